@@ -1,0 +1,131 @@
+//! Hopper: one leg in a plane, four motors.
+//!
+//! | observation | content |
+//! |---|---|
+//! | 0..3 | velocity of the torso, m/s |
+//! | 3..6, 6..9 | forward and up axis of the torso |
+//! | 9 | foot on the ground, 0 or 1 |
+//! | 10..26 | rotations of waist, hip, knee, ankle: four quaternions x y z w |
+//! | 26..30 | velocities of the same joints, half turns per second |
+//! | 30 | height of the foot's center, m |
+//!
+//! `Hopper-v0`: r = v/4 + forward bonus - 0.3 effort - 4 (joints at limit), all of the torso.
+//! `Hopper-v1`: r = V + 0.05 upright + (1 - mean effort) min(V, 0.25), V = 0.7 v / 8 m/s.
+//! Fails when anything but foot and calf touches the ground.
+
+use marathon_physics::lanes::Real;
+
+use super::FASTEST;
+use crate::agent::{Agent, Facts, Motors, Part, ResetNoise};
+use crate::senses::{Senses, unit};
+use crate::write::{Obs, Terms};
+
+const MODEL: &str = include_str!("../../../../assets/agents/hopper.xml");
+
+/// Physics steps per decision: 200 Hz physics, 50 Hz control.
+const FRAME_SKIP: usize = 4;
+/// 20 seconds.
+const MAX_EPISODE_STEPS: usize = 1000;
+
+const ACTIONS: [&str; 4] = ["waist", "hip", "knee", "ankle"];
+const PARTS: [&str; 2] = ["torso", "foot"];
+/// The original calls it "pelvis" and maps it to the torso.
+const TORSO: Part = Part::named(&PARTS, "torso");
+const FOOT: Part = Part::named(&PARTS, "foot");
+/// The calf counts as foot because it pokes through the sole's capsule at the ankle.
+const FEET: [&str; 2] = ["foot", "calf"];
+
+/// Price of the effort.
+const EFFORT: f64 = -0.3;
+/// Price of the joints driven at their limit.
+const JOINTS_AT_LIMIT: f64 = -4.0;
+
+/// Share of the speed in the `-v1` reward.
+const V1_VELOCITY: f64 = 0.7;
+/// Share of the posture.
+const V1_UPRIGHT: f64 = 0.05;
+/// Largest share of the saved effort, which is never more than that of the speed.
+const V1_EFFORT: f64 = 0.25;
+
+/// The paper's Hopper.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HopperV0;
+
+impl Agent for HopperV0 {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: "Hopper-v0",
+            summary: "one leg in a plane: run forward upright, cheaply",
+            model: MODEL.into(),
+            frame_skip: FRAME_SKIP,
+            max_episode_steps: MAX_EPISODE_STEPS,
+            observation: 31,
+            actions: &ACTIONS,
+            reward_terms: &["velocity", "uprightness", "effort", "joints_at_limit"],
+            parts: &PARTS,
+            feet: &FEET,
+            touch: &["foot"],
+            memory: 0,
+            reset: ResetNoise::MARATHON,
+            termination_reward: -1.0,
+        }
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.vector(s.linear_velocity(TORSO));
+        out.vector(s.forward(TORSO));
+        out.vector(s.up(TORSO));
+        out.touch_sensors(s);
+        out.joint_rotations(s);
+        out.joint_velocities(s);
+        out.scalar(s.height(FOOT));
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        terms.add("velocity", 1.0, s.velocity(TORSO));
+        terms.add("uprightness", 1.0, s.forward_bonus(TORSO));
+        terms.add("effort", EFFORT, s.effort(Motors::NONE));
+        terms.add("joints_at_limit", JOINTS_AT_LIMIT, s.joints_at_limit_penalty(Motors::NONE));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        s.terminate_on_non_foot_contact()
+    }
+}
+
+/// Hopper as of the paper's Table 1: the same senses, a reward between 0 and 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HopperV1;
+
+impl Agent for HopperV1 {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: "Hopper-v1",
+            summary: "one leg in a plane, reward between 0 and 1",
+            reward_terms: &["velocity", "uprightness", "effort"],
+            ..HopperV0.facts()
+        }
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        HopperV0.observe(s, out);
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let velocity = s.normalized_velocity(TORSO, FASTEST) * T::lit(V1_VELOCITY);
+        let saved = T::lit(1.0) - s.effort_mean(Motors::NONE);
+        terms.add("velocity", 1.0, velocity);
+        terms.add("uprightness", V1_UPRIGHT, unit(s.forward_bonus_of(TORSO, 1.0)));
+        terms.add("effort", 1.0, saved * velocity.min(T::lit(V1_EFFORT)));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        HopperV0.terminated(s)
+    }
+}

@@ -1,0 +1,98 @@
+//! What can go wrong before an environment runs.
+
+use marathon_physics::SimError;
+use marathon_physics::mjcf::MjcfError;
+use thiserror::Error;
+
+/// Errors of the registry, of agents and of [`VecEnv`](crate::VecEnv).
+#[derive(Debug, Error)]
+pub enum EnvError {
+    /// No agent of this name is registered.
+    #[error("agent '{name}' does not exist; {}known: {known}", did_you_mean(.nearest))]
+    UnknownAgent {
+        /// What was asked for.
+        name: String,
+        /// The registered name closest to it, if any is close.
+        nearest: Option<String>,
+        /// All registered names, comma separated.
+        known: String,
+    },
+    /// A name is registered twice.
+    #[error("agent '{id}' is registered already; give the new one another id, such as '{suggestion}'")]
+    DuplicateAgent {
+        /// The name.
+        id: String,
+        /// A free name.
+        suggestion: String,
+    },
+    /// An agent and its model do not fit together.
+    #[error("agent '{id}': {problem}")]
+    Agent {
+        /// Registry name of the agent.
+        id: String,
+        /// What was found and what was expected.
+        problem: String,
+    },
+    /// The agent's model file cannot be read.
+    #[error("model of agent '{id}': {source}")]
+    Model {
+        /// Registry name of the agent.
+        id: String,
+        /// The loader's complaint.
+        source: Box<MjcfError>,
+    },
+    /// The agent's model cannot be simulated.
+    #[error("agent '{id}': {source}")]
+    Sim {
+        /// Registry name of the agent.
+        id: String,
+        /// The simulator's complaint.
+        source: SimError,
+    },
+    /// The processor lacks an instruction set.
+    #[error("this processor cannot run '{isa}'; the best it has is '{best}'")]
+    Isa {
+        /// What was asked for.
+        isa: &'static str,
+        /// What there is.
+        best: &'static str,
+    },
+    /// An array handed over by the caller has the wrong length.
+    #[error("{what} has {found} numbers, expected {expected}")]
+    Shape {
+        /// Which array, with its shape.
+        what: String,
+        /// Its length.
+        found: usize,
+        /// The length it should have.
+        expected: usize,
+    },
+    /// An option has a value that makes no sense.
+    #[error("{option} is {found}, expected {expected}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// Its value.
+        found: String,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// A snapshot does not fit the environment it is loaded into.
+    #[error("snapshot: {0}")]
+    Snapshot(String),
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|n| format!("did you mean '{n}'? ")).unwrap_or_default()
+}
+
+/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    known
+        .into_iter()
+        .map(|k| (strsim::damerau_levenshtein(&name, &k.to_lowercase()), k))
+        .filter(|(distance, k)| *distance <= 2.max(k.len() / 3))
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, k)| k)
+}

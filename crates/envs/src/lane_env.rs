@@ -1,0 +1,302 @@
+//! An agent on the physics kernels: the [`Shard`] of every registered agent, for any lane width.
+//!
+//! A block of sixteen agents is `16 / L` lane groups. One decision of a group is: clip the actions, step the physics
+//! `frame_skip` times, look at the state reached, reward, terminate. Nothing in it allocates and no lane sees another.
+
+use std::sync::Arc;
+
+use marathon_physics::lanes::Real;
+use marathon_physics::{Sim, Work};
+
+use crate::agent::{Agent, Facts};
+use crate::anatomy::{Anatomy, Blueprint, sim_options};
+use crate::error::EnvError;
+use crate::lane_group::LaneGroup;
+use crate::random::EpisodeRng;
+use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+
+/// Name of the reward term that replaces all others when an agent fails.
+pub const TERMINATION_TERM: &str = "termination";
+
+/// A state of one agent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AgentState {
+    /// Configuration, MuJoCo's layout.
+    pub qpos: Vec<f64>,
+    /// Velocity, MuJoCo's layout.
+    pub qvel: Vec<f64>,
+}
+
+/// A [`Shard`] whose agents can be looked at: for viewers, tests and tools.
+pub trait AgentShard: Shard {
+    /// State of an agent, numbered within this shard.
+    fn state(&self, agent: usize) -> AgentState;
+    /// Puts an agent into a state, as if an episode had begun there.
+    ///
+    /// # Errors
+    /// If lengths are wrong or a number is not finite.
+    fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
+    /// Starts all random streams anew from a seed; the next reset begins every agent's first episode under it.
+    fn reseed(&mut self, seed: u64);
+}
+
+/// A [`ShardFactory`] that can also make [`AgentShard`]s.
+pub trait AgentShards: ShardFactory {
+    /// Same as [`ShardFactory::shard`].
+    fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard>;
+}
+
+/// What all shards of an agent share.
+pub(crate) struct Task<T: Real, A> {
+    pub agent: Arc<A>,
+    pub facts: Facts,
+    pub spec: Spec,
+    pub blueprint: Blueprint,
+    pub anatomy: Anatomy<T>,
+    pub sim: Sim<T>,
+}
+
+/// Makes shards of an agent for one lane width.
+pub(crate) struct AgentFactory<T: Real, A> {
+    task: Arc<Task<T, A>>,
+}
+
+impl<T: Real, A: Agent> AgentFactory<T, A> {
+    pub fn new(agent: Arc<A>) -> Result<Self, EnvError> {
+        let facts = agent.facts();
+        let blueprint = Blueprint::new(&facts)?;
+        let anatomy = Anatomy::new(&facts, &blueprint)?;
+        let sim = Sim::new(&blueprint.model, sim_options())
+            .map_err(|source| EnvError::Sim { id: facts.id.into(), source })?;
+        let mut reward_terms: Vec<String> = facts.reward_terms.iter().map(|t| t.to_string()).collect();
+        reward_terms.push(TERMINATION_TERM.into());
+        let spec = Spec {
+            id: facts.id.into(),
+            obs: facts.observation,
+            act: blueprint.model.nu,
+            dt: blueprint.model.opt.timestep * facts.frame_skip as f64,
+            frame_skip: facts.frame_skip,
+            max_episode_steps: facts.max_episode_steps,
+            reward_terms,
+        };
+        let task = Task { agent, facts, spec, blueprint, anatomy, sim };
+        task.rehearse()?;
+        Ok(AgentFactory { task: Arc::new(task) })
+    }
+}
+
+impl<T: Real, A: Agent> Task<T, A> {
+    /// Lets the agent observe and reward once, to find out whether it keeps to its facts.
+    fn rehearse(&self) -> Result<(), EnvError> {
+        let wrong = |problem: String| Err(EnvError::Agent { id: self.facts.id.into(), problem });
+        let (written, names) = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
+        if written != self.facts.observation {
+            return wrong(format!("it observes {written} numbers, but its facts say {}", self.facts.observation));
+        }
+        if names != self.facts.reward_terms {
+            return wrong(format!(
+                "it adds the reward terms {names:?}, but its facts say {:?}",
+                self.facts.reward_terms
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real, A: Agent> ShardFactory for AgentFactory<T, A> {
+    fn spec(&self) -> &Spec {
+        &self.task.spec
+    }
+
+    fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
+        Box::new(LaneShard::new(self.task.clone(), first, blocks, seed))
+    }
+}
+
+impl<T: Real, A: Agent> AgentShards for AgentFactory<T, A> {
+    fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard> {
+        Box::new(LaneShard::new(self.task.clone(), first, blocks, seed))
+    }
+}
+
+/// Whose life it is, and how far it has come: what an agent is besides its physics.
+#[derive(Clone, Copy, Debug)]
+struct Life {
+    seed: u64,
+    /// Number of the agent in the whole environment.
+    agent: u64,
+    /// Episodes begun.
+    episode: u64,
+    /// Decisions made in the present episode.
+    steps: u64,
+}
+
+/// Sixteen agents.
+struct Block<T: Real> {
+    groups: Vec<LaneGroup<T>>,
+    lives: [Life; BLOCK],
+}
+
+/// A run of blocks of one agent, owned by one thread.
+struct LaneShard<T: Real, A> {
+    task: Arc<Task<T, A>>,
+    work: Work<T>,
+    blocks: Vec<Block<T>>,
+    // scratch of resets
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+}
+
+impl<T: Real, A: Agent> LaneShard<T, A> {
+    fn new(task: Arc<Task<T, A>>, first: usize, blocks: usize, seed: u64) -> Self {
+        let groups = |task| (0..BLOCK / T::LANES).map(|_| LaneGroup::new(task)).collect();
+        let life = |agent: usize| Life { seed, agent: agent as u64, episode: 0, steps: 0 };
+        let blocks = (first..first + blocks)
+            .map(|b| Block { groups: groups(&task), lives: std::array::from_fn(|i| life(b * BLOCK + i)) })
+            .collect();
+        let work = Work::new(&task.sim);
+        LaneShard { task, work, blocks, qpos: Vec::new(), qvel: Vec::new() }
+    }
+
+    /// Begins an episode of one agent: the spawn pose with noise of the agent's own.
+    fn begin_episode(&mut self, block: usize, agent: usize) {
+        let Task { blueprint, facts, sim, .. } = &*self.task;
+        let block = &mut self.blocks[block];
+        let life = &mut block.lives[agent];
+        life.episode += 1;
+        life.steps = 0;
+        let mut rng = EpisodeRng::new(life.seed, life.agent, life.episode);
+        self.qpos.clone_from(&blueprint.spawn);
+        self.qvel.clear();
+        self.qvel.resize(blueprint.model.nv, 0.0);
+        for joint in &blueprint.joints {
+            let q = &mut self.qpos[joint.qpos];
+            *q += rng.around_zero(facts.reset.joint_position);
+            if let Some([low, high]) = joint.range {
+                *q = q.max(low).min(high);
+            }
+            self.qvel[joint.dof] = rng.around_zero(facts.reset.joint_velocity);
+        }
+        for dof in &blueprint.root_dofs {
+            self.qvel[*dof] = rng.around_zero(facts.reset.root_velocity);
+        }
+        block.groups[agent / T::LANES].put(sim, agent % T::LANES, &self.qpos, &self.qvel);
+    }
+}
+
+/// Bits of a block's mask that belong to the group whose first agent is `first`.
+fn lanes_of<T: Real>(mask: u16, first: usize) -> u32 {
+    (u32::from(mask) >> first) & ((1 << T::LANES) - 1)
+}
+
+impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
+    fn spec(&self) -> &Spec {
+        &self.task.spec
+    }
+
+    fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
+        for agent in (0..BLOCK).filter(|i| mask >> i & 1 == 1) {
+            self.begin_episode(block, agent);
+        }
+        let task = &*self.task;
+        for (i, group) in self.blocks[block].groups.iter_mut().enumerate() {
+            let first = i * T::LANES;
+            let lanes = lanes_of::<T>(mask, first);
+            if lanes != 0 {
+                group.observe_start(task, &mut self.work, lanes, first, obs);
+            }
+        }
+    }
+
+    fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep) {
+        let task = &*self.task;
+        let Block { groups, lives } = &mut self.blocks[block];
+        out.terms.resize(BLOCK * task.spec.reward_terms.len(), 0.0);
+        (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
+        for (i, group) in groups.iter_mut().enumerate() {
+            let first = i * T::LANES;
+            let ended = group.decide(task, &mut self.work, action, first);
+            group.report(first, obs, out);
+            out.terminated |= (ended.terminated << first) as u16;
+            out.diverged |= (ended.diverged << first) as u16;
+            // a broken state is put away at once: it must not slow its group down until the caller resets it
+            for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
+                self.qvel.clear();
+                self.qvel.resize(task.blueprint.model.nv, 0.0);
+                group.put(&task.sim, lane, &task.blueprint.spawn, &self.qvel);
+            }
+        }
+        for (i, life) in lives.iter_mut().enumerate() {
+            life.steps += 1;
+            if life.steps >= task.spec.max_episode_steps as u64 {
+                out.truncated |= 1 << i;
+            }
+        }
+        out.truncated &= !out.terminated;
+    }
+
+    fn save(&self, block: usize, bytes: &mut Vec<u8>) {
+        let Block { groups, lives } = &self.blocks[block];
+        for (i, life) in lives.iter().enumerate() {
+            for n in [life.seed, life.agent, life.episode, life.steps] {
+                bytes.extend(n.to_le_bytes());
+            }
+            let lane = i % T::LANES;
+            for v in groups[i / T::LANES].future() {
+                // exact for single precision too, so a snapshot fits every lane width
+                bytes.extend(T::widen(v.get(lane)).to_le_bytes());
+            }
+        }
+    }
+
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        let Block { groups, lives } = &mut self.blocks[block];
+        let numbers = 4 + groups[0].future().count();
+        let (mine, rest) = bytes.split_at_checked(BLOCK * numbers * 8)?;
+        for ((i, life), agent) in lives.iter_mut().enumerate().zip(mine.chunks_exact(numbers * 8)) {
+            let mut words = agent.as_chunks::<8>().0.iter();
+            for n in [&mut life.seed, &mut life.agent, &mut life.episode, &mut life.steps] {
+                *n = u64::from_le_bytes(*words.next()?);
+            }
+            let lane = i % T::LANES;
+            for (v, word) in groups[i / T::LANES].future_mut().zip(words) {
+                v.set(lane, T::scalar(f64::from_le_bytes(*word)));
+            }
+        }
+        Some(rest)
+    }
+}
+
+impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
+    fn state(&self, agent: usize) -> AgentState {
+        let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        let (qpos, qvel) = group.state(agent % T::LANES);
+        AgentState { qpos, qvel }
+    }
+
+    fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
+        let model = &self.task.blueprint.model;
+        for (what, given, expected) in [("qpos", &state.qpos, model.nq), ("qvel", &state.qvel, model.nv)] {
+            if given.len() != expected {
+                return Err(EnvError::Shape { what: what.into(), found: given.len(), expected });
+            }
+            if let Some(x) = given.iter().find(|x| !x.is_finite()) {
+                return Err(EnvError::Option { option: what, found: x.to_string(), expected: "finite numbers" });
+            }
+        }
+        let block = &mut self.blocks[agent / BLOCK];
+        block.lives[agent % BLOCK].steps = 0;
+        block.groups[agent % BLOCK / T::LANES].put(&self.task.sim, agent % T::LANES, &state.qpos, &state.qvel);
+        Ok(())
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        for life in self.blocks.iter_mut().flat_map(|b| &mut b.lives) {
+            (life.seed, life.episode, life.steps) = (seed, 0, 0);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Agents by name.
+//!
+//! The global registry starts with the crate's own agents; [`register`] adds others. A [`Registry`] of one's own works
+//! the same way for those who want no global state.
+
+use std::sync::{Arc, LazyLock, PoisonError, RwLock};
+
+use marathon_physics::lanes::Isa;
+
+use crate::agent::AnyAgent;
+use crate::agents;
+use crate::error::{EnvError, nearest};
+use crate::lane_env::AgentShards;
+use crate::shard::ShardFactory;
+
+/// Agents by name.
+#[derive(Clone)]
+pub struct Registry {
+    agents: Vec<(String, Arc<dyn AnyAgent>)>,
+    aliases: Vec<(String, String)>,
+}
+
+impl Default for Registry {
+    /// The agents of [`agents::all`].
+    fn default() -> Self {
+        let mut registry = Registry::empty();
+        for agent in agents::all() {
+            registry.agents.push((agent.facts().id.to_string(), agent));
+        }
+        for (alias, id) in agents::ALIASES {
+            registry.aliases.push((alias.into(), id.into()));
+        }
+        registry
+    }
+}
+
+impl Registry {
+    /// A registry without agents.
+    pub fn empty() -> Self {
+        Registry { agents: Vec::new(), aliases: Vec::new() }
+    }
+
+    /// All names, in the order of registration.
+    pub fn ids(&self) -> Vec<String> {
+        self.agents.iter().map(|(id, _)| id.clone()).collect()
+    }
+
+    /// Adds an agent under the id of its facts.
+    ///
+    /// # Errors
+    /// If the id is taken, or the agent does not fit its model.
+    pub fn register(&mut self, agent: Arc<dyn AnyAgent>) -> Result<(), EnvError> {
+        let id = agent.facts().id.to_string();
+        if self.find(&id).is_some() {
+            let base = id.rsplit_once("-v").map_or(id.as_str(), |(base, _)| base);
+            let free = (0..).map(|v| format!("{base}-v{v}")).find(|name| self.find(name).is_none());
+            return Err(EnvError::DuplicateAgent { suggestion: free.unwrap_or_default(), id });
+        }
+        // an agent that contradicts its model is refused here, not at its first use
+        agent.clone().shards(Isa::F32)?;
+        self.agents.push((id, agent));
+        Ok(())
+    }
+
+    /// The agent of a name: its id, an alias, or an id without the version (then the lowest version). Case does not
+    /// matter.
+    ///
+    /// # Errors
+    /// If there is none; the message names the nearest.
+    pub fn agent(&self, name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        self.find(name).cloned().ok_or_else(|| {
+            let ids: Vec<_> = self.agents.iter().map(|(id, _)| id.as_str()).collect();
+            let bases: Vec<_> = ids.iter().map(|id| id.rsplit_once("-v").map_or(*id, |(base, _)| base)).collect();
+            let near = nearest(name, ids.iter().copied()).or_else(|| {
+                let base = nearest(name, bases.iter().copied())?;
+                bases.iter().position(|b| *b == base).map(|i| ids[i])
+            });
+            EnvError::UnknownAgent { name: name.into(), nearest: near.map(Into::into), known: ids.join(", ") }
+        })
+    }
+
+    /// The blocks of an agent for an instruction set.
+    ///
+    /// # Errors
+    /// If there is no such agent, or it cannot be simulated.
+    pub fn shards(&self, name: &str, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        self.agent(name)?.shards(isa)
+    }
+
+    fn find(&self, name: &str) -> Option<&Arc<dyn AnyAgent>> {
+        let by_id =
+            |name: &str| self.agents.iter().find(|(id, _)| id.eq_ignore_ascii_case(name)).map(|(_, agent)| agent);
+        let by_alias = || {
+            let (_, id) = self.aliases.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(name))?;
+            by_id(id)
+        };
+        let by_base = || {
+            let versions = self.agents.iter().filter_map(|(id, agent)| {
+                let (base, version) = id.rsplit_once("-v")?;
+                base.eq_ignore_ascii_case(name).then_some((version.parse::<u32>().ok()?, agent))
+            });
+            versions.min_by_key(|(version, _)| *version).map(|(_, agent)| agent)
+        };
+        by_id(name).or_else(by_alias).or_else(by_base)
+    }
+}
+
+static GLOBAL: LazyLock<RwLock<Registry>> = LazyLock::new(|| RwLock::new(Registry::default()));
+
+/// A copy of the global registry (agents are shared, not copied).
+pub fn global() -> Registry {
+    GLOBAL.read().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// Adds an agent to the global registry.
+///
+/// # Errors
+/// As [`Registry::register`].
+pub fn register(agent: Arc<dyn AnyAgent>) -> Result<(), EnvError> {
+    GLOBAL.write().unwrap_or_else(PoisonError::into_inner).register(agent)
+}
+
+/// All names in the global registry.
+pub fn ids() -> Vec<String> {
+    global().ids()
+}
+
+/// The agent of a name in the global registry.
+///
+/// # Errors
+/// As [`Registry::agent`].
+pub fn agent(name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
+    global().agent(name)
+}
+
+/// The blocks of an agent in the global registry, for a learner.
+///
+/// # Errors
+/// As [`Registry::shards`].
+pub fn factory(name: &str, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> {
+    Ok(global().shards(name, isa)?)
+}

@@ -1,0 +1,319 @@
+//! What an agent can perceive, and the paper's helper library of bonuses and penalties.
+//!
+//! The names are those of the original's `MarathonAgent` (`GetForwardBonus`, `GetEffort`, ...) in Rust's casing. Angles
+//! are compared as in the original, by the angle itself and not its cosine: a bonus falls linearly from full at 0 to
+//! its negative at 180 degrees. World axes: +x forward, +y left, +z up.
+
+use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
+
+use marathon_physics::Readings;
+use marathon_physics::lanes::Real;
+
+use crate::agent::{Motors, Part};
+use crate::anatomy::Anatomy;
+
+/// Speed in m/s that [`Senses::velocity`] calls 1.
+pub const MAX_SPEED: f64 = 4.0;
+/// Penalty per joint driven at its limit.
+pub const AT_LIMIT_PENALTY: f64 = 0.2;
+/// Largest forward and upright bonus.
+pub const MAX_BONUS: f64 = 0.5;
+
+/// An agent's view of itself after a decision: one value per lane.
+pub struct Senses<'a, T: Real> {
+    pub(crate) readings: Readings<'a, T>,
+    pub(crate) anatomy: &'a Anatomy<T>,
+    /// Clipped to [-1, 1].
+    pub(crate) action: &'a [T],
+    pub(crate) memory: &'a [T],
+    /// An episode has just begun: there has been no physics step whose contacts could be felt.
+    pub(crate) fresh: bool,
+}
+
+impl<T: Real> Senses<'_, T> {
+    // ------------------------------------------------------------------------------------------------ perception
+
+    /// Position of a part's center in the world, m.
+    #[inline(always)]
+    pub fn position(&self, part: Part) -> [T; 3] {
+        self.readings.geom_pos(self.anatomy.parts[part.0].geom)
+    }
+
+    /// Velocity of a part's center, world axes, m/s.
+    #[inline(always)]
+    pub fn linear_velocity(&self, part: Part) -> [T; 3] {
+        self.readings.geom_velocity(self.anatomy.parts[part.0].geom)
+    }
+
+    /// The axis of a part that pointed forward (+x) in the spawn pose.
+    #[inline(always)]
+    pub fn forward(&self, part: Part) -> [T; 3] {
+        let part = &self.anatomy.parts[part.0];
+        turn(&self.readings.body_axes(part.body), &part.forward)
+    }
+
+    /// The axis of a part that pointed up (+z) in the spawn pose.
+    #[inline(always)]
+    pub fn up(&self, part: Part) -> [T; 3] {
+        let part = &self.anatomy.parts[part.0];
+        turn(&self.readings.body_axes(part.body), &part.up)
+    }
+
+    /// Number of touch sensors.
+    #[inline(always)]
+    pub fn touch_count(&self) -> usize {
+        self.anatomy.touch.len()
+    }
+
+    /// Whether touch sensor `i` touches the ground at the end of the decision. False at the start of an episode.
+    #[inline(always)]
+    pub fn touch(&self, i: usize) -> T::Mask {
+        if self.fresh { T::none() } else { self.readings.touching(self.anatomy.touch[i]) }
+    }
+
+    /// Number of actuated pairs of bodies.
+    #[inline(always)]
+    pub fn joint_rotation_count(&self) -> usize {
+        self.anatomy.pairs.len()
+    }
+
+    /// Orientation of the parent as seen from the child, `inverse(R_child) R_parent`, for the `i`-th actuated pair of
+    /// bodies in the order of the actuators: `[x, y, z, w]` with `w >= 0`. A joint with several axes is one pair.
+    #[inline(always)]
+    pub fn joint_rotation(&self, i: usize) -> [T; 4] {
+        let [w, x, y, z] = self.anatomy.pairs[i].rotation(&self.readings);
+        let flip = w.lt(T::zero());
+        // the inverse of a unit quaternion has the opposite vector part
+        [T::select(flip, x, -x), T::select(flip, y, -y), T::select(flip, z, -z), T::select(flip, -w, w)]
+    }
+
+    /// Velocity of the joint that motor `i` drives: rad/s divided by pi (half turns per second) for a hinge, m/s for a
+    /// slide. (The original differentiated an Euler angle that wrapped; this is what it meant.)
+    #[inline(always)]
+    pub fn joint_velocity(&self, i: usize) -> T {
+        let motor = &self.anatomy.motors[i];
+        self.readings.qvel(motor.dof) * T::splat(motor.velocity_scale)
+    }
+
+    /// Length of the action.
+    #[inline(always)]
+    pub fn action_count(&self) -> usize {
+        self.action.len()
+    }
+
+    /// Component `i` of the action, clipped to [-1, 1].
+    #[inline(always)]
+    pub fn action(&self, i: usize) -> T {
+        self.action[i]
+    }
+
+    /// Variable `i` of the agent's own memory, see [`Agent::remember`](crate::Agent::remember).
+    #[inline(always)]
+    pub fn memory(&self, i: usize) -> T {
+        self.memory[i]
+    }
+
+    /// The physics: every coordinate, velocity, body and geom of the model, by index.
+    #[inline(always)]
+    pub fn readings(&self) -> &Readings<'_, T> {
+        &self.readings
+    }
+
+    // -------------------------------------------------------------------------------------------- helper library
+
+    /// `GetVelocity`: forward velocity of a part in units of 4 m/s.
+    #[inline(always)]
+    pub fn velocity(&self, part: Part) -> T {
+        self.linear_velocity(part)[0] * T::lit(1.0 / MAX_SPEED)
+    }
+
+    /// The normalized velocity of the `-v1` agents: forward velocity over `fastest` (m/s), clamped to [0, 1].
+    #[inline(always)]
+    pub fn normalized_velocity(&self, part: Part, fastest: f64) -> T {
+        unit(self.linear_velocity(part)[0] * T::lit(1.0 / fastest))
+    }
+
+    /// `GetDirectionBonus`: `max` if the unit vectors coincide, falling linearly with the angle to `-max` at 180 degrees.
+    /// (At exactly 180 degrees the original jumps back to `max`.)
+    #[inline(always)]
+    pub fn direction_bonus(&self, axis: [T; 3], direction: [T; 3], max: f64) -> T {
+        angle(axis, direction).neg_mul_add(T::lit(2.0 * max * FRAC_1_PI), T::lit(max))
+    }
+
+    /// `GetForwardBonus`: 0.5 - angle / 180 degrees, the angle between a part's forward axis and +x. Sees pitch and yaw,
+    /// not roll.
+    #[inline(always)]
+    pub fn forward_bonus(&self, part: Part) -> T {
+        self.forward_bonus_of(part, MAX_BONUS)
+    }
+
+    /// The forward bonus with another maximum than 0.5.
+    #[inline(always)]
+    pub fn forward_bonus_of(&self, part: Part, max: f64) -> T {
+        self.direction_bonus(self.forward(part), world::<T>(0), max)
+    }
+
+    /// `GetUprightBonus`: 0.5 - angle / 180 degrees, the angle between a part's up axis and +z. Sees pitch and roll, not
+    /// yaw.
+    #[inline(always)]
+    pub fn upright_bonus(&self, part: Part) -> T {
+        self.upright_bonus_of(part, MAX_BONUS)
+    }
+
+    /// The upright bonus with another maximum than 0.5.
+    #[inline(always)]
+    pub fn upright_bonus_of(&self, part: Part, max: f64) -> T {
+        self.direction_bonus(self.up(part), world::<T>(2), max)
+    }
+
+    /// `GetLeftBonus`: angle by which a part's forward axis points out of the sagittal plane to the left, over 180
+    /// degrees; 0 when straight, at most 0.5, negative to the right.
+    #[inline(always)]
+    pub fn left_bonus(&self, part: Part) -> T {
+        let [x, y, z] = self.forward(part);
+        y.atan2(hypot(x, z)) * T::lit(FRAC_1_PI)
+    }
+
+    /// `GetRightBonus`: the negative of [`Senses::left_bonus`].
+    #[inline(always)]
+    pub fn right_bonus(&self, part: Part) -> T {
+        -self.left_bonus(part)
+    }
+
+    /// How far a part's forward axis points above the horizon, in quarter turns: for a thigh, the flexion of the hip.
+    #[inline(always)]
+    pub fn flexion(&self, part: Part) -> T {
+        let [x, y, z] = self.forward(part);
+        z.atan2(hypot(x, y)) * T::lit(FRAC_2_PI)
+    }
+
+    /// `GetHeight`: height of a part's center above the ground, m. (The original's search for the lowest foot finds none,
+    /// which leaves the height above 0.)
+    #[inline(always)]
+    pub fn height(&self, part: Part) -> T {
+        self.position(part)[2]
+    }
+
+    /// `GetHeightPenality`: how far a part is below `height`, clamped to [0, height].
+    #[inline(always)]
+    pub fn height_penalty(&self, part: Part, height: f64) -> T {
+        clamp(T::lit(height) - self.height(part), 0.0, height)
+    }
+
+    /// `GetEffort`: sum of squared actions, except those of the motors in `ignore`.
+    #[inline(always)]
+    pub fn effort(&self, ignore: Motors) -> T {
+        let mut sum = T::zero();
+        for (i, a) in self.action.iter().enumerate() {
+            if !ignore.contains(i) {
+                sum = a.mul_add(*a, sum);
+            }
+        }
+        sum
+    }
+
+    /// Mean of squared actions, except those of the motors in `ignore`.
+    #[inline(always)]
+    pub fn effort_mean(&self, ignore: Motors) -> T {
+        self.effort(ignore) * T::lit(1.0 / self.counted(ignore))
+    }
+
+    /// `GetEffortSum`: sum of the actions' absolute values, except those of the motors in `ignore`.
+    #[inline(always)]
+    pub fn effort_sum(&self, ignore: Motors) -> T {
+        let mut sum = T::zero();
+        for (i, a) in self.action.iter().enumerate() {
+            if !ignore.contains(i) {
+                sum += a.abs();
+            }
+        }
+        sum
+    }
+
+    /// `GetJointsAtLimitPenality`: 0.2 per motor driven with full action, |a| >= 1, except those in `ignore`. As in the
+    /// original it is the action that is tested, not the joint's angle.
+    #[inline(always)]
+    pub fn joints_at_limit_penalty(&self, ignore: Motors) -> T {
+        let mut sum = T::zero();
+        for (i, a) in self.action.iter().enumerate() {
+            if !ignore.contains(i) {
+                sum += T::select(a.abs().lt(T::lit(1.0)), T::zero(), T::lit(AT_LIMIT_PENALTY));
+            }
+        }
+        sum
+    }
+
+    /// `TerminateNever`.
+    #[inline(always)]
+    pub fn terminate_never(&self) -> T::Mask {
+        T::none()
+    }
+
+    /// `TerminateOnNonFootHitTerrain`: a geom that is not among the agent's [`Facts::feet`](crate::Facts::feet) touched
+    /// the ground in any physics step of the decision.
+    #[inline(always)]
+    pub fn terminate_on_non_foot_contact(&self) -> T::Mask {
+        let mut hit = T::none();
+        if !self.fresh {
+            for geom in &self.anatomy.not_feet {
+                hit = T::or(hit, self.readings.touched(*geom));
+            }
+        }
+        hit
+    }
+
+    #[inline(always)]
+    fn counted(&self, ignore: Motors) -> f64 {
+        let mut n = 0;
+        for i in 0..self.action.len() {
+            n += usize::from(!ignore.contains(i));
+        }
+        n.max(1) as f64
+    }
+}
+
+/// `x` clamped to [low, high].
+#[inline(always)]
+pub fn clamp<T: Real>(x: T, low: f64, high: f64) -> T {
+    x.max(T::lit(low)).min(T::lit(high))
+}
+
+/// `x` clamped to [0, 1].
+#[inline(always)]
+pub fn unit<T: Real>(x: T) -> T {
+    clamp(x, 0.0, 1.0)
+}
+
+/// Angle between two vectors in radians, from the lengths of their cross and dot products: exact where an arc cosine
+/// loses half of its digits.
+#[inline(always)]
+pub fn angle<T: Real>(a: [T; 3], b: [T; 3]) -> T {
+    let dot = a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
+    let x = a[1].mul_add(b[2], -(a[2] * b[1]));
+    let y = a[2].mul_add(b[0], -(a[0] * b[2]));
+    let z = a[0].mul_add(b[1], -(a[1] * b[0]));
+    x.mul_add(x, y.mul_add(y, z * z)).sqrt().atan2(dot)
+}
+
+/// World axis `i`.
+#[inline(always)]
+fn world<T: Real>(i: usize) -> [T; 3] {
+    let mut v = [T::zero(); 3];
+    v[i] = T::lit(1.0);
+    v
+}
+
+#[inline(always)]
+fn hypot<T: Real>(x: T, y: T) -> T {
+    x.mul_add(x, y * y).sqrt()
+}
+
+/// A constant vector of a body's frame in world axes, given the body's axes.
+#[inline(always)]
+fn turn<T: Real>(axes: &[[T; 3]; 3], v: &[T::Scalar; 3]) -> [T; 3] {
+    let mut out = [T::zero(); 3];
+    for (i, o) in out.iter_mut().enumerate() {
+        *o = axes[0][i].mul_add(T::splat(v[0]), axes[1][i].mul_add(T::splat(v[1]), axes[2][i] * T::splat(v[2])));
+    }
+    out
+}

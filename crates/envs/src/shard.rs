@@ -1,0 +1,73 @@
+//! What a learner sees of an environment: blocks of sixteen agents, stepped by one thread.
+//!
+//! A *block* is sixteen agents, whatever the vector width of the machine; every array of a block has the layout
+//! `[feature][16]`, the layout of the physics and of the narrow networks, so nothing is transposed between them.
+//! A *shard* is a run of consecutive blocks that one thread owns. Agent `i` of block `b` is agent `16 b + i` of the
+//! whole environment: its random stream, and with it its whole life, depends on that number and the seed alone, never
+//! on how the blocks are spread over shards and threads.
+
+/// Agents per block.
+pub const BLOCK: usize = 16;
+
+/// Constant facts of a task.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spec {
+    /// Registry name, such as `Hopper-v0`.
+    pub id: String,
+    /// Observation length.
+    pub obs: usize,
+    /// Action length; actions are nominally in [-1, 1] and clipped by the environment.
+    pub act: usize,
+    /// Seconds between decisions.
+    pub dt: f64,
+    /// Physics steps per decision.
+    pub frame_skip: usize,
+    /// Decisions after which an episode is truncated.
+    pub max_episode_steps: usize,
+    /// Names of the reward's terms, in the order of [`BlockStep::terms`].
+    pub reward_terms: Vec<String>,
+}
+
+/// What one decision of a block led to.
+#[derive(Clone, Debug, Default)]
+pub struct BlockStep {
+    /// Reward per agent.
+    pub reward: [f32; BLOCK],
+    /// Bit per agent: the episode ended in a terminal state (do not bootstrap).
+    pub terminated: u16,
+    /// Bit per agent: the episode ended by its time limit (bootstrap from the observation written by `step`).
+    pub truncated: u16,
+    /// Distance that the agent moved along +x in this decision, m.
+    pub forward: [f32; BLOCK],
+    /// Bit per agent: its state was not finite; it was quarantined, counts as terminated with reward 0, and its
+    /// observation was replaced by zeros. It is made whole by the `reset` that follows, like any other ended episode.
+    pub diverged: u16,
+    /// Terms of the reward, `[term][16]`, length `16 * reward_terms.len()`; they add up to the reward.
+    pub terms: Vec<f32>,
+}
+
+/// A run of blocks owned by one thread.
+pub trait Shard: Send {
+    /// Facts of the task.
+    fn spec(&self) -> &Spec;
+    /// Number of blocks.
+    fn blocks(&self) -> usize;
+    /// Starts new episodes for the agents in `mask` and writes their first observations into `obs`
+    /// (`[obs][16]`; lanes outside the mask are left alone).
+    fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]);
+    /// Advances every agent of a block by one decision. `action` is `[act][16]`. Writes the observation of the state
+    /// reached into `obs` (`[obs][16]`), for ended episodes too: the caller then calls `reset` for those.
+    fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep);
+    /// Appends everything that a block's future depends on to `bytes`.
+    fn save(&self, block: usize, bytes: &mut Vec<u8>);
+    /// Restores what [`Shard::save`] wrote and returns the rest of `bytes`; `None` if they are too short.
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]>;
+}
+
+/// Makes shards of a task.
+pub trait ShardFactory: Send + Sync {
+    /// Facts of the task.
+    fn spec(&self) -> &Spec;
+    /// A shard of blocks `first .. first + blocks`, all agents before their first reset.
+    fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard>;
+}

@@ -1,0 +1,436 @@
+//! Any number of agents behind plain arrays, for everyone who is not the embedded learner.
+//!
+//! Arrays are row-major, one row per agent, and belong to the caller. Agents live in blocks of sixteen spread over the
+//! threads of a pool; results do not depend on the number of threads, the number of agents or the instruction set.
+
+use marathon_physics::lanes::Isa;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::EnvError;
+use crate::lane_env::{AgentShard, AgentState};
+use crate::registry::{self, Registry};
+use crate::shard::{BLOCK, BlockStep, Spec};
+
+/// What happens to an agent whose episode ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Autoreset {
+    /// It starts a new episode within the same step: `obs` is the first of the new, `final_obs` the last of the old.
+    #[default]
+    SameStep,
+    /// Nothing: the caller resets it with [`VecEnv::reset_agents`].
+    Disabled,
+}
+
+/// How a [`VecEnv`] is made.
+#[derive(Clone, Debug)]
+pub struct VecEnvOptions {
+    /// Number of agents, at least 1.
+    pub agents: usize,
+    /// Seed until [`VecEnv::reset`] gives another.
+    pub seed: u64,
+    /// Number of threads; 0 means one per processor core, but not more than there are blocks.
+    pub threads: usize,
+    /// Instruction set; `None` means the widest that the processor has.
+    pub isa: Option<Isa>,
+    /// What happens at the end of an episode.
+    pub autoreset: Autoreset,
+}
+
+impl Default for VecEnvOptions {
+    fn default() -> Self {
+        VecEnvOptions { agents: 1, seed: 0, threads: 1, isa: None, autoreset: Autoreset::SameStep }
+    }
+}
+
+/// Results of a step, in arrays of their own. Made by [`VecEnv::buffers`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Observations to act upon next, `[agents][obs]`.
+    pub obs: Vec<f32>,
+    /// Observations of the states reached, `[agents][obs]`: the same as `obs` except where an episode ended.
+    pub final_obs: Vec<f32>,
+    /// Rewards, `[agents]`.
+    pub reward: Vec<f32>,
+    /// Terms that add up to the rewards, `[agents][reward_terms]`.
+    pub terms: Vec<f32>,
+    /// Distance moved along +x, m, `[agents]`.
+    pub forward: Vec<f32>,
+    /// The agent failed, `[agents]`.
+    pub terminated: Vec<bool>,
+    /// The episode reached its time limit, `[agents]`.
+    pub truncated: Vec<bool>,
+    /// The simulation of the agent broke down; it counts as terminated, with reward 0. `[agents]`.
+    pub diverged: Vec<bool>,
+}
+
+impl Step {
+    /// Borrows all arrays.
+    pub fn as_mut(&mut self) -> StepMut<'_> {
+        StepMut {
+            obs: &mut self.obs,
+            final_obs: &mut self.final_obs,
+            reward: &mut self.reward,
+            terms: &mut self.terms,
+            forward: &mut self.forward,
+            terminated: &mut self.terminated,
+            truncated: &mut self.truncated,
+            diverged: &mut self.diverged,
+        }
+    }
+}
+
+/// Where a step writes to: the caller's arrays, with the shapes of [`Step`].
+#[derive(Debug)]
+pub struct StepMut<'a> {
+    /// See [`Step::obs`].
+    pub obs: &'a mut [f32],
+    /// See [`Step::final_obs`].
+    pub final_obs: &'a mut [f32],
+    /// See [`Step::reward`].
+    pub reward: &'a mut [f32],
+    /// See [`Step::terms`].
+    pub terms: &'a mut [f32],
+    /// See [`Step::forward`].
+    pub forward: &'a mut [f32],
+    /// See [`Step::terminated`].
+    pub terminated: &'a mut [bool],
+    /// See [`Step::truncated`].
+    pub truncated: &'a mut [bool],
+    /// See [`Step::diverged`].
+    pub diverged: &'a mut [bool],
+}
+
+/// Agents of one kind that are stepped together.
+pub struct VecEnv {
+    spec: Spec,
+    agents: usize,
+    autoreset: Autoreset,
+    workers: Vec<Worker>,
+    /// Agents per worker, a multiple of the block; the last worker may have fewer.
+    stride: usize,
+    /// None for a single worker.
+    pool: Option<ThreadPool>,
+}
+
+/// A shard and the block-shaped arrays that it reads and writes.
+struct Worker {
+    shard: Box<dyn AgentShard>,
+    action: Vec<f32>,
+    obs: Vec<f32>,
+    out: BlockStep,
+}
+
+const MAGIC: &[u8; 8] = b"MRTHNv01";
+
+impl VecEnv {
+    /// Makes an environment of an agent of the global registry. Agents must be [reset](VecEnv::reset) before their
+    /// first step.
+    ///
+    /// # Errors
+    /// If there is no such agent, an option makes no sense, or the pool of threads cannot be started.
+    pub fn new(agent: &str, options: &VecEnvOptions) -> Result<VecEnv, EnvError> {
+        Self::from_registry(&registry::global(), agent, options)
+    }
+
+    /// The same with another registry.
+    ///
+    /// # Errors
+    /// As [`VecEnv::new`].
+    pub fn from_registry(registry: &Registry, agent: &str, options: &VecEnvOptions) -> Result<VecEnv, EnvError> {
+        let wrong = |option, found: String, expected| Err(EnvError::Option { option, found, expected });
+        if options.agents == 0 {
+            return wrong("agents", "0".into(), "at least 1");
+        }
+        let factory = registry.shards(agent, options.isa.unwrap_or_else(Isa::best))?;
+        let spec = factory.spec().clone();
+        let blocks = options.agents.div_ceil(BLOCK);
+        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+        let threads = if options.threads == 0 { cores() } else { options.threads }.min(blocks);
+        let share = blocks.div_ceil(threads);
+        let workers: Vec<_> = (0..blocks)
+            .step_by(share)
+            .map(|first| Worker {
+                shard: factory.agent_shard(first, share.min(blocks - first), options.seed),
+                action: vec![0.0; spec.act * BLOCK],
+                obs: vec![0.0; spec.obs * BLOCK],
+                out: BlockStep { terms: vec![0.0; spec.reward_terms.len() * BLOCK], ..Default::default() },
+            })
+            .collect();
+        let pool = if workers.len() > 1 {
+            let builder =
+                ThreadPoolBuilder::new().num_threads(workers.len()).thread_name(|i| format!("marathon-env-{i}"));
+            match builder.build() {
+                Ok(pool) => Some(pool),
+                Err(e) => return wrong("threads", format!("{threads} ({e})"), "a number that the system can start"),
+            }
+        } else {
+            None
+        };
+        Ok(VecEnv { spec, agents: options.agents, autoreset: options.autoreset, workers, stride: share * BLOCK, pool })
+    }
+
+    /// Facts of the task.
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// Number of agents.
+    pub fn agents(&self) -> usize {
+        self.agents
+    }
+
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// Arrays of the right shapes for [`VecEnv::step`].
+    pub fn buffers(&self) -> Step {
+        let n = self.agents;
+        Step {
+            obs: vec![0.0; n * self.spec.obs],
+            final_obs: vec![0.0; n * self.spec.obs],
+            reward: vec![0.0; n],
+            terms: vec![0.0; n * self.spec.reward_terms.len()],
+            forward: vec![0.0; n],
+            terminated: vec![false; n],
+            truncated: vec![false; n],
+            diverged: vec![false; n],
+        }
+    }
+
+    /// Starts a new episode for every agent and writes the first observations, `[agents][obs]`. A seed starts all random
+    /// streams anew.
+    ///
+    /// # Errors
+    /// If the array's length is wrong.
+    pub fn reset(&mut self, seed: Option<u64>, obs: &mut [f32]) -> Result<(), EnvError> {
+        self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
+        if let Some(seed) = seed {
+            for worker in &mut self.workers {
+                worker.shard.reseed(seed);
+            }
+        }
+        self.reset_where(|_| true, obs);
+        Ok(())
+    }
+
+    /// Starts a new episode for the agents in `mask` and writes their first observations; other rows are left alone.
+    ///
+    /// # Errors
+    /// If an array's length is wrong.
+    pub fn reset_agents(&mut self, mask: &[bool], obs: &mut [f32]) -> Result<(), EnvError> {
+        self.check("mask [agents]", mask.len(), 1)?;
+        self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
+        self.reset_where(|i| mask[i], obs);
+        Ok(())
+    }
+
+    /// Advances every agent by one decision. `actions` is `[agents][act]`, nominally in [-1, 1] and clipped to it.
+    ///
+    /// # Errors
+    /// If an array's length is wrong; then nothing has been done.
+    pub fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), EnvError> {
+        let (obs, act, terms) = (self.spec.obs, self.spec.act, self.spec.reward_terms.len());
+        self.check("actions [agents][act]", actions.len(), act)?;
+        self.check("obs [agents][obs]", out.obs.len(), obs)?;
+        self.check("final_obs [agents][obs]", out.final_obs.len(), obs)?;
+        self.check("reward [agents]", out.reward.len(), 1)?;
+        self.check("terms [agents][reward_terms]", out.terms.len(), terms)?;
+        self.check("forward [agents]", out.forward.len(), 1)?;
+        self.check("terminated [agents]", out.terminated.len(), 1)?;
+        self.check("truncated [agents]", out.truncated.len(), 1)?;
+        self.check("diverged [agents]", out.diverged.len(), 1)?;
+
+        let autoreset = self.autoreset;
+        let Some(pool) = &self.pool else {
+            self.workers[0].step(autoreset, actions, out);
+            return Ok(());
+        };
+        // every worker gets the rows of its own agents
+        let n = self.stride;
+        let StepMut { obs: o, final_obs: f, reward, terms: t, forward, terminated, truncated, diverged } = out;
+        pool.install(|| {
+            (
+                self.workers.par_iter_mut(),
+                actions.par_chunks(n * act),
+                o.par_chunks_mut(n * obs),
+                f.par_chunks_mut(n * obs),
+                reward.par_chunks_mut(n),
+                t.par_chunks_mut(n * terms),
+                forward.par_chunks_mut(n),
+                terminated.par_chunks_mut(n),
+                truncated.par_chunks_mut(n),
+                diverged.par_chunks_mut(n),
+            )
+                .into_par_iter()
+                .for_each(
+                    |(worker, actions, obs, final_obs, reward, terms, forward, terminated, truncated, diverged)| {
+                        let mut out =
+                            StepMut { obs, final_obs, reward, terms, forward, terminated, truncated, diverged };
+                        worker.step(autoreset, actions, &mut out);
+                    },
+                );
+        });
+        Ok(())
+    }
+
+    /// State of an agent.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn state(&self, agent: usize) -> Result<AgentState, EnvError> {
+        self.check_agent(agent)?;
+        Ok(self.workers[agent / self.stride].shard.state(agent % self.stride))
+    }
+
+    /// Puts an agent into a state, as if an episode had begun there.
+    ///
+    /// # Errors
+    /// If there is no such agent, or the state does not fit it.
+    pub fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
+        self.check_agent(agent)?;
+        self.workers[agent / self.stride].shard.set_state(agent % self.stride, state)
+    }
+
+    /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
+    /// the same bits, whatever the number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend((self.agents as u64).to_le_bytes());
+        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
+        bytes.extend(self.spec.id.as_bytes());
+        for worker in &self.workers {
+            for block in 0..worker.shard.blocks() {
+                worker.shard.save(block, &mut bytes);
+            }
+        }
+        bytes
+    }
+
+    /// Restores what [`VecEnv::save`] returned.
+    ///
+    /// # Errors
+    /// If the bytes are not a snapshot of an environment with the same agent and the same number of them; then nothing
+    /// has changed.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), EnvError> {
+        let present = self.save();
+        let header = present.len() - self.body_len(&present);
+        if bytes.get(..header) != Some(&present[..header]) {
+            return Err(EnvError::Snapshot(format!(
+                "it does not begin like one of {} agents of '{}'",
+                self.agents, self.spec.id
+            )));
+        }
+        if bytes.len() != present.len() {
+            return Err(EnvError::Snapshot(format!("it has {} bytes, expected {}", bytes.len(), present.len())));
+        }
+        let mut rest = &bytes[header..];
+        for worker in &mut self.workers {
+            for block in 0..worker.shard.blocks() {
+                let Some(r) = worker.shard.load(block, rest) else {
+                    return Err(EnvError::Snapshot("it ends too early".into()));
+                };
+                rest = r;
+            }
+        }
+        Ok(())
+    }
+
+    fn body_len(&self, snapshot: &[u8]) -> usize {
+        snapshot.len() - (MAGIC.len() + 16 + self.spec.id.len())
+    }
+
+    fn check(&self, what: &str, found: usize, columns: usize) -> Result<(), EnvError> {
+        let expected = self.agents * columns;
+        if found == expected { Ok(()) } else { Err(EnvError::Shape { what: what.into(), found, expected }) }
+    }
+
+    fn check_agent(&self, agent: usize) -> Result<(), EnvError> {
+        if agent < self.agents {
+            return Ok(());
+        }
+        Err(EnvError::Option { option: "agent", found: agent.to_string(), expected: "less than the number of agents" })
+    }
+
+    fn reset_where(&mut self, chosen: impl Fn(usize) -> bool + Sync, obs: &mut [f32]) {
+        let (rows, n) = (self.spec.obs, self.stride);
+        let run = |(i, (worker, obs)): (usize, (&mut Worker, &mut [f32]))| {
+            worker.reset(|agent| chosen(i * n + agent), rows, obs);
+        };
+        match &self.pool {
+            None => run((0, (&mut self.workers[0], obs))),
+            Some(pool) => pool.install(|| {
+                self.workers.par_iter_mut().zip(obs.par_chunks_mut(n * rows)).enumerate().for_each(run);
+            }),
+        }
+    }
+}
+
+impl Worker {
+    /// Resets the chosen agents, numbered within this worker; `obs` has a row for each of its real agents.
+    fn reset(&mut self, chosen: impl Fn(usize) -> bool, columns: usize, obs: &mut [f32]) {
+        for (block, rows) in obs.chunks_mut(BLOCK * columns).enumerate() {
+            let mut mask = 0;
+            for i in 0..rows.len() / columns {
+                mask |= u16::from(chosen(block * BLOCK + i)) << i;
+            }
+            if mask != 0 {
+                self.shard.reset(block, mask, &mut self.obs);
+                to_rows(&self.obs, columns, mask, rows);
+            }
+        }
+    }
+
+    /// Steps all agents of this worker.
+    fn step(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut) {
+        let Worker { shard, action, obs, out: o } = self;
+        let spec = shard.spec();
+        let (n_obs, n_act, n_terms) = (spec.obs, spec.act, spec.reward_terms.len());
+        for block in 0..shard.blocks() {
+            let first = block * BLOCK;
+            let count = BLOCK.min(out.reward.len() - first);
+            let real = ((1_u32 << count) - 1) as u16;
+            let agents = first..first + count;
+
+            // lanes without an agent get no action
+            for (i, row) in actions[first * n_act..(first + count) * n_act].chunks_exact(n_act).enumerate() {
+                for (a, x) in row.iter().enumerate() {
+                    action[a * BLOCK + i] = *x;
+                }
+            }
+            shard.step(block, action, obs, o);
+
+            out.reward[agents.clone()].copy_from_slice(&o.reward[..count]);
+            out.forward[agents.clone()].copy_from_slice(&o.forward[..count]);
+            to_rows(&o.terms, n_terms, real, &mut out.terms[first * n_terms..(first + count) * n_terms]);
+            for i in 0..count {
+                out.terminated[first + i] = o.terminated >> i & 1 == 1;
+                out.truncated[first + i] = o.truncated >> i & 1 == 1;
+                out.diverged[first + i] = o.diverged >> i & 1 == 1;
+            }
+            let rows = first * n_obs..(first + count) * n_obs;
+            to_rows(obs, n_obs, real, &mut out.final_obs[rows.clone()]);
+            if autoreset == Autoreset::SameStep {
+                // lanes without an agent live on unseen
+                let ended = o.terminated | o.truncated;
+                if ended != 0 {
+                    shard.reset(block, ended, obs);
+                }
+            }
+            to_rows(obs, n_obs, real, &mut out.obs[rows]);
+        }
+    }
+}
+
+/// Copies the agents in `mask` from a block's `[column][16]` into rows.
+fn to_rows(block: &[f32], columns: usize, mask: u16, rows: &mut [f32]) {
+    for (i, row) in rows.chunks_exact_mut(columns).enumerate() {
+        if mask >> i & 1 == 1 {
+            for (column, x) in row.iter_mut().enumerate() {
+                *x = block[column * BLOCK + i];
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! An agent's life depends on its number and the seed, not on who else is simulated, where, or with what instructions.
+//!
+//! The same agents play the same actions among 1, 7, 16 and 100 agents, on 1, 2 and 3 threads, with every instruction set
+//! of single precision that this processor has. All observations, rewards and endings are equal to the bit.
+
+mod common;
+
+use common::{isas, make, play};
+use marathon_envs::{Autoreset, Step};
+use marathon_physics::lanes::Isa;
+
+const DECISIONS: usize = 60;
+
+/// Everything the first `agents` agents saw and earned, by decision.
+fn lives(id: &str, agents: usize, n: usize, threads: usize, isa: Isa) -> Vec<Vec<u32>> {
+    let mut env = make(id, n, threads, Some(isa), Autoreset::SameStep);
+    let (obs, terms) = (env.spec().obs, env.spec().reward_terms.len());
+    let mut lives = vec![Vec::new(); agents];
+    play(&mut env, DECISIONS, 0.9, |_, step: &Step| {
+        for (i, life) in lives.iter_mut().enumerate() {
+            life.extend(step.obs[i * obs..][..obs].iter().map(|x| x.to_bits()));
+            life.extend(step.final_obs[i * obs..][..obs].iter().map(|x| x.to_bits()));
+            life.extend(step.terms[i * terms..][..terms].iter().map(|x| x.to_bits()));
+            life.extend([step.reward[i].to_bits(), step.forward[i].to_bits()]);
+            life.push(u32::from(step.terminated[i]) | u32::from(step.truncated[i]) << 1);
+        }
+    });
+    lives
+}
+
+/// Compares many settings with one.
+fn check(id: &str) {
+    let reference = lives(id, 100, 100, 1, Isa::F32);
+    for isa in isas().filter(|isa| *isa != Isa::F64) {
+        for (n, threads) in [(1, 1), (7, 1), (16, 2), (100, 1), (100, 2), (100, 3)] {
+            for (i, life) in lives(id, n, n, threads, isa).iter().enumerate() {
+                assert!(
+                    *life == reference[i],
+                    "{id}: agent {i} of {n} on {threads} threads with {} lived another life",
+                    isa.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn hopper() {
+    check("Hopper-v0");
+}
+
+#[test]
+fn walker() {
+    check("Walker2d-v1");
+}
+
+#[test]
+fn humanoid() {
+    check("Humanoid-v0");
+}
+
+#[test]
+fn ant() {
+    check("Ant-v0");
+}
+
+/// Agents differ from each other: otherwise the tests above would pass for the wrong reason.
+#[test]
+fn no_two_agents_live_the_same_life() {
+    let lives = lives("Hopper-v0", 40, 40, 1, Isa::best());
+    for (i, life) in lives.iter().enumerate() {
+        assert!(lives[..i].iter().all(|other| other != life), "agent {i} has a twin");
+    }
+}

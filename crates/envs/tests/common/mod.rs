@@ -1,0 +1,90 @@
+//! Shared by the contract tests.
+#![allow(dead_code)]
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions};
+use marathon_physics::lanes::Isa;
+use serde_json::Value;
+
+/// Asks a Python script in `tests/oracle`: JSON in, JSON out.
+pub fn oracle(script: &str, request: &Value) -> Value {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let python = match std::env::var_os("MARATHON_PYTHON") {
+        Some(python) => PathBuf::from(python),
+        None => root.join(".venv/bin/python"),
+    };
+    let spawned = Command::new(&python)
+        .arg(root.join("tests/oracle").join(script))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn();
+    let mut child = match spawned {
+        Ok(child) => child,
+        Err(e) => panic!("{}: {e}; run ./test.sh, which sets up .venv, or set MARATHON_PYTHON", python.display()),
+    };
+    let mut stdin = child.stdin.take().expect("stdin is piped");
+    stdin.write_all(request.to_string().as_bytes()).expect("the oracle reads its request");
+    drop(stdin);
+    let output = child.wait_with_output().expect("the oracle ends");
+    assert!(output.status.success(), "{script} failed");
+    serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
+}
+
+/// Instruction sets of this processor.
+pub fn isas() -> impl Iterator<Item = Isa> {
+    Isa::ALL.into_iter().filter(|isa| isa.supported())
+}
+
+/// A fixed sequence of numbers in [-1, 1) that are exact in single precision.
+pub struct Noise(u64);
+
+impl Noise {
+    pub fn new(seed: u64) -> Self {
+        Noise(seed ^ 0x9e37_79b9_7f4a_7c15)
+    }
+
+    pub fn next(&mut self) -> f32 {
+        // the generator of Knuth's MMIX; its upper bits are good enough for test inputs
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+}
+
+/// Action of one agent at one decision: a function of these numbers alone, the same in any batch.
+pub fn action(agent: usize, decision: usize, scale: f32, row: &mut [f32]) {
+    let mut noise = Noise::new((agent as u64) << 32 | decision as u64);
+    noise.next();
+    for a in row {
+        *a = scale * noise.next();
+    }
+}
+
+/// An environment of its own options.
+pub fn make(id: &str, agents: usize, threads: usize, isa: Option<Isa>, autoreset: Autoreset) -> VecEnv {
+    let options = VecEnvOptions { agents, seed: 11, threads, isa, autoreset };
+    VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Resets and plays `decisions` decisions with [`action`]; calls `each` after every one.
+pub fn play(env: &mut VecEnv, decisions: usize, scale: f32, mut each: impl FnMut(usize, &Step)) -> Step {
+    let mut out = env.buffers();
+    env.reset(Some(5), &mut out.obs).expect("the arrays fit");
+    go_on(env, &mut out, 0, decisions, scale, &mut each);
+    out
+}
+
+/// Plays decisions `from .. to`.
+pub fn go_on(env: &mut VecEnv, out: &mut Step, from: usize, to: usize, scale: f32, mut each: impl FnMut(usize, &Step)) {
+    let act = env.spec().act;
+    let mut actions = vec![0.0; env.agents() * act];
+    for decision in from..to {
+        for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
+            action(agent, decision, scale, row);
+        }
+        env.step(&actions, &mut out.as_mut()).expect("the arrays fit");
+        each(decision, out);
+    }
+}

@@ -1,0 +1,294 @@
+//! Checkpoints: a folder that holds everything a run needs to go on with the same bits.
+//!
+//! `checkpoint.json` describes the run and names the file with its numbers, `state-<iteration>.safetensors`. The state is
+//! written first and the description last, each under a temporary name, so an interruption at any moment leaves the old
+//! or the new checkpoint, never half of one.
+
+use crate::files::{self, TensorReader, TensorWriter, write_atomic};
+use crate::learner::Learner;
+use crate::noise::Noise;
+use crate::normalize::Moments;
+use crate::ppo::{Clocks, Run};
+use crate::{BLOCK, Error, PpoConfig};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const FORMAT: &str = "marathon-checkpoint";
+const VERSION: u32 = 1;
+const DESCRIPTION: &str = "checkpoint.json";
+
+/// Everything a run needs to go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    about: About,
+    params: Vec<f32>,
+    adam_m: Vec<f32>,
+    adam_v: Vec<f32>,
+    obs_mean: Vec<f64>,
+    obs_var: Vec<f64>,
+    /// Words of the random streams, `[block][64]`.
+    noise: Vec<u32>,
+    /// Raw observations, `[block][obs][16]`.
+    obs: Vec<f32>,
+    /// Running sums of the agents, `[tally][block][16]`.
+    tallies: Vec<f32>,
+    /// What the environments saved, block after block, and where each block's part ends.
+    env: Vec<u8>,
+    env_ends: Vec<u64>,
+}
+
+/// The description.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct About {
+    format: String,
+    version: u32,
+    agent: String,
+    obs: usize,
+    act: usize,
+    config: PpoConfig,
+    iteration: u64,
+    steps: u64,
+    skipped_minibatches: u64,
+    lr: f64,
+    adam_powers: [f64; 2],
+    observation_count: f64,
+    return_count: f64,
+    return_mean: f64,
+    return_var: f64,
+    wall_seconds: f64,
+    cpu_seconds: f64,
+    state: StateFile,
+}
+
+/// The file with the numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct StateFile {
+    name: String,
+    bytes: u64,
+    checksum: String,
+}
+
+impl Checkpoint {
+    pub(crate) fn of(run: &Run<'_>, learner: &Learner, clocks: &Clocks) -> Self {
+        let about = About {
+            format: FORMAT.into(),
+            version: VERSION,
+            agent: run.spec.id.clone(),
+            obs: run.spec.obs,
+            act: run.spec.act,
+            config: run.config.clone(),
+            iteration: learner.iteration,
+            steps: learner.steps,
+            skipped_minibatches: learner.skipped,
+            lr: learner.lr,
+            adam_powers: learner.adam.powers,
+            observation_count: learner.observations.count,
+            return_count: learner.returns.count,
+            return_mean: learner.returns.mean[0],
+            return_var: learner.returns.var[0],
+            wall_seconds: clocks.wall,
+            cpu_seconds: clocks.cpu,
+            state: StateFile::default(),
+        };
+        let (mut noise, mut obs, mut env, mut env_ends) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut tallies = [(); 4].map(|()| Vec::new());
+        for actor in &run.actors {
+            let actor = actor.lock().expect("no worker has panicked");
+            for b in 0..actor.blocks() {
+                noise.extend(actor.noise()[b].words());
+                obs.extend_from_slice(actor.obs(b));
+                for (all, tally) in tallies.iter_mut().zip(&actor.tallies) {
+                    all.extend_from_slice(&tally[b]);
+                }
+                actor.shard().save(b, &mut env);
+                env_ends.push(env.len() as u64);
+            }
+        }
+        Self {
+            about,
+            params: learner.params.clone(),
+            adam_m: learner.adam.m.clone(),
+            adam_v: learner.adam.v.clone(),
+            obs_mean: learner.observations.mean.clone(),
+            obs_var: learner.observations.var.clone(),
+            noise,
+            obs,
+            tallies: tallies.concat(),
+            env,
+            env_ends,
+        }
+    }
+
+    /// Name of the agent and its task.
+    pub fn agent(&self) -> &str {
+        &self.about.agent
+    }
+    /// Configuration of the run.
+    pub fn config(&self) -> &PpoConfig {
+        &self.about.config
+    }
+    /// Rollouts done.
+    pub fn iteration(&self) -> u64 {
+        self.about.iteration
+    }
+    /// Agent-steps done.
+    pub fn steps(&self) -> u64 {
+        self.about.steps
+    }
+
+    /// Puts a fresh run into the state of the checkpoint.
+    pub(crate) fn restore(self, run: &Run<'_>, learner: &mut Learner, clocks: &mut Clocks) -> Result<(), Error> {
+        let (about, old, new) = (&self.about, &self.about.config, run.config);
+        let pairs = [
+            ("agent", about.agent.clone(), run.spec.id.clone()),
+            ("observation length", about.obs.to_string(), run.spec.obs.to_string()),
+            ("action length", about.act.to_string(), run.spec.act.to_string()),
+            ("agents", old.agents.to_string(), new.agents.to_string()),
+            ("seed", old.seed.to_string(), new.seed.to_string()),
+            ("actor_hidden", format!("{:?}", old.actor_hidden), format!("{:?}", new.actor_hidden)),
+            ("critic_hidden", format!("{:?}", old.critic_hidden), format!("{:?}", new.critic_hidden)),
+            ("activation", old.activation.name().into(), new.activation.name().into()),
+        ];
+        let mismatch = |what: &str, found: String, expected: String| {
+            Err(Error::Mismatch { what: format!("checkpoint: {what}"), found, expected })
+        };
+        for (what, found, expected) in pairs {
+            if found != expected {
+                return mismatch(what, found, expected);
+            }
+        }
+        let (blocks, len) = (new.blocks(), run.layout.len);
+        let lengths = [
+            ("params", self.params.len(), len),
+            ("adam_m", self.adam_m.len(), len),
+            ("adam_v", self.adam_v.len(), len),
+            ("obs_mean", self.obs_mean.len(), run.spec.obs),
+            ("obs_var", self.obs_var.len(), run.spec.obs),
+            ("noise", self.noise.len(), blocks * Noise::WORDS),
+            ("obs", self.obs.len(), blocks * run.spec.obs * BLOCK),
+            ("tallies", self.tallies.len(), 4 * blocks * BLOCK),
+            ("env_ends", self.env_ends.len(), blocks),
+        ];
+        for (what, found, expected) in lengths {
+            if found != expected {
+                return mismatch(what, format!("{found} numbers"), format!("{expected}"));
+            }
+        }
+
+        learner.adam.powers = about.adam_powers;
+        learner.lr = about.lr;
+        learner.observations = Moments { count: about.observation_count, mean: self.obs_mean, var: self.obs_var };
+        learner.returns =
+            Moments { count: about.return_count, mean: vec![about.return_mean], var: vec![about.return_var] };
+        learner.iteration = about.iteration;
+        learner.steps = about.steps;
+        learner.skipped = about.skipped_minibatches;
+        *clocks = Clocks { wall: about.wall_seconds, cpu: about.cpu_seconds };
+        learner.params = self.params;
+        learner.adam.m = self.adam_m;
+        learner.adam.v = self.adam_v;
+
+        let (obs_row, tally) = (run.spec.obs * BLOCK, blocks * BLOCK);
+        for actor in &run.actors {
+            let actor = &mut *actor.lock().expect("no worker has panicked");
+            for b in 0..actor.blocks() {
+                let block = actor.first_block() + b;
+                let words = self.noise[block * Noise::WORDS..].first_chunk().expect("the length was checked");
+                actor.noise_mut()[b] = Noise::from_words(words);
+                actor.obs_mut(b).copy_from_slice(&self.obs[block * obs_row..(block + 1) * obs_row]);
+                for (k, all) in actor.tallies.iter_mut().enumerate() {
+                    all[b].copy_from_slice(&self.tallies[k * tally + block * BLOCK..][..BLOCK]);
+                }
+                let start = if block == 0 { 0 } else { self.env_ends[block - 1] };
+                let bytes = self.env.get(start as usize..self.env_ends[block] as usize);
+                let rest = bytes.and_then(|bytes| actor.shard_mut().load(b, bytes));
+                if rest.is_none_or(|rest| !rest.is_empty()) {
+                    let size = bytes.map_or("no".into(), |bytes| bytes.len().to_string());
+                    let found = format!("{size} bytes of block {block}'s environment");
+                    return mismatch("environment", found, "what this version of the task saves".into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the checkpoint into a folder, replacing the one there.
+    ///
+    /// # Errors
+    /// If a file cannot be written; the old checkpoint is whole then.
+    pub fn save(&self, folder: &Path) -> Result<(), Error> {
+        std::fs::create_dir_all(folder).map_err(Error::io(folder, "create folder"))?;
+        let mut file = TensorWriter::default();
+        file.list("params", &self.params);
+        file.list("adam_m", &self.adam_m);
+        file.list("adam_v", &self.adam_v);
+        file.list("obs_mean", &self.obs_mean);
+        file.list("obs_var", &self.obs_var);
+        file.list("noise", &self.noise);
+        file.list("obs", &self.obs);
+        file.list("tallies", &self.tallies);
+        file.list("env", &self.env);
+        file.list("env_ends", &self.env_ends);
+        let bytes = file.bytes(&serde_json::json!({ "format": FORMAT, "version": VERSION }));
+        let checksum = files::checksum(&bytes);
+        // a name of its own for every state: the old description must keep naming the old state
+        let name = format!("state-{}-{}.safetensors", self.about.iteration, &checksum[..8]);
+        write_atomic(&folder.join(&name), &bytes)?;
+        let state = StateFile { name: name.clone(), bytes: bytes.len() as u64, checksum };
+        let about = About { state, ..self.about.clone() };
+        let json = serde_json::to_string_pretty(&about).expect("descriptions are plain data");
+        write_atomic(&folder.join(DESCRIPTION), json.as_bytes())?;
+
+        // states that no description names any more; failing to remove one harms nobody
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let old = entry.file_name().to_string_lossy().into_owned();
+            if old.starts_with("state-") && old.ends_with(".safetensors") && old != name {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the checkpoint in a folder.
+    ///
+    /// # Errors
+    /// If a file is missing, damaged or of another format.
+    pub fn load(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(DESCRIPTION);
+        let json = std::fs::read(&path).map_err(Error::io(&path, "read"))?;
+        let json = String::from_utf8(json).map_err(|e| Error::file(&path, "text", e, "UTF-8"))?;
+        let about: About = files::parse(&path, &json, FORMAT, VERSION)?;
+        about.config.validate().map_err(|e| Error::file(&path, "config", e, "a valid configuration"))?;
+        if about.state.name.contains(['/', '\\']) {
+            return Err(Error::file(&path, "state.name", &about.state.name, "a file in the same folder"));
+        }
+
+        let path = folder.join(&about.state.name);
+        let bytes = std::fs::read(&path).map_err(Error::io(&path, "read"))?;
+        if bytes.len() as u64 != about.state.bytes {
+            return Err(Error::file(&path, "length", bytes.len(), format!("{} bytes", about.state.bytes)));
+        }
+        let checksum = files::checksum(&bytes);
+        if checksum != about.state.checksum {
+            return Err(Error::file(&path, "checksum", checksum, &about.state.checksum));
+        }
+        let file = TensorReader::new(&path, &bytes)?;
+        fn list<N: files::Number>(file: &TensorReader<'_>, name: &str) -> Result<Vec<N>, Error> {
+            file.get(name, &[file.list_len(name)])
+        }
+        let finite = |name| file.finite(name, &[file.list_len(name)]);
+        Ok(Self {
+            params: finite("params")?,
+            adam_m: finite("adam_m")?,
+            adam_v: finite("adam_v")?,
+            obs_mean: list(&file, "obs_mean")?,
+            obs_var: list(&file, "obs_var")?,
+            noise: list(&file, "noise")?,
+            obs: list(&file, "obs")?,
+            tallies: list(&file, "tallies")?,
+            env: list(&file, "env")?,
+            env_ends: list(&file, "env_ends")?,
+            about,
+        })
+    }
+}

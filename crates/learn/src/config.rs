@@ -1,0 +1,213 @@
+//! The trainer's configuration.
+
+use crate::{Activation, BLOCK, Error};
+use serde::{Deserialize, Serialize};
+
+/// How the policy's learning rate moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Schedule {
+    /// Not at all.
+    Constant,
+    /// Linearly to zero over the run, the value function's rate too.
+    Linear,
+    /// After every minibatch: divided by 1.5 where the divergence from the policy that acted exceeds twice `target_kl`,
+    /// multiplied by 1.2 where it is below half of it, within `lr_range` (Rudin et al., "Learning to walk in minutes",
+    /// 2021, with smaller steps).
+    Adaptive,
+}
+
+/// Settings of PPO. Every field has a default, so a file names only what it changes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PpoConfig {
+    /// Agents that act side by side, a multiple of 16.
+    pub agents: usize,
+    /// Decisions of each agent per rollout.
+    pub horizon: usize,
+    /// Parts that the rollout is split into in every epoch. A part of fewer than 256 samples per thread leaves threads idle.
+    pub minibatches: usize,
+    /// Passes over each rollout.
+    pub epochs: usize,
+    /// Agent-steps of the whole run; training ends with the first rollout that reaches them.
+    pub total_steps: u64,
+
+    /// Widths of the policy's hidden layers.
+    pub actor_hidden: Vec<usize>,
+    /// Widths of the value function's hidden layers.
+    pub critic_hidden: Vec<usize>,
+    /// Activation of all hidden layers.
+    pub activation: Activation,
+
+    /// Learning rate of the policy (where the adaptive schedule starts).
+    pub lr: f64,
+    /// Learning rate of the value function.
+    pub value_lr: f64,
+    /// How the policy's learning rate moves.
+    pub schedule: Schedule,
+    /// Divergence per update that the adaptive schedule aims at, nats.
+    pub target_kl: f64,
+    /// Bounds of the adaptive schedule.
+    pub lr_range: [f64; 2],
+    /// Bound of the gradient's norm, for each network by itself.
+    pub max_grad_norm: f64,
+
+    /// Discount per decision.
+    pub gamma: f64,
+    /// Decay of generalized advantage estimation.
+    pub gae_lambda: f64,
+    /// Clip range of the probability ratio.
+    pub clip: f64,
+    /// Clip range of the value's change (in units of the scaled return); none by default.
+    pub value_clip: Option<f64>,
+    /// Weight of the entropy bonus at the start.
+    pub entropy_coef: f64,
+    /// Weight of the entropy bonus at the end, reached linearly; the same as at the start by default.
+    pub final_entropy_coef: Option<f64>,
+
+    /// Logarithm of the standard deviation of the actions at the start.
+    pub init_log_std: f64,
+    /// Smallest standard deviation.
+    pub min_std: f64,
+    /// Largest standard deviation.
+    pub max_std: f64,
+
+    /// Whether observations are normalized by their running mean and deviation.
+    pub normalize_observations: bool,
+    /// Bound of the normalized observations.
+    pub observation_clip: f64,
+    /// Whether rewards are divided by the running deviation of the discounted return.
+    pub scale_rewards: bool,
+    /// Most samples that the running statistics remember.
+    pub statistics_cap: f64,
+
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Threads; 0 means one per processor. The result does not depend on it.
+    pub threads: usize,
+}
+
+impl Default for PpoConfig {
+    /// A setting that solves the small tasks.
+    fn default() -> Self {
+        Self {
+            agents: 256,
+            horizon: 64,
+            minibatches: 8,
+            epochs: 4,
+            total_steps: 10_000_000,
+            actor_hidden: vec![64, 64],
+            critic_hidden: vec![64, 64],
+            activation: Activation::Tanh,
+            lr: 1e-3,
+            value_lr: 1e-3,
+            schedule: Schedule::Adaptive,
+            target_kl: 0.015,
+            lr_range: [1e-5, 3e-3],
+            max_grad_norm: 1.0,
+            gamma: 0.99,
+            gae_lambda: 0.95,
+            clip: 0.2,
+            value_clip: None,
+            entropy_coef: 0.002,
+            final_entropy_coef: None,
+            init_log_std: -0.5,
+            min_std: 0.05,
+            max_std: 2.0,
+            normalize_observations: true,
+            observation_clip: 10.0,
+            scale_rewards: true,
+            statistics_cap: 3e7,
+            seed: 1,
+            threads: 0,
+        }
+    }
+}
+
+impl PpoConfig {
+    /// Number of blocks of sixteen agents.
+    pub fn blocks(&self) -> usize {
+        self.agents / BLOCK
+    }
+    /// Agent-steps per rollout.
+    pub fn rollout_steps(&self) -> u64 {
+        (self.agents * self.horizon) as u64
+    }
+    /// Threads that a run uses: the configured or available number, at most one per block.
+    pub fn worker_count(&self) -> usize {
+        let wanted = match self.threads {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        };
+        wanted.clamp(1, self.blocks().max(1))
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self) -> Result<(), Error> {
+        if self.agents == 0 || !self.agents.is_multiple_of(BLOCK) {
+            let nearest = (self.agents as f64 / BLOCK as f64).round().max(1.0) as usize * BLOCK;
+            return Err(Error::config("agents", self.agents, format!("a multiple of {BLOCK}, such as {nearest}")));
+        }
+        let items = self.blocks().saturating_mul(self.horizon);
+        if items.saturating_mul(BLOCK) > 1 << 31 {
+            return Err(Error::config("agents * horizon", items.saturating_mul(BLOCK), "at most 2^31 samples"));
+        }
+        let counts = [("horizon", self.horizon), ("minibatches", self.minibatches), ("epochs", self.epochs)];
+        for (field, n) in counts {
+            if n == 0 {
+                return Err(Error::config(field, n, "at least 1"));
+            }
+        }
+        if self.minibatches > items {
+            let most = format!("at most {items}, one for every 16 of the rollout's {} samples", items * BLOCK);
+            return Err(Error::config("minibatches", self.minibatches, most));
+        }
+        for (field, widths) in [("actor_hidden", &self.actor_hidden), ("critic_hidden", &self.critic_hidden)] {
+            if widths.iter().any(|w| !(1..=65536).contains(w)) || widths.len() > 64 {
+                return Err(Error::config(field, format!("{widths:?}"), "up to 64 widths between 1 and 65536"));
+            }
+        }
+        let positive = [
+            ("lr", self.lr),
+            ("value_lr", self.value_lr),
+            ("target_kl", self.target_kl),
+            ("max_grad_norm", self.max_grad_norm),
+            ("clip", self.clip),
+            ("value_clip", self.value_clip.unwrap_or(1.0)),
+            ("min_std", self.min_std),
+            ("observation_clip", self.observation_clip),
+            ("statistics_cap", self.statistics_cap),
+        ];
+        for (field, x) in positive {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(Error::config(field, x, "a positive number"));
+            }
+        }
+        let fractions = [("gamma", self.gamma), ("gae_lambda", self.gae_lambda)];
+        for (field, x) in fractions {
+            if !(0.0..=1.0).contains(&x) {
+                return Err(Error::config(field, x, "a number between 0 and 1"));
+            }
+        }
+        let entropy = [("entropy_coef", Some(self.entropy_coef)), ("final_entropy_coef", self.final_entropy_coef)];
+        for (field, x) in entropy.into_iter().filter_map(|(f, x)| Some((f, x?))) {
+            if !(x.is_finite() && x >= 0.0) {
+                return Err(Error::config(field, x, "a number not below 0"));
+            }
+        }
+        if !(self.max_std.is_finite() && self.max_std >= self.min_std) {
+            return Err(Error::config("max_std", self.max_std, format!("a number not below min_std = {}", self.min_std)));
+        }
+        if !self.init_log_std.is_finite() {
+            return Err(Error::config("init_log_std", self.init_log_std, "a finite number"));
+        }
+        let [low, high] = self.lr_range;
+        if !(low > 0.0 && low <= high && high.is_finite()) {
+            return Err(Error::config("lr_range", format!("[{low}, {high}]"), "two positive numbers in ascending order"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+//! What can go wrong.
+
+use std::path::{Path, PathBuf};
+
+/// An error of the trainer; the text says where, what was found and what was expected.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A configuration value is out of range.
+    #[error("configuration: {field} is {found}, expected {expected}")]
+    Config {
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        found: String,
+        /// What would do, with the nearest valid choice where there is one.
+        expected: String,
+    },
+    /// The instruction set is not one that networks run on, or not there.
+    #[error("instruction set {0} cannot train networks on this processor; use {1}")]
+    Isa(&'static str, &'static str),
+    /// A file cannot be read or written.
+    #[error("{}: {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{}: {place}: found {found}, expected {expected}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        place: String,
+        /// What is there.
+        found: String,
+        /// What should be there.
+        expected: String,
+    },
+    /// A policy or checkpoint belongs to something else.
+    #[error("{what} is for {found}, expected {expected}")]
+    Mismatch {
+        /// What does not fit.
+        what: String,
+        /// What it is for.
+        found: String,
+        /// What it is used for.
+        expected: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn config(field: &'static str, found: impl ToString, expected: impl ToString) -> Self {
+        Error::Config { field, found: found.to_string(), expected: expected.to_string() }
+    }
+    pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
+        move |source| Error::Io { path: path.into(), action, source }
+    }
+    pub(crate) fn file(
+        path: &Path,
+        place: impl ToString,
+        found: impl ToString,
+        expected: impl ToString,
+    ) -> Self {
+        let (place, found, expected) = (place.to_string(), found.to_string(), expected.to_string());
+        Error::File { path: path.into(), place, found, expected }
+    }
+}

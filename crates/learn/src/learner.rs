@@ -1,0 +1,183 @@
+//! What learning changes: parameters, optimizer, statistics, counters.
+//!
+//! Every worker holds a replica and applies the same updates to it, so nothing is shared while minibatches are
+//! computed; the replicas stay equal bit for bit.
+
+use crate::adam::Adam;
+use crate::gaussian::Gaussian;
+use crate::mlp::Mlp;
+use crate::noise::{PARAMETERS, SplitMix};
+use crate::normalize::{Moments, Normalizer};
+use crate::rollout::{BlockSums, Rollout};
+use crate::{BLOCK, PpoConfig, init};
+use marathon_envs::Spec;
+use std::ops::{Deref, Range};
+
+/// Gradient elements whose squares are summed together.
+const NORM_BLOCK: usize = 1024;
+
+/// Where the parameters of the two networks lie in one array; both parts are padded with zeros to rows of sixteen.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// Policy network.
+    pub actor: Mlp,
+    /// Value network.
+    pub critic: Mlp,
+    /// Logarithms of the standard deviations, after the policy network's parameters.
+    pub log_std: Range<usize>,
+    /// First parameter of the value network.
+    pub critic_start: usize,
+    /// Length of the array.
+    pub len: usize,
+}
+
+impl Layout {
+    /// For a task and a configuration.
+    pub fn new(spec: &Spec, config: &PpoConfig) -> Self {
+        let sizes = |hidden: &[usize], out| [&[spec.obs], hidden, &[out]].concat();
+        let actor = Mlp::new(&sizes(&config.actor_hidden, spec.act), config.activation);
+        let critic = Mlp::new(&sizes(&config.critic_hidden, 1), config.activation);
+        let log_std = actor.len()..actor.len() + spec.act;
+        let critic_start = log_std.end.next_multiple_of(BLOCK);
+        let len = (critic_start + critic.len()).next_multiple_of(BLOCK);
+        Self { actor, critic, log_std, critic_start, len }
+    }
+    /// The policy network's parameters.
+    pub fn actor_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
+        &params[..self.actor.len()]
+    }
+    /// The value network's parameters.
+    pub fn critic_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
+        &params[self.critic_start..self.critic_start + self.critic.len()]
+    }
+    /// Pieces of the array whose squares are summed together, none of them in both networks.
+    pub fn norm_blocks(&self) -> Vec<Range<usize>> {
+        let cut = |r: Range<usize>| r.clone().step_by(NORM_BLOCK).map(move |i| i..(i + NORM_BLOCK).min(r.end));
+        cut(0..self.critic_start).chain(cut(self.critic_start..self.len)).collect()
+    }
+}
+
+/// The state of learning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Learner {
+    /// Parameters of both networks, see [`Layout`].
+    pub params: Vec<f32>,
+    /// Optimizer.
+    pub adam: Adam,
+    /// Learning rate of the policy.
+    pub lr: f64,
+    /// Statistics of raw observations.
+    pub observations: Moments,
+    /// Statistics of the discounted return.
+    pub returns: Moments,
+    /// Rollouts so far.
+    pub iteration: u64,
+    /// Agent-steps so far.
+    pub steps: u64,
+    /// Minibatches skipped because their gradient was not finite.
+    pub skipped: u64,
+}
+
+impl Learner {
+    /// At the start of a run.
+    pub fn new(layout: &Layout, spec: &Spec, config: &PpoConfig) -> Self {
+        let mut params = vec![0.0; layout.len];
+        let mut random = SplitMix::new(config.seed, PARAMETERS);
+        init::orthogonal(&layout.actor, &mut params, 0.01, &mut random);
+        init::orthogonal(&layout.critic, &mut params[layout.critic_start..], 1.0, &mut random);
+        params[layout.log_std.clone()].fill(config.init_log_std as f32);
+        Self {
+            params,
+            adam: Adam::new(layout.len),
+            lr: config.lr,
+            observations: Moments::new(spec.obs),
+            returns: Moments::new(1),
+            iteration: 0,
+            steps: 0,
+            skipped: 0,
+        }
+    }
+
+    /// Current standard deviations.
+    pub fn gaussian(&self, layout: &Layout) -> Gaussian<f32> {
+        Gaussian::new(&self.params[layout.log_std.clone()])
+    }
+
+    /// Current map of observations.
+    pub fn normalizer(&self, config: &PpoConfig) -> Normalizer {
+        let clip = config.observation_clip as f32;
+        if config.normalize_observations {
+            Normalizer::new(self.observations.mean32(), self.observations.std(), clip)
+        } else {
+            Normalizer::identity(self.observations.mean.len(), clip)
+        }
+    }
+
+    /// Factor of the rewards.
+    pub fn reward_scale(&self, config: &PpoConfig) -> f64 {
+        if config.scale_rewards { 1.0 / (self.returns.var[0] + 1e-8).sqrt().max(1e-3) } else { 1.0 }
+    }
+
+    /// Takes in the statistics of a rollout.
+    pub fn absorb(&mut self, totals: &Totals, config: &PpoConfig) {
+        // without normalization the deviations are from zero, not from the mean
+        if config.normalize_observations {
+            self.observations.merge(totals.samples, &totals.sums.observations, config.statistics_cap);
+        }
+        self.returns.merge(totals.samples, &[totals.sums.discounted], config.statistics_cap);
+        self.iteration += 1;
+        self.steps += totals.samples as u64;
+    }
+}
+
+/// Sums over a whole rollout, added up in the order of the blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Totals {
+    /// Number of samples.
+    pub samples: f64,
+    /// The sums.
+    pub sums: BlockSums,
+}
+
+impl Totals {
+    /// Of the workers' rollouts, in order.
+    pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
+        let mut t = Totals::default();
+        for block in rollouts.iter().flat_map(|r| &r.sums) {
+            t.samples += (horizon * BLOCK) as f64;
+            let s = &mut t.sums;
+            s.episodes += block.episodes;
+            s.returns += block.returns;
+            s.lengths += block.lengths;
+            s.speeds += block.speeds;
+            s.falls += block.falls;
+            s.diverged += block.diverged;
+            s.terms.resize(block.terms.len(), 0.0);
+            s.terms.iter_mut().zip(&block.terms).for_each(|(a, b)| *a += b);
+            s.observations.resize(block.observations.len(), (0.0, 0.0));
+            s.observations.iter_mut().zip(&block.observations).for_each(|(a, b)| add(a, b));
+            add(&mut s.discounted, &block.discounted);
+            add(&mut s.advantages, &block.advantages);
+            add(&mut s.targets, &block.targets);
+        }
+        t
+    }
+    /// Mean and variance of the advantages.
+    pub fn advantage(&self) -> (f64, f64) {
+        self.moments(self.sums.advantages)
+    }
+    /// Part of the variance of the value targets that the value function had foreseen.
+    pub fn explained_variance(&self) -> f64 {
+        // the error of a value is its advantage
+        1.0 - self.advantage().1 / self.moments(self.sums.targets).1.max(1e-12)
+    }
+    fn moments(&self, (sum, square): (f64, f64)) -> (f64, f64) {
+        let mean = sum / self.samples;
+        (mean, (square / self.samples - mean * mean).max(0.0))
+    }
+}
+
+fn add(a: &mut (f64, f64), b: &(f64, f64)) {
+    a.0 += b.0;
+    a.1 += b.1;
+}

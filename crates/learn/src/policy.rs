@@ -1,0 +1,314 @@
+//! Deployable policies: one safetensors file with everything that is needed to act.
+//!
+//! The header's metadata hold one JSON document, [`PolicyMeta`]; the tensors are `obs_mean`, `obs_std`, `log_std`, and
+//! `layer.<i>.weight` (`[output, input]`) and `layer.<i>.bias` for each layer. The action for an observation is
+//!
+//! ```text
+//! x = clamp((obs - obs_mean) * (1 / obs_std), -observation_clip, observation_clip)
+//! action = clamp(mlp(x), -action_clip, action_clip)
+//! ```
+
+use crate::buffer::Blocks;
+use crate::eval::Evaluation;
+use crate::files::{TensorReader, TensorWriter, write_atomic};
+use crate::learner::Learner;
+use crate::mlp::{CHUNK, Mlp, Tape};
+use crate::normalize::{Normalize, Normalizer};
+use crate::ppo::{Clocks, Run};
+use crate::{Activation, BLOCK, Error, PpoConfig, f32_lanes};
+use marathon_envs::Spec;
+use marathon_physics::lanes::{Isa, Real};
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+use std::path::Path;
+
+const FORMAT: &str = "marathon-policy";
+const VERSION: u32 = 1;
+
+/// What a policy is for, and where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PolicyMeta {
+    /// Kind of file: `marathon-policy`.
+    pub format: String,
+    /// Version of the format.
+    pub version: u32,
+    /// Name of the agent and its task, such as `Hopper-v0`.
+    pub agent: String,
+    /// Observation length.
+    pub obs: usize,
+    /// Action length.
+    pub act: usize,
+    /// Seconds between decisions.
+    pub control_dt: f64,
+    /// Physics steps per decision.
+    pub frame_skip: usize,
+    /// Seconds per physics step.
+    pub physics_dt: f64,
+    /// Widths of the hidden layers.
+    pub hidden: Vec<usize>,
+    /// Activation of the hidden layers.
+    pub activation: Activation,
+    /// Bound of the normalized observations.
+    pub observation_clip: f32,
+    /// Bound of the actions.
+    pub action_clip: f32,
+    /// How the policy was trained, if by Marathon.
+    pub training: Option<Training>,
+    /// How it did when it was last evaluated.
+    pub evaluation: Option<Evaluation>,
+}
+
+/// Summary of a policy's training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Training {
+    /// Configuration.
+    pub config: PpoConfig,
+    /// Agent-steps.
+    pub steps: u64,
+    /// Rollouts.
+    pub iterations: u64,
+    /// Wall-clock seconds.
+    pub wall_seconds: f64,
+    /// Processor seconds.
+    pub cpu_seconds: f64,
+}
+
+/// A policy that can act.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Policy {
+    meta: PolicyMeta,
+    net: Mlp,
+    params: Vec<f32>,
+    normalizer: Normalizer,
+    log_std: Vec<f32>,
+}
+
+impl Policy {
+    pub(crate) fn of(run: &Run<'_>, learner: &Learner, clocks: &Clocks) -> Self {
+        let (spec, config, layout) = (&run.spec, run.config, &run.layout);
+        let training = Training {
+            config: config.clone(),
+            steps: learner.steps,
+            iterations: learner.iteration,
+            wall_seconds: clocks.wall,
+            cpu_seconds: clocks.cpu,
+        };
+        let meta = PolicyMeta {
+            format: FORMAT.into(),
+            version: VERSION,
+            agent: spec.id.clone(),
+            obs: spec.obs,
+            act: spec.act,
+            control_dt: spec.dt,
+            frame_skip: spec.frame_skip,
+            physics_dt: spec.dt / spec.frame_skip as f64,
+            hidden: config.actor_hidden.clone(),
+            activation: config.activation,
+            observation_clip: config.observation_clip as f32,
+            action_clip: 1.0,
+            training: Some(training),
+            evaluation: None,
+        };
+        Self {
+            meta,
+            net: layout.actor.clone(),
+            params: layout.actor_params(&learner.params).to_vec(),
+            normalizer: learner.normalizer(config),
+            log_std: learner.params[layout.log_std.clone()].to_vec(),
+        }
+    }
+
+    /// A policy from its parts: parameters of the network in the order of [`Mlp`], means and deviations of observations,
+    /// logarithms of the standard deviations of actions.
+    ///
+    /// # Errors
+    /// If a length does not fit the widths in `meta`.
+    pub fn from_parts(
+        meta: PolicyMeta,
+        params: Vec<f32>,
+        (obs_mean, obs_std): (Vec<f32>, Vec<f32>),
+        log_std: Vec<f32>,
+    ) -> Result<Self, Error> {
+        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+        let count: u64 = sizes.windows(2).map(|p| (p[0] as u64 + 1).saturating_mul(p[1] as u64)).sum();
+        let mismatch = |what: &str, found: String, expected: String| Error::Mismatch { what: what.into(), found, expected };
+        if sizes.iter().any(|s| !(1..=1 << 16).contains(s)) || sizes.len() > 66 || count > 1 << 28 {
+            return Err(mismatch("network", format!("widths {sizes:?}"), "positive widths of a practical size".into()));
+        }
+        let lengths = [
+            ("parameters", params.len(), count as usize),
+            ("obs_mean", obs_mean.len(), meta.obs),
+            ("obs_std", obs_std.len(), meta.obs),
+            ("log_std", log_std.len(), meta.act),
+        ];
+        for (what, found, expected) in lengths {
+            if found != expected {
+                return Err(mismatch(what, format!("{found} numbers"), format!("{expected} numbers")));
+            }
+        }
+        let normalizer = Normalizer::new(obs_mean, obs_std, meta.observation_clip);
+        Ok(Self { net: Mlp::new(&sizes, meta.activation), meta, params, normalizer, log_std })
+    }
+
+    /// What the policy is for, and where it comes from.
+    pub fn meta(&self) -> &PolicyMeta {
+        &self.meta
+    }
+    /// Notes how the policy did.
+    pub fn set_evaluation(&mut self, evaluation: Evaluation) {
+        self.meta.evaluation = Some(evaluation);
+    }
+    /// The network.
+    pub fn net(&self) -> &Mlp {
+        &self.net
+    }
+    /// The network's parameters.
+    pub fn params(&self) -> &[f32] {
+        &self.params
+    }
+    /// The map of observations.
+    pub fn normalizer(&self) -> &Normalizer {
+        &self.normalizer
+    }
+    /// Logarithms of the standard deviations that the actions had in training.
+    pub fn log_std(&self) -> &[f32] {
+        &self.log_std
+    }
+
+    /// The best action for one observation, one number at a time, with the bits of [`BlockPolicy::act`].
+    ///
+    /// # Panics
+    /// If the observation does not have `meta().obs` numbers.
+    pub fn act(&self, obs: &[f32]) -> Vec<f32> {
+        assert_eq!(obs.len(), self.meta.obs, "length of the observation");
+        let mut action = self.net.forward_row(&self.params, &self.normalizer.row(obs));
+        let clip = self.meta.action_clip;
+        action.iter_mut().for_each(|a| *a = Real::min(Real::max(*a, -clip), clip));
+        action
+    }
+
+    /// Writes the policy to a file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
+        let mut file = TensorWriter::default();
+        file.list("obs_mean", self.normalizer.mean());
+        file.list("obs_std", self.normalizer.std());
+        file.list("log_std", &self.log_std);
+        for (l, (weights, biases)) in self.net.layers().enumerate() {
+            let shape = [self.net.sizes()[l + 1], self.net.sizes()[l]];
+            file.add(format!("layer.{l}.weight"), &shape, self.params[weights].iter().copied());
+            file.list(&format!("layer.{l}.bias"), &self.params[biases]);
+        }
+        write_atomic(path, &file.bytes(&self.meta))
+    }
+
+    /// Reads a policy.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not a whole and finite policy.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(Error::io(path, "read"))?;
+        let file = TensorReader::new(path, &bytes)?;
+        let meta: PolicyMeta = file.document(FORMAT, VERSION)?;
+        let positive = |x: f32| x.is_finite() && x > 0.0;
+        if !positive(meta.observation_clip) || !positive(meta.action_clip) {
+            let found = format!("{} and {}", meta.observation_clip, meta.action_clip);
+            return Err(Error::file(path, "observation_clip and action_clip", found, "positive numbers"));
+        }
+        let mean = file.finite("obs_mean", &[meta.obs])?;
+        let std = file.finite("obs_std", &[meta.obs])?;
+        if let Some(i) = std.iter().position(|s| !positive(*s)) {
+            return Err(Error::file(path, format!("tensor 'obs_std', number {i}"), std[i], "a positive number"));
+        }
+        let log_std = file.finite("log_std", &[meta.act])?;
+        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+        let mut params = Vec::new();
+        for (l, pair) in sizes.windows(2).enumerate() {
+            params.extend(file.finite(&format!("layer.{l}.weight"), &[pair[1], pair[0]])?);
+            params.extend(file.finite(&format!("layer.{l}.bias"), &[pair[1]])?);
+        }
+        Self::from_parts(meta, params, (mean, std), log_std)
+            .map_err(|e| Error::file(path, "network", e, "tensors that fit the widths"))
+    }
+
+    /// Reads a policy for a given task.
+    ///
+    /// # Errors
+    /// As [`Policy::load`], or if the policy is for another agent.
+    pub fn load_for(path: &Path, spec: &Spec) -> Result<Self, Error> {
+        let policy = Self::load(path)?;
+        policy.check(spec).map_err(|e| match e {
+            Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),
+            other => other,
+        })?;
+        Ok(policy)
+    }
+
+    /// Whether the policy fits a task.
+    ///
+    /// # Errors
+    /// Names what differs.
+    pub fn check(&self, spec: &Spec) -> Result<(), Error> {
+        let meta = &self.meta;
+        let pairs = [
+            ("agent", meta.agent.clone(), spec.id.clone()),
+            ("observation length", meta.obs.to_string(), spec.obs.to_string()),
+            ("action length", meta.act.to_string(), spec.act.to_string()),
+            ("seconds between decisions", meta.control_dt.to_string(), spec.dt.to_string()),
+            ("frame_skip", meta.frame_skip.to_string(), spec.frame_skip.to_string()),
+        ];
+        for (what, found, expected) in pairs {
+            if found != expected {
+                return Err(Error::Mismatch { what: what.into(), found, expected });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A policy with work space to act for many blocks.
+pub struct BlockPolicy<'a> {
+    policy: &'a Policy,
+    isa: Isa,
+    input: Blocks<f32>,
+    tape: Tape<f32>,
+}
+
+impl<'a> BlockPolicy<'a> {
+    /// Work space for a policy.
+    ///
+    /// # Panics
+    /// If this processor lacks the instruction set, at the first use.
+    pub fn new(policy: &'a Policy, isa: Isa) -> Self {
+        Self { policy, isa, input: policy.net.input(), tape: policy.net.inference_tape() }
+    }
+
+    /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`.
+    ///
+    /// # Panics
+    /// If the lengths do not fit each other.
+    pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
+        let (policy, clip) = (self.policy, self.policy.meta.action_clip);
+        let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
+        assert!(obs.len() / obs_row * act_row == action.len() && obs.len() % obs_row == 0, "whole blocks");
+        for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
+            f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
+                normalizer: &policy.normalizer,
+                raw,
+                input: &mut self.input,
+                copy: None,
+                sums: None,
+                lanes: PhantomData,
+            }));
+            let n = raw.len() / obs_row;
+            policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, n);
+            for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
+                for (out, x) in out.iter_mut().zip(self.tape.output().block(b)) {
+                    *out = Real::min(Real::max(*x, -clip), clip);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Acting: a worker's agents play one horizon, and what happened is kept for learning.
+//!
+//! A worker owns a run of consecutive blocks and goes through the whole rollout without waiting for anyone. Everything
+//! it adds up is kept per block, so that the totals, taken in the order of the blocks, do not depend on how blocks are
+//! spread over workers.
+
+use crate::advantage::{self, Discounts};
+use crate::buffer::{Aligned, Blocks};
+use crate::clock;
+use crate::gaussian::{Gaussian, Sample};
+use crate::loss::Samples;
+use crate::mlp::{CHUNK, Mlp, Tape};
+use crate::noise::Noise;
+use crate::normalize::{Normalize, Normalizer};
+use crate::{BLOCK, f32_lanes};
+use marathon_envs::{BlockStep, Shard, ShardFactory};
+use marathon_physics::lanes::{Isa, Real};
+use std::marker::PhantomData;
+
+/// What the agents act with in a rollout; the same for all workers.
+pub struct Acting<'a> {
+    pub isa: Isa,
+    pub actor: (&'a Mlp, &'a [f32]),
+    pub critic: (&'a Mlp, &'a [f32]),
+    pub gaussian: &'a Gaussian<f32>,
+    pub normalizer: &'a Normalizer,
+    pub discounts: Discounts,
+    /// Divides the rewards.
+    pub reward_scale: f64,
+    /// Center of the statistics of discounted returns.
+    pub return_center: f32,
+}
+
+/// Sums over the episodes that ended in a block, and over its rewards.
+#[derive(Clone, Debug, Default)]
+pub struct BlockSums {
+    /// Episodes ended.
+    pub episodes: f64,
+    /// Their returns (undiscounted, unscaled).
+    pub returns: f64,
+    /// Their lengths in decisions.
+    pub lengths: f64,
+    /// Their mean forward speeds, m per decision.
+    pub speeds: f64,
+    /// Episodes that ended in a terminal state.
+    pub falls: f64,
+    /// Agents whose state stopped being finite.
+    pub diverged: f64,
+    /// Sum of each reward term over the rollout.
+    pub terms: Vec<f64>,
+    /// Discounted returns: deviations from the center and their squares.
+    pub discounted: (f64, f64),
+    /// Observations: deviations from the mean and their squares.
+    pub observations: Vec<(f64, f64)>,
+    /// Advantages and their squares.
+    pub advantages: (f64, f64),
+    /// Value targets and their squares.
+    pub targets: (f64, f64),
+}
+
+/// What a worker's agents experienced in one horizon; item `t * blocks + b` is block `b` at decision `t`.
+pub struct Rollout {
+    blocks: usize,
+    obs_len: usize,
+    act_len: usize,
+    /// Normalized, `[item][obs][16]`.
+    obs: Aligned<f32>,
+    /// `[item][act][16]`.
+    action: Aligned<f32>,
+    /// `[item][16]`, as are the following.
+    log_prob: Aligned<f32>,
+    reward: Aligned<f32>,
+    value: Aligned<f32>,
+    advantage: Aligned<f32>,
+    target: Aligned<f32>,
+    /// Agents whose episode ended with the item.
+    done: Vec<u16>,
+    /// Truncated episodes: item, agents, and the normalized observation they were cut off at.
+    cut: Vec<(usize, u16)>,
+    cut_obs: Vec<f32>,
+    /// Value of the observation after the last decision, `[block][16]`.
+    last_value: Aligned<f32>,
+    /// Per block.
+    pub sums: Vec<BlockSums>,
+}
+
+impl Rollout {
+    /// Room for `horizon` decisions of `blocks` blocks.
+    pub fn new(blocks: usize, horizon: usize, obs_len: usize, act_len: usize) -> Self {
+        let items = blocks * horizon;
+        let row = || Aligned::rows(items);
+        Self {
+            blocks,
+            obs_len,
+            act_len,
+            obs: Aligned::rows(items * obs_len),
+            action: Aligned::rows(items * act_len),
+            log_prob: row(),
+            reward: row(),
+            value: row(),
+            advantage: row(),
+            target: row(),
+            done: vec![0; items],
+            cut: Vec::new(),
+            cut_obs: Vec::new(),
+            last_value: Aligned::rows(blocks),
+            sums: Vec::new(),
+        }
+    }
+
+    fn items(&self) -> usize {
+        self.done.len()
+    }
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.blocks
+    }
+    /// Normalized observations of an item, `[obs][16]`.
+    pub fn obs(&self, item: usize) -> &[f32] {
+        &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
+    }
+    /// What the objective needs to know about an item.
+    pub fn samples(&self, item: usize) -> Samples<'_, f32> {
+        let row = item * BLOCK..(item + 1) * BLOCK;
+        Samples {
+            action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
+            log_prob: &self.log_prob[row.clone()],
+            advantage: &self.advantage[row.clone()],
+            value: &self.value[row.clone()],
+            target: &self.target[row],
+        }
+    }
+}
+
+/// A worker's agents.
+pub struct Actor {
+    shard: Box<dyn Shard>,
+    first_block: usize,
+    noise: Vec<Noise>,
+    /// Current raw observations, `[block][obs][16]`.
+    obs: Aligned<f32>,
+    /// Per agent, `[block][16]`: discounted return, and return, length and distance of the episode so far.
+    pub(crate) tallies: [Vec<[f32; BLOCK]>; 4],
+    /// Work space.
+    obs_sums: [Aligned<f32>; 2],
+    input: Blocks<f32>,
+    tape: Tape<f32>,
+    critic_tape: Tape<f32>,
+    eps: Vec<[f32; BLOCK]>,
+    out: BlockStep,
+}
+
+impl Actor {
+    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode.
+    pub fn new(
+        factory: &dyn ShardFactory,
+        (first_block, blocks): (usize, usize),
+        seed: u64,
+        actor: &Mlp,
+        critic: &Mlp,
+    ) -> Self {
+        let n = factory.spec().obs * BLOCK;
+        let mut shard = factory.shard(first_block, blocks, seed);
+        let mut obs = Aligned::new(blocks * n);
+        for b in 0..blocks {
+            shard.reset(b, !0, &mut obs[b * n..(b + 1) * n]);
+        }
+        Self {
+            shard,
+            first_block,
+            noise: (0..blocks).map(|b| Noise::new(seed, first_block + b)).collect(),
+            obs,
+            tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
+            obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
+            input: actor.input(),
+            tape: actor.inference_tape(),
+            critic_tape: critic.inference_tape(),
+            eps: vec![[0.0; BLOCK]; factory.spec().act],
+            out: BlockStep::default(),
+        }
+    }
+
+    /// First block of the whole environment that this worker owns.
+    pub fn first_block(&self) -> usize {
+        self.first_block
+    }
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.noise.len()
+    }
+    /// The environments.
+    pub fn shard(&self) -> &dyn Shard {
+        &*self.shard
+    }
+    /// The environments.
+    pub fn shard_mut(&mut self) -> &mut dyn Shard {
+        &mut *self.shard
+    }
+    /// Current observations of a block, `[obs][16]`.
+    pub fn obs(&self, block: usize) -> &[f32] {
+        let n = self.obs.len() / self.noise.len();
+        &self.obs[block * n..(block + 1) * n]
+    }
+    /// Current observations of a block, `[obs][16]`.
+    pub fn obs_mut(&mut self, block: usize) -> &mut [f32] {
+        let n = self.obs.len() / self.noise.len();
+        &mut self.obs[block * n..(block + 1) * n]
+    }
+    /// Random streams, one per block.
+    pub fn noise(&self) -> &[Noise] {
+        &self.noise
+    }
+    /// Random streams, one per block.
+    pub fn noise_mut(&mut self) -> &mut [Noise] {
+        &mut self.noise
+    }
+
+    /// Plays one horizon and fills `rollout`, advantages included. Returns the seconds spent in the environments.
+    pub fn collect(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) -> f64 {
+        let blocks = self.blocks();
+        let terms = self.shard.spec().reward_terms.len();
+        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], ..Default::default() }; blocks];
+        rollout.cut.clear();
+        rollout.cut_obs.clear();
+        self.obs_sums.iter_mut().for_each(|s| s.fill(0.0));
+        let mut env_seconds = 0.0;
+        for t in 0..rollout.items() / blocks {
+            for first in (0..blocks).step_by(CHUNK) {
+                self.act(acting, rollout, t * blocks, first, CHUNK.min(blocks - first));
+            }
+            let start = clock::wall();
+            for b in 0..blocks {
+                self.step(acting, rollout, t * blocks + b, b);
+            }
+            env_seconds += clock::wall() - start;
+        }
+        self.add_up_observations(rollout);
+        self.evaluate(acting, rollout);
+        advantage::estimate(acting, rollout);
+        env_seconds
+    }
+
+    /// Normalizes the observations of `n` blocks, and draws and stores their actions.
+    fn act(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
+        let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
+        let of = |row: usize| first * row..(first + n) * row;
+        let at = |row: usize| (item + first) * row..(item + first + n) * row;
+        let [sum, square] = &mut self.obs_sums;
+        f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
+            normalizer: acting.normalizer,
+            raw: &self.obs[of(obs_row)],
+            input: &mut self.input,
+            copy: Some(&mut rollout.obs[at(obs_row)]),
+            sums: Some((&mut sum[of(obs_row)], &mut square[of(obs_row)])),
+            lanes: PhantomData,
+        }));
+        acting.actor.0.forward(acting.isa, acting.actor.1, &self.input, &mut self.tape, n);
+        f32_lanes!(acting.isa, T => <T as Real>::enter(Sample::<T> {
+            gaussian: acting.gaussian,
+            mean: self.tape.output(),
+            noise: &mut self.noise[first..first + n],
+            action: &mut rollout.action[at(act_row)],
+            log_prob: &mut rollout.log_prob[at(BLOCK)],
+            eps: &mut self.eps,
+            lanes: PhantomData,
+        }));
+    }
+
+    /// One decision of one block, with all bookkeeping.
+    fn step(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, b: usize) {
+        let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
+        let out = &mut self.out;
+        let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
+        self.shard.step(b, &rollout.action[item * act_row..(item + 1) * act_row], obs, out);
+
+        // running sums of the agents
+        let sums = &mut rollout.sums[b];
+        let [discounted, returns, lengths, distances] = &mut self.tallies;
+        let (discounted, returns) = (&mut discounted[b], &mut returns[b]);
+        let (lengths, distances) = (&mut lengths[b], &mut distances[b]);
+        let (gamma, center) = (acting.discounts.gamma as f32, acting.return_center);
+        let scale = acting.reward_scale as f32;
+        let reward = &mut rollout.reward[item * BLOCK..(item + 1) * BLOCK];
+        let (mut first, mut second) = (0.0, 0.0);
+        for i in 0..BLOCK {
+            discounted[i] = discounted[i] * gamma + out.reward[i];
+            returns[i] += out.reward[i];
+            lengths[i] += 1.0;
+            distances[i] += out.forward[i];
+            reward[i] = out.reward[i] * scale;
+            let d = (discounted[i] - center) as f64;
+            first += d;
+            second += d * d;
+        }
+        sums.discounted.0 += first;
+        sums.discounted.1 += second;
+        for (sum, term) in sums.terms.iter_mut().zip(out.terms.chunks_exact(BLOCK)) {
+            *sum += term.iter().map(|x| *x as f64).sum::<f64>();
+        }
+
+        // ended episodes
+        let done = out.terminated | out.truncated | out.diverged;
+        rollout.done[item] = done;
+        if done == 0 {
+            return;
+        }
+        let cut = out.truncated & !(out.terminated | out.diverged);
+        if cut != 0 {
+            rollout.cut.push((item, cut));
+            rollout.cut_obs.extend_from_slice(obs);
+        }
+        for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
+            sums.episodes += 1.0;
+            sums.returns += returns[i] as f64;
+            sums.lengths += lengths[i] as f64;
+            sums.speeds += distances[i] as f64 / lengths[i] as f64;
+            sums.falls += (out.terminated >> i & 1) as f64;
+            sums.diverged += (out.diverged >> i & 1) as f64;
+            (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
+        }
+        self.shard.reset(b, done, obs);
+    }
+
+    /// Sums of the observations per block.
+    fn add_up_observations(&self, rollout: &mut Rollout) {
+        let [sum, square] = &self.obs_sums;
+        let total = |row: &[f32]| row.iter().map(|x| *x as f64).sum::<f64>();
+        let rows = sum.chunks_exact(BLOCK).zip(square.chunks_exact(BLOCK));
+        let all: Vec<(f64, f64)> = rows.map(|(s, q)| (total(s), total(q))).collect();
+        for (b, sums) in rollout.sums.iter_mut().enumerate() {
+            sums.observations = all[b * rollout.obs_len..(b + 1) * rollout.obs_len].to_vec();
+        }
+    }
+
+    /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
+    /// episodes.
+    fn evaluate(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
+        let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, .. } = rollout;
+        let row = *obs_len * BLOCK;
+        // values of normalized observations
+        for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * BLOCK)) {
+            for (b, obs) in obs.chunks_exact(row).enumerate() {
+                self.input.block_mut(b).copy_from_slice(obs);
+            }
+            value_of_input(acting, &self.input, &mut self.critic_tape, value);
+        }
+        // values of raw ones
+        let mut cut_value = vec![0.0; cut.len() * BLOCK];
+        for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
+            for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * BLOCK)) {
+                f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
+                    normalizer: acting.normalizer,
+                    raw,
+                    input: &mut self.input,
+                    copy: None,
+                    sums: None,
+                    lanes: PhantomData,
+                }));
+                value_of_input(acting, &self.input, &mut self.critic_tape, value);
+            }
+        }
+        let gamma = acting.discounts.gamma as f32;
+        for ((item, agents), value) in cut.iter().zip(cut_value.chunks_exact(BLOCK)) {
+            for i in (0..BLOCK).filter(|i| agents >> i & 1 == 1) {
+                reward[item * BLOCK + i] += gamma * value[i];
+            }
+        }
+    }
+}
+
+/// Values of the first blocks of `input`, as many as `out` has rows.
+fn value_of_input(acting: &Acting<'_>, input: &Blocks<f32>, tape: &mut Tape<f32>, out: &mut [f32]) {
+    let n = out.len() / BLOCK;
+    acting.critic.0.forward(acting.isa, acting.critic.1, input, tape, n);
+    for (b, out) in out.chunks_exact_mut(BLOCK).enumerate() {
+        out.copy_from_slice(tape.output().block(b));
+    }
+}
+
+/// Rows that the advantage estimator works on.
+pub struct Rewards<'a> {
+    pub reward: &'a [f32],
+    pub value: &'a [f32],
+    pub last_value: &'a [f32],
+    pub done: &'a [u16],
+    pub advantage: &'a mut [f32],
+    pub target: &'a mut [f32],
+    pub sums: &'a mut [BlockSums],
+}
+
+impl Rollout {
+    /// What the advantage estimator reads and writes.
+    pub fn rewards(&mut self) -> Rewards<'_> {
+        Rewards {
+            reward: &self.reward,
+            value: &self.value,
+            last_value: &self.last_value,
+            done: &self.done,
+            advantage: &mut self.advantage,
+            target: &mut self.target,
+            sums: &mut self.sums,
+        }
+    }
+}

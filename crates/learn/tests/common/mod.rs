@@ -1,0 +1,176 @@
+//! A task small enough to be learned within a test: hold a drifting puck at the origin of a plane.
+
+#![allow(dead_code, reason = "every test file uses a part")]
+
+use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+
+/// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
+#[derive(Clone, Copy, Default)]
+struct Puck {
+    pos: [f32; 2],
+    vel: [f32; 2],
+    drift: [f32; 2],
+    steps: u32,
+    random: u64,
+}
+
+/// The task; `limit` decisions per episode.
+pub struct PuckTask {
+    spec: Spec,
+    /// Makes one agent's observation NaN at a decision, to see what the trainer does.
+    pub poison: Option<(usize, u32)>,
+}
+
+impl PuckTask {
+    pub fn new() -> Self {
+        Self::with_limit(64)
+    }
+    pub fn with_limit(limit: usize) -> Self {
+        let spec = Spec {
+            id: "Puck-v0".into(),
+            obs: 6,
+            act: 2,
+            dt: 0.05,
+            frame_skip: 2,
+            max_episode_steps: limit,
+            reward_terms: vec!["near".into(), "effort".into()],
+        };
+        Self { spec, poison: None }
+    }
+    pub fn renamed(mut self, id: &str) -> Self {
+        self.spec.id = id.into();
+        self
+    }
+}
+
+impl ShardFactory for PuckTask {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+    fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
+        let agent = |i: usize| Puck {
+            random: (seed ^ (first * BLOCK + i) as u64 * 0x9e37_79b9).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1,
+            ..Default::default()
+        };
+        let pucks = (0..blocks * BLOCK).map(agent).collect();
+        Box::new(PuckShard { spec: self.spec.clone(), pucks, first, poison: self.poison })
+    }
+}
+
+struct PuckShard {
+    spec: Spec,
+    pucks: Vec<Puck>,
+    first: usize,
+    poison: Option<(usize, u32)>,
+}
+
+impl Puck {
+    fn uniform(&mut self) -> f32 {
+        self.random = self.random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.random >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+    }
+    fn observe(&self, lane: usize, obs: &mut [f32]) {
+        let numbers = [self.pos, self.vel, self.drift].concat();
+        for (k, x) in numbers.iter().enumerate() {
+            // scaled and shifted, so that learning needs the normalizer
+            obs[k * BLOCK + lane] = 30.0 * x + 7.0;
+        }
+    }
+}
+
+impl Shard for PuckShard {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+    fn blocks(&self) -> usize {
+        self.pucks.len() / BLOCK
+    }
+    fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
+        for lane in (0..BLOCK).filter(|i| mask >> i & 1 == 1) {
+            let p = &mut self.pucks[block * BLOCK + lane];
+            for axis in 0..2 {
+                p.pos[axis] = p.uniform();
+                p.vel[axis] = 0.5 * p.uniform();
+                p.drift[axis] = 2.0 * p.uniform();
+            }
+            p.steps = 0;
+            p.observe(lane, obs);
+        }
+    }
+    fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep) {
+        (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
+        out.terms.resize(2 * BLOCK, 0.0);
+        for lane in 0..BLOCK {
+            let p = &mut self.pucks[block * BLOCK + lane];
+            let (mut near, mut effort) = (0.0, 0.0);
+            let x0 = p.pos[0];
+            for axis in 0..2 {
+                let a = action[axis * BLOCK + lane].clamp(-1.0, 1.0);
+                p.vel[axis] += 0.05 * (8.0 * a + p.drift[axis] - p.vel[axis]);
+                p.pos[axis] += 0.05 * p.vel[axis];
+                near += 0.5 - p.pos[axis] * p.pos[axis];
+                effort -= 0.05 * a * a;
+            }
+            p.steps += 1;
+            let fell = p.pos.iter().any(|x| x.abs() > 2.0);
+            out.terms[lane] = near;
+            out.terms[BLOCK + lane] = effort;
+            out.reward[lane] = near + effort;
+            out.forward[lane] = p.pos[0] - x0;
+            out.terminated |= (fell as u16) << lane;
+            out.truncated |= ((!fell && p.steps as usize >= self.spec.max_episode_steps) as u16) << lane;
+            p.observe(lane, obs);
+            if let Some((agent, step)) = self.poison
+                && (self.first + block) * BLOCK + lane == agent
+                && p.steps == step
+            {
+                obs[lane] = f32::NAN;
+            }
+        }
+    }
+    fn save(&self, block: usize, bytes: &mut Vec<u8>) {
+        for p in &self.pucks[block * BLOCK..(block + 1) * BLOCK] {
+            for x in [p.pos, p.vel, p.drift].concat() {
+                bytes.extend_from_slice(&x.to_le_bytes());
+            }
+            bytes.extend_from_slice(&p.steps.to_le_bytes());
+            bytes.extend_from_slice(&p.random.to_le_bytes());
+        }
+    }
+    fn load<'a>(&mut self, block: usize, mut bytes: &'a [u8]) -> Option<&'a [u8]> {
+        for p in &mut self.pucks[block * BLOCK..(block + 1) * BLOCK] {
+            for x in p.pos.iter_mut().chain(&mut p.vel).chain(&mut p.drift) {
+                *x = f32::from_le_bytes(take(&mut bytes)?);
+            }
+            p.steps = u32::from_le_bytes(take(&mut bytes)?);
+            p.random = u64::from_le_bytes(take(&mut bytes)?);
+        }
+        Some(bytes)
+    }
+}
+
+fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, rest) = bytes.split_first_chunk()?;
+    *bytes = rest;
+    Some(*head)
+}
+
+/// A small setting for tests of equality.
+pub fn small_config() -> marathon_learn::PpoConfig {
+    marathon_learn::PpoConfig {
+        agents: 80,
+        horizon: 24,
+        minibatches: 3,
+        epochs: 2,
+        total_steps: 4 * 80 * 24,
+        actor_hidden: vec![13, 8],
+        critic_hidden: vec![16],
+        threads: 1,
+        ..Default::default()
+    }
+}
+
+/// An observer that never stops.
+pub fn silent(_: &marathon_learn::IterationStats, _: &marathon_learn::Snapshot<'_>) -> marathon_learn::Control {
+    marathon_learn::Control::Continue
+}

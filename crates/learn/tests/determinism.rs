@@ -1,0 +1,53 @@
+//! The same seed gives the same policy for any number of threads and any vector width.
+
+mod common;
+
+use common::{PuckTask, silent, small_config};
+use marathon_learn::{Activation, PpoConfig, Schedule, TrainOutput, train};
+use marathon_physics::lanes::Isa;
+
+fn run(config: &PpoConfig, isa: Isa) -> TrainOutput {
+    train(&PuckTask::with_limit(20), isa, config, None, &mut silent).unwrap()
+}
+
+fn bits(output: &TrainOutput) -> Vec<u32> {
+    let policy = &output.policy;
+    let numbers = policy.params().iter().chain(policy.log_std()).chain(policy.normalizer().mean());
+    numbers.chain(policy.normalizer().std()).map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn threads_do_not_change_the_policy() {
+    // five blocks, so that threads get unequal shares and fewer groups than threads are possible
+    for config in [
+        small_config(),
+        PpoConfig { minibatches: 1, horizon: 40, value_clip: Some(0.2), ..small_config() },
+        PpoConfig { minibatches: 17, schedule: Schedule::Linear, activation: Activation::Elu, ..small_config() },
+    ] {
+        let one = run(&config, Isa::best());
+        for threads in [2, 3, 5, 9] {
+            let many = run(&PpoConfig { threads, ..config.clone() }, Isa::best());
+            assert_eq!(bits(&one), bits(&many), "{threads} threads");
+            let (a, b) = (one.last.as_ref().unwrap(), many.last.as_ref().unwrap());
+            assert_eq!((a.kl, a.value_loss, a.return_mean), (b.kl, b.value_loss, b.return_mean));
+            assert_eq!((a.lr, a.explained_variance, &a.reward_terms), (b.lr, b.explained_variance, &b.reward_terms));
+        }
+    }
+}
+
+#[test]
+fn vector_width_does_not_change_the_policy() {
+    for activation in Activation::ALL {
+        let config = PpoConfig { activation, total_steps: 3 * 80 * 24, ..small_config() };
+        let want = run(&config, Isa::F32);
+        for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
+            assert_eq!(bits(&want), bits(&run(&config, isa)), "{} {}", activation.name(), isa.name());
+        }
+    }
+}
+
+#[test]
+fn seed_changes_the_policy() {
+    let other = PpoConfig { seed: 2, ..small_config() };
+    assert_ne!(bits(&run(&small_config(), Isa::best())), bits(&run(&other, Isa::best())));
+}

@@ -1,0 +1,105 @@
+//! The trainer learns: a task with drift, limits and unscaled observations is solved within seconds.
+
+mod common;
+
+use common::PuckTask;
+use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Schedule, Snapshot, evaluate, train};
+use marathon_physics::lanes::Isa;
+
+fn config() -> PpoConfig {
+    PpoConfig {
+        agents: 128,
+        horizon: 32,
+        minibatches: 4,
+        total_steps: 400_000,
+        actor_hidden: vec![32, 32],
+        critic_hidden: vec![32, 32],
+        threads: 1,
+        ..Default::default()
+    }
+}
+
+/// Return of the best policy is about 64 (holding still at the origin) less the way there and the effort against drift.
+fn learned(config: &PpoConfig) -> f64 {
+    let task = PuckTask::new();
+    let mut returns = Vec::new();
+    let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+        returns.extend(stats.return_mean);
+        assert!(stats.kl.is_finite() && stats.value_loss.is_finite() && stats.std_mean > 0.0);
+        Control::Continue
+    };
+    let output = train(&task, Isa::best(), config, None, &mut observer).unwrap();
+    let result = evaluate(&task, Isa::best(), &output.policy, &Default::default()).unwrap();
+    println!("first {:?}, last {:?}, {result:?}, {:?}", returns.first(), returns.last(), output.last);
+    assert!(returns[0] < 0.0, "the untrained policy is bad: {}", returns[0]);
+    assert_eq!(result.episodes, 64);
+    assert!(result.falls == 0 && output.last.unwrap().explained_variance > 0.5);
+    result.return_mean
+}
+
+#[test]
+fn adaptive_rate_solves_the_task() {
+    assert!(learned(&config()) > 52.0);
+}
+
+#[test]
+fn linear_rate_with_value_clipping_and_swish_solves_the_task() {
+    let config = PpoConfig {
+        schedule: Schedule::Linear,
+        value_clip: Some(0.5),
+        final_entropy_coef: Some(0.0),
+        activation: Activation::Swish,
+        ..config()
+    };
+    assert!(learned(&config) > 52.0);
+}
+
+#[test]
+fn constant_rate_with_elu_solves_the_task() {
+    assert!(learned(&PpoConfig { schedule: Schedule::Constant, activation: Activation::Elu, ..config() }) > 52.0);
+}
+
+#[test]
+fn observer_can_stop_and_looks_at_every_iteration() {
+    let mut seen = Vec::new();
+    let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
+        seen.push(stats.steps);
+        assert_eq!(snapshot.checkpoint().steps(), stats.steps);
+        assert_eq!(snapshot.policy().meta().training.as_ref().unwrap().steps, stats.steps);
+        if seen.len() == 3 { Control::Stop } else { Control::Continue }
+    };
+    let output = train(&PuckTask::new(), Isa::best(), &config(), None, &mut observer).unwrap();
+    let last = output.last.unwrap();
+    assert_eq!((seen, last.iteration), (vec![4096, 8192, 12288], 3));
+    assert!(last.cpu_seconds > 0.0 && last.reward_terms.len() == 2);
+}
+
+/// A number that is not finite in one observation of every episode of one agent does not keep the others from learning.
+#[test]
+fn poisoned_observation_is_contained() {
+    let mut task = PuckTask::new();
+    task.poison = Some((5, 20));
+    let output = train(&task, Isa::best(), &config(), None, &mut common::silent).unwrap();
+    let (policy, normalizer) = (&output.policy, output.policy.normalizer());
+    let numbers = policy.params().iter().chain(policy.log_std()).chain(normalizer.mean()).chain(normalizer.std());
+    assert!(numbers.into_iter().all(|x| x.is_finite()));
+    let result = evaluate(&PuckTask::new(), Isa::best(), policy, &Default::default()).unwrap();
+    assert!(result.return_mean > 52.0, "{result:?}");
+}
+
+#[test]
+fn impossible_settings_are_refused_with_the_nearest_possible_one() {
+    let refuse = |config: PpoConfig| {
+        let result = train(&PuckTask::new(), Isa::best(), &config, None, &mut common::silent);
+        result.err().expect("an error").to_string()
+    };
+    assert_eq!(
+        refuse(PpoConfig { agents: 100, ..config() }),
+        "configuration: agents is 100, expected a multiple of 16, such as 96"
+    );
+    assert!(refuse(PpoConfig { minibatches: 5000, ..config() }).contains("at most 256"));
+    assert!(refuse(PpoConfig { gamma: 1.5, ..config() }).contains("gamma is 1.5"));
+    assert!(refuse(PpoConfig { lr: f64::NAN, ..config() }).contains("lr is NaN"));
+    let isa = train(&PuckTask::new(), Isa::F64, &config(), None, &mut common::silent);
+    assert!(isa.err().unwrap().to_string().contains("f64"));
+}

@@ -1,0 +1,157 @@
+//! A run that is interrupted between any two iterations and resumed gives the bits of one that never stopped, and
+//! damaged checkpoints are refused with a reason.
+
+mod common;
+
+use common::{PuckTask, silent, small_config};
+use marathon_learn::{Checkpoint, Control, Error, IterationStats, PpoConfig, Snapshot, train};
+use marathon_physics::lanes::Isa;
+use std::path::Path;
+
+const LIMIT: usize = 30;
+
+fn run(config: &PpoConfig, resume: Option<Checkpoint>) -> Result<Checkpoint, Error> {
+    let output = train(&PuckTask::with_limit(LIMIT), Isa::best(), config, resume, &mut silent)?;
+    Ok(output.checkpoint)
+}
+
+/// The files of a checkpoint without the clocks, which no two runs share.
+fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
+    let json = std::fs::read(folder.join("checkpoint.json")).unwrap();
+    let mut about: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    for clock in ["wall_seconds", "cpu_seconds"] {
+        assert!(about[clock].is_number());
+        about[clock] = 0.into();
+    }
+    about["config"]["threads"] = 0.into();
+    let state = std::fs::read(folder.join(about["state"]["name"].as_str().unwrap())).unwrap();
+    (about, state)
+}
+
+#[test]
+fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = PpoConfig { total_steps: 5 * small_config().rollout_steps(), ..small_config() };
+    let whole = dir.path().join("whole");
+    run(&config, None).unwrap().save(&whole).unwrap();
+    for stop_at in 1..5 {
+        // interrupted by the observer, saved, loaded, and resumed with another number of threads
+        let folder = dir.path().join(format!("part-{stop_at}"));
+        let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
+            if stats.iteration < stop_at {
+                return Control::Continue;
+            }
+            snapshot.checkpoint().save(&folder).unwrap();
+            Control::Stop
+        };
+        train(&PuckTask::with_limit(LIMIT), Isa::best(), &config, None, &mut observer).unwrap();
+        let checkpoint = Checkpoint::load(&folder).unwrap();
+        assert_eq!((checkpoint.iteration(), checkpoint.agent()), (stop_at, "Puck-v0"));
+        assert_eq!(checkpoint.config(), &config);
+        run(&PpoConfig { threads: 2, ..config.clone() }, Some(checkpoint)).unwrap().save(&folder).unwrap();
+        assert_eq!(contents(&folder), contents(&whole), "interrupted after iteration {stop_at}");
+        // the old state is gone
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
+    }
+}
+
+#[test]
+fn finished_run_resumes_to_itself() {
+    let first = run(&small_config(), None).unwrap();
+    assert_eq!(run(&small_config(), Some(first.clone())).unwrap(), first);
+}
+
+#[test]
+fn checkpoint_of_something_else_is_refused() {
+    let checkpoint = run(&small_config(), None).unwrap();
+    let refuse = |config: PpoConfig, text: &str| {
+        let error = run(&config, Some(checkpoint.clone())).err().expect("an error").to_string();
+        assert!(error.contains(text), "{error}");
+    };
+    refuse(PpoConfig { agents: 96, ..small_config() }, "checkpoint: agents is for 80, expected 96");
+    refuse(PpoConfig { actor_hidden: vec![7], ..small_config() }, "actor_hidden is for [13, 8], expected [7]");
+    refuse(PpoConfig { seed: 9, ..small_config() }, "seed is for 1, expected 9");
+    let task = PuckTask::new().renamed("Puck-v1");
+    let error = train(&task, Isa::best(), &small_config(), Some(checkpoint.clone()), &mut silent).err().unwrap();
+    assert!(error.to_string().contains("agent is for Puck-v0, expected Puck-v1"), "{error}");
+}
+
+#[test]
+fn damaged_checkpoints_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path();
+    run(&small_config(), None).unwrap().save(folder).unwrap();
+    let description = folder.join("checkpoint.json");
+    let json = std::fs::read_to_string(&description).unwrap();
+    let about: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let state = folder.join(about["state"]["name"].as_str().unwrap());
+    let bytes = std::fs::read(&state).unwrap();
+    let error = || Checkpoint::load(folder).err().expect("an error").to_string();
+
+    std::fs::write(&state, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(error().contains("length: found"), "{}", error());
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() / 2] ^= 4;
+    std::fs::write(&state, &flipped).unwrap();
+    assert!(error().contains("checksum"), "{}", error());
+    std::fs::remove_file(&state).unwrap();
+    assert!(error().contains("state-"), "{}", error());
+    std::fs::write(&state, &bytes).unwrap();
+    Checkpoint::load(folder).unwrap();
+
+    for (from, to, text) in [
+        ("marathon-checkpoint", "marathon-policy", "format: found"),
+        ("\"version\": 1", "\"version\": 7", "version: found 7, expected 1"),
+        ("\"agents\": 80", "\"agents\": 81", "agents is 81"),
+        ("\"lr\"", "\"lrr\"", "lr"),
+        ("state-", "../state-", "a file in the same folder"),
+        ("{", "[", "JSON"),
+    ] {
+        std::fs::write(&description, json.replacen(from, to, 1)).unwrap();
+        assert!(error().contains(text), "{}", error());
+    }
+    std::fs::write(&description, b"\xff\xfe").unwrap();
+    assert!(error().contains("UTF-8"), "{}", error());
+    std::fs::remove_file(&description).unwrap();
+    assert!(error().contains("checkpoint.json: read"), "{}", error());
+}
+
+/// Numbers that lie about their own lengths are refused too, whatever the checksum says.
+#[test]
+fn truncated_environments_are_refused() {
+    struct Shrunk(PuckTask);
+    struct ShrunkShard(Box<dyn marathon_envs::Shard>);
+    impl marathon_envs::ShardFactory for Shrunk {
+        fn spec(&self) -> &marathon_envs::Spec {
+            self.0.spec()
+        }
+        fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn marathon_envs::Shard> {
+            Box::new(ShrunkShard(self.0.shard(first, blocks, seed)))
+        }
+    }
+    impl marathon_envs::Shard for ShrunkShard {
+        fn spec(&self) -> &marathon_envs::Spec {
+            self.0.spec()
+        }
+        fn blocks(&self) -> usize {
+            self.0.blocks()
+        }
+        fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
+            self.0.reset(block, mask, obs)
+        }
+        fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut marathon_envs::BlockStep) {
+            self.0.step(block, action, obs, out)
+        }
+        fn save(&self, block: usize, bytes: &mut Vec<u8>) {
+            self.0.save(block, bytes);
+            bytes.pop();
+        }
+        fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+            self.0.load(block, bytes)
+        }
+    }
+    let task = Shrunk(PuckTask::new());
+    let saved = train(&task, Isa::best(), &small_config(), None, &mut silent).unwrap().checkpoint;
+    let error = train(&task, Isa::best(), &small_config(), Some(saved), &mut silent).err().unwrap();
+    assert!(error.to_string().contains("bytes of block 0's environment"), "{error}");
+}

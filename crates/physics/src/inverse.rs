@@ -1,0 +1,87 @@
+//! Joint-space quantities for inspection and tests: bias, passive, actuator and constraint forces, and the mass matrix.
+//!
+//! A step never needs them; they are computed from what the last [`Sim::forward`](crate::Sim::forward) left behind.
+
+use crate::lanes::Real;
+use crate::readings::Readings;
+use crate::spatial::*;
+
+impl<T: Real> Readings<'_, T> {
+    /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
+    pub fn bias_forces(&self) -> Vec<T> {
+        self.joint_space(self.work.bias_force.clone())
+    }
+
+    /// Springs, dampers and actuators together (`qfrc_passive + qfrc_actuator`).
+    pub fn applied_forces(&self) -> Vec<T> {
+        self.work.tau.clone()
+    }
+
+    /// Contacts, limits and dry friction (`qfrc_constraint`).
+    pub fn constraint_forces(&self) -> Vec<T> {
+        let mut forces = vec![[T::zero(); 6]; self.sim.links.len()];
+        for c in &self.work.contacts {
+            let w = c.wrench(&c.force);
+            for i in 0..6 {
+                forces[c.link][i] += w[i];
+            }
+        }
+        let mut out = self.joint_space(forces);
+        for l in &self.work.limits {
+            out[l.dof] += l.sign * l.force;
+        }
+        for f in &self.work.dry {
+            out[f.dof] += f.force;
+        }
+        out
+    }
+
+    /// The mass matrix, `nv` rows of `nv`, armature included.
+    pub fn mass_matrix(&self) -> Vec<Vec<T>> {
+        let nv = self.sim.model.nv;
+        let mut rows = Vec::with_capacity(nv);
+        for i in 0..nv {
+            // inertial forces of a unit acceleration of one degree of freedom
+            let mut motion = vec![[T::zero(); 6]; self.sim.links.len()];
+            let mut forces = motion.clone();
+            for (l, link) in self.sim.links.iter().enumerate() {
+                let mut a = link.parent.map_or([T::zero(); 6], |p| motion[p]);
+                if link.dofs.contains(&i) {
+                    a = axpy6(&self.work.axis[i], T::lit(1.0), &a);
+                }
+                motion[l] = a;
+                forces[l] = inertia_mul(&self.work.inertia[l], &a);
+            }
+            let mut row = self.joint_space(forces);
+            row[i] += T::splat(self.sim.armature[i]);
+            rows.push(row);
+        }
+        rows
+    }
+
+    /// Forces on links as forces on joints: every joint carries all that is above it.
+    fn joint_space(&self, mut forces: Vec<V6<T>>) -> Vec<T> {
+        let mut out = vec![T::zero(); self.sim.model.nv];
+        for (l, link) in self.sim.links.iter().enumerate().rev() {
+            let f = forces[l];
+            for d in link.dofs.clone() {
+                out[d] = dot6(&self.work.axis[d], &f);
+            }
+            if let Some(p) = link.parent {
+                for i in 0..6 {
+                    forces[p][i] += f[i];
+                }
+            }
+        }
+        out
+    }
+
+    /// Number of contacts with the floor per lane.
+    pub fn contact_count(&self) -> T {
+        let mut n = T::zero();
+        for on in &self.work.touching {
+            n += T::masked(*on, T::lit(1.0));
+        }
+        n
+    }
+}

@@ -1,0 +1,276 @@
+//! Positions: link frames, motion axes and spatial inertias from `qpos`.
+
+use crate::lanes::Real;
+use crate::model::JointType;
+use crate::sim::{Link, LinkJoint, Sim};
+use crate::spatial::*;
+use crate::work::{Group, Work};
+
+/// Computes every link's frame, its joints' motion axes and its spatial inertia.
+///
+/// Everything of a tree is expressed in world axes about the origin of its root link, so that children add to parents
+/// without a transform and single precision does not suffer far from the world's origin.
+#[inline(always)]
+pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    for l in 0..sim.links.len() {
+        let link = &sim.links[l];
+        let root = link.parent.is_none();
+        let (mut rot, mut pos) = frame_at_parent(link, work);
+        for j in link.joints.clone() {
+            apply_joint(&sim.joints[j], j, group, work, &mut rot, &mut pos);
+        }
+        if root {
+            // the tree's reference point is known only now: move anchors and axes to it
+            work.reference[link.tree] = pos;
+            for j in link.joints.clone() {
+                work.anchor[j] = sub3(&work.anchor[j], &pos);
+            }
+            pos = [T::zero(); 3];
+        }
+        for j in link.joints.clone() {
+            finish_axes(&sim.joints[j], j, &rot, work);
+        }
+        work.rot[l] = rot;
+        work.pos[l] = pos;
+        work.inertia[l] = spatial_inertia(link, &rot, &pos);
+    }
+}
+
+/// Frame of a link before its joints move it; in world coordinates for a root.
+#[inline(always)]
+fn frame_at_parent<T: Real>(link: &Link<T::Scalar>, work: &Work<T>) -> (Rot<T>, V3<T>) {
+    match link.parent {
+        None => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
+        Some(p) => {
+            let parent = &work.rot[p];
+            let pos = rotate_add(parent, &splat3(&link.pos), &work.pos[p]);
+            let rot = if link.rot_is_identity { *parent } else { compose(parent, &link.rot) };
+            (rot, pos)
+        }
+    }
+}
+
+/// Moves a link's frame by one joint and records the joint's anchor and axis direction.
+#[inline(always)]
+fn apply_joint<T: Real>(
+    joint: &LinkJoint<T::Scalar>,
+    j: usize,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    rot: &mut Rot<T>,
+    pos: &mut V3<T>,
+) {
+    let (q, z, one) = (&group.qpos, T::zero(), T::lit(1.0));
+    let a = joint.qpos;
+    match joint.kind {
+        JointType::Free => {
+            *pos = [q[a], q[a + 1], q[a + 2]];
+            *rot = quat_to_rot(&[q[a + 3], q[a + 4], q[a + 5], q[a + 6]]);
+            work.anchor[j] = *pos;
+        }
+        JointType::Slide => {
+            let dir = rotate(rot, &splat3(&joint.axis));
+            let d = q[a] - T::splat(joint.q0);
+            *pos = [d.mul_add(dir[0], pos[0]), d.mul_add(dir[1], pos[1]), d.mul_add(dir[2], pos[2])];
+            work.axis[joint.dof] = [z, z, z, dir[0], dir[1], dir[2]];
+            work.anchor[j] = *pos;
+        }
+        JointType::Hinge => {
+            let anchor = anchor_of(joint, rot, pos);
+            let (s, c) = (q[a] - T::splat(joint.q0)).sin_cos();
+            let dir;
+            if let Some((k, negative)) = joint.aligned {
+                // turn the two columns beside the axis
+                let s = if negative { -s } else { s };
+                let x = rot[k];
+                dir = if negative { [-x[0], -x[1], -x[2]] } else { x };
+                let (i1, i2) = ((k + 1) % 3, (k + 2) % 3);
+                let (c1, c2) = (rot[i1], rot[i2]);
+                for i in 0..3 {
+                    rot[i1][i] = c.mul_add(c1[i], s * c2[i]);
+                    rot[i2][i] = s.neg_mul_add(c1[i], c * c2[i]);
+                }
+            } else {
+                // Rodrigues' formula in the link's own frame
+                let n: V3<T> = splat3(&joint.axis);
+                dir = rotate(rot, &n);
+                let t = one - c;
+                let (tn, sn) = ([t * n[0], t * n[1], t * n[2]], [s * n[0], s * n[1], s * n[2]]);
+                let c0 = [tn[0].mul_add(n[0], c), tn[0].mul_add(n[1], sn[2]), tn[0].mul_add(n[2], -sn[1])];
+                let c1 = [tn[1].mul_add(n[0], -sn[2]), tn[1].mul_add(n[1], c), tn[1].mul_add(n[2], sn[0])];
+                let c2 = [tn[2].mul_add(n[0], sn[1]), tn[2].mul_add(n[1], -sn[0]), tn[2].mul_add(n[2], c)];
+                *rot = [rotate(rot, &c0), rotate(rot, &c1), rotate(rot, &c2)];
+            }
+            restore_anchor(joint, rot, pos, &anchor);
+            work.anchor[j] = anchor;
+            work.axis[joint.dof] = [dir[0], dir[1], dir[2], z, z, z];
+        }
+        JointType::Ball => {
+            let anchor = anchor_of(joint, rot, pos);
+            let turn = quat_to_rot(&[q[a], q[a + 1], q[a + 2], q[a + 3]]);
+            *rot = [rotate(rot, &turn[0]), rotate(rot, &turn[1]), rotate(rot, &turn[2])];
+            restore_anchor(joint, rot, pos, &anchor);
+            work.anchor[j] = anchor;
+        }
+    }
+}
+
+#[inline(always)]
+fn anchor_of<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &V3<T>) -> V3<T> {
+    if joint.centered { *pos } else { rotate_add(rot, &splat3(&joint.pos), pos) }
+}
+
+/// Puts a link back so that a rotation leaves the joint's anchor in place.
+#[inline(always)]
+fn restore_anchor<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &mut V3<T>, anchor: &V3<T>) {
+    if !joint.centered {
+        *pos = sub3(anchor, &rotate(rot, &splat3(&joint.pos)));
+    }
+}
+
+/// Completes a joint's motion axes, now that the link's orientation and the reference point are known.
+#[inline(always)]
+fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, work: &mut Work<T>) {
+    let (z, one) = (T::zero(), T::lit(1.0));
+    let d = joint.dof;
+    match joint.kind {
+        JointType::Slide => {}
+        JointType::Hinge => {
+            let s = &mut work.axis[d];
+            let l = cross(&work.anchor[j], &[s[0], s[1], s[2]]);
+            s[3] = l[0];
+            s[4] = l[1];
+            s[5] = l[2];
+        }
+        JointType::Ball => {
+            for k in 0..3 {
+                let l = cross(&work.anchor[j], &rot[k]);
+                work.axis[d + k] = [rot[k][0], rot[k][1], rot[k][2], l[0], l[1], l[2]];
+            }
+        }
+        JointType::Free => {
+            // translation along the world's axes, rotation about the link's own axes through the reference point
+            for k in 0..3 {
+                let mut e = [z; 6];
+                e[3 + k] = one;
+                work.axis[d + k] = e;
+                work.axis[d + 3 + k] = [rot[k][0], rot[k][1], rot[k][2], z, z, z];
+            }
+        }
+    }
+}
+
+/// A link's inertia about the tree's reference point in world axes.
+#[inline(always)]
+fn spatial_inertia<T: Real>(link: &Link<T::Scalar>, r: &Rot<T>, pos: &V3<T>) -> Inertia<T> {
+    let c = rotate_add(r, &splat3(&link.com), pos);
+    let m = T::splat(link.mass);
+    let mc = [m * c[0], m * c[1], m * c[2]];
+    let i = &link.inertia;
+    // columns of R I
+    let mut t = [[T::zero(); 3]; 3];
+    if link.inertia_is_diagonal {
+        for k in 0..3 {
+            let d = T::splat(i[k]);
+            t[k] = [r[k][0] * d, r[k][1] * d, r[k][2] * d];
+        }
+    } else {
+        t[0] = rotate(r, &splat3(&[i[0], i[3], i[4]]));
+        t[1] = rotate(r, &splat3(&[i[3], i[1], i[5]]));
+        t[2] = rotate(r, &splat3(&[i[4], i[5], i[2]]));
+    }
+    let (xx, yy, zz) = (mc[0] * c[0], mc[1] * c[1], mc[2] * c[2]);
+    [
+        m,
+        mc[0],
+        mc[1],
+        mc[2],
+        turned(&t, r, 0, 0) + (yy + zz),
+        turned(&t, r, 1, 1) + (xx + zz),
+        turned(&t, r, 2, 2) + (xx + yy),
+        mc[0].neg_mul_add(c[1], turned(&t, r, 0, 1)),
+        mc[0].neg_mul_add(c[2], turned(&t, r, 0, 2)),
+        mc[1].neg_mul_add(c[2], turned(&t, r, 1, 2)),
+    ]
+}
+
+/// Entry (a, b) of R I R'.
+#[inline(always)]
+fn turned<T: Real>(t: &Rot<T>, r: &Rot<T>, a: usize, b: usize) -> T {
+    t[0][a].mul_add(r[0][b], t[1][a].mul_add(r[1][b], t[2][a] * r[2][b]))
+}
+
+/// Velocities of the links and the forces that the present motion needs (first half of a recursive Newton-Euler pass).
+#[inline(always)]
+pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    let z = T::zero();
+    let v = &group.qvel;
+    for l in 0..sim.links.len() {
+        let link = &sim.links[l];
+        let (mut vel, mut acc) = match link.parent {
+            Some(p) => (work.vel[p], work.bias_acc[p]),
+            None => {
+                let g = &sim.gravity;
+                ([z; 6], [z, z, z, -T::splat(g[0]), -T::splat(g[1]), -T::splat(g[2])])
+            }
+        };
+        for j in link.joints.clone() {
+            let joint = &sim.joints[j];
+            let d = joint.dof;
+            match joint.kind {
+                JointType::Free => {
+                    // translation first: its axes are fixed in the world
+                    for k in 0..3 {
+                        vel[3 + k] += v[d + k];
+                    }
+                    let s = ball_motion(&work.axis, v, d + 3);
+                    add_motion(&s, &mut vel, &mut acc);
+                }
+                JointType::Ball => {
+                    let s = ball_motion(&work.axis, v, d);
+                    add_motion(&s, &mut vel, &mut acc);
+                }
+                JointType::Slide => {
+                    let s = &work.axis[d];
+                    let turn = cross(&ang(&vel), &lin(s));
+                    for k in 0..3 {
+                        acc[3 + k] = turn[k].mul_add(v[d], acc[3 + k]);
+                        vel[3 + k] = s[3 + k].mul_add(v[d], vel[3 + k]);
+                    }
+                }
+                JointType::Hinge => {
+                    let s = &work.axis[d];
+                    let rate = cross_motion(&vel, s);
+                    acc = axpy6(&rate, v[d], &acc);
+                    vel = axpy6(s, v[d], &vel);
+                }
+            }
+        }
+        work.vel[l] = vel;
+        work.bias_acc[l] = acc;
+        let inertia = &work.inertia[l];
+        let f = inertia_mul(inertia, &acc);
+        let h = inertia_mul(inertia, &vel);
+        // v x* h: the momentum carried along
+        let t = cross_add(&ang(&vel), &ang(&h), &cross_add(&lin(&vel), &lin(&h), &ang(&f)));
+        let f = cross_add(&ang(&vel), &lin(&h), &lin(&f));
+        work.bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];
+    }
+}
+
+/// Motion of three rotational degrees of freedom together.
+#[inline(always)]
+fn ball_motion<T: Real>(axis: &[V6<T>], v: &[T], d: usize) -> V6<T> {
+    let s = axpy6(&axis[d], v[d], &[T::zero(); 6]);
+    let s = axpy6(&axis[d + 1], v[d + 1], &s);
+    axpy6(&axis[d + 2], v[d + 2], &s)
+}
+
+#[inline(always)]
+fn add_motion<T: Real>(s: &V6<T>, vel: &mut V6<T>, acc: &mut V6<T>) {
+    let rate = cross_motion(vel, s);
+    for k in 0..6 {
+        acc[k] += rate[k];
+        vel[k] += s[k];
+    }
+}

@@ -1,0 +1,333 @@
+//! Lanes: one generic number that is a plain `f64` or `f32`, or `L` agents side by side in one vector register.
+//!
+//! Every kernel of the engine is written once over [`Real`]. Lane `i` of every value belongs to agent `i` of a group and
+//! no operation mixes lanes, which is what makes a trajectory independent of the slot an agent sits in and of the
+//! vector width. All backends round alike: `mul_add` is fused (one rounding) everywhere, emulated exactly where the
+//! processor has no such instruction; the transcendentals in [`math`] are built from these operations alone.
+//!
+//! Rust compiles a function for the baseline processor unless told otherwise, so vector code must be entered through
+//! [`Real::enter`], which runs a [`Kernel`] inside a function compiled for the right instruction set. Everything a
+//! kernel calls must be `#[inline(always)]`.
+
+pub mod math;
+mod portable;
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+pub use portable::F32x4;
+#[cfg(target_arch = "x86_64")]
+pub use x86::{F32x8, F32x16};
+
+/// A piece of work over lanes of type `T`, run by [`Real::enter`].
+///
+/// Implementations mark `run` `#[inline(always)]`.
+pub trait Kernel<T: Real> {
+    /// What the work returns.
+    type Output;
+    /// Does the work.
+    fn run(self) -> Self::Output;
+}
+
+/// `L` numbers, one per agent of a lane group.
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+{
+    /// The number in one lane: `f32` or `f64`. Constants are stored like this and broadcast at use.
+    type Scalar: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 'static;
+    /// One truth value per lane.
+    type Mask: Copy + Debug + Send + Sync + 'static;
+    /// Number of lanes.
+    const LANES: usize;
+    /// Name of the instruction set, as printed by benchmarks.
+    const ISA: &'static str;
+
+    /// Whether this processor can run the backend.
+    fn supported() -> bool;
+    /// Runs a kernel inside a function compiled for this backend's instruction set.
+    ///
+    /// # Panics
+    /// If the processor does not support it.
+    fn enter<K: Kernel<Self>>(kernel: K) -> K::Output;
+
+    /// Rounds to the precision of a lane.
+    fn scalar(x: f64) -> Self::Scalar;
+    /// The exact value of a lane's number.
+    fn widen(x: Self::Scalar) -> f64;
+    /// The same number in every lane.
+    fn splat(x: Self::Scalar) -> Self;
+    /// A literal in every lane.
+    #[inline(always)]
+    fn lit(x: f64) -> Self {
+        Self::splat(Self::scalar(x))
+    }
+    /// Zero in every lane.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::lit(0.0)
+    }
+    /// Reads `LANES` consecutive numbers.
+    fn load(from: &[Self::Scalar]) -> Self;
+    /// Writes `LANES` consecutive numbers.
+    fn store(self, to: &mut [Self::Scalar]);
+    /// The number in lane `i`.
+    fn get(&self, i: usize) -> Self::Scalar;
+    /// Replaces the number in lane `i`.
+    fn set(&mut self, i: usize, x: Self::Scalar);
+
+    /// `self * b + c`, rounded once.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`, rounded once.
+    fn neg_mul_add(self, b: Self, c: Self) -> Self;
+    /// Quotient, correctly rounded.
+    fn div(self, by: Self) -> Self;
+    /// Reciprocal, correctly rounded.
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::lit(1.0).div(self)
+    }
+    /// Square root, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// `self` where `self > other`, else `other` (so a NaN in `self` yields `other`).
+    fn max(self, other: Self) -> Self;
+    /// `self` where `self < other`, else `other` (so a NaN in `self` yields `other`).
+    fn min(self, other: Self) -> Self;
+    /// Nearest integer, ties to even.
+    fn round(self) -> Self;
+    /// Largest integer not above.
+    fn floor(self) -> Self;
+    /// `2^self` for integral `self` within the range of normal numbers.
+    fn exp2_int(self) -> Self;
+    /// `(m, e)` with `self = m * 2^e`, `1 <= m < 2`, for positive normal numbers.
+    fn split_exponent(self) -> (Self, Self);
+    /// Sum over the lanes in the order of a halving tree: `x[i] + x[i + L/2]`, and so on.
+    fn reduce_add(self) -> Self::Scalar;
+
+    /// Lanes where `self < other`; false where either is NaN.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `a` where the mask is set, else `b`.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// `a` where the mask is set, else +0.
+    #[inline(always)]
+    fn masked(mask: Self::Mask, a: Self) -> Self {
+        Self::select(mask, a, Self::zero())
+    }
+    /// Lane-wise and.
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Lane-wise or.
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Lane-wise exclusive or.
+    fn xor(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Lane-wise negation.
+    fn not(a: Self::Mask) -> Self::Mask;
+    /// No lane.
+    fn none() -> Self::Mask;
+    /// Whether any lane is set.
+    fn any(a: Self::Mask) -> bool;
+    /// Whether every lane is set.
+    #[inline(always)]
+    fn all(a: Self::Mask) -> bool {
+        !Self::any(Self::not(a))
+    }
+    /// Bit `i` tells lane `i`.
+    fn bits(a: Self::Mask) -> u32;
+    /// The inverse of [`Real::bits`].
+    fn from_bits(bits: u32) -> Self::Mask;
+
+    /// Sine and cosine.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        math::sin_cos(self)
+    }
+    /// Exponential; the argument is clamped to the range of normal results.
+    #[inline(always)]
+    fn exp(self) -> Self {
+        math::exp(self)
+    }
+    /// Natural logarithm of a positive normal number.
+    #[inline(always)]
+    fn ln(self) -> Self {
+        math::ln(self)
+    }
+    /// Hyperbolic tangent.
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        math::tanh(self)
+    }
+    /// Angle of the point (`x`, `self`), in (-pi, pi].
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        math::atan2(self, x)
+    }
+    /// Lanes that are neither infinite nor NaN.
+    #[inline(always)]
+    fn is_finite(self) -> Self::Mask {
+        // inf - inf and NaN - NaN are NaN, and a NaN compares false
+        (self - self).abs().lt(Self::lit(1.0))
+    }
+}
+
+/// Sum over 16 consecutive lanes held in `16 / LANES` vectors, in the same halving tree for every width.
+#[inline(always)]
+pub fn sum16<T: Real>(v: &[T]) -> T::Scalar {
+    match v.len() {
+        1 => v[0].reduce_add(),
+        2 => (v[0] + v[1]).reduce_add(),
+        4 => ((v[0] + v[2]) + (v[1] + v[3])).reduce_add(),
+        n => {
+            // one lane each: fold halves until one number is left
+            let mut x = [T::zero(); 16];
+            x[..n].copy_from_slice(v);
+            let mut half = n / 2;
+            while half > 0 {
+                for i in 0..half {
+                    x[i] += x[i + half];
+                }
+                half /= 2;
+            }
+            x[0].reduce_add()
+        }
+    }
+}
+
+/// Instruction sets a group of agents can be stepped with, chosen at run time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Isa {
+    /// One `f64` lane: the oracle that tests compare with MuJoCo.
+    F64,
+    /// One `f32` lane.
+    F32,
+    /// Four `f32` lanes without special instructions.
+    X4,
+    /// Eight lanes, AVX2 and FMA.
+    X8,
+    /// Sixteen lanes, AVX-512F.
+    X16,
+}
+
+impl Isa {
+    /// All of them, narrowest first.
+    pub const ALL: [Isa; 5] = [Isa::F64, Isa::F32, Isa::X4, Isa::X8, Isa::X16];
+
+    /// The widest that this processor supports.
+    pub fn best() -> Isa {
+        *[Isa::X16, Isa::X8].iter().find(|isa| isa.supported()).unwrap_or(&Isa::X4)
+    }
+    /// Number of agents per group.
+    pub fn lanes(self) -> usize {
+        match self {
+            Isa::F64 | Isa::F32 => 1,
+            Isa::X4 => 4,
+            Isa::X8 => 8,
+            Isa::X16 => 16,
+        }
+    }
+    /// Whether this processor can run it.
+    pub fn supported(self) -> bool {
+        match self {
+            Isa::F64 | Isa::F32 | Isa::X4 => true,
+            #[cfg(target_arch = "x86_64")]
+            Isa::X8 => F32x8::supported(),
+            #[cfg(target_arch = "x86_64")]
+            Isa::X16 => F32x16::supported(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Isa::X8 | Isa::X16 => false,
+        }
+    }
+    /// Short name for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Isa::F64 => "f64",
+            Isa::F32 => "f32",
+            Isa::X4 => "baseline",
+            Isa::X8 => "avx2",
+            Isa::X16 => "avx512",
+        }
+    }
+}
+
+impl std::str::FromStr for Isa {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        Isa::ALL
+            .into_iter()
+            .find(|isa| isa.name() == s)
+            .ok_or_else(|| format!("unknown instruction set '{s}'; expected one of f64, f32, baseline, avx2, avx512"))
+    }
+}
+
+/// Runs `$body` with the type alias `$T` bound to the lane type of an [`Isa`].
+#[macro_export]
+macro_rules! with_lanes {
+    ($isa:expr, $T:ident => $body:expr) => {
+        match $isa {
+            $crate::lanes::Isa::F64 => {
+                type $T = f64;
+                $body
+            }
+            $crate::lanes::Isa::F32 => {
+                type $T = f32;
+                $body
+            }
+            $crate::lanes::Isa::X4 => {
+                type $T = $crate::lanes::F32x4;
+                $body
+            }
+            #[cfg(target_arch = "x86_64")]
+            $crate::lanes::Isa::X8 => {
+                type $T = $crate::lanes::F32x8;
+                $body
+            }
+            #[cfg(target_arch = "x86_64")]
+            $crate::lanes::Isa::X16 => {
+                type $T = $crate::lanes::F32x16;
+                $body
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => unreachable!("not supported on this processor"),
+        }
+    };
+}
+
+macro_rules! assign_ops {
+    ($t:ty) => {
+        impl AddAssign for $t {
+            #[inline(always)]
+            fn add_assign(&mut self, o: Self) {
+                *self = *self + o
+            }
+        }
+        impl SubAssign for $t {
+            #[inline(always)]
+            fn sub_assign(&mut self, o: Self) {
+                *self = *self - o
+            }
+        }
+        impl MulAssign for $t {
+            #[inline(always)]
+            fn mul_assign(&mut self, o: Self) {
+                *self = *self * o
+            }
+        }
+    };
+}
+pub(crate) use assign_ops;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,134 @@
+//! `<default>` classes: which settings lie under an element of a given class.
+
+use super::document::Element;
+use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
+use super::value::Attrs;
+use std::collections::BTreeMap;
+
+/// Name of the outermost class.
+pub(crate) const MAIN: &str = "main";
+
+/// Actuator elements; a class has one actuator default, which each of them modifies.
+pub(crate) const ACTUATORS: [&str; 13] = [
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "orientation",
+    "pid",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+    "dcmotor",
+    "plugin",
+];
+
+/// Kind of element under which defaults are kept.
+fn kind(name: &str) -> &str {
+    match name {
+        "spatial" | "fixed" => "tendon",
+        name if ACTUATORS.contains(&name) => "actuator",
+        name => name,
+    }
+}
+
+/// Elements that set the defaults of a class, by kind, outermost class first.
+#[derive(Clone, Default)]
+struct Class<'a> {
+    layers: BTreeMap<&'a str, Vec<&'a Element>>,
+    /// Number of actuator elements up to the end of each enclosing class, this one last.
+    actuator_ends: Vec<usize>,
+}
+
+/// All default classes of a model.
+pub(crate) struct Defaults<'a> {
+    classes: BTreeMap<&'a str, Class<'a>>,
+}
+
+impl<'a> Defaults<'a> {
+    /// Reads every `<default>` section of the model.
+    pub fn read(root: &'a Element) -> Result<Self, MjcfError> {
+        let mut defaults = Defaults { classes: BTreeMap::from([(MAIN, Class::default())]) };
+        for section in root.children.iter().filter(|e| e.name == "default") {
+            if section.text("class").is_some_and(|c| c != MAIN) {
+                let message = format!("the outermost default class is named '{MAIN}'; leave 'class' out");
+                return Err(section.invalid(message));
+            }
+            defaults.section(section, MAIN)?;
+        }
+        Ok(defaults)
+    }
+
+    fn section(&mut self, section: &'a Element, name: &'a str) -> Result<(), MjcfError> {
+        let mut class = self.classes.remove(name).unwrap_or_default();
+        let settings = section.children.iter().filter(|e| e.name != "default");
+        for element in settings {
+            class.layers.entry(kind(&element.name)).or_default().push(element);
+        }
+        let actuators = class.layers.get("actuator").map_or(0, Vec::len);
+        match class.actuator_ends.last_mut() {
+            Some(end) => *end = actuators,
+            None => class.actuator_ends.push(actuators),
+        }
+        // a nested class starts as a copy of its parent, complete as of the end of the parent's element
+        self.classes.insert(name, class.clone());
+        for nested in section.children.iter().filter(|e| e.name == "default") {
+            let Some(name) = nested.text("class").filter(|c| !c.is_empty()) else {
+                return Err(nested.invalid("a nested default needs the attribute 'class'"));
+            };
+            if self.classes.contains_key(name) {
+                return Err(nested.invalid(format!("the default class '{}' is already defined", shorten(name))));
+            }
+            let mut inner = class.clone();
+            inner.actuator_ends.push(actuators);
+            self.classes.insert(name, inner);
+            self.section(nested, name)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that the class that `element` names in `attribute` exists, and returns it.
+    pub fn named<'e>(&self, element: &'e Element, attribute: &str) -> Result<Option<&'e str>, MjcfError> {
+        let Some(attr) = element.attr(attribute).filter(|a| !a.value.is_empty()) else { return Ok(None) };
+        if self.classes.contains_key(attr.value.as_str()) {
+            return Ok(Some(&attr.value));
+        }
+        Err(attr.place.error(MjcfErrorKind::UnknownName {
+            element: element.label(),
+            attribute: attribute.to_owned(),
+            kind: "default class".to_owned(),
+            found: shorten(&attr.value),
+            nearest: nearest(&attr.value, self.classes.keys().copied()),
+        }))
+    }
+
+    /// The element's attributes over those of its class, else of `childclass`, else of the outermost class.
+    pub fn attrs<'d>(&'d self, element: &'d Element, childclass: Option<&str>) -> Result<Attrs<'d>, MjcfError>
+    where
+        'a: 'd,
+    {
+        let class = self.named(element, "class")?.or(childclass).unwrap_or(MAIN);
+        let layers = self.classes.get(class).and_then(|c| c.layers.get(kind(&element.name)));
+        Ok(Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) })
+    }
+
+    /// Attributes of an actuator, and the number of its default elements up to the end of each class that encloses it.
+    pub fn actuator<'d>(&'d self, element: &'d Element) -> Result<(Attrs<'d>, &'d [usize]), MjcfError>
+    where
+        'a: 'd,
+    {
+        let class = self.named(element, "class")?.unwrap_or(MAIN);
+        let ends = self.classes.get(class).map_or(&[][..], |c| &c.actuator_ends);
+        Ok((self.attrs(element, None)?, ends))
+    }
+
+    /// Every element that sets defaults, on top of the ones below it: for checks.
+    pub fn all(&self) -> impl Iterator<Item = Attrs<'_>> {
+        self.classes.values().flat_map(|class| class.layers.values()).filter_map(|layers| {
+            let (element, defaults) = layers.split_last()?;
+            Some(Attrs { element, defaults })
+        })
+    }
+}

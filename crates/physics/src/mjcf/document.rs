@@ -1,0 +1,235 @@
+//! The XML document: elements with their places, `<include>` already expanded.
+
+use super::error::{MjcfError, MjcfErrorKind, shorten};
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
+/// Elements may be nested this deep; deeper files would exhaust the stack of whatever walks them.
+const MAX_DEPTH: usize = 200;
+/// Elements, text pieces and comments per file; keeps memory in proportion.
+const MAX_NODES: u32 = 4_000_000;
+
+/// Where something stands: file and line.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    pub file: Rc<str>,
+    pub line: usize,
+}
+
+impl Place {
+    pub fn error(&self, kind: MjcfErrorKind) -> MjcfError {
+        MjcfError { file: self.file.to_string(), line: self.line, kind }
+    }
+}
+
+/// One attribute and the line it stands on.
+#[derive(Clone, Debug)]
+pub(crate) struct Attr {
+    pub name: String,
+    pub value: String,
+    pub place: Place,
+}
+
+/// One element with everything below it.
+#[derive(Clone, Debug)]
+pub(crate) struct Element {
+    pub name: String,
+    pub attrs: Vec<Attr>,
+    pub children: Vec<Element>,
+    pub place: Place,
+}
+
+impl Element {
+    /// The attribute of that name.
+    pub fn attr(&self, name: &str) -> Option<&Attr> {
+        self.attrs.iter().find(|a| a.name == name)
+    }
+
+    /// The attribute's text.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.attr(name).map(|a| a.value.as_str())
+    }
+
+    /// Start tag with the name, for messages.
+    pub fn label(&self) -> String {
+        let tag = shorten(&self.name);
+        for key in ["name", "class"] {
+            if let Some(value) = self.text(key).filter(|v| !v.is_empty()) {
+                return format!("<{tag} {key}=\"{}\">", shorten(value));
+            }
+        }
+        format!("<{tag}>")
+    }
+
+    /// The element contradicts itself or the rest of the model.
+    pub fn invalid(&self, message: impl Into<String>) -> MjcfError {
+        self.place.error(MjcfErrorKind::Invalid { element: self.label(), message: message.into() })
+    }
+
+    /// The element, or one attribute of it, is valid MJCF that this engine does not have.
+    pub fn unsupported(&self, attribute: Option<&str>, reason: impl Into<String>) -> MjcfError {
+        let place = attribute.and_then(|a| self.attr(a)).map_or(&self.place, |a| &a.place);
+        place.error(MjcfErrorKind::Unsupported {
+            element: self.label(),
+            attribute: attribute.map(str::to_owned),
+            reason: reason.into(),
+        })
+    }
+
+    /// The attribute's text is not what it should be.
+    pub fn bad_value(&self, attr: &Attr, expected: impl Into<String>) -> MjcfError {
+        attr.place.error(MjcfErrorKind::BadValue {
+            element: self.label(),
+            attribute: attr.name.clone(),
+            found: shorten(&attr.value),
+            expected: expected.into(),
+        })
+    }
+}
+
+/// Reads the text of an included file, given the path relative to the main file.
+pub(crate) type Resolve<'a> = dyn Fn(&str) -> Result<String, String> + 'a;
+
+/// Parses `text` and expands its includes with `resolve`. `name` is the file's name for messages.
+pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve) -> Result<Element, MjcfError> {
+    let mut loader = Loader { resolve, included: BTreeSet::new() };
+    let root = loader.file(text, name, "", 0)?;
+    if root.name != "mujoco" {
+        let found = shorten(&root.name);
+        let message = format!("the top-level element is <{found}>; expected <mujoco>");
+        return Err(root.place.error(MjcfErrorKind::Syntax(message)));
+    }
+    Ok(root)
+}
+
+struct Loader<'a> {
+    resolve: &'a Resolve<'a>,
+    included: BTreeSet<String>,
+}
+
+impl Loader<'_> {
+    /// One file; `dir` is its directory relative to the main file, empty or with a trailing slash.
+    fn file(&mut self, text: &str, name: &str, dir: &str, depth: usize) -> Result<Element, MjcfError> {
+        let file: Rc<str> = name.into();
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        // no DTD, hence no entity bombs; the parser itself does not recurse over elements
+        let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
+        let document = roxmltree::Document::parse_with_options(text, options).map_err(|error| {
+            let place = Place { file: file.clone(), line: error.pos().row as usize };
+            place.error(MjcfErrorKind::Syntax(format!("not well-formed XML: {error}")))
+        })?;
+        let lines = LineIndex::new(text);
+        self.element(document.root_element(), &file, &lines, dir, depth)
+    }
+
+    fn element(
+        &mut self,
+        node: roxmltree::Node,
+        file: &Rc<str>,
+        lines: &LineIndex,
+        dir: &str,
+        depth: usize,
+    ) -> Result<Element, MjcfError> {
+        let place = |offset: usize| Place { file: file.clone(), line: lines.line(offset) };
+        let mut element = Element {
+            name: node.tag_name().name().to_owned(),
+            // attributes of other namespaces (xsi:schemaLocation) are not MJCF
+            attrs: node
+                .attributes()
+                .filter(|a| a.namespace().is_none())
+                .map(|a| Attr { name: a.name().to_owned(), value: a.value().to_owned(), place: place(a.range().start) })
+                .collect(),
+            children: Vec::new(),
+            place: place(node.range().start),
+        };
+        if depth >= MAX_DEPTH {
+            return Err(element.invalid(format!("elements are nested more than {MAX_DEPTH} deep")));
+        }
+        for child in node.children().filter(|n| n.is_element()) {
+            let child = self.element(child, file, lines, dir, depth + 1)?;
+            if child.name == "include" {
+                element.children.extend(self.include(&child, dir, depth)?);
+            } else {
+                element.children.push(child);
+            }
+        }
+        Ok(element)
+    }
+
+    /// The children of the included file's top-level element.
+    fn include(&mut self, include: &Element, dir: &str, depth: usize) -> Result<Vec<Element>, MjcfError> {
+        if let Some(attr) = include.attrs.iter().find(|a| a.name != "file") {
+            return Err(attr.place.error(MjcfErrorKind::UnknownAttribute {
+                element: include.label(),
+                attribute: shorten(&attr.name),
+                nearest: super::error::nearest(&attr.name, ["file"]),
+            }));
+        }
+        let Some(attr) = include.attr("file") else {
+            return Err(include.invalid("the attribute 'file' is missing"));
+        };
+        if let Some(child) = include.children.first() {
+            return Err(child.place.error(MjcfErrorKind::UnknownElement {
+                element: child.label(),
+                parent: "include".into(),
+                nearest: None,
+            }));
+        }
+        // relative to the main file, else to the including one
+        let path = normalize(&attr.value);
+        let (path, text) = match (self.resolve)(&path) {
+            Ok(text) => (path, text),
+            Err(reason) => {
+                let local = normalize(&join(dir, &attr.value));
+                let text = (self.resolve)(&local).map_err(|_| {
+                    let message = format!("included file '{}': {reason}", shorten(&path));
+                    attr.place.error(MjcfErrorKind::Read(message))
+                })?;
+                (local, text)
+            }
+        };
+        if !self.included.insert(path.clone()) {
+            return Err(include.invalid(format!("the file '{}' is already included", shorten(&path))));
+        }
+        let dir = path.rfind('/').map_or("", |end| &path[..=end]);
+        let root = self.file(&text, &path, dir, depth)?;
+        if root.children.is_empty() {
+            return Err(include.invalid(format!("the file '{}' contains no elements", shorten(&path))));
+        }
+        Ok(root.children)
+    }
+}
+
+/// `path` seen from `dir`, which is empty or ends with a slash.
+fn join(dir: &str, path: &str) -> String {
+    if path.starts_with('/') { path.to_owned() } else { format!("{dir}{path}") }
+}
+
+/// Removes `.` and resolvable `..` parts, so that one file has one name.
+fn normalize(path: &str) -> String {
+    let mut parts: Vec<&str> = Vec::new();
+    for part in path.split(['/', '\\']) {
+        match part {
+            "." => {}
+            "" if !parts.is_empty() => {}
+            ".." if parts.last().is_some_and(|&last| last != ".." && !last.is_empty()) => {
+                parts.pop();
+            }
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+/// Line numbers by byte offset.
+struct LineIndex(Vec<usize>);
+
+impl LineIndex {
+    fn new(text: &str) -> Self {
+        LineIndex(text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i).collect())
+    }
+
+    fn line(&self, offset: usize) -> usize {
+        self.0.partition_point(|&newline| newline < offset) + 1
+    }
+}

@@ -1,0 +1,133 @@
+//! What can be wrong with a model file, and where.
+
+use std::fmt;
+
+/// An error in an MJCF model: the file, the line and what was found there.
+///
+/// Its text reads `hopper.xml:12: <geom name="foot"> has no attribute 'siez'; did you mean 'size'?`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub struct MjcfError {
+    /// File as it was named to the loader, or the name given with the text.
+    pub file: String,
+    /// Line, counted from 1; 0 when the error concerns the file as a whole.
+    pub line: usize,
+    /// What is wrong.
+    pub kind: MjcfErrorKind,
+}
+
+impl fmt::Display for MjcfError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            0 => write!(f, "{}: {}", self.file, self.kind),
+            line => write!(f, "{}:{}: {}", self.file, line, self.kind),
+        }
+    }
+}
+
+/// The kinds of [`MjcfError`]. `element` is the start tag with its name, such as `<geom name="foot">`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MjcfErrorKind {
+    /// The file could not be read.
+    #[error("cannot read the file: {0}")]
+    Read(String),
+    /// The file is not well-formed XML, or it is not an MJCF file.
+    #[error("{0}")]
+    Syntax(String),
+    /// MJCF has no such element at this place.
+    #[error("{element} is not an element of <{parent}>{}", hint(.nearest))]
+    UnknownElement {
+        /// The element found.
+        element: String,
+        /// Name of the enclosing element.
+        parent: String,
+        /// The most similar valid name.
+        nearest: Option<String>,
+    },
+    /// MJCF has no such attribute in this element.
+    #[error("{element} has no attribute '{attribute}'{}", hint(.nearest))]
+    UnknownAttribute {
+        /// The element found.
+        element: String,
+        /// The attribute found.
+        attribute: String,
+        /// The most similar valid name.
+        nearest: Option<String>,
+    },
+    /// Valid MJCF that would change the dynamics and that this engine does not have.
+    #[error("{element}{}: {reason}", in_attribute(.attribute))]
+    Unsupported {
+        /// The element found.
+        element: String,
+        /// The attribute, unless the whole element is meant.
+        attribute: Option<String>,
+        /// Why it is refused, and what to do instead where there is something.
+        reason: String,
+    },
+    /// An attribute's text is not what the attribute takes.
+    #[error("{element} attribute '{attribute}' is '{found}'; expected {expected}")]
+    BadValue {
+        /// The element found.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// Its text (shortened when long).
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
+    /// An attribute refers to something that does not exist.
+    #[error("{element} attribute '{attribute}': there is no {kind} '{found}'{}", hint(.nearest))]
+    UnknownName {
+        /// The element found.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// What was looked for: `joint`, `site`, `default class`...
+        kind: String,
+        /// The name found.
+        found: String,
+        /// The most similar existing name.
+        nearest: Option<String>,
+    },
+    /// The element contradicts itself or the rest of the model.
+    #[error("{element}: {message}")]
+    Invalid {
+        /// The element found.
+        element: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+fn hint(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default()
+}
+
+fn in_attribute(attribute: &Option<String>) -> String {
+    attribute.as_ref().map(|a| format!(" attribute '{a}'")).unwrap_or_default()
+}
+
+/// The candidate most similar to `name`, if any is similar enough to be worth suggesting.
+pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    // a suggestion for a very long name is of no use and costs quadratic time
+    if name.is_empty() || name.len() > 64 {
+        return None;
+    }
+    candidates
+        .into_iter()
+        .filter(|c| !c.is_empty() && c.len() <= 64)
+        .map(|c| (strsim::damerau_levenshtein(name, c), c))
+        .min_by_key(|&(distance, _)| distance)
+        .filter(|&(distance, c)| distance <= 1 + name.len().min(c.len()) / 3)
+        .map(|(_, c)| c.to_owned())
+}
+
+/// `text`, shortened to what fits in a message.
+pub(crate) fn shorten(text: &str) -> String {
+    const LONGEST: usize = 60;
+    if text.chars().count() <= LONGEST {
+        return text.to_owned();
+    }
+    let head: String = text.chars().take(LONGEST).collect();
+    format!("{head}...")
+}

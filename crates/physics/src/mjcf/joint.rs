@@ -1,0 +1,184 @@
+//! `<joint>` and `<freejoint>`.
+
+use super::document::Element;
+use super::error::MjcfError;
+use super::math::{EPS, Frame, rotate, unit};
+use super::settings::Settings;
+use super::value::{Attrs, Tristate};
+use crate::model::{JointType, SolImp, SolRef, Vec3};
+
+/// Default `solref` of every constraint.
+pub(crate) const SOLREF: SolRef = [0.02, 1.0];
+/// Default `solimp` of every constraint.
+pub(crate) const SOLIMP: SolImp = [0.9, 0.95, 0.001, 0.5, 2.0];
+
+const TYPES: [(&str, JointType); 4] =
+    [("free", JointType::Free), ("ball", JointType::Ball), ("slide", JointType::Slide), ("hinge", JointType::Hinge)];
+
+/// A joint as the file describes it, angles in radians, in the frame of its body.
+pub(crate) struct JointSpec<'a> {
+    pub element: &'a Element,
+    pub kind: JointType,
+    pub pos: Vec3,
+    pub axis: Vec3,
+    pub reference: f64,
+    pub spring_reference: f64,
+    pub limited: bool,
+    pub range: [f64; 2],
+    pub margin: f64,
+    pub stiffness: f64,
+    pub damping: f64,
+    pub armature: f64,
+    pub frictionloss: f64,
+    /// Time constant and damping ratio from which stiffness and damping follow.
+    pub springdamper: Option<[f64; 2]>,
+    pub solref_limit: SolRef,
+    pub solimp_limit: SolImp,
+    pub solref_friction: SolRef,
+    pub solimp_friction: SolImp,
+    pub actuator_force_range: Option<[f64; 2]>,
+    pub group: i32,
+}
+
+impl JointSpec<'_> {
+    /// Number of coordinates in `qpos` and of velocities in `qvel`.
+    pub fn sizes(&self) -> (usize, usize) {
+        match self.kind {
+            JointType::Free => (7, 6),
+            JointType::Ball => (4, 3),
+            JointType::Slide | JointType::Hinge => (1, 1),
+        }
+    }
+
+    /// `<freejoint>`: a free joint that no default touches.
+    pub fn free(element: &Element) -> Result<JointSpec<'_>, MjcfError> {
+        let attrs = Attrs::plain(element);
+        Ok(JointSpec {
+            element,
+            kind: JointType::Free,
+            pos: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+            reference: 0.0,
+            spring_reference: 0.0,
+            limited: false,
+            range: [0.0; 2],
+            margin: 0.0,
+            stiffness: 0.0,
+            damping: 0.0,
+            armature: 0.0,
+            frictionloss: 0.0,
+            springdamper: None,
+            solref_limit: SOLREF,
+            solimp_limit: SOLIMP,
+            solref_friction: SOLREF,
+            solimp_friction: SOLIMP,
+            actuator_force_range: None,
+            group: attrs.integer_or("group", 0)?,
+        })
+    }
+
+    /// `<joint>` with its defaults; `frame` is that of enclosing `<frame>` elements.
+    pub fn read<'a>(attrs: &Attrs<'a>, frame: &Frame, settings: &Settings) -> Result<JointSpec<'a>, MjcfError> {
+        let element = attrs.element;
+        let kind = attrs.keyword("type", &TYPES)?.unwrap_or(JointType::Hinge);
+        let scalar = matches!(kind, JointType::Hinge | JointType::Slide);
+        let angle = |x: f64| if kind == JointType::Slide { x } else { settings.angle(x) };
+        let mut axis: Vec3 = attrs.array_or("axis", [0.0, 0.0, 1.0])?;
+        if scalar {
+            axis = rotate(frame.quat, axis);
+            axis = unit(axis).ok_or_else(|| element.invalid(format!("the axis is shorter than {EPS:e}")))?;
+        } else {
+            axis = [0.0, 0.0, 1.0];
+        }
+        let pos = attrs.array_or("pos", [0.0; 3])?;
+        let range = attrs.array_or("range", [0.0; 2])?;
+        let limited = is_limited(attrs, "limited", range)? && kind != JointType::Free;
+        let force_range = attrs.array_or("actuatorfrcrange", [0.0; 2])?;
+        let force_limited = is_limited(attrs, "actuatorfrclimited", force_range)?;
+        let reference = attrs.number_or("ref", 0.0)?;
+        let spring_reference = attrs.number_or("springref", 0.0)?;
+        let spec = JointSpec {
+            element,
+            kind,
+            pos: if kind == JointType::Free { [0.0; 3] } else { frame.point(pos) },
+            axis,
+            reference: if kind == JointType::Hinge { settings.angle(reference) } else { reference },
+            spring_reference: if kind == JointType::Hinge {
+                settings.angle(spring_reference)
+            } else {
+                spring_reference
+            },
+            limited,
+            // as in MuJoCo, a range that does not apply is not converted
+            range: if limited { range.map(angle) } else { range },
+            margin: attrs.number_or("margin", 0.0)?,
+            stiffness: linear(attrs, "stiffness")?,
+            damping: linear(attrs, "damping")?,
+            armature: attrs.number_or("armature", 0.0)?,
+            frictionloss: attrs.number_or("frictionloss", 0.0)?,
+            springdamper: Some(attrs.array_or("springdamper", [0.0; 2])?).filter(|s| s[0] > 0.0 && s[1] > 0.0),
+            solref_limit: attrs.partial_or("solreflimit", SOLREF)?,
+            solimp_limit: attrs.partial_or("solimplimit", SOLIMP)?,
+            solref_friction: attrs.partial_or("solreffriction", SOLREF)?,
+            solimp_friction: attrs.partial_or("solimpfriction", SOLIMP)?,
+            actuator_force_range: (force_limited && scalar).then_some(force_range),
+            group: attrs.integer_or("group", 0)?,
+        };
+        Ok(spec)
+    }
+
+    /// Checks what only a joint of the model, not a default, must fulfill.
+    pub fn check(&self, attrs: &Attrs, settings: &Settings) -> Result<(), MjcfError> {
+        if self.kind == JointType::Free {
+            return Ok(());
+        }
+        check_limit(attrs, "limited", "range", self.range, settings)?;
+        if self.limited && self.kind == JointType::Ball && self.range[0] != 0.0 {
+            return Err(self.element.invalid("the range of a ball joint must start with 0"));
+        }
+        if self.kind != JointType::Ball {
+            let force = attrs.array_or("actuatorfrcrange", [0.0; 2])?;
+            check_limit(attrs, "actuatorfrclimited", "actuatorfrcrange", force, settings)?;
+        }
+        Ok(())
+    }
+}
+
+/// Stiffness or damping, of which only the linear term is supported.
+fn linear(attrs: &Attrs, name: &str) -> Result<f64, MjcfError> {
+    let terms: [f64; 3] = attrs.partial_or(name, [0.0; 3])?;
+    if terms[1] != 0.0 || terms[2] != 0.0 {
+        let element = attrs.find(name).map_or(attrs.element, |(e, _)| e);
+        return Err(element.unsupported(Some(name), "only the linear term is supported; leave the others out"));
+    }
+    Ok(terms[0])
+}
+
+/// Whether a range applies: as switched, or as it is given when the switch is `auto`.
+pub(crate) fn is_limited(attrs: &Attrs, switch: &str, range: [f64; 2]) -> Result<bool, MjcfError> {
+    Ok(match attrs.tristate(switch)? {
+        Tristate::False => false,
+        Tristate::True => true,
+        Tristate::Auto => range[0] < range[1],
+    })
+}
+
+/// Checks a range and its switch in an element of the model; those of a class may still be completed.
+pub(crate) fn check_limit(
+    attrs: &Attrs,
+    switch: &str,
+    name: &str,
+    range: [f64; 2],
+    settings: &Settings,
+) -> Result<(), MjcfError> {
+    let given = range[0] != 0.0 || range[1] != 0.0;
+    if attrs.tristate(switch)? == Tristate::Auto && given && !settings.autolimits {
+        let message = format!("there is '{name}' but not '{switch}', and the compiler's autolimits is false");
+        return Err(attrs.element.invalid(message));
+    }
+    if is_limited(attrs, switch, range)? && !(range[0] < range[1]) {
+        let [low, high] = range;
+        return Err(attrs.element.invalid(format!("'{name}' goes from {low} to {high}; the first must be smaller")));
+    }
+    Ok(())
+}

@@ -1,0 +1,91 @@
+//! MJCF: reads a model file and compiles it as MuJoCo 4.0 does.
+//!
+//! ```no_run
+//! let model = marathon_physics::Model::from_xml_file("hopper.xml")?;
+//! println!("{} has {} degrees of freedom", model.name, model.nv);
+//! # Ok::<(), marathon_physics::mjcf::MjcfError>(())
+//! ```
+//!
+//! The way of a file: [`document`] parses the XML and expands includes, [`schema`] refuses what is misspelled or not
+//! supported, [`defaults`] lays classes under elements, [`tree`] reads the bodies, [`inertia`] gives them mass,
+//! [`assemble`] puts the [`Model`] together, [`set0`] and [`statistics`] compute what follows from the reference
+//! configuration.
+//!
+//! What changes the dynamics and is not supported is an error with file and line, never skipped.
+
+mod actuator;
+mod assemble;
+mod contact;
+mod custom;
+mod defaults;
+mod document;
+mod error;
+mod geom;
+mod inertia;
+mod joint;
+mod math;
+mod names;
+mod orientation;
+mod schema;
+mod sensor;
+mod set0;
+mod settings;
+mod statistics;
+mod tree;
+mod value;
+
+pub use error::{MjcfError, MjcfErrorKind};
+
+use crate::model::Model;
+use std::path::{Path, PathBuf};
+
+impl Model {
+    /// Reads and compiles a model file.
+    ///
+    /// Included files are looked up relative to this file, then relative to the file that includes them.
+    ///
+    /// # Errors
+    ///
+    /// The file or an included one cannot be read or is not a valid, supported model.
+    pub fn from_xml_file(path: impl AsRef<Path>) -> Result<Model, MjcfError> {
+        let path = path.as_ref();
+        let shown = path.display().to_string();
+        let text = read(path).map_err(|reason| MjcfError {
+            file: shown.clone(),
+            line: 0,
+            kind: MjcfErrorKind::Read(reason),
+        })?;
+        let dir: PathBuf = path.parent().map(Path::to_owned).unwrap_or_default();
+        let root = document::parse(&text, &shown, &|file| read(&dir.join(file)))?;
+        assemble::compile(&root)
+    }
+
+    /// Compiles a model given as text, without includes. `name` stands for the file in messages.
+    ///
+    /// # Errors
+    ///
+    /// The text is not a valid, supported model.
+    pub fn from_xml_str(xml: &str, name: &str) -> Result<Model, MjcfError> {
+        Self::from_xml_str_with(xml, name, &|_| Err("a model given as text has no files to include".to_owned()))
+    }
+
+    /// Compiles a model given as text. `resolve` returns the text of an included file, given its path relative to the
+    /// model, or why there is none.
+    ///
+    /// # Errors
+    ///
+    /// The text or an included file is not a valid, supported model.
+    pub fn from_xml_str_with(
+        xml: &str,
+        name: &str,
+        resolve: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Model, MjcfError> {
+        let root = document::parse(xml, name, resolve)?;
+        assemble::compile(&root)
+    }
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    String::from_utf8(bytes).map_err(|e| format!("the file is not UTF-8 text: {e}"))
+}

@@ -1,0 +1,478 @@
+//! Which elements and attributes MJCF has (MuJoCo 4.0), and which of them this engine takes.
+//!
+//! Everything in a file is either read, or known to leave the dynamics alone, or refused with its file and line.
+//! Nothing is skipped silently.
+
+use super::document::{Attr, Element};
+use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
+
+/// One element that may stand inside another.
+struct Rule {
+    name: &'static str,
+    /// Attributes that are read.
+    reads: &'static str,
+    /// Attributes that do not change the dynamics.
+    ignores: &'static str,
+    /// Attributes that would change the dynamics, as `name` or `name=value` with the values that leave it alone,
+    /// separated by `|`.
+    refuses: &'static str,
+    inside: Inside,
+}
+
+/// What an element may contain.
+enum Inside {
+    /// The elements of this list.
+    Rules(&'static [Rule]),
+    /// Anything: the element is of no consequence.
+    Anything,
+    /// The element itself is refused.
+    Refused(&'static str),
+}
+
+const NOTHING: Inside = Inside::Rules(&[]);
+
+const fn rule(name: &'static str, reads: &'static str, ignores: &'static str, refuses: &'static str) -> Rule {
+    Rule { name, reads, ignores, refuses, inside: NOTHING }
+}
+
+const fn section(name: &'static str, reads: &'static str, rules: &'static [Rule]) -> Rule {
+    Rule { name, reads, ignores: "", refuses: "", inside: Inside::Rules(rules) }
+}
+
+const fn anything(name: &'static str) -> Rule {
+    Rule { name, reads: "", ignores: "", refuses: "", inside: Inside::Anything }
+}
+
+const fn refused(name: &'static str, reason: &'static str) -> Rule {
+    Rule { name, reads: "", ignores: "", refuses: "", inside: Inside::Refused(reason) }
+}
+
+const fn containing(rule: Rule, rules: &'static [Rule]) -> Rule {
+    Rule { inside: Inside::Rules(rules), ..rule }
+}
+
+const NO_PLUGIN: Rule = refused("plugin", "plugins are not supported");
+const EXPAND: &str = "this engine does not expand models; save the expanded model from MuJoCo and load that";
+const NO_FLEX: &str = "deformable bodies are not supported";
+
+const TOP: &[Rule] = &[
+    containing(
+        rule(
+            "compiler",
+            "angle autolimits balanceinertia boundinertia boundmass coordinate eulerseq inertiafromgeom \
+             inertiagrouprange settotalmass",
+            "assetdir conflict discardvisual fitaabb meshdir passthrough savecanonical savecompiled saveinertial \
+             strippath texturedir usethread",
+            "alignfree=false fusestatic=false",
+        ),
+        &[rule(
+            "lengthrange",
+            "",
+            "accel interval inttotal maxforce mode timeconst timestep tolrange useexisting uselimit",
+            "",
+        )],
+    ),
+    containing(
+        rule(
+            "option",
+            "timestep gravity integrator cone impratio iterations ls_iterations tolerance solver jacobian",
+            // each of these has an effect only together with something that is refused
+            "ls_tolerance magnetic ccd_iterations ccd_tolerance noslip_tolerance sdf_initpoints sdf_iterations \
+             sleep_tolerance wind o_margin o_solref o_solimp o_friction",
+            "density=0 viscosity=0 noslip_iterations=0 actuatorgroupdisable",
+        ),
+        &[rule(
+            "flag",
+            "constraint limit contact frictionloss spring damper gravity clampctrl warmstart actuation refsafe \
+             eulerdamp filterparent",
+            "equality autoreset energy fwdinv invdiscrete island midphase multiccd nativeccd",
+            "sensor=enable override=disable sleep=disable diagexact=disable ipc=disable speculative=disable",
+        )],
+    ),
+    rule(
+        "size",
+        "nkey",
+        "memory nconmax njmax nstack nuser_actuator nuser_body nuser_cam nuser_geom nuser_jnt nuser_sensor \
+         nuser_site nuser_tendon nuserdata",
+        "",
+    ),
+    rule("statistic", "center extent meaninertia meanmass meansize", "", ""),
+    section("visual", "", VISUAL),
+    section("default", "class", &[]),
+    section("extension", "", &[NO_PLUGIN]),
+    section("asset", "", ASSET),
+    section("worldbody", "", BODY),
+    section("deformable", "", &[refused("flex", NO_FLEX), anything("skin")]),
+    section("contact", "", CONTACT),
+    section("tendon", "", TENDON),
+    section("equality", "", EQUALITY),
+    section("actuator", "", ACTUATOR),
+    section("sensor", "", SENSOR),
+    section("custom", "", CUSTOM),
+    section("keyframe", "", &[rule("key", "name time qpos qvel ctrl", "", "act mpos mquat plastic")]),
+];
+
+const VISUAL: &[Rule] = &[
+    rule(
+        "global",
+        "",
+        "azimuth bvactive cameraid elevation ellipsoidinertia fovy glow ipd linewidth offheight offwidth \
+         orthographic realtime",
+        "",
+    ),
+    rule("quality", "", "numquads numslices numstacks offsamples shadowsize", ""),
+    rule("headlight", "", "active ambient diffuse specular", ""),
+    rule(
+        "map",
+        "",
+        "actuatortendon alpha fogend fogstart force haze shadowclip shadowscale stiffness stiffnessrot torque zfar \
+         znear",
+        "",
+    ),
+    rule(
+        "scale",
+        "",
+        "actuatorlength actuatorwidth camera com connect constraint contactheight contactwidth forcewidth \
+         framelength framewidth frustum jointlength jointwidth light selectpoint slidercrank",
+        "",
+    ),
+    rule(
+        "rgba",
+        "",
+        "actuator actuatornegative actuatorpositive bv bvactive camera com connect constraint contactforce \
+         contactfriction contactgap contactpoint contacttorque crankbroken fog force frustum haze inertia joint \
+         light rangefinder selectpoint slidercrank",
+        "",
+    ),
+];
+
+// assets that nothing refers to are of no consequence; geoms that refer to meshes are refused
+const ASSET: &[Rule] = &[
+    anything("mesh"),
+    anything("hfield"),
+    anything("skin"),
+    anything("model"),
+    rule(
+        "texture",
+        "name class",
+        "builtin colorspace content_type embed file fileback filedown filefront fileleft fileright fileup \
+         gridlayout gridsize height hflip mark markrgb nchannel random rgb1 rgb2 type vflip width",
+        "",
+    ),
+    containing(
+        rule(
+            "material",
+            "name class rgba",
+            "emission metallic reflectance roughness shininess specular texrepeat texture texuniform",
+            "",
+        ),
+        &[rule("layer", "", "role texture", "")],
+    ),
+];
+
+const BODY: &[Rule] = &[
+    rule("body", "name childclass mocap simple pos quat axisangle euler xyaxes zaxis", "user fuse sleep", "gravcomp=0"),
+    rule("frame", "name childclass pos quat axisangle euler xyaxes zaxis", "scaling", "scale=1 massscale=1"),
+    rule("inertial", "pos mass diaginertia fullinertia quat axisangle euler xyaxes zaxis", "", ""),
+    rule(
+        "joint",
+        "name class type pos axis range limited margin ref springref stiffness damping armature frictionloss \
+         springdamper solreflimit solimplimit solreffriction solimpfriction actuatorfrcrange actuatorfrclimited \
+         group",
+        "user",
+        "springyield=0 actuatorgravcomp=false",
+    ),
+    rule("freejoint", "name group", "", "align=false|auto"),
+    containing(
+        rule(
+            "geom",
+            "name class type pos quat axisangle euler xyaxes zaxis fromto size mass density contype conaffinity \
+             condim priority friction solmix solref solimp margin gap group rgba material",
+            "castshadow fitscale fluidcoef fluidshape user",
+            "adhesion=0 surfacevel=0 shellinertia=false hfield mesh",
+        ),
+        &[NO_PLUGIN],
+    ),
+    rule(
+        "site",
+        "name class type pos quat axisangle euler xyaxes zaxis fromto size group rgba material",
+        "user",
+        "mesh",
+    ),
+    rule(
+        "camera",
+        "name class pos quat axisangle euler xyaxes zaxis mode target fovy",
+        "focal focalpixel ipd output principal principalpixel projection resolution sensorsize user",
+        "",
+    ),
+    rule(
+        "light",
+        "name class pos dir mode target directional type diffuse",
+        "active ambient attenuation bulbradius castshadow cutoff exponent intensity range softness specular texture",
+        "",
+    ),
+    NO_PLUGIN,
+    refused("attach", EXPAND),
+    refused("replicate", EXPAND),
+    refused("composite", EXPAND),
+    refused("flexcomp", NO_FLEX),
+];
+
+const CONTACT: &[Rule] = &[
+    rule("pair", "name class condim friction gap geom1 geom2 margin solimp solref", "", "adhesion=0 solreffriction=0"),
+    rule("exclude", "name body1 body2", "", ""),
+];
+
+const TENDON: &[Rule] = &[
+    containing(
+        rule(
+            "spatial",
+            "name class stiffness damping frictionloss armature springyield limited range",
+            "actuatorfrclimited actuatorfrcrange group margin material rgba solimpfriction solimplimit \
+             solreffriction solreflimit springlength user width",
+            "",
+        ),
+        &[rule("site", "site", "", ""), rule("geom", "geom", "sidesite", ""), rule("pulley", "", "divisor", "")],
+    ),
+    containing(
+        rule(
+            "fixed",
+            "name class stiffness damping frictionloss armature springyield limited range",
+            "actuatorfrclimited actuatorfrcrange group margin solimpfriction solimplimit solreffriction solreflimit \
+             springlength user",
+            "",
+        ),
+        &[rule("joint", "joint", "coef", "")],
+    ),
+];
+
+const NO_EQUALITY: &str = "equality constraints are not supported";
+const EQUALITY: &[Rule] = &[
+    refused("connect", NO_EQUALITY),
+    refused("weld", NO_EQUALITY),
+    refused("joint", NO_EQUALITY),
+    refused("tendon", NO_EQUALITY),
+    refused("flex", NO_EQUALITY),
+    refused("flexstrain", NO_EQUALITY),
+];
+
+/// Attributes of every actuator that have an effect only with something that is refused.
+macro_rules! actuator_ignores {
+    () => {
+        "cranklength group interp lengthrange user"
+    };
+}
+/// Attributes of every actuator that are refused: other transmissions, inertia, damping and delay.
+macro_rules! actuator_refuses {
+    () => {
+        "armature=0 damping=0 delay=0 nsample=0 site refsite slidersite cranksite tendon"
+    };
+}
+/// Attributes of every actuator that are read.
+macro_rules! actuator_reads {
+    () => {
+        "name class joint jointinparent gear ctrllimited ctrlrange forcelimited forcerange"
+    };
+}
+const NO_ACTUATOR: &str = "only the actuators motor, position, velocity and general are supported";
+const ACTUATOR: &[Rule] = &[
+    rule(
+        "general",
+        concat!(actuator_reads!(), " gainprm gaintype biasprm biastype inheritrange"),
+        concat!(actuator_ignores!(), " dynprm actearly actrange"),
+        concat!(actuator_refuses!(), " body dyntype=none actdim=0|-1 actlimited=false|auto ffrange velrange input"),
+    ),
+    rule("motor", actuator_reads!(), actuator_ignores!(), actuator_refuses!()),
+    rule(
+        "position",
+        concat!(actuator_reads!(), " kp kv dampratio inheritrange"),
+        actuator_ignores!(),
+        concat!(actuator_refuses!(), " timeconst=0"),
+    ),
+    rule("velocity", concat!(actuator_reads!(), " kv"), actuator_ignores!(), actuator_refuses!()),
+    refused("intvelocity", NO_ACTUATOR),
+    refused("orientation", NO_ACTUATOR),
+    refused("pid", NO_ACTUATOR),
+    refused("damper", NO_ACTUATOR),
+    refused("cylinder", NO_ACTUATOR),
+    refused("muscle", NO_ACTUATOR),
+    refused("adhesion", NO_ACTUATOR),
+    refused("dcmotor", NO_ACTUATOR),
+    NO_PLUGIN,
+];
+
+const fn sensor(name: &'static str, reads: &'static str) -> Rule {
+    rule(name, reads, "name cutoff delay interval interp noise nsample user", "")
+}
+const FRAME: &str = "objtype objname reftype refname";
+const PAIR: &str = "body1 body2 geom1 geom2";
+const SENSOR: &[Rule] = &[
+    sensor("touch", "site"),
+    sensor("accelerometer", "site"),
+    sensor("velocimeter", "site"),
+    sensor("gyro", "site"),
+    sensor("force", "site"),
+    sensor("torque", "site"),
+    sensor("magnetometer", "site"),
+    sensor("camprojection", "site camera"),
+    sensor("rangefinder", "site camera data"),
+    sensor("jointpos", "joint"),
+    sensor("jointvel", "joint"),
+    sensor("tendonpos", "tendon"),
+    sensor("tendonvel", "tendon"),
+    sensor("actuatorpos", "actuator"),
+    sensor("actuatorvel", "actuator"),
+    sensor("actuatorfrc", "actuator"),
+    sensor("jointactuatorfrc", "joint"),
+    sensor("tendonactuatorfrc", "tendon"),
+    sensor("ballquat", "joint"),
+    sensor("ballangvel", "joint"),
+    sensor("jointlimitpos", "joint"),
+    sensor("jointlimitvel", "joint"),
+    sensor("jointlimitfrc", "joint"),
+    sensor("tendonlimitpos", "tendon"),
+    sensor("tendonlimitvel", "tendon"),
+    sensor("tendonlimitfrc", "tendon"),
+    sensor("framepos", FRAME),
+    sensor("framequat", FRAME),
+    sensor("framexaxis", FRAME),
+    sensor("frameyaxis", FRAME),
+    sensor("framezaxis", FRAME),
+    sensor("framelinvel", FRAME),
+    sensor("frameangvel", FRAME),
+    sensor("framelinacc", "objtype objname"),
+    sensor("frameangacc", "objtype objname"),
+    sensor("subtreecom", "body"),
+    sensor("subtreelinvel", "body"),
+    sensor("subtreeangmom", "body"),
+    sensor("insidesite", "site objtype objname enclosed"),
+    sensor("distance", PAIR),
+    sensor("normal", PAIR),
+    sensor("fromto", PAIR),
+    sensor("contact", "body1 body2 geom1 geom2 data num reduce site subtree1 subtree2"),
+    sensor("e_potential", ""),
+    sensor("e_kinetic", ""),
+    sensor("clock", ""),
+    sensor("user", "datatype dim needstage objtype objname"),
+    refused("tactile", "this sensor needs a mesh, and meshes are not supported"),
+    NO_PLUGIN,
+];
+
+const CUSTOM: &[Rule] = &[
+    rule("numeric", "name data size", "", ""),
+    rule("text", "name data", "", ""),
+    section("tuple", "name", &[rule("element", "objname objtype prm", "", "")]),
+];
+
+/// Checks the names of all elements and attributes.
+pub(crate) fn check(root: &Element) -> Result<(), MjcfError> {
+    attributes(root, &section("mujoco", "model", TOP), "")?;
+    root.children.iter().try_for_each(|child| element(child, root, TOP))
+}
+
+fn element(element: &Element, parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
+    let Some(rule) = rules.iter().find(|r| r.name == element.name) else {
+        return Err(unknown_element(element, parent, rules.iter().map(|r| r.name)));
+    };
+    checked(element, rule, "")?;
+    match &rule.inside {
+        // bodies and frames contain what the world does
+        _ if matches!(rule.name, "body" | "frame") && std::ptr::eq(rules, BODY) => descend(element, BODY),
+        _ if rule.name == "default" => element.children.iter().try_for_each(|child| default(child, element)),
+        Inside::Rules(inner) => descend(element, inner),
+        _ => Ok(()),
+    }
+}
+
+fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
+    parent.children.iter().try_for_each(|child| element(child, parent, rules))
+}
+
+/// An element of a `<default>` class: an element of the model without its name and class.
+fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
+    const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];
+    match child.name.as_str() {
+        "default" => {
+            checked(child, &section("default", "class", &[]), "")?;
+            return child.children.iter().try_for_each(|inner| default(inner, child));
+        }
+        // meshes and equality constraints are refused where they are used
+        "mesh" | "equality" => return Ok(()),
+        "tendon" => return checked(child, &TENDON[0], "name class"),
+        _ => {}
+    }
+    let tables = [BODY, CONTACT, ASSET].map(|t| t.iter()).into_iter().flatten();
+    let rule = tables.filter(|r| DEFAULTS.contains(&r.name)).chain(ACTUATOR).find(|r| r.name == child.name);
+    match rule {
+        Some(rule) => {
+            checked(child, rule, "name class")?;
+            match &rule.inside {
+                Inside::Rules(inner) => descend(child, inner),
+                _ => Ok(()),
+            }
+        }
+        None => {
+            let names =
+                ACTUATOR.iter().map(|r| r.name).chain(DEFAULTS).chain(["default", "mesh", "equality", "tendon"]);
+            Err(unknown_element(child, parent, names))
+        }
+    }
+}
+
+fn unknown_element<'a>(element: &Element, parent: &Element, names: impl Iterator<Item = &'a str>) -> MjcfError {
+    element.place.error(MjcfErrorKind::UnknownElement {
+        element: element.label(),
+        parent: shorten(&parent.name),
+        nearest: nearest(&element.name, names),
+    })
+}
+
+fn checked(element: &Element, rule: &Rule, except: &str) -> Result<(), MjcfError> {
+    match rule.inside {
+        Inside::Refused(reason) => Err(element.unsupported(None, reason)),
+        Inside::Anything => Ok(()),
+        Inside::Rules(_) => attributes(element, rule, except),
+    }
+}
+
+/// Checks the attributes of one element; those in `except` do not exist here.
+fn attributes(element: &Element, rule: &Rule, except: &str) -> Result<(), MjcfError> {
+    let known = || {
+        let plain = rule.reads.split_ascii_whitespace().chain(rule.ignores.split_ascii_whitespace());
+        plain.filter(|name| !except.split_ascii_whitespace().any(|e| e == *name))
+    };
+    for attr in &element.attrs {
+        if known().any(|name| name == attr.name) {
+            continue;
+        }
+        let refuses = || rule.refuses.split_ascii_whitespace().map(|r| r.split_once('=').unwrap_or((r, "")));
+        match refuses().find(|(name, _)| *name == attr.name) {
+            Some((_, neutral)) if is_neutral(attr, neutral) => {}
+            Some((_, neutral)) => {
+                let reason = match neutral.split('|').next().unwrap_or_default() {
+                    "" => "it is not supported".to_owned(),
+                    value => format!("'{}' is not supported, only '{value}'", shorten(&attr.value)),
+                };
+                return Err(element.unsupported(Some(&attr.name), reason));
+            }
+            None => {
+                let names = known().chain(refuses().map(|(name, _)| name));
+                return Err(attr.place.error(MjcfErrorKind::UnknownAttribute {
+                    element: element.label(),
+                    attribute: shorten(&attr.name),
+                    nearest: nearest(&attr.name, names),
+                }));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether every word of the value is one of the neutral ones, as a word or as a number.
+fn is_neutral(attr: &Attr, neutral: &str) -> bool {
+    attr.value.split_ascii_whitespace().all(|word| {
+        neutral
+            .split('|')
+            .any(|n| n == word || matches!((n.parse::<f64>(), word.parse::<f64>()), (Ok(a), Ok(b)) if a == b))
+    })
+}

@@ -1,0 +1,333 @@
+//! What follows from the reference configuration: mass matrix and inverse weights.
+//!
+//! In the reference configuration every joint is at rest, so the world poses are the bodies' own frames chained, and
+//! the mass matrix falls into one dense block per kinematic tree.
+
+use super::math::*;
+use crate::model::{JointType, Model, Vec3};
+
+/// A tree with more degrees of freedom than this is refused: its dense mass matrix would not fit.
+const MAX_TREE_DOFS: usize = 4096;
+
+/// World poses in the reference configuration.
+pub(crate) struct Pose {
+    /// Body frames.
+    pub body: Vec<Frame>,
+    /// Centers of mass.
+    pub com: Vec<Vec3>,
+}
+
+impl Pose {
+    pub fn new(model: &Model) -> Self {
+        let mut body: Vec<Frame> = Vec::with_capacity(model.bodies.len());
+        for (i, b) in model.bodies.iter().enumerate() {
+            let own = Frame { pos: b.pos, quat: b.quat };
+            body.push(if i == 0 { own } else { body[b.parent].compose(&own) });
+        }
+        let com = model.bodies.iter().zip(&body).map(|(b, frame)| frame.point(b.ipos)).collect();
+        Pose { body, com }
+    }
+
+    /// World position of a joint's anchor.
+    pub fn anchor(&self, model: &Model, joint: usize) -> Vec3 {
+        let joint = &model.joints[joint];
+        self.body[joint.body].point(joint.pos)
+    }
+}
+
+/// Why the reference quantities do not exist.
+#[derive(Debug)]
+pub(crate) enum Set0Error {
+    /// The tree of this body has too many degrees of freedom.
+    TooLarge(usize),
+    /// The mass matrix of the tree of this body is not positive definite.
+    Singular(usize),
+}
+
+impl Set0Error {
+    pub fn body(&self) -> usize {
+        let (Set0Error::TooLarge(body) | Set0Error::Singular(body)) = self;
+        *body
+    }
+}
+
+impl std::fmt::Display for Set0Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Set0Error::TooLarge(_) => write!(f, "its tree has more than {MAX_TREE_DOFS} degrees of freedom"),
+            Set0Error::Singular(_) => write!(f, "the mass matrix of its tree is not positive definite"),
+        }
+    }
+}
+
+/// The mass matrix in the reference configuration.
+pub(crate) struct MassMatrix {
+    /// Its diagonal, armature included.
+    pub diagonal: Vec<f64>,
+    /// First dof, number of dofs and lower factor of each tree's block.
+    blocks: Vec<(usize, usize, Vec<f64>)>,
+}
+
+impl MassMatrix {
+    /// `v inv(M) v'` for a vector that is zero except for `values` from the dof `first` on, all of one tree.
+    pub fn inverse_form(&self, first: usize, values: &[f64]) -> f64 {
+        let block = self.blocks.partition_point(|(start, ..)| *start <= first);
+        let Some((start, n, factor)) = block.checked_sub(1).map(|b| &self.blocks[b]) else { return 0.0 };
+        let mut rhs = vec![0.0; *n];
+        rhs[first - start..first - start + values.len()].copy_from_slice(values);
+        solve_lower(factor, *n, rhs).iter().map(|x| x * x).sum()
+    }
+}
+
+/// Sets the inverse weights of bodies and dofs, and returns the mass matrix.
+///
+/// `simple` says for each body whether it may be treated as a lone slider.
+pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool]) -> Result<MassMatrix, Set0Error> {
+    let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
+    let mut first = 0;
+    while first < model.nv {
+        let root = model.bodies[model.dofs[first].body].root_id;
+        let in_tree = |d: &crate::model::Dof| model.bodies[d.body].root_id == root;
+        let count = model.dofs[first..].iter().take_while(|d| in_tree(d)).count();
+        if count > MAX_TREE_DOFS {
+            return Err(Set0Error::TooLarge(root));
+        }
+        let tree = Tree::new(model, pose, root, first, count);
+        let mass = tree.mass_matrix(model, pose);
+        for i in 0..count {
+            mass_matrix.diagonal[first + i] = mass[i * count + i];
+        }
+        let factor = cholesky(mass, count).ok_or(Set0Error::Singular(root))?;
+        tree.set_weights(model, pose, &factor);
+        mass_matrix.blocks.push((first, count, factor));
+        first += count;
+    }
+    // MuJoCo takes the mass alone for a lone slider: no armature, no mean over the three directions
+    for body in 1..model.bodies.len() {
+        if simple[body] && is_lone_slider(model, body) {
+            let weight = 1.0 / model.bodies[body].mass.max(MIN_VAL);
+            model.bodies[body].invweight0 = [weight, 0.0];
+            let first = model.bodies[body].dof_start;
+            let count = model.bodies[body].dof_count;
+            model.dofs[first..first + count].iter_mut().for_each(|d| d.invweight0 = weight);
+        }
+    }
+    Ok(mass_matrix)
+}
+
+/// A body without children that only slides, along its own axes, on a body that does not move.
+fn is_lone_slider(model: &Model, index: usize) -> bool {
+    /// Frames this close count as equal; MuJoCo's `kFrameEps`.
+    const FRAME_EPS: f64 = 1e-6;
+    let body = &model.bodies[index];
+    let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
+    let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
+    let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
+    !joints.is_empty()
+        && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, EPS) && aligned(j.axis))
+        && small(&body.ipos, FRAME_EPS)
+        && small(&body.iquat[1..], FRAME_EPS)
+        && model.bodies[model.bodies[body.parent].weld_id].dof_count == 0
+        && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
+}
+
+/// Spatial inertia about the tree's reference point: mass, first moment, second moment by rows.
+#[derive(Clone, Copy)]
+struct SpatialInertia {
+    mass: f64,
+    first: Vec3,
+    second: [Vec3; 3],
+}
+
+/// Motion axis of one dof: angular velocity, and linear velocity at the tree's reference point.
+#[derive(Clone, Copy)]
+struct Motion {
+    angular: Vec3,
+    linear: Vec3,
+}
+
+impl Motion {
+    /// Linear velocity at a point `r` away from the reference point.
+    fn at(&self, r: Vec3) -> Vec3 {
+        add(self.linear, cross(self.angular, r))
+    }
+}
+
+/// One kinematic tree and its dofs `first..first + motions.len()`.
+struct Tree {
+    /// Bodies of the tree; they are numbered depth first.
+    bodies: std::ops::Range<usize>,
+    first: usize,
+    /// Reference point: the tree's center of mass, for accuracy.
+    origin: Vec3,
+    motions: Vec<Motion>,
+}
+
+impl Tree {
+    fn new(model: &Model, pose: &Pose, root: usize, first: usize, count: usize) -> Self {
+        let size = model.bodies[root..].iter().take_while(|b| b.root_id == root).count();
+        let bodies = root..root + size;
+        let (mass, moment) = bodies.clone().fold((0.0, [0.0; 3]), |(mass, moment), b| {
+            let m = model.bodies[b].mass;
+            (mass + m, add(moment, scale(pose.com[b], m)))
+        });
+        let origin = if mass >= MIN_VAL { scale(moment, 1.0 / mass) } else { pose.com[root] };
+        let motions = (first..first + count).map(|dof| motion(model, pose, dof, origin)).collect();
+        Tree { bodies, first, origin, motions }
+    }
+
+    /// Lower triangle of the mass matrix by rows, armature included.
+    fn mass_matrix(&self, model: &Model, pose: &Pose) -> Vec<f64> {
+        let n = self.motions.len();
+        let mut composite: Vec<SpatialInertia> =
+            self.bodies.clone().map(|b| spatial_inertia(model, pose, b, self.origin)).collect();
+        let root = self.bodies.start;
+        for b in (1..composite.len()).rev() {
+            let child = composite[b];
+            composite[model.bodies[root + b].parent - root].accumulate(&child);
+        }
+        let mut mass = vec![0.0; n * n];
+        for i in 0..n {
+            let (linear, angular) = composite[model.dofs[self.first + i].body - root].momentum(&self.motions[i]);
+            let mut ancestor = Some(self.first + i);
+            while let Some(j) = ancestor {
+                let m = &self.motions[j - self.first];
+                mass[i * n + j - self.first] = dot(m.angular, angular) + dot(m.linear, linear);
+                ancestor = model.dofs[j].parent;
+            }
+            mass[i * n + i] += model.dofs[self.first + i].armature;
+        }
+        mass
+    }
+
+    /// Mean diagonals of `J inv(M) J'`, for each joint and for the center of mass of each body.
+    fn set_weights(&self, model: &mut Model, pose: &Pose, factor: &[f64]) {
+        let n = self.motions.len();
+        let inverse = |rhs: Vec<f64>| solve_lower(factor, n, rhs).iter().map(|x| x * x).sum::<f64>();
+
+        let single: Vec<f64> = (0..n)
+            .map(|i| {
+                let mut rhs = vec![0.0; n];
+                rhs[i] = 1.0;
+                inverse(rhs)
+            })
+            .collect();
+        for joint in model.joints.iter().filter(|j| self.bodies.contains(&j.body)) {
+            let start = joint.dof_adr - self.first;
+            let groups: &[std::ops::Range<usize>] = match joint.kind {
+                JointType::Free => &[0..3, 3..6],
+                JointType::Ball => &[0..3],
+                JointType::Slide | JointType::Hinge => &[0..1],
+            };
+            for group in groups {
+                let range = start + group.start..start + group.end;
+                let mean = single[range.clone()].iter().sum::<f64>() / group.len() as f64;
+                for i in range {
+                    model.dofs[self.first + i].invweight0 = mean;
+                }
+            }
+        }
+
+        for b in self.bodies.clone() {
+            let body = &model.bodies[b];
+            if body.weld_id == 0 {
+                continue;
+            }
+            // the dofs that move this body: those of the body it is welded to, and their ancestors
+            let weld = &model.bodies[body.weld_id];
+            let mut rows = vec![vec![0.0; n]; 6];
+            let mut dof = (weld.dof_count > 0).then(|| weld.dof_start + weld.dof_count - 1);
+            while let Some(j) = dof {
+                let motion = &self.motions[j - self.first];
+                let linear = motion.at(sub(pose.com[b], self.origin));
+                for k in 0..3 {
+                    rows[k][j - self.first] = linear[k];
+                    rows[k + 3][j - self.first] = motion.angular[k];
+                }
+                dof = model.dofs[j].parent;
+            }
+            let diagonal: Vec<f64> = rows.into_iter().map(inverse).collect();
+            let translation = diagonal[..3].iter().sum::<f64>() / 3.0;
+            let rotation = diagonal[3..].iter().sum::<f64>() / 3.0;
+            model.bodies[b].invweight0 = [translation, rotation];
+        }
+    }
+}
+
+impl SpatialInertia {
+    fn accumulate(&mut self, other: &SpatialInertia) {
+        self.mass += other.mass;
+        self.first = add(self.first, other.first);
+        for (row, own) in self.second.iter_mut().zip(other.second) {
+            *row = add(*row, own);
+        }
+    }
+
+    /// Linear and angular momentum about the reference point.
+    fn momentum(&self, motion: &Motion) -> (Vec3, Vec3) {
+        let linear = add(scale(motion.linear, self.mass), cross(motion.angular, self.first));
+        let angular = add(self.second.map(|row| dot(row, motion.angular)), cross(self.first, motion.linear));
+        (linear, angular)
+    }
+}
+
+fn spatial_inertia(model: &Model, pose: &Pose, b: usize, origin: Vec3) -> SpatialInertia {
+    let body = &model.bodies[b];
+    let r = sub(pose.com[b], origin);
+    let [xx, yy, zz, xy, xz, yz] = rotate_diagonal(mul_quat(pose.body[b].quat, body.iquat), body.inertia);
+    let mut second = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    for (i, row) in second.iter_mut().enumerate() {
+        for (j, entry) in row.iter_mut().enumerate() {
+            *entry += body.mass * (if i == j { dot(r, r) } else { 0.0 } - r[i] * r[j]);
+        }
+    }
+    SpatialInertia { mass: body.mass, first: scale(r, body.mass), second }
+}
+
+/// Free joints: three world axes, then the body's axes. Ball joints: the body's axes. Others: the joint's axis.
+fn motion(model: &Model, pose: &Pose, dof: usize, origin: Vec3) -> Motion {
+    let joint_index = model.dofs[dof].joint;
+    let joint = &model.joints[joint_index];
+    let k = dof - joint.dof_adr;
+    let frame = &pose.body[joint.body];
+    let turning = |axis: Vec3| {
+        let arm = sub(origin, pose.anchor(model, joint_index));
+        Motion { angular: axis, linear: cross(axis, arm) }
+    };
+    let sliding = |axis: Vec3| Motion { angular: [0.0; 3], linear: axis };
+    match joint.kind {
+        JointType::Free if k < 3 => sliding([0, 1, 2].map(|i| if i == k { 1.0 } else { 0.0 })),
+        JointType::Free => turning(axes(frame.quat)[k - 3]),
+        JointType::Ball => turning(axes(frame.quat)[k]),
+        JointType::Slide => sliding(rotate(frame.quat, joint.axis)),
+        JointType::Hinge => turning(rotate(frame.quat, joint.axis)),
+    }
+}
+
+/// Lower factor of a symmetric positive definite matrix, `None` if it is not one.
+fn cholesky(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
+    for j in 0..n {
+        for i in j..n {
+            let (row_i, row_j) = (&a[i * n..i * n + j], &a[j * n..j * n + j]);
+            let sum = a[i * n + j] - row_i.iter().zip(row_j).map(|(x, y)| x * y).sum::<f64>();
+            if i == j {
+                if !(sum >= MIN_VAL) || !sum.is_finite() {
+                    return None;
+                }
+                a[i * n + j] = sum.sqrt();
+            } else {
+                a[i * n + j] = sum / a[j * n + j];
+            }
+        }
+    }
+    Some(a)
+}
+
+/// Solves `L x = rhs`.
+fn solve_lower(factor: &[f64], n: usize, mut x: Vec<f64>) -> Vec<f64> {
+    for i in 0..n {
+        let sum: f64 = factor[i * n..i * n + i].iter().zip(&x).map(|(l, x)| l * x).sum();
+        x[i] = (x[i] - sum) / factor[i * n + i];
+    }
+    x
+}

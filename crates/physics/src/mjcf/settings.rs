@@ -1,0 +1,235 @@
+//! `<compiler>`, `<option>`, `<size>` and `<statistic>`: what holds for the whole model.
+
+use super::document::Element;
+use super::error::MjcfError;
+use super::value::{Attrs, Tristate};
+use crate::model::{Cone, Flags, Integrator, Options, Vec3};
+
+/// One of the three Euler rotations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// About the parent's axis instead of the rotating frame's.
+    pub fixed: bool,
+}
+
+/// `<compiler>` after defaults are applied.
+#[derive(Debug)]
+pub(crate) struct Settings {
+    pub degree: bool,
+    pub autolimits: bool,
+    pub eulerseq: [Turn; 3],
+    pub boundmass: f64,
+    pub boundinertia: f64,
+    pub balanceinertia: bool,
+    pub settotalmass: f64,
+    pub inertiafromgeom: Tristate,
+    pub inertiagrouprange: [i32; 2],
+}
+
+impl Settings {
+    /// The angle in radians.
+    pub fn angle(&self, given: f64) -> f64 {
+        if self.degree { given * std::f64::consts::PI / 180.0 } else { given }
+    }
+
+    /// Reads all `<compiler>` sections; of an attribute given several times the last counts.
+    pub fn read(root: &Element) -> Result<Self, MjcfError> {
+        let mut settings = Settings {
+            degree: true,
+            autolimits: true,
+            eulerseq: [0, 1, 2].map(|axis| Turn { axis, fixed: false }),
+            boundmass: 0.0,
+            boundinertia: 0.0,
+            balanceinertia: false,
+            settotalmass: -1.0,
+            inertiafromgeom: Tristate::Auto,
+            inertiagrouprange: [0, 5],
+        };
+        for element in sections(root, "compiler") {
+            settings.section(element)?;
+        }
+        Ok(settings)
+    }
+
+    fn section(&mut self, element: &Element) -> Result<(), MjcfError> {
+        let attrs = Attrs::plain(element);
+        if attrs.keyword("coordinate", &[("local", false), ("global", true)])? == Some(true) {
+            let reason = "global coordinates are not supported; MuJoCo 2.3.3 and older can convert the file";
+            return Err(element.unsupported(Some("coordinate"), reason));
+        }
+        self.degree = attrs.keyword("angle", &[("radian", false), ("degree", true)])?.unwrap_or(self.degree);
+        self.autolimits = attrs.flag_or("autolimits", self.autolimits)?;
+        self.boundmass = attrs.number_or("boundmass", self.boundmass)?;
+        self.boundinertia = attrs.number_or("boundinertia", self.boundinertia)?;
+        self.balanceinertia = attrs.flag_or("balanceinertia", self.balanceinertia)?;
+        self.settotalmass = attrs.number_or("settotalmass", self.settotalmass)?;
+        if attrs.has("inertiafromgeom") {
+            self.inertiafromgeom = attrs.tristate("inertiafromgeom")?;
+        }
+        if let Some(range) = attrs.array::<2>("inertiagrouprange")? {
+            self.inertiagrouprange = range.map(|x| x as i32);
+        }
+        if let Some(attr) = element.attr("eulerseq") {
+            let turn = |c: char| {
+                let axis = "xyz".find(c.to_ascii_lowercase())?;
+                Some(Turn { axis, fixed: c.is_ascii_uppercase() })
+            };
+            let turns: Option<Vec<Turn>> = attr.value.chars().map(turn).collect();
+            self.eulerseq = turns
+                .and_then(|t| t.try_into().ok())
+                .ok_or_else(|| element.bad_value(attr, "three letters out of x, y, z, X, Y, Z"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Sections of the model with the given name, in document order.
+pub(crate) fn sections<'a>(root: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    root.children.iter().filter(move |e| e.name == name)
+}
+
+/// All children of the sections with the given name, in document order.
+pub(crate) fn entries<'a>(root: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    sections(root, name).flat_map(|section| section.children.iter())
+}
+
+/// Reads `<option>` with its `<flag>`.
+pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
+    let mut opt = Options {
+        timestep: 0.002,
+        gravity: [0.0, 0.0, -9.81],
+        integrator: Integrator::Euler,
+        cone: Cone::Pyramidal,
+        impratio: 1.0,
+        iterations: 100,
+        ls_iterations: 50,
+        tolerance: 1e-8,
+        flags: Flags {
+            constraint: true,
+            limit: true,
+            contact: true,
+            frictionloss: true,
+            spring: true,
+            damper: true,
+            gravity: true,
+            clampctrl: true,
+            warmstart: true,
+            actuation: true,
+            refsafe: true,
+            eulerdamp: true,
+            filterparent: true,
+        },
+    };
+    for element in sections(root, "option") {
+        option(element, &mut opt)?;
+    }
+    Ok(opt)
+}
+
+fn option(element: &Element, opt: &mut Options) -> Result<(), MjcfError> {
+    let attrs = Attrs::plain(element);
+    let at_least_zero = |name: &str, value: f64| match element.attr(name) {
+        Some(attr) if value < 0.0 => Err(element.bad_value(attr, "a number that is not negative")),
+        _ => Ok(value),
+    };
+    opt.timestep = attrs.number_or("timestep", opt.timestep)?;
+    if let Some(attr) = element.attr("timestep").filter(|_| opt.timestep <= 0.0) {
+        return Err(element.bad_value(attr, "a number greater than zero"));
+    }
+    opt.gravity = attrs.array_or("gravity", opt.gravity)?;
+    opt.impratio = attrs.number_or("impratio", opt.impratio)?;
+    if let Some(attr) = element.attr("impratio").filter(|_| opt.impratio <= 0.0) {
+        return Err(element.bad_value(attr, "a number greater than zero"));
+    }
+    opt.tolerance = at_least_zero("tolerance", attrs.number_or("tolerance", opt.tolerance)?)?;
+    for (name, value) in [("iterations", &mut opt.iterations), ("ls_iterations", &mut opt.ls_iterations)] {
+        if let Some(attr) = element.attr(name) {
+            let given = attrs.integer_or(name, 0)?;
+            *value = usize::try_from(given).map_err(|_| element.bad_value(attr, "an integer that is not negative"))?;
+        }
+    }
+    let integrators = [
+        ("Euler", Some(Integrator::Euler)),
+        ("RK4", Some(Integrator::Rk4)),
+        ("implicit", Some(Integrator::Implicit)),
+        ("implicitfast", Some(Integrator::ImplicitFast)),
+        ("discrete", None),
+    ];
+    match attrs.keyword("integrator", &integrators)? {
+        Some(Some(integrator)) => opt.integrator = integrator,
+        Some(None) => {
+            let reason = "the integrator 'discrete' is not supported; use Euler or RK4";
+            return Err(element.unsupported(Some("integrator"), reason));
+        }
+        None => {}
+    }
+    let cones = [("pyramidal", Cone::Pyramidal), ("elliptic", Cone::Elliptic)];
+    opt.cone = attrs.keyword("cone", &cones)?.unwrap_or(opt.cone);
+    // every solver finds the same forces; only the spelling is checked
+    attrs.keyword("solver", &[("PGS", ()), ("CG", ()), ("Newton", ())])?;
+    attrs.keyword("jacobian", &[("dense", ()), ("sparse", ()), ("auto", ())])?;
+    for child in element.children.iter().filter(|e| e.name == "flag") {
+        flags(child, &mut opt.flags)?;
+    }
+    Ok(())
+}
+
+fn flags(element: &Element, flags: &mut Flags) -> Result<(), MjcfError> {
+    let attrs = Attrs::plain(element);
+    for attr in &element.attrs {
+        let slot = match attr.name.as_str() {
+            "constraint" => Some(&mut flags.constraint),
+            "limit" => Some(&mut flags.limit),
+            "contact" => Some(&mut flags.contact),
+            "frictionloss" => Some(&mut flags.frictionloss),
+            "spring" => Some(&mut flags.spring),
+            "damper" => Some(&mut flags.damper),
+            "gravity" => Some(&mut flags.gravity),
+            "clampctrl" => Some(&mut flags.clampctrl),
+            "warmstart" => Some(&mut flags.warmstart),
+            "actuation" => Some(&mut flags.actuation),
+            "refsafe" => Some(&mut flags.refsafe),
+            "eulerdamp" => Some(&mut flags.eulerdamp),
+            "filterparent" => Some(&mut flags.filterparent),
+            _ => None,
+        };
+        let value = attrs.keyword(&attr.name, &[("disable", false), ("enable", true)])?;
+        if let (Some(slot), Some(value)) = (slot, value) {
+            *slot = value;
+        }
+    }
+    Ok(())
+}
+
+/// `<statistic>`: only what the file gives.
+#[derive(Default)]
+pub(crate) struct GivenStatistics {
+    pub mean_inertia: Option<f64>,
+    pub mean_mass: Option<f64>,
+    pub extent: Option<f64>,
+    pub center: Option<Vec3>,
+}
+
+/// Reads all `<statistic>` sections.
+pub(crate) fn statistics(root: &Element) -> Result<GivenStatistics, MjcfError> {
+    let mut given = GivenStatistics::default();
+    for element in sections(root, "statistic") {
+        let attrs = Attrs::plain(element);
+        for (name, slot) in [
+            ("meaninertia", &mut given.mean_inertia),
+            ("meanmass", &mut given.mean_mass),
+            ("extent", &mut given.extent),
+        ] {
+            let Some(attr) = element.attr(name) else { continue };
+            let value = attrs.number_or(name, 0.0)?;
+            if value <= 0.0 {
+                return Err(element.bad_value(attr, "a number greater than zero"));
+            }
+            *slot = Some(value);
+        }
+        given.center = attrs.array("center")?.or(given.center);
+    }
+    Ok(given)
+}

@@ -1,0 +1,101 @@
+//! Rigid transforms and lumped inertias in double precision, for preparing a model.
+
+use crate::model::{Model, Quat, Vec3};
+
+/// Position and rotation (columns) of one frame in another.
+pub(crate) type Frame = (Vec3, [Vec3; 3]);
+
+/// Rotation matrix by columns of a quaternion of any length.
+pub(crate) fn quat_to_rot(q: &Quat) -> [Vec3; 3] {
+    let n = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    let [w, x, y, z] = *q;
+    [
+        [1.0 - n * (y * y + z * z), n * (x * y + w * z), n * (x * z - w * y)],
+        [n * (x * y - w * z), 1.0 - n * (x * x + z * z), n * (y * z + w * x)],
+        [n * (x * z + w * y), n * (y * z - w * x), 1.0 - n * (x * x + y * y)],
+    ]
+}
+
+/// Rotated vector.
+pub(crate) fn rotate(r: &[Vec3; 3], v: &Vec3) -> Vec3 {
+    let mut out = [0.0; 3];
+    for i in 0..3 {
+        out[i] = r[0][i] * v[0] + r[1][i] * v[1] + r[2][i] * v[2];
+    }
+    out
+}
+
+/// Frame `b` given in `a`, as seen from where `a` is given.
+pub(crate) fn compose(a: &Frame, b: &Frame) -> Frame {
+    let p = rotate(&a.1, &b.0);
+    ([a.0[0] + p[0], a.0[1] + p[1], a.0[2] + p[2]], b.1.map(|column| rotate(&a.1, &column)))
+}
+
+/// Whether a rotation is the identity to rounding.
+pub(crate) fn is_identity(r: &[Vec3; 3]) -> bool {
+    (0..3).all(|i| (0..3).all(|j| (r[i][j] - f64::from(i == j)).abs() < 1e-14))
+}
+
+/// Frame of a body in the frame of the body it is welded to.
+pub(crate) struct BodyMount {
+    pub body: usize,
+    pub pos: Vec3,
+    pub rot: [Vec3; 3],
+}
+
+/// Where every body sits on its `weld_id`: the identity for bodies that move, world frames for static bodies.
+pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut out: Vec<BodyMount> = Vec::with_capacity(model.bodies.len());
+    for (i, body) in model.bodies.iter().enumerate() {
+        let mount = if i == 0 || body.weld_id == i {
+            BodyMount { body: i, pos: [0.0; 3], rot: identity }
+        } else {
+            let parent = &out[body.parent];
+            let (pos, rot) = compose(&(parent.pos, parent.rot), &(body.pos, quat_to_rot(&body.quat)));
+            BodyMount { body: body.weld_id, pos, rot }
+        };
+        out.push(mount);
+    }
+    out
+}
+
+/// Mass, center and inertia (about the center, xx yy zz xy xz yz) of a body with all bodies welded to it.
+pub(crate) struct Lump {
+    pub mass: f64,
+    pub com: Vec3,
+    pub inertia: [f64; 6],
+}
+
+/// Lumps the bodies welded to `link`.
+pub(crate) fn lump(model: &Model, mounts: &[BodyMount], link: usize) -> Lump {
+    let parts: Vec<_> = (0..model.bodies.len()).filter(|&b| mounts[b].body == link).collect();
+    let mass: f64 = parts.iter().map(|&b| model.bodies[b].mass).sum();
+    let centers: Vec<Frame> = parts
+        .iter()
+        .map(|&b| {
+            let body = &model.bodies[b];
+            compose(&(mounts[b].pos, mounts[b].rot), &(body.ipos, quat_to_rot(&body.iquat)))
+        })
+        .collect();
+    let mut com = [0.0; 3];
+    for (&b, (center, _)) in parts.iter().zip(&centers) {
+        for i in 0..3 {
+            com[i] += center[i] * model.bodies[b].mass / mass.max(1e-300);
+        }
+    }
+    let mut inertia = [0.0; 6];
+    for (&b, (center, axes)) in parts.iter().zip(&centers) {
+        let body = &model.bodies[b];
+        let d = [center[0] - com[0], center[1] - com[1], center[2] - com[2]];
+        let entry = |i: usize, j: usize| {
+            let principal: f64 = (0..3).map(|k| axes[k][i] * body.inertia[k] * axes[k][j]).sum();
+            let square = if i == j { d[0] * d[0] + d[1] * d[1] + d[2] * d[2] } else { 0.0 };
+            principal + body.mass * (square - d[i] * d[j])
+        };
+        for (slot, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+            inertia[slot] += entry(i, j);
+        }
+    }
+    Lump { mass, com, inertia }
+}

@@ -1,0 +1,243 @@
+//! One step, stage by stage.
+
+use crate::articulated::articulated_solve;
+use crate::collision::collide;
+use crate::forces::applied_forces;
+use crate::kinematics::{kinematics, velocities};
+use crate::lanes::{Kernel, Real};
+use crate::model::JointType;
+use crate::sim::Sim;
+use crate::solver::{joint_rows, solve};
+use crate::spatial::*;
+use crate::work::{Group, Work};
+
+/// A stage of the step, compiled as a function of its own for each instruction set.
+macro_rules! stage {
+    ($(#[$doc:meta])* $name:ident, $kernel:ident, |$sim:ident, $group:ident, $work:ident| $body:expr) => {
+        struct $kernel<'a, T: Real>(&'a Sim<T>, &'a Group<T>, &'a mut Work<T>);
+        impl<T: Real> Kernel<T> for $kernel<'_, T> {
+            type Output = ();
+            #[inline(always)]
+            fn run(self) {
+                let ($sim, $group, $work) = (self.0, self.1, self.2);
+                $body
+            }
+        }
+        $(#[$doc])*
+        fn $name<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+            T::enter($kernel(sim, group, work));
+        }
+    };
+}
+
+stage!(
+    /// Frames, axes, inertias, velocities, and applied forces.
+    smooth_stage, SmoothStage, |sim, group, work| {
+        kinematics(sim, group, work);
+        velocities(sim, group, work);
+        applied_forces(sim, group, work);
+    }
+);
+stage!(
+    /// Contacts, limits, dry friction.
+    constraint_stage, ConstraintStage, |sim, group, work| {
+        collide(sim, work);
+        joint_rows(sim, group, work);
+    }
+);
+stage!(
+    /// Constrained acceleration.
+    solver_stage, SolverStage, |sim, group, work| solve(sim, group, work)
+);
+stage!(
+    /// Acceleration with the joint damping taken at the end of the step.
+    damping_stage, DampingStage, |sim, _group, work| implicit_damping(sim, work)
+);
+stage!(
+    /// Positions and velocities only.
+    refresh_stage, RefreshStage, |sim, group, work| {
+        kinematics(sim, group, work);
+        velocities(sim, group, work);
+    }
+);
+
+struct Integrate<'a, T: Real>(&'a Sim<T>, &'a mut Group<T>, &'a mut Work<T>);
+impl<T: Real> Kernel<T> for Integrate<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let dt = T::splat(self.0.dt);
+        let acc = if self.0.implicit_damping { &self.2.next } else { &self.2.acc };
+        self.1.warm.copy_from_slice(&self.2.acc);
+        for (v, a) in self.1.qvel.iter_mut().zip(acc) {
+            *v = a.mul_add(dt, *v);
+        }
+        let Group { qpos, qvel, .. } = self.1;
+        integrate_positions(self.0, qpos, qvel, dt);
+    }
+}
+
+impl<T: Real> Sim<T> {
+    /// Accelerations and constraint forces at the present state; the state does not change.
+    pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
+        smooth_stage(self, group, work);
+        constraint_stage(self, group, work);
+        solver_stage(self, group, work);
+    }
+
+    /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
+    /// (positions and velocities) up to date.
+    pub fn step(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
+        for touched in work.touched.iter_mut() {
+            *touched = T::none();
+        }
+        for _ in 0..substeps {
+            if self.rk4 {
+                self.step_rk4(work, group);
+            } else {
+                self.forward(work, group);
+                if self.implicit_damping {
+                    damping_stage(self, group, work);
+                }
+                T::enter(Integrate(self, group, work));
+            }
+        }
+        self.refresh(work, group);
+    }
+
+    /// Recomputes positions and velocities of bodies at the present state.
+    pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
+        refresh_stage(self, group, work);
+    }
+
+    /// Classical Runge-Kutta over the whole dynamics.
+    fn step_rk4(&self, work: &mut Work<T>, group: &mut Group<T>) {
+        let mut stages = std::mem::take(&mut work.stages);
+        let [start, sum] = stages.as_mut_slice() else { unreachable!("a model with RK4 has two stage states") };
+        start.qpos.copy_from_slice(&group.qpos);
+        start.qvel.copy_from_slice(&group.qvel);
+        // weighted sums of velocities and accelerations live in `sum.qvel` and `sum.warm`
+        let tableau = [(1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.0)];
+        for (stage, (weight, reach_before, reach)) in tableau.into_iter().enumerate() {
+            self.forward(work, group);
+            let first = stage == 0;
+            T::enter(RkStage { sim: self, work, group, start, sum, first, weight, reach_before, reach });
+        }
+        work.stages = stages;
+    }
+}
+
+/// Adds one stage's derivatives to the weighted sum and moves to the next stage's state, or to the end of the step.
+struct RkStage<'a, T: Real> {
+    sim: &'a Sim<T>,
+    work: &'a mut Work<T>,
+    group: &'a mut Group<T>,
+    start: &'a mut Group<T>,
+    sum: &'a mut Group<T>,
+    first: bool,
+    weight: f64,
+    /// Fraction of the step at which this stage was taken.
+    reach_before: f64,
+    /// Fraction of the step at which the next stage is taken; 0 after the last.
+    reach: f64,
+}
+impl<T: Real> Kernel<T> for RkStage<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let RkStage { sim, work, group, start, sum, first, weight, reach_before, reach } = self;
+        let dt = T::splat(sim.dt);
+        let w = T::lit(weight);
+        // velocities in the coordinates of the start's tangent space; `start.warm` holds those of the stage before
+        let mut rate = std::mem::take(&mut sum.ctrl);
+        rate.clear();
+        rate.extend_from_slice(&group.qvel);
+        if !first {
+            correct_rotations(sim, &start.warm, &mut rate, dt * T::lit(reach_before));
+        }
+        for d in 0..sim.model.nv {
+            let (v, a) = (rate[d] * w, work.acc[d] * w);
+            sum.qvel[d] = if first { v } else { sum.qvel[d] + v };
+            sum.warm[d] = if first { a } else { sum.warm[d] + a };
+        }
+        group.warm.copy_from_slice(&work.acc);
+        group.qpos.copy_from_slice(&start.qpos);
+        if reach > 0.0 {
+            let h = dt * T::lit(reach);
+            integrate_positions(sim, &mut group.qpos, &rate, h);
+            for d in 0..sim.model.nv {
+                group.qvel[d] = work.acc[d].mul_add(h, start.qvel[d]);
+            }
+            start.warm.copy_from_slice(&rate);
+        } else {
+            let h = dt * T::lit(1.0 / 6.0);
+            integrate_positions(sim, &mut group.qpos, &sum.qvel, h);
+            for d in 0..sim.model.nv {
+                group.qvel[d] = sum.warm[d].mul_add(h, start.qvel[d]);
+            }
+        }
+        sum.ctrl = rate;
+    }
+}
+
+/// Angular velocities of rotated stages as rates of the rotation vector from the start (Munthe-Kaas: the inverse of the
+/// exponential's differential), which is what makes the method of fourth order for quaternions.
+///
+/// `rate` holds the stage's velocities, `before` the rates of the stage that led here in `h` seconds.
+#[inline(always)]
+fn correct_rotations<T: Real>(sim: &Sim<T>, before: &[T], rate: &mut [T], h: T) {
+    for joint in &sim.joints {
+        let d = match joint.kind {
+            JointType::Free => joint.dof + 3,
+            JointType::Ball => joint.dof,
+            _ => continue,
+        };
+        let u = [before[d] * h, before[d + 1] * h, before[d + 2] * h];
+        let w = [rate[d], rate[d + 1], rate[d + 2]];
+        let once = cross(&u, &w);
+        let twice = cross(&u, &once);
+        // (1 - t/2 cot(t/2)) / t^2 for the angle t, as its series
+        let t2 = dot(&u, &u);
+        let c = T::lit(1.0 / 1_209_600.0).mul_add(t2, T::lit(1.0 / 30_240.0));
+        let c = c.mul_add(t2, T::lit(1.0 / 720.0)).mul_add(t2, T::lit(1.0 / 12.0));
+        for i in 0..3 {
+            rate[d + i] = c.mul_add(twice[i], T::lit(0.5).mul_add(once[i], w[i]));
+        }
+    }
+}
+
+/// Solves `(M + dt B) a = tau - bias + J' f` for the forces of the constraint solver, into `next`.
+#[inline(always)]
+fn implicit_damping<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+    let dt = T::splat(sim.dt);
+    for d in 0..sim.model.nv {
+        work.diag[d] = T::splat(sim.damping[d]).mul_add(dt, T::splat(sim.armature[d]));
+        work.rhs[d] = work.tau[d];
+    }
+    crate::solver::apply_forces(work);
+    articulated_solve(sim, work, false);
+}
+
+/// `qpos` moved along `qvel` for `h` seconds; quaternions stay normalized.
+#[inline(always)]
+fn integrate_positions<T: Real>(sim: &Sim<T>, qpos: &mut [T], qvel: &[T], h: T) {
+    for joint in &sim.joints {
+        let (q, d) = (joint.qpos, joint.dof);
+        match joint.kind {
+            JointType::Hinge | JointType::Slide => qpos[q] = qvel[d].mul_add(h, qpos[q]),
+            JointType::Ball => turn(&mut qpos[q..q + 4], &[qvel[d], qvel[d + 1], qvel[d + 2]], h),
+            JointType::Free => {
+                for i in 0..3 {
+                    qpos[q + i] = qvel[d + i].mul_add(h, qpos[q + i]);
+                }
+                turn(&mut qpos[q + 3..q + 7], &[qvel[d + 3], qvel[d + 4], qvel[d + 5]], h);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn turn<T: Real>(q: &mut [T], w: &V3<T>, h: T) {
+    let r = integrate_quat(&[q[0], q[1], q[2], q[3]], w, h);
+    q.copy_from_slice(&r);
+}

@@ -1,0 +1,225 @@
+//! State of a lane group and the scratch memory of a step.
+
+use crate::lanes::Real;
+use crate::model::JointType;
+use crate::sim::Sim;
+use crate::solver::{ContactRow, DryRow, LimitRow};
+use crate::spatial::{Inertia, Rot, Sym6, V3, V6};
+
+/// State of `T::LANES` agents that share a model: everything their future depends on.
+#[derive(Clone, Debug)]
+pub struct Group<T: Real> {
+    /// Configuration in MuJoCo's layout, one entry per coordinate.
+    pub qpos: Vec<T>,
+    /// Velocity in MuJoCo's layout.
+    pub qvel: Vec<T>,
+    /// Controls, one per actuator; kept until changed.
+    pub ctrl: Vec<T>,
+    /// Acceleration of the last step: where the constraint solver starts from.
+    pub warm: Vec<T>,
+}
+
+impl<T: Real> Group<T> {
+    /// All agents in the reference configuration, at rest.
+    pub fn new(sim: &Sim<T>) -> Self {
+        let m = &sim.model;
+        let zero = T::zero();
+        Group {
+            qpos: m.qpos0.iter().map(|x| T::lit(*x)).collect(),
+            qvel: vec![zero; m.nv],
+            ctrl: vec![zero; m.nu],
+            warm: vec![zero; m.nv],
+        }
+    }
+
+    /// Puts one agent into a state; its controls and warm start are cleared. Quaternions are normalized.
+    ///
+    /// # Panics
+    /// If a slice's length is not the model's `nq` or `nv`.
+    pub fn reset_lane(&mut self, sim: &Sim<T>, lane: usize, qpos: &[f64], qvel: &[f64]) {
+        assert_eq!(qpos.len(), self.qpos.len(), "qpos has the model's length");
+        assert_eq!(qvel.len(), self.qvel.len(), "qvel has the model's length");
+        for (v, x) in self.qpos.iter_mut().zip(qpos) {
+            v.set(lane, T::scalar(*x));
+        }
+        for joint in &sim.model.joints {
+            let start = match joint.kind {
+                JointType::Free => joint.qpos_adr + 3,
+                JointType::Ball => joint.qpos_adr,
+                _ => continue,
+            };
+            let q = &qpos[start..start + 4];
+            let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            for i in 0..4 {
+                let x = if n > 1e-10 { q[i] / n } else { f64::from(i == 0) };
+                self.qpos[start + i].set(lane, T::scalar(x));
+            }
+        }
+        for (v, x) in self.qvel.iter_mut().zip(qvel) {
+            v.set(lane, T::scalar(*x));
+        }
+        for v in self.warm.iter_mut().chain(&mut self.ctrl) {
+            v.set(lane, T::scalar(0.0));
+        }
+    }
+
+    /// Lanes whose state is finite.
+    pub fn finite(&self) -> T::Mask {
+        let mut sum = T::zero();
+        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
+            // x - x is 0, or NaN where x is not finite
+            sum += *x - *x;
+        }
+        sum.is_finite()
+    }
+}
+
+/// Scratch memory of a step; holds the readings of the group stepped last. One per thread.
+#[derive(Clone, Debug)]
+pub struct Work<T: Real> {
+    /// Position of each tree's reference point (the origin of its root link) in the world.
+    pub(crate) reference: Vec<V3<T>>,
+    /// Link frames: rotation, and position relative to the tree's reference point.
+    pub(crate) rot: Vec<Rot<T>>,
+    pub(crate) pos: Vec<V3<T>>,
+    /// Motion axis of every degree of freedom.
+    pub(crate) axis: Vec<V6<T>>,
+    /// Anchor of every joint, relative to the reference point (absolute while a root link is being computed).
+    pub(crate) anchor: Vec<V3<T>>,
+    pub(crate) inertia: Vec<Inertia<T>>,
+    /// Spatial velocity of each link.
+    pub(crate) vel: Vec<V6<T>>,
+    /// Velocity-dependent acceleration of each link, gravity included.
+    pub(crate) bias_acc: Vec<V6<T>>,
+    /// Force that the present motion and gravity would need: `I a + v x I v`.
+    pub(crate) bias_force: Vec<V6<T>>,
+    /// Applied joint forces: springs, dampers, actuators.
+    pub(crate) tau: Vec<T>,
+    /// Force of each actuator.
+    pub(crate) actuator_force: Vec<T>,
+    /// Joint accelerations, after a solve.
+    pub(crate) acc: Vec<T>,
+    /// Candidate accelerations of the present Newton iteration.
+    pub(crate) next: Vec<T>,
+    /// Spatial acceleration (without bias) of each link for `next`.
+    pub(crate) link_acc: Vec<V6<T>>,
+    /// Contact stiffness and wrench of each link.
+    pub(crate) stiffness: Vec<Sym6<T>>,
+    pub(crate) wrench: Vec<V6<T>>,
+    pub(crate) in_contact: Vec<bool>,
+    /// Diagonal added to the mass matrix: armature, limit stiffness, implicit damping.
+    pub(crate) diag: Vec<T>,
+    /// Joint forces of the present right-hand side.
+    pub(crate) rhs: Vec<T>,
+    /// Articulated inertias and forces.
+    pub(crate) art: Vec<Sym6<T>>,
+    pub(crate) art_force: Vec<V6<T>>,
+    /// Per degree of freedom: articulated momentum times the inverse pivot, and the inverse pivot.
+    pub(crate) gain: Vec<V6<T>>,
+    pub(crate) pivot: Vec<T>,
+    /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
+    pub(crate) root_factor: Vec<[[T; 6]; 6]>,
+    /// Forces on links for [`crate::articulated::articulated_resolve`].
+    pub(crate) link_force: Vec<V6<T>>,
+    pub(crate) contacts: Vec<ContactRow<T>>,
+    pub(crate) limits: Vec<LimitRow<T>>,
+    pub(crate) dry: Vec<DryRow<T>>,
+    /// Per floor candidate: in contact at the last physics step, and at any step of the last `step` call.
+    pub(crate) touching: Vec<T::Mask>,
+    pub(crate) touched: Vec<T::Mask>,
+    /// Per floor candidate: normal force at the last physics step, N.
+    pub(crate) normal_force: Vec<T>,
+    /// States of the Runge-Kutta stages.
+    pub(crate) stages: Vec<Group<T>>,
+    pub(crate) stats: SolverStats,
+}
+
+/// Counts of the constraint solver's work, summed over steps since the work was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SolverStats {
+    /// Solves of a lane group.
+    pub solves: u64,
+    /// Newton iterations of a lane group (that of its slowest lane).
+    pub newton: u64,
+    /// Line search iterations.
+    pub line_search: u64,
+    /// Largest number of Newton iterations in a solve.
+    pub max_newton: u64,
+    /// Lanes that hit the iteration cap before they converged.
+    pub unconverged: u64,
+    /// Contacts, summed over lanes.
+    pub contacts: u64,
+    /// Contacts in the union of a group's lanes.
+    pub contact_rows: u64,
+}
+
+impl<T: Real> Work<T> {
+    /// Scratch memory for a model.
+    pub fn new(sim: &Sim<T>) -> Self {
+        let z = T::zero();
+        let (nl, nv, nj) = (sim.links.len(), sim.model.nv, sim.joints.len());
+        Work {
+            reference: vec![[z; 3]; sim.trees],
+            rot: vec![[[z; 3]; 3]; nl],
+            pos: vec![[z; 3]; nl],
+            axis: vec![[z; 6]; nv],
+            anchor: vec![[z; 3]; nj],
+            inertia: vec![[z; 10]; nl],
+            vel: vec![[z; 6]; nl],
+            bias_acc: vec![[z; 6]; nl],
+            bias_force: vec![[z; 6]; nl],
+            tau: vec![z; nv],
+            actuator_force: vec![z; sim.model.nu],
+            acc: vec![z; nv],
+            next: vec![z; nv],
+            link_acc: vec![[z; 6]; nl],
+            stiffness: vec![[z; 21]; nl],
+            wrench: vec![[z; 6]; nl],
+            in_contact: vec![false; nl],
+            diag: vec![z; nv],
+            rhs: vec![z; nv],
+            art: vec![[z; 21]; nl],
+            art_force: vec![[z; 6]; nl],
+            gain: vec![[z; 6]; nv],
+            pivot: vec![z; nv],
+            root_factor: vec![[[z; 6]; 6]; sim.trees],
+            link_force: vec![[z; 6]; nl],
+            contacts: Vec::with_capacity(sim.floor.len()),
+            limits: Vec::with_capacity(2 * sim.limits.len()),
+            dry: Vec::with_capacity(sim.dry.len()),
+            touching: vec![T::none(); sim.floor.len()],
+            touched: vec![T::none(); sim.floor.len()],
+            normal_force: vec![z; sim.floor.len()],
+            stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
+            stats: SolverStats::default(),
+        }
+    }
+
+    /// Counts of the constraint solver's work.
+    pub fn stats(&self) -> SolverStats {
+        self.stats
+    }
+}
+
+impl SolverStats {
+    /// Adds another thread's counts.
+    pub fn add(&mut self, other: &SolverStats) {
+        self.solves += other.solves;
+        self.newton += other.newton;
+        self.line_search += other.line_search;
+        self.max_newton = self.max_newton.max(other.max_newton);
+        self.unconverged += other.unconverged;
+        self.contacts += other.contacts;
+        self.contact_rows += other.contact_rows;
+    }
+
+    /// Takes earlier counts away (the largest iteration count stays).
+    pub(crate) fn subtract(&mut self, earlier: &SolverStats) {
+        self.solves -= earlier.solves;
+        self.newton -= earlier.newton;
+        self.line_search -= earlier.line_search;
+        self.unconverged -= earlier.unconverged;
+        self.contacts -= earlier.contacts;
+        self.contact_rows -= earlier.contact_rows;
+    }
+}

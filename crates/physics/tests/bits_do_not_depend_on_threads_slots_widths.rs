@@ -1,0 +1,82 @@
+//! Contract: bits do not depend on threads, slots, widths or batch size.
+//!
+//! An agent's trajectory is a function of its own state and controls. Whoever shares its vector register, however many
+//! others there are, wherever it sits among them, and however many threads and lanes the machine has: the same bits.
+//! The agents of this test start apart, so that a group always holds standing, falling and lying ones, and they run for
+//! long enough to meet every branch of the solver.
+
+mod common;
+
+use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions};
+
+/// Starts and controls of agent number `id`, from a hash of the number alone.
+fn noise(id: usize, k: usize) -> f64 {
+    let mut z = (id as u64) << 32 | k as u64;
+    z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Runs agents `ids` (in this order of slots) and returns each one's state after every ten steps, as bits.
+fn run(model: &Model, ids: &[usize], threads: usize, isa: Isa, decisions: usize) -> Vec<Vec<u64>> {
+    let sim = SimOptions { ground_contacts_only: true, ..Default::default() };
+    let mut batch = Batch::new(model, &BatchOptions { agents: ids.len(), threads, isa, sim }).expect("supported");
+    for (slot, &id) in ids.iter().enumerate() {
+        let mut qpos = model.qpos0.clone();
+        for (k, q) in qpos.iter_mut().enumerate().skip(model.nq - model.nu) {
+            *q += 0.2 * noise(id, k);
+        }
+        let qvel: Vec<f64> = (0..model.nv).map(|k| 0.5 * noise(id, 100 + k)).collect();
+        batch.reset(slot, &qpos, &qvel);
+    }
+    let mut out = vec![Vec::new(); ids.len()];
+    for t in 0..decisions {
+        let ctrl: Vec<f64> =
+            ids.iter().flat_map(|&id| (0..model.nu).map(move |u| noise(id, 1000 + t * 64 + u))).collect();
+        assert!(batch.step(&ctrl, 10).is_empty(), "the trajectory stays finite");
+        for (slot, o) in out.iter_mut().enumerate() {
+            o.extend(batch.qpos(slot).iter().chain(&batch.qvel(slot)).map(|x| x.to_bits()));
+        }
+    }
+    out
+}
+
+fn models() -> Vec<Model> {
+    let dir = common::workspace();
+    let agents = ["hopper", "walker2d", "humanoid", "ant"].map(|n| dir.join(format!("assets/agents/{n}.xml")));
+    let others = ["tumbler", "arm"].map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
+    agents.iter().chain(&others).map(|p| Model::from_xml_file(p).unwrap_or_else(|e| panic!("{e}"))).collect()
+}
+
+#[test]
+fn widths_batch_sizes_and_slots() {
+    for model in models() {
+        let ids: Vec<usize> = (0..16).collect();
+        let want = run(&model, &ids, 1, Isa::F32, 40);
+        for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|i| i.supported()) {
+            assert!(run(&model, &ids, 1, isa, 40) == want, "{}: {} differs from one lane", model.name, isa.name());
+        }
+        let best = Isa::best();
+        for n in [1, 7] {
+            assert!(run(&model, &ids[..n], 1, best, 40)[..] == want[..n], "{}: {n} agents", model.name);
+        }
+        // every agent in another slot, among strangers
+        let mixed: Vec<usize> = (0..64).map(|i| if i % 4 == 1 { (i / 4 * 7 + 3) % 16 } else { 100 + i }).collect();
+        let got = run(&model, &mixed, 1, best, 40);
+        for (slot, &id) in mixed.iter().enumerate().filter(|(_, id)| **id < 16) {
+            assert!(got[slot] == want[id], "{}: agent {id} in slot {slot}", model.name);
+        }
+    }
+}
+
+#[test]
+fn threads_and_a_thousand_agents() {
+    let model = &models()[0];
+    let ids: Vec<usize> = (0..1000).collect();
+    let want = run(model, &ids, 1, Isa::best(), 30);
+    for threads in [2, 3] {
+        assert!(run(model, &ids, threads, Isa::best(), 30) == want, "{threads} threads");
+    }
+    assert!(run(model, &ids[..16], 1, Isa::F32, 30)[..] == want[..16], "alone in one lane");
+}

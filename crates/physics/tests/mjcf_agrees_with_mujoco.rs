@@ -1,0 +1,167 @@
+//! A compiled model is MuJoCo's compiled model.
+//!
+//! Whatever the file, the loader accepts it and every number of the model equals MuJoCo's to 1e-9 relative: frames,
+//! masses, inertias, inverse weights, joints, geoms, sites, cameras, lights, actuators, sensors, keyframes, contact
+//! pairs, options and statistics. The files are Marathon's agents, the models that come with dm_control and
+//! Gymnasium, and one small model per feature of the format in `models/mjcf`. Colors are single precision in MuJoCo and
+//! agree to 1e-6.
+
+mod common;
+
+use common::{oracle, package, workspace};
+use marathon_physics::Model;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+const TOLERANCE: f64 = 1e-9;
+
+/// XML files of a folder, in order; none if there is no such folder.
+fn xml_files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("a folder entry").path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "xml"));
+    files.sort();
+    files
+}
+
+/// Compiles every file on both sides and collects what differs.
+fn compare(files: &[PathBuf]) {
+    assert!(!files.is_empty(), "no model files");
+    let answers = oracle("compiled_model.py", &json!({ "files": files }));
+    let mut report = Vec::new();
+    for (file, theirs) in files.iter().zip(answers["files"].as_array().expect("one answer per file")) {
+        if let Some(error) = theirs.get("error") {
+            report.push(format!("{}: MuJoCo refuses it: {error}", file.display()));
+            continue;
+        }
+        match Model::from_xml_file(file) {
+            Err(error) => report.push(format!("refused: {error}")),
+            Ok(model) => {
+                let ours = serde_json::to_value(&model).expect("a model is JSON");
+                let mut differences = Vec::new();
+                differ("", &ours, theirs, &mut differences);
+                report.extend(differences.iter().take(10).map(|d| format!("{}: {d}", file.display())));
+            }
+        }
+    }
+    assert!(report.is_empty(), "{}", report.join("\n"));
+}
+
+/// Walks what the oracle says: `null` is not compared, `"none"` stands for an absent value.
+fn differ(path: &str, ours: &Value, theirs: &Value, out: &mut Vec<String>) {
+    match (ours, theirs) {
+        (_, Value::Null) => {}
+        (Value::Null, Value::String(none)) if none == "none" => {}
+        // q and -q are the same rotation
+        (Value::Array(a), Value::Array(b)) if path.ends_with("quat") && a.len() == 4 && b.len() == 4 => {
+            let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
+            let far =
+                |sign: f64| a.iter().zip(b).map(|(x, y)| (number(x) - sign * number(y)).abs()).fold(0.0, f64::max);
+            if !(far(1.0).min(far(-1.0)) <= TOLERANCE) {
+                out.push(format!("{path} is {ours}, MuJoCo has {theirs}"));
+            }
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            if a.len() != b.len() {
+                out.push(format!("{path} has length {}, MuJoCo has {}", a.len(), b.len()));
+            }
+            a.iter().zip(b).enumerate().for_each(|(i, (a, b))| differ(&format!("{path}[{i}]"), a, b, out));
+        }
+        (Value::Object(a), Value::Object(b)) => {
+            for (key, value) in b {
+                differ(&format!("{path}.{key}"), a.get(key).unwrap_or(&Value::Null), value, out);
+            }
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().expect("a number"), b.as_f64().expect("a number"));
+            let single = path.contains("rgba") || path.contains("diffuse");
+            let tolerance = if single { 1e-6 } else { TOLERANCE };
+            if !((a - b).abs() <= tolerance * a.abs().max(b.abs()) + 1e-13) {
+                out.push(format!("{path} is {a}, MuJoCo has {b}"));
+            }
+        }
+        (ours, theirs) if ours == theirs => {}
+        _ => out.push(format!("{path} is {ours}, MuJoCo has {theirs}")),
+    }
+}
+
+#[test]
+fn every_feature_of_the_format() {
+    compare(&xml_files(&workspace().join("crates/physics/tests/models/mjcf")));
+}
+
+#[test]
+fn marathons_own_agents() {
+    let files = xml_files(&workspace().join("assets/agents"));
+    if !files.is_empty() {
+        compare(&files);
+    }
+}
+
+#[test]
+fn dm_control_suite() {
+    let folder = package("dm_control").join("suite");
+    let names = ["acrobot", "cartpole", "cheetah", "finger", "hopper", "humanoid", "humanoid_CMU", "lqr", "pendulum"];
+    let files = names.iter().chain(&["reacher", "walker"]).map(|name| folder.join(format!("{name}.xml")));
+    compare(&files.collect::<Vec<_>>());
+}
+
+#[test]
+fn gymnasium_mujoco() {
+    let folder = package("gymnasium").join("envs/mujoco/assets");
+    let names = [
+        "ant",
+        "half_cheetah",
+        "hopper",
+        "humanoid",
+        "humanoidstandup",
+        "inverted_double_pendulum",
+        "inverted_pendulum",
+        "point",
+        "pusher",
+        "pusher_v5",
+        "reacher",
+        "walker2d",
+        "walker2d_v5",
+    ];
+    compare(&names.map(|name| folder.join(format!("{name}.xml"))));
+}
+
+/// The frame of equal moments is arbitrary; the tensor that it stands for is not.
+#[test]
+fn the_inertia_tensor_of_nearly_symmetric_bodies() {
+    let shapes = [
+        r#"<geom size=".1"/><geom size=".1" pos="1 1 0"/>"#,
+        r#"<geom size=".1"/><geom size=".1" pos="0 0 1"/><geom size=".1" pos="0 0 -1"/>"#,
+        r#"<geom type="box" size=".1 .1 .1" euler="10 20 30"/><geom type="box" size=".1 .1 .1" pos=".3 .3 .3"/>"#,
+        r#"<inertial pos="0 0 0" mass="1" fullinertia="1 1 1 1e-7 0 0"/>"#,
+        r#"<inertial pos="0 0 0" mass="1" fullinertia="2 2 3 .4 .5 .5"/>"#,
+    ];
+    let texts: Vec<String> =
+        shapes.iter().map(|s| format!("<mujoco><worldbody><body><joint/>{s}</body></worldbody></mujoco>")).collect();
+    let answers = oracle("compiled_model.py", &json!({ "texts": texts }));
+    for (text, theirs) in texts.iter().zip(answers["texts"].as_array().expect("one answer per text")) {
+        let model = Model::from_xml_str(text, "text").expect("a valid model");
+        let numbers = |key: &str| -> Vec<f64> {
+            let values = theirs["bodies"][1][key].as_array().expect("a vector");
+            values.iter().map(|v| v.as_f64().expect("a number")).collect()
+        };
+        let body = &model.bodies[1];
+        let ours = tensor(&body.iquat, &body.inertia);
+        let theirs = tensor(&numbers("iquat"), &numbers("inertia"));
+        for (a, b) in ours.iter().zip(theirs) {
+            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{text}: {a} and {b}");
+        }
+    }
+}
+
+/// `R diag(inertia) R'` by rows.
+fn tensor(quat: &[f64], inertia: &[f64]) -> [f64; 9] {
+    let (w, x, y, z) = (quat[0], quat[1], quat[2], quat[3]);
+    let r = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ];
+    std::array::from_fn(|n| (0..3).map(|k| r[n / 3][k] * inertia[k] * r[n % 3][k]).sum())
+}

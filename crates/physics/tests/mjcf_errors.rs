@@ -1,0 +1,270 @@
+//! A mistake in a model file is reported with its file, line, element and attribute, and with the nearest valid name.
+//!
+//! What would change the dynamics and is not supported is refused in the same way; nothing is skipped silently. Each row
+//! below is a model with one mistake and what the message must contain.
+
+use marathon_physics::Model;
+use marathon_physics::mjcf::MjcfErrorKind;
+
+/// The message for a model given as text.
+fn message(xml: &str) -> String {
+    match Model::from_xml_str(xml, "bad.xml") {
+        Ok(_) => panic!("accepted: {xml}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[track_caller]
+fn check(xml: &str, parts: &[&str]) {
+    let message = message(xml);
+    for part in parts {
+        assert!(message.contains(part), "'{part}' is missing in\n  {message}\nfor\n  {xml}");
+    }
+}
+
+/// A model around something in a body that has a geom of its own.
+fn in_body(content: &str) -> String {
+    format!(
+        "<mujoco>\n<worldbody>\n<body name=\"b\">\n<geom name=\"g\" size=\"1\"/><joint name=\"j\"/><site name=\"s\"/>\n{content}\n</body>\n</worldbody>\n</mujoco>"
+    )
+}
+
+/// A model around a section next to a world with a body, joint, geom and site.
+fn with_section(content: &str) -> String {
+    in_body("").replace("</worldbody>", &format!("</worldbody>\n{content}"))
+}
+
+#[test]
+fn misspelled_names_come_with_the_nearest_valid_one() {
+    check("<mujoco><compilr/></mujoco>", &["bad.xml:1:", "<compilr>", "<mujoco>", "did you mean 'compiler'?"]);
+    check("<mujoco>\n\n<compiler angel='radian'/></mujoco>", &["bad.xml:3:", "'angel'", "did you mean 'angle'?"]);
+    check(&in_body("<goem size='1'/>"), &["bad.xml:5:", "<goem>", "<body>", "did you mean 'geom'?"]);
+    check(&in_body("<geom name='foot' siez='1'/>"), &["bad.xml:5:", "<geom name=\"foot\">", "did you mean 'size'?"]);
+    check(&in_body("<joint tpye='ball'/>"), &["did you mean 'type'?"]);
+    check(&in_body("<geom size='1' type='capsul'/>"), &["'type' is 'capsul'", "did you mean 'capsule'?"]);
+    check("<mujoco><option><flag gravty='enable'/></option></mujoco>", &["<flag>", "did you mean 'gravity'?"]);
+    check("<mujoco><option integrator='euler'/></mujoco>", &["one of Euler, RK4", "did you mean 'Euler'?"]);
+    check("<mujoco><default><jont/></default></mujoco>", &["<jont>", "<default>", "did you mean 'joint'?"]);
+    check("<mujoco><default><geom name='a'/></default></mujoco>", &["<geom name=\"a\"> has no attribute 'name'"]);
+    check("<mujoco><visual><map zner='1'/></visual></mujoco>", &["did you mean 'znear'?"]);
+    // nothing similar: no suggestion
+    assert!(!message("<mujoco><xyzzyplugh/></mujoco>").contains("did you mean"));
+}
+
+#[test]
+fn references_must_exist() {
+    check(&in_body("<geom size='1' class='leg'/>"), &["bad.xml:5:", "'class': there is no default class 'leg'"]);
+    check("<mujoco><worldbody><body childclass='x'/></worldbody></mujoco>", &["'childclass'", "default class 'x'"]);
+    check(&in_body("<geom size='1' material='grid'/>"), &["there is no material 'grid'"]);
+    let section = "<actuator>\n<motor name='m' joint='hip'/></actuator>";
+    check(&with_section(section), &["<motor name=\"m\"> attribute 'joint': there is no joint 'hip'"]);
+    check(&with_section("<actuator><motor/></actuator>"), &["<motor>: the attribute 'joint' is missing"]);
+    check(&with_section("<sensor><gyro site='t'/></sensor>"), &["there is no site 't'", "did you mean 's'?"]);
+    check(&with_section("<sensor><framepos objtype='geom' objname='h'/></sensor>"), &["there is no geom 'h'"]);
+    check(&with_section("<sensor><framepos objname='g'/></sensor>"), &["'objtype' is missing"]);
+    check(&with_section("<sensor><tendonpos tendon='t'/></sensor>"), &["there is no tendon 't'"]);
+    check(&with_section("<contact><pair geom1='g' geom2='h'/></contact>"), &["'geom2': there is no geom 'h'"]);
+    check(&with_section("<contact><exclude body1='b' body2='c'/></contact>"), &["'body2': there is no body 'c'"]);
+    check(&in_body("<camera mode='targetbody' target='c'/>"), &["'target': there is no body 'c'"]);
+    check(&in_body("<light mode='targetbody'/>"), &["needs the attribute 'target'"]);
+}
+
+#[test]
+fn names_must_be_unique() {
+    check(&in_body("<geom name='g' size='1'/>"), &["bad.xml:5:", "there is already a geom of this name"]);
+    check(&in_body("<body name='world'/>"), &["there is already a body of this name"]);
+    check(&with_section("<sensor><clock name='a'/><clock name='a'/></sensor>"), &["already a sensor"]);
+    let classes = "<default><default class='a'/>\n<default class='a'/></default>";
+    check(&format!("<mujoco>{classes}</mujoco>"), &["bad.xml:2:", "the default class 'a' is already defined"]);
+    check("<mujoco><default class='x'/></mujoco>", &["the outermost default class is named 'main'"]);
+    check("<mujoco><default><default/></default></mujoco>", &["a nested default needs the attribute 'class'"]);
+}
+
+#[test]
+fn numbers_must_be_numbers_and_as_many_as_needed() {
+    check(&in_body("<geom size='1 x'/>"), &["bad.xml:5:", "'size' is '1 x'; expected up to 3 numbers"]);
+    check(&in_body("<geom size='1,2'/>"), &["expected up to 3 numbers"]);
+    check(&in_body("<geom size='nan'/>"), &["'size' is 'nan'"]);
+    check(&in_body("<geom size='1e999'/>"), &["'size' is '1e999'"]);
+    check(&in_body("<geom size='1 2 3 4'/>"), &["up to 3 numbers, but there are 4"]);
+    check(&in_body("<geom size='1' pos='1 2'/>"), &["'pos' is '1 2'; expected 3 numbers, but there are 2"]);
+    check(&in_body("<geom size='1' condim='3.0'/>"), &["'condim' is '3.0'; expected an integer"]);
+    check(&in_body("<geom size='1' contype='99999999999'/>"), &["expected an integer"]);
+    check(&in_body("<joint limited='yes'/>"), &["'limited' is 'yes'; expected one of false, true, auto"]);
+    check("<mujoco><option timestep='-1'/></mujoco>", &["expected a number greater than zero"]);
+    check("<mujoco><compiler eulerseq='xyw'/></mujoco>", &["'eulerseq' is 'xyw'; expected three letters"]);
+    check("<mujoco><statistic extent='0'/></mujoco>", &["'extent' is '0'; expected a number greater than zero"]);
+    // a mistake in a class is found although nothing uses the class
+    check("<mujoco><default>\n<joint axis='1 2'/></default></mujoco>", &["bad.xml:2:", "expected 3 numbers"]);
+    check("<mujoco><default>\n<geom solref='a'/></default></mujoco>", &["bad.xml:2:", "expected up to 2 numbers"]);
+    check("<mujoco><default><motor gear='a'/></default></mujoco>", &["expected up to 6 numbers"]);
+    check(&with_section("<keyframe><key qpos='1 2'/></keyframe>"), &["'qpos' is '1 2'; expected a number"]);
+}
+
+#[test]
+fn contradictions() {
+    check(&in_body("<geom size='1' quat='1 0 0 0' euler='0 0 0'/>"), &["only one orientation", "quat and euler"]);
+    check(&in_body("<geom size='1' quat='0 0 0 0'/>"), &["'quat' is '0 0 0 0'; expected a quaternion"]);
+    check(&in_body("<geom size='1' xyaxes='1 0 0 2 0 0'/>"), &["expected a y axis"]);
+    check(&in_body("<geom size='1' fromto='0 0 0 1 0 0'/>"), &["'fromto' requires a capsule"]);
+    check(&in_body("<geom type='capsule' size='1' fromto='1 1 1 1 1 1'/>"), &["coincide"]);
+    check(&in_body("<geom type='capsule' size='1'/>"), &["size 2 of 2 is 0; it must be greater than zero"]);
+    check(&in_body("<geom/>"), &["size 1 of 1 is 0"]);
+    check(&in_body("<geom size='1' condim='2'/>"), &["condim is 2; expected 1, 3, 4 or 6"]);
+    check(&in_body("<geom size='1' mass='-1'/>"), &["must not be negative"]);
+    check(&in_body("<geom type='plane' size='1 1 1'/>"), &["a plane must belong to the world"]);
+    check(&in_body("<joint axis='0 0 0'/>"), &["the axis is shorter"]);
+    check(&in_body("<joint limited='true' range='1 0'/>"), &["'range' goes from"]);
+    check(&in_body("<joint limited='true'/>"), &["'range' goes from 0 to 0"]);
+    check(&in_body("<joint type='free'/>"), &["a free joint must be the only joint"]);
+    check(&in_body("<body><freejoint/></body>"), &["only in a child of the world"]);
+    check(&in_body("<body mocap='true'/>"), &["a mocap body must be a child of the world"]);
+    check(&in_body("<joint/><joint/><joint/><joint/><joint/><joint/>"), &["bad.xml:3:", "at most 6 degrees", "not 7"]);
+    check(&in_body("<inertial pos='0 0 0' mass='1' diaginertia='1 1 3'/>"), &["bad.xml:5:", "balanceinertia"]);
+    check(&in_body("<inertial mass='1' diaginertia='1 1 1'/>"), &["<inertial>: the attribute 'pos' is missing"]);
+    let twice = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>".repeat(2);
+    check(&in_body(&twice), &["already has an <inertial>"]);
+    check(
+        "<mujoco><worldbody><body name='x'><joint/></body></worldbody></mujoco>",
+        &["<body name=\"x\">", "needs mass"],
+    );
+    check("<mujoco><worldbody><joint/></worldbody></mujoco>", &["the world cannot have joints"]);
+    check("<mujoco><worldbody name='x'/></mujoco>", &["<worldbody name=\"x\"> has no attribute 'name'"]);
+    let strict = in_body("<body><joint range='0 1'/></body>")
+        .replace("<worldbody>", "<compiler autolimits='false'/><worldbody>");
+    check(&strict, &["there is 'range' but not 'limited'", "autolimits is false"]);
+    let motor = "<actuator><motor joint='j' ctrllimited='true' ctrlrange='1 -1'/></actuator>";
+    check(&with_section(motor), &["'ctrlrange' goes from 1 to -1"]);
+    check(&with_section("<actuator><position joint='j' kv='-1'/></actuator>"), &["kv must not be negative"]);
+    check(&with_section("<custom><numeric name='a'/></custom>"), &["there are no numbers"]);
+    check(&with_section("<custom><numeric name='a' data='1 2' size='1'/></custom>"), &["expected an integer from 2"]);
+}
+
+#[test]
+fn what_is_not_supported_is_refused_by_name() {
+    for (content, parts) in [
+        ("<geom size='1' adhesion='2'/>", &["attribute 'adhesion'", "'2' is not supported, only '0'"][..]),
+        ("<geom size='1' shellinertia='true'/>", &["attribute 'shellinertia'", "only 'false'"]),
+        ("<geom type='mesh' mesh='m'/>", &["<geom> attribute 'mesh'"]),
+        ("<geom type='mesh'/>", &["meshes are not supported; use a capsule"]),
+        ("<geom type='hfield'/>", &["height fields"]),
+        ("<geom size='1'><plugin/></geom>", &["plugins are not supported"]),
+        ("<joint stiffness='1 2'/>", &["attribute 'stiffness'", "only the linear term"]),
+        ("<joint damping='1 0 3'/>", &["attribute 'damping'", "only the linear term"]),
+        ("<joint springyield='1'/>", &["attribute 'springyield'"]),
+        ("<body gravcomp='1'/>", &["attribute 'gravcomp'"]),
+        ("<replicate count='2'/>", &["<replicate>", "save the expanded model from MuJoCo"]),
+        ("<composite/>", &["<composite>"]),
+        ("<attach/>", &["<attach>"]),
+        ("<flexcomp/>", &["<flexcomp>"]),
+        ("<frame scale='2'/>", &["attribute 'scale'", "only '1'"]),
+    ] {
+        check(&in_body(content), &[&["bad.xml:5:"], parts].concat());
+    }
+    for (section, parts) in [
+        ("<equality><weld body1='b'/></equality>", &["<weld>: equality constraints are not supported"][..]),
+        ("<tendon><fixed stiffness='1'/></tendon>", &["<fixed> attribute 'stiffness'"]),
+        ("<tendon><spatial limited='true' range='0 1'/></tendon>", &["<spatial> attribute 'limited'"]),
+        ("<tendon><spatial range='0 1'/></tendon>", &["<spatial> attribute 'range'"]),
+        ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
+        ("<extension><plugin/></extension>", &["plugins are not supported"]),
+        ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
+        ("<actuator><motor tendon='t'/></actuator>", &["<motor> attribute 'tendon'"]),
+        ("<actuator><motor joint='j' armature='1'/></actuator>", &["<motor> attribute 'armature'"]),
+        ("<actuator><position joint='j' timeconst='1'/></actuator>", &["<position> attribute 'timeconst'"]),
+        ("<actuator><general joint='j' dyntype='filter'/></actuator>", &["attribute 'dyntype'", "only 'none'"]),
+        ("<actuator><general joint='j' gaintype='muscle'/></actuator>", &["attribute 'gaintype'"]),
+        ("<actuator><general joint='j' gainprm='1 2 3 4'/></actuator>", &["only the first three"]),
+        ("<keyframe><key act='1'/></keyframe>", &["<key> attribute 'act'"]),
+        ("<option viscosity='1'/>", &["<option> attribute 'viscosity'", "only '0'"]),
+        ("<option density='1.2'/>", &["<option> attribute 'density'"]),
+        ("<option noslip_iterations='3'/>", &["<option> attribute 'noslip_iterations'"]),
+        ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
+        ("<option><flag override='enable'/></option>", &["<flag> attribute 'override'", "only 'disable'"]),
+        ("<compiler coordinate='global'/>", &["global coordinates are not supported"]),
+        ("<compiler fusestatic='true'/>", &["attribute 'fusestatic'"]),
+        ("<contact><pair geom1='g' geom2='g' solreffriction='1 1'/></contact>", &["attribute 'solreffriction'"]),
+    ] {
+        check(&with_section(section), parts);
+        assert!(
+            Model::from_xml_str(&with_section(section), "bad.xml").is_err_and(|e| e.line >= 7),
+            "line of {section}"
+        );
+    }
+    let error = Model::from_xml_str(&with_section("<equality><weld/></equality>"), "bad.xml").unwrap_err();
+    assert!(matches!(error.kind, MjcfErrorKind::Unsupported { attribute: None, .. }));
+}
+
+#[test]
+fn settings_without_effect_are_accepted() {
+    for content in [
+        "<geom size='1' adhesion='0' surfacevel='0 0 0 0 0 0' shellinertia='false' user='1 2' castshadow='false'/>",
+        "<joint axis='1 0 0' damping='1 0 0' springyield='0' actuatorgravcomp='false'/>",
+        "<body gravcomp='0.0'><geom size='1'/></body>",
+    ] {
+        Model::from_xml_str(&in_body(content), "good.xml").unwrap();
+    }
+    for section in [
+        "<option density='0' solver='PGS' jacobian='sparse' wind='1 0 0' o_margin='1'/>",
+        "<tendon><fixed><joint joint='j' coef='1'/></fixed></tendon><equality/><deformable/>",
+        "<asset><mesh name='unused' file='a.stl'/><texture type='2d' builtin='checker'/></asset>",
+        "<actuator><general joint='j' dyntype='none' actlimited='false' delay='0'/></actuator>",
+    ] {
+        Model::from_xml_str(&with_section(section), "good.xml").unwrap();
+    }
+}
+
+/// An extension: where there is no site of that name, a touch sensor may name a geom.
+#[test]
+fn a_touch_sensor_may_name_a_geom() {
+    use marathon_physics::model::{SensorObject, SensorType};
+    let xml = with_section("<sensor><touch site='g'/><touch site='s'/></sensor>");
+    let model = Model::from_xml_str(&xml, "touch.xml").unwrap();
+    assert_eq!(model.sensors[0].kind, SensorType::Touch);
+    assert_eq!(model.sensors[0].object, SensorObject::Geom(0));
+    assert_eq!(model.sensors[1].object, SensorObject::Site(0));
+}
+
+#[test]
+fn broken_files() {
+    check("", &["bad.xml:1:", "not well-formed XML"]);
+    check("<mujoco>\n<worldbody>\n</mujoco>", &["bad.xml:3:", "not well-formed XML"]);
+    check("<robot/>", &["the top-level element is <robot>; expected <mujoco>"]);
+    check("<!DOCTYPE x [<!ENTITY a 'b'>]><mujoco model='&a;'/>", &["not well-formed XML"]);
+    let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(5000), "</body>".repeat(5000));
+    check(&deep, &["nested more than"]);
+    let missing = Model::from_xml_file("no/such/model.xml").unwrap_err().to_string();
+    assert!(missing.starts_with("no/such/model.xml: cannot read the file:"), "{missing}");
+}
+
+#[test]
+fn includes() {
+    let files = |name: &str| match name {
+        "parts/a.xml" => Ok("<mujoco><include file='b.xml'/></mujoco>".to_owned()),
+        "parts/b.xml" => Ok("<mujoco><option timestep='0.5'/>\n<compiler angel='radian'/></mujoco>".to_owned()),
+        "parts/c.xml" => Ok("<mujocoinclude><option timestep='0.5'/></mujocoinclude>".to_owned()),
+        "loop.xml" => Ok("<mujoco><include file='./loop.xml'/></mujoco>".to_owned()),
+        "empty.xml" => Ok("<mujoco/>".to_owned()),
+        _ => Err("no such file".to_owned()),
+    };
+    let load = |file: &str| {
+        let xml = format!("<mujoco>\n<include file='{file}'/>\n</mujoco>");
+        Model::from_xml_str_with(&xml, "main.xml", &files).map_err(|e| e.to_string())
+    };
+    assert_eq!(load("parts/c.xml").unwrap().opt.timestep, 0.5);
+    assert_eq!(load("parts/../parts/./c.xml").unwrap().opt.timestep, 0.5);
+    for (file, parts) in [
+        // the error names the included file, which was found next to the file that includes it
+        ("parts/a.xml", &["parts/b.xml:2:", "did you mean 'angle'?"][..]),
+        ("missing.xml", &["main.xml:2:", "'missing.xml'", "no such file"]),
+        ("loop.xml", &["loop.xml:1:", "'loop.xml' is already included"]),
+        ("empty.xml", &["main.xml:2:", "'empty.xml' contains no elements"]),
+    ] {
+        let message = load(file).unwrap_err();
+        for part in parts {
+            assert!(message.contains(part), "'{part}' is missing in {message}");
+        }
+    }
+    check("<mujoco><include file='a.xml'/></mujoco>", &["a model given as text has no files to include"]);
+    check("<mujoco><include/></mujoco>", &["the attribute 'file' is missing"]);
+}

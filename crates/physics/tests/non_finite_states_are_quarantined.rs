@@ -1,0 +1,37 @@
+//! A state that stops being finite is caught at its own agent: counted, reset, reported, and nobody else notices.
+
+mod common;
+
+use marathon_physics::{Batch, BatchOptions, Model, SimOptions};
+
+#[test]
+fn a_broken_agent_is_reset_and_its_neighbors_are_untouched() {
+    let path = common::workspace().join("assets/agents/walker2d.xml");
+    let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+    let options = BatchOptions {
+        agents: 16,
+        sim: SimOptions { ground_contacts_only: true, ..Default::default() },
+        ..Default::default()
+    };
+    let (mut sick, mut healthy) = (Batch::new(&model, &options).unwrap(), Batch::new(&model, &options).unwrap());
+    let ctrl = vec![0.3; 16 * model.nu];
+    for (name, value) in [("infinite", f64::INFINITY), ("not a number", f64::NAN), ("huge", 1e30)] {
+        let mut qvel = vec![0.0; model.nv];
+        qvel[2] = value;
+        let before = sick.quarantined();
+        sick.reset(5, &model.qpos0, &qvel);
+        healthy.reset(5, &model.qpos0, &vec![0.0; model.nv]);
+        let mut reported = Vec::new();
+        for _ in 0..20 {
+            reported.extend(sick.step(&ctrl, 4));
+            healthy.step(&ctrl, 4);
+            for agent in (0..16).filter(|a| *a != 5) {
+                assert_eq!(sick.qpos(agent), healthy.qpos(agent), "{name}: agent {agent}");
+                assert_eq!(sick.qvel(agent), healthy.qvel(agent), "{name}: agent {agent}");
+            }
+            assert!(sick.qpos(5).iter().chain(&sick.qvel(5)).all(|x| x.is_finite()), "{name}: only finite states are seen");
+        }
+        assert_eq!(reported, [5], "{name}: reported once");
+        assert_eq!(sick.quarantined(), before + 1, "{name}: counted");
+    }
+}

@@ -1,0 +1,214 @@
+//! Contract: the physics agrees with MuJoCo.
+//!
+//! On random states of every shipped model and of models that were not written here (dm_control, Gymnasium), the mass
+//! matrix, the bias, passive and actuator forces, the contacts, the constraint forces, the acceleration, the sensors and
+//! the next state equal those of the `mujoco` package: to 1e-9 in double precision, and in single precision to the
+//! rounding of its arithmetic, in every lane width that the processor has.
+
+mod common;
+
+use marathon_physics::lanes::Real;
+use marathon_physics::model::SensorType;
+use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Work, with_lanes};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// States per model.
+const STATES: usize = 500;
+
+fn numbers(v: &Value) -> Vec<f64> {
+    v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+/// Distance of two vectors, relative to the second or to `floor` if that is larger.
+fn distance(a: &[f64], b: &[f64], floor: f64) -> f64 {
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied()).max(floor)
+}
+
+/// Models under test: shipped ones, those of two installed packages, and features that neither uses.
+fn models() -> Vec<PathBuf> {
+    let root = common::workspace();
+    let suite = common::package("dm_control").join("suite");
+    let gym = common::package("gymnasium").join("envs/mujoco/assets");
+    let mut paths: Vec<PathBuf> = Vec::new();
+    for dir in ["assets/agents", "crates/physics/tests/models"] {
+        let mut found: Vec<_> = std::fs::read_dir(root.join(dir))
+            .expect("the folder exists")
+            .map(|e| e.expect("readable").path())
+            .filter(|p| p.extension().is_some_and(|e| e == "xml"))
+            .collect();
+        found.sort();
+        paths.extend(found);
+    }
+    paths.extend(["hopper", "walker", "humanoid", "cheetah"].map(|n| suite.join(format!("{n}.xml"))));
+    paths.extend(["hopper", "walker2d_v5", "half_cheetah", "ant", "humanoid"].map(|n| gym.join(format!("{n}.xml"))));
+    paths
+}
+
+/// Errors of one quantity over all states.
+#[derive(Default)]
+struct Errors(Vec<f64>);
+impl Errors {
+    fn add(&mut self, got: &[f64], want: &[f64]) {
+        self.0.push(distance(got, want, 1e-9));
+    }
+    /// Forces below 1 N (N m) count absolutely: a limit violated by a rounding error pushes with nearly nothing.
+    fn add_force(&mut self, got: &[f64], want: &[f64]) {
+        self.0.push(distance(got, want, 1.0));
+    }
+    fn median(&self) -> f64 {
+        let mut v = self.0.clone();
+        v.sort_by(f64::total_cmp);
+        v[v.len() / 2]
+    }
+    fn max(&self) -> f64 {
+        self.0.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+#[derive(Default)]
+struct Comparison {
+    qacc: Errors,
+    constraint: Errors,
+    bias: Errors,
+    applied: Errors,
+    mass: Errors,
+    positions: Errors,
+    sensors: Errors,
+    next: Errors,
+    contact_mismatches: usize,
+}
+
+fn lane<T: Real>(v: &[T], i: usize) -> Vec<f64> {
+    v.iter().map(|x| T::widen(x.get(i))).collect()
+}
+
+fn compare<T: Real>(model: &Model, states: &[Value]) -> Comparison {
+    let mut model = model.clone();
+    // double precision is solved to the end; single precision keeps the model's own tolerance
+    if T::scalar(1.0 + 1e-12) != T::scalar(1.0) {
+        model.opt.tolerance = 1e-14;
+        model.opt.ls_iterations = 100;
+    }
+    let options = SimOptions { ground_contacts_only: true, ..Default::default() };
+    let sim = Sim::<T>::new(&model, options).unwrap_or_else(|e| panic!("{e}"));
+    let mut work = Work::new(&sim);
+    let mut out = Comparison::default();
+    for chunk in states.chunks(T::LANES) {
+        let mut group = Group::new(&sim);
+        for (i, s) in chunk.iter().enumerate() {
+            group.reset_lane(&sim, i, &numbers(&s["qpos"]), &numbers(&s["qvel"]));
+            for (u, x) in group.ctrl.iter_mut().zip(numbers(&s["ctrl"])) {
+                u.set(i, T::scalar(x));
+            }
+        }
+        sim.forward(&mut work, &group);
+        let r = Readings::new(&sim, &group, &work);
+        let (bias, applied, constraint, mass) =
+            (r.bias_forces(), r.applied_forces(), r.constraint_forces(), r.mass_matrix());
+        let acc: Vec<T> = (0..model.nv).map(|d| r.qacc(d)).collect();
+        let contacts = r.contact_count();
+        let positions: Vec<T> = (1..model.bodies.len())
+            .flat_map(|b| r.body_pos(b))
+            .chain((0..model.geoms.len()).flat_map(|g| r.geom_pos(g)))
+            .collect();
+        let sensors: Vec<(usize, Vec<T>)> = model
+            .sensors
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| s.kind != SensorType::Unsupported)
+            .map(|(i, s)| (s.adr, r.sensor(i).unwrap_or_else(|| panic!("sensor {} evaluates", s.name))))
+            .collect();
+        sim.step(&mut work, &mut group, 1);
+        for (i, s) in chunk.iter().enumerate() {
+            let want = |key: &str| numbers(&s[key]);
+            out.qacc.add(&lane(&acc, i), &want("qacc"));
+            out.bias.add(&lane(&bias, i), &want("qfrc_bias"));
+            out.applied.add(&lane(&applied, i), &want("qfrc_applied"));
+            let m: Vec<f64> = mass.iter().flat_map(|row| lane(row, i)).collect();
+            out.mass.add(&m, &want("qM"));
+            let force = want("qfrc_constraint");
+            if force.iter().any(|x| x.abs() > 1e-6) {
+                out.constraint.add_force(&lane(&constraint, i), &force);
+            }
+            let xpos = want("xpos").split_off(3);
+            let want_positions: Vec<f64> = xpos.into_iter().chain(want("geom_xpos")).collect();
+            out.positions.add(&lane(&positions, i), &want_positions);
+            let data = want("sensordata");
+            for (adr, values) in &sensors {
+                // touch and other forces inherit the constraint forces' scale
+                let w = &data[*adr..*adr + values.len()];
+                let scale = w.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
+                let got = lane(values, i);
+                let error = got.iter().zip(w).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max);
+                out.sensors.0.push(error);
+            }
+            let next = [lane(&group.qpos, i), lane(&group.qvel, i)].concat();
+            out.next.add(&next, &[want("next_qpos"), want("next_qvel")].concat());
+            let n = T::widen(contacts.get(i)) as u64;
+            out.contact_mismatches += usize::from(n != s["ncon"].as_u64().expect("a count"));
+        }
+    }
+    out
+}
+
+#[test]
+fn physics_agrees_with_mujoco() {
+    let paths = models();
+    let jobs: Vec<Value> =
+        paths.iter().enumerate().map(|(i, p)| json!({"xml": p, "states": STATES, "seed": i})).collect();
+    let answers = common::oracle("dynamics.py", &Value::Array(jobs));
+    let mut failures = Vec::new();
+    for (path, answer) in paths.iter().zip(answers.as_array().expect("a list")) {
+        let model = Model::from_xml_file(path).unwrap_or_else(|e| panic!("{e}"));
+        let states = answer["states"].as_array().expect("a list");
+        for isa in Isa::ALL.into_iter().filter(|i| i.supported()) {
+            let c = with_lanes!(isa, T => compare::<T>(&model, states));
+            let double = isa == Isa::F64;
+            println!(
+                "{:70} {:9} qacc {:.0e}/{:.0e} constraint {:.0e}/{:.0e} bias {:.0e} applied {:.0e} mass {:.0e} \
+                 positions {:.0e} sensors {:.0e} next {:.0e} contacts differ {}",
+                path.strip_prefix(common::workspace()).unwrap_or(path).display(),
+                isa.name(),
+                c.qacc.median(),
+                c.qacc.max(),
+                if c.constraint.0.is_empty() { 0.0 } else { c.constraint.median() },
+                c.constraint.max(),
+                c.bias.max(),
+                c.applied.max(),
+                c.mass.max(),
+                c.positions.max(),
+                c.sensors.max(),
+                c.next.max(),
+                c.contact_mismatches
+            );
+            let mut check = |what: &str, ok: bool| {
+                if !ok {
+                    failures.push(format!("{} {}: {what}", path.display(), isa.name()));
+                }
+            };
+            if double {
+                check("qacc 1e-9", c.qacc.max() < 1e-9);
+                check("constraint force 1e-9", c.constraint.max() < 1e-9);
+                check("bias 1e-9", c.bias.max() < 1e-9);
+                check("applied 1e-9", c.applied.max() < 1e-9);
+                check("mass 1e-9", c.mass.max() < 1e-9);
+                check("positions 1e-9", c.positions.max() < 1e-9);
+                check("sensors 1e-8", c.sensors.max() < 1e-8);
+                check("next state 1e-9", c.next.max() < 1e-9);
+                check("contacts", c.contact_mismatches == 0);
+            } else {
+                // the feature models have rows far stiffer than any locomotion model's, on purpose
+                let slack = if path.parent().is_some_and(|p| p.ends_with("tests/models")) { 10.0 } else { 1.0 };
+                check("qacc median 2e-6", c.qacc.median() < 2e-6 * slack);
+                check("qacc max 5e-4", c.qacc.max() < 5e-4 * slack);
+                check("constraint median 2e-6", c.constraint.0.is_empty() || c.constraint.median() < 2e-6 * slack);
+                check("constraint max 5e-4", c.constraint.max() < 5e-4 * slack);
+                check("mass 1e-5", c.mass.max() < 1e-5);
+                check("positions 1e-5", c.positions.max() < 1e-5);
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}

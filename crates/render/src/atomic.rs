@@ -1,0 +1,61 @@
+//! Files appear whole or not at all: they are written beside their final name, then renamed.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::error::RenderError;
+
+/// A file in the making; dropped without [`commit`](Self::commit), it is removed again.
+pub(crate) struct Pending {
+    path: PathBuf,
+    temporary: PathBuf,
+    committed: bool,
+}
+
+impl Pending {
+    /// Reserves a temporary name in the folder of `path` and creates an empty file there.
+    pub fn create(path: &Path) -> Result<(Self, File), RenderError> {
+        // two writers of one process must not share a temporary file
+        static COUNTER: AtomicU64 = AtomicU64::new(0);
+        let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
+
+        let name = path.file_name().ok_or_else(|| {
+            let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "the path names no file");
+            RenderError::io(path, "cannot create")(source)
+        })?;
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(format!(".{}-{unique}.tmp", std::process::id()));
+        let temporary = path.with_file_name(hidden);
+
+        let file = File::create(&temporary).map_err(RenderError::io(path, "cannot create"))?;
+        Ok((Self { path: path.to_path_buf(), temporary, committed: false }, file))
+    }
+
+    /// Final path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Path to write to.
+    pub fn temporary(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Gives the finished file its final name, replacing an older one.
+    pub fn commit(&mut self) -> Result<(), RenderError> {
+        fs::rename(&self.temporary, &self.path).map_err(RenderError::io(&self.path, "cannot rename into place"))?;
+        self.committed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        if !self.committed {
+            // nothing to report to: the caller already has the error that led here
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}

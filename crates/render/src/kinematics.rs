@@ -1,0 +1,123 @@
+//! Forward kinematics: world poses of all geoms from `qpos` alone, in `f64`.
+//!
+//! The same composition as MuJoCo's `mj_kinematics`, so results agree with `geom_xpos` and `geom_xmat`.
+
+use glam::{DMat3, DQuat, DVec3};
+use marathon_physics::model::{JointType, Model};
+
+use crate::error::RenderError;
+
+/// World pose of one geom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeomPose {
+    /// Center, m.
+    pub pos: [f64; 3],
+    /// Rotation matrix, rows of three; column `i` is the geom's axis `i` in world coordinates.
+    pub mat: [[f64; 3]; 3],
+}
+
+/// World poses of a model at one `qpos`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// One entry per [`Model::geoms`].
+    pub geoms: Vec<GeomPose>,
+    /// Position of the first moving body, m.
+    pub root: [f64; 3],
+    /// Center of mass of the kinematic tree of the first joint, m; props in trees of their own do not count.
+    pub com: [f64; 3],
+}
+
+/// Computes the pose of every geom. `agent` is only used to name the culprit in errors.
+pub(crate) fn pose(model: &Model, qpos: &[f64], agent: usize) -> Result<Pose, RenderError> {
+    check(model, qpos, agent)?;
+    let (pos, quat) = bodies(model, qpos);
+
+    let geoms = model
+        .geoms
+        .iter()
+        .map(|geom| {
+            let body = geom.body;
+            let mat = DMat3::from_quat(quat[body] * dquat(geom.quat)).transpose();
+            GeomPose { pos: (pos[body] + quat[body] * dvec(geom.pos)).to_array(), mat: mat.to_cols_array_2d() }
+        })
+        .collect();
+
+    let first = model.joints.first().map_or(0, |joint| joint.body);
+    let tree = model.bodies.get(first).map_or(0, |body| body.root_id);
+    let mut mass = 0.0;
+    let mut moment = DVec3::ZERO;
+    for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.root_id == tree && tree != 0) {
+        mass += body.mass;
+        moment += body.mass * (pos[i] + quat[i] * dvec(body.ipos));
+    }
+    let root = pos.get(first).copied().unwrap_or(DVec3::ZERO);
+    let com = if mass > 0.0 { moment / mass } else { root };
+    Ok(Pose { geoms, root: root.to_array(), com: com.to_array() })
+}
+
+fn check(model: &Model, qpos: &[f64], agent: usize) -> Result<(), RenderError> {
+    if qpos.len() != model.nq {
+        let (found, expected) = (qpos.len(), model.nq);
+        return Err(RenderError::QposLength { agent, model: model.name.clone(), found, expected });
+    }
+    match qpos.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(RenderError::NotFinite { agent, index, value: qpos[index] }),
+        None => Ok(()),
+    }
+}
+
+/// Positions and orientations of all bodies in the world.
+fn bodies(model: &Model, qpos: &[f64]) -> (Vec<DVec3>, Vec<DQuat>) {
+    let mut xpos = vec![DVec3::ZERO; model.bodies.len()];
+    let mut xquat = vec![DQuat::IDENTITY; model.bodies.len()];
+
+    for (i, body) in model.bodies.iter().enumerate().skip(1) {
+        let parent = body.parent;
+        let mut pos = xpos[parent] + xquat[parent] * dvec(body.pos);
+        let mut quat = xquat[parent] * dquat(body.quat);
+
+        for joint in &model.joints[body.joint_start..body.joint_start + body.joint_count] {
+            let q = &qpos[joint.qpos_adr..];
+            let anchor = pos + quat * dvec(joint.pos);
+            match joint.kind {
+                JointType::Free => {
+                    pos = DVec3::new(q[0], q[1], q[2]);
+                    quat = unit_quat([q[3], q[4], q[5], q[6]]);
+                }
+                JointType::Slide => {
+                    pos += (q[0] - model.qpos0[joint.qpos_adr]) * (quat * dvec(joint.axis));
+                }
+                JointType::Ball => {
+                    quat *= unit_quat([q[0], q[1], q[2], q[3]]);
+                    pos = anchor - quat * dvec(joint.pos);
+                }
+                JointType::Hinge => {
+                    // the platform's sin and cos differ between systems, libm's do not
+                    let half = 0.5 * (q[0] - model.qpos0[joint.qpos_adr]);
+                    let axis = libm::sin(half) * dvec(joint.axis);
+                    quat *= DQuat::from_xyzw(axis.x, axis.y, axis.z, libm::cos(half));
+                    pos = anchor - quat * dvec(joint.pos);
+                }
+            }
+        }
+        xpos[i] = pos;
+        xquat[i] = quat.normalize();
+    }
+    (xpos, xquat)
+}
+
+fn dvec(v: [f64; 3]) -> DVec3 {
+    DVec3::from_array(v)
+}
+
+/// MuJoCo stores `[w, x, y, z]`.
+fn dquat(q: [f64; 4]) -> DQuat {
+    DQuat::from_xyzw(q[1], q[2], q[3], q[0])
+}
+
+/// Normalizes; a zero quaternion is the identity, as in MuJoCo's `mju_normalize4`.
+fn unit_quat(q: [f64; 4]) -> DQuat {
+    let quat = dquat(q);
+    let norm = quat.length();
+    if norm < 1e-15 { DQuat::IDENTITY } else { quat / norm }
+}

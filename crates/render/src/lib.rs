@@ -1,0 +1,50 @@
+//! Looks at a gait without a GPU: a small ray caster that turns `qpos` into PNG, strips, GIF and MP4.
+//!
+//! ```no_run
+//! use marathon_render::{Corner, Follow, Recorder, Renderer, Scene, status_line};
+//! # fn film(model: &marathon_physics::Model, gait: &[Vec<f64>], speed: f64) -> Result<(), marathon_render::RenderError> {
+//! let scene = Scene::new(model);
+//! let renderer = Renderer::new(640, 360)?;
+//! let mut camera = Follow::new(&scene, 1, 640, 360);
+//! let mut film = Recorder::create("run.gif", 25.0, 8)?;
+//! for (i, qpos) in gait.iter().enumerate() {
+//!     let frame = scene.frame(&[qpos])?;
+//!     let mut image = renderer.render(&frame, &camera.update(&frame, 1.0 / 25.0));
+//!     let at = frame.agents()[0].com[0];
+//!     image.caption(Corner::TopLeft, &[status_line(i as f64 / 25.0, at, speed)]);
+//!     film.push(&image)?;
+//! }
+//! film.finish()
+//! # }
+//! ```
+//!
+//! A picture depends on its inputs alone: not on the number of threads, and not on the platform's math library.
+
+mod animation;
+mod atomic;
+mod bins;
+mod camera;
+mod error;
+mod font;
+mod ground;
+mod image;
+mod kinematics;
+mod mp4;
+mod palette;
+mod recorder;
+mod render;
+mod scene;
+mod shade;
+mod shape;
+mod view;
+
+pub use animation::GifWriter;
+pub use camera::{Camera, Follow};
+pub use error::RenderError;
+pub use image::{Corner, Image, MAX_SIDE, status_line, strip};
+pub use kinematics::{GeomPose, Pose};
+pub use mp4::Mp4Writer;
+pub use recorder::{Format, Recorder};
+pub use render::{Antialias, Renderer};
+pub use scene::{AgentView, Frame, Scene};
+pub use shape::{Hit, Shape};

@@ -1,0 +1,281 @@
+//! What is in the picture: a model's visible geoms, and frames of one or several agents posed from `qpos`.
+
+use glam::{DMat3, DVec3};
+use marathon_physics::model::{Geom, GeomType, Model};
+
+use crate::error::RenderError;
+use crate::ground::Marks;
+use crate::kinematics::{self, Pose};
+use crate::palette::{self, Side};
+use crate::shape::{Plane, Shape, Solid};
+
+/// MuJoCo's default color, which says that nobody chose one.
+const UNCHOSEN: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+/// Geom groups from here on are hidden by MuJoCo's viewer unless asked for.
+const FIRST_HIDDEN_GROUP: i32 = 3;
+
+/// A model ready to be drawn. Make it once, then one [`Frame`] per `qpos`.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    model: Model,
+    shown: Vec<Shown>,
+    planes: Vec<ShownPlane>,
+    /// The runner's geoms all have the same color.
+    one_color: bool,
+    spacing: f64,
+    radius: f64,
+    height: f64,
+    marks: Marks,
+}
+
+/// A geom that will be drawn, with what does not change between frames.
+#[derive(Clone, Debug)]
+struct Shown {
+    geom: usize,
+    shape: Shape,
+    /// Own color in linear light; the palette's when `None`.
+    color: Option<DVec3>,
+    alpha: f64,
+    side: Side,
+    moving: bool,
+    /// Part of the first joint's kinematic tree: the runner, not a prop.
+    runner: bool,
+}
+
+#[derive(Clone, Debug)]
+struct ShownPlane {
+    geom: usize,
+    half: [f64; 2],
+}
+
+/// One picture's worth of geometry in world coordinates.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    pub(crate) solids: Vec<Solid>,
+    pub(crate) planes: Vec<Plane>,
+    pub(crate) marks: Marks,
+    agents: Vec<AgentView>,
+}
+
+/// Where an agent is in a frame, lateral offset included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AgentView {
+    /// Position of its root body, m.
+    pub root: [f64; 3],
+    /// Its center of mass, m.
+    pub com: [f64; 3],
+}
+
+impl Scene {
+    /// Collects the visible geoms of `model`.
+    ///
+    /// Left out are geoms with alpha 0, height fields and meshes (which the simulator refuses), and MuJoCo's hidden
+    /// groups 3 and up unless every geom of the moving bodies is in one of those.
+    pub fn new(model: &Model) -> Self {
+        let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
+        let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
+        let listed = |geom: &Geom| geom.group < FIRST_HIDDEN_GROUP;
+        let all_hidden = !model.geoms.iter().any(|geom| moving(geom) && opaque(geom) && listed(geom));
+        let visible = |geom: &Geom| opaque(geom) && (listed(geom) || (all_hidden && moving(geom)));
+
+        let tree = model.joints.first().and_then(|joint| model.bodies.get(joint.body)).map(|body| body.root_id);
+        let rest = kinematics::pose(model, &model.qpos0, 0).ok();
+        let mut shown = Vec::new();
+        let mut planes = Vec::new();
+        for (index, geom) in model.geoms.iter().enumerate().filter(|(_, geom)| visible(geom)) {
+            if geom.kind == GeomType::Plane {
+                planes.push(ShownPlane { geom: index, half: [geom.size[0], geom.size[1]] });
+            } else if let Some(shape) = shape_of(geom) {
+                let color = (geom.rgba != UNCHOSEN).then(|| {
+                    let [r, g, b, _] = geom.rgba.map(f64::from);
+                    DVec3::new(palette::to_linear(r), palette::to_linear(g), palette::to_linear(b))
+                });
+                let alpha = f64::from(geom.rgba[3]).min(1.0);
+                let runner = moving(geom) && model.bodies.get(geom.body).map(|body| body.root_id) == tree;
+                let side = side_of(model, geom, rest.as_ref().map(|pose| pose.geoms[index].pos[1]));
+                shown.push(Shown { geom: index, shape, color, alpha, side, moving: moving(geom), runner });
+            }
+        }
+
+        // sides are shaded apart only where the model's own colors do not tell them apart
+        let sides: Vec<_> = shown.iter().map(|shown| (shown.side, shown.color)).collect();
+        for shown in &mut shown {
+            let twin = |side| sides.contains(&(side, shown.color));
+            if !(twin(Side::Left) && twin(Side::Right)) {
+                shown.side = Side::Middle;
+            }
+        }
+        let mut colors = shown.iter().filter(|shown| shown.runner).map(|shown| shown.color);
+        let first = colors.next();
+        let one_color = colors.all(|color| Some(color) == first);
+
+        let (radius, height, half_width) = match &rest {
+            Some(pose) => measure(&shown, pose),
+            None => (1.0, 1.0, 0.5),
+        };
+        let spacing = 2.0 * half_width + 0.6 * radius;
+        let marks = Marks::new(radius, half_width);
+        Self { model: model.clone(), shown, planes, one_color, spacing, radius, height, marks }
+    }
+
+    /// The same scene with agents of a row `spacing` meters apart along y; 0 overlays them in one place.
+    pub fn with_spacing(mut self, spacing: f64) -> Self {
+        self.spacing = spacing;
+        self
+    }
+
+    /// The same scene with or without numbers and lines on the ground.
+    pub fn with_marks(mut self, visible: bool) -> Self {
+        self.marks.visible = visible;
+        self
+    }
+
+    /// The model that is drawn.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Distance between neighbors of a row, m.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Radius of the ball about the center of mass that holds the agent in its reference pose, m.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Height of the agent in its reference pose from its lowest to its highest point, m.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// World poses of all geoms of `model` at `qpos`.
+    ///
+    /// # Errors
+    /// [`RenderError::QposLength`] and [`RenderError::NotFinite`].
+    pub fn pose_from_qpos(model: &Model, qpos: &[f64]) -> Result<Pose, RenderError> {
+        kinematics::pose(model, qpos, 0)
+    }
+
+    /// Places one agent per `qpos` side by side: the first on y = 0, each next one farther from the default camera.
+    ///
+    /// Planes are drawn once; other geoms of the world are repeated in each agent's lane.
+    ///
+    /// # Errors
+    /// [`RenderError::QposLength`] and [`RenderError::NotFinite`], with the agent's index.
+    pub fn frame<Q: AsRef<[f64]>>(&self, qpos: &[Q]) -> Result<Frame, RenderError> {
+        let mut frame = Frame { solids: Vec::new(), planes: Vec::new(), marks: self.marks, agents: Vec::new() };
+        for (agent, qpos) in qpos.iter().enumerate() {
+            let pose = kinematics::pose(&self.model, qpos.as_ref(), agent)?;
+            let offset = DVec3::new(0.0, self.spacing * agent as f64, 0.0);
+            self.add_agent(&mut frame, agent, offset, &pose);
+        }
+        Ok(frame)
+    }
+
+    fn add_agent(&self, frame: &mut Frame, agent: usize, offset: DVec3, pose: &Pose) {
+        // overlaid agents share one world
+        let repeat_world = agent == 0 || self.spacing != 0.0;
+        for shown in self.shown.iter().filter(|shown| shown.moving || repeat_world) {
+            let (pos, rot) = placed(pose, shown.geom);
+            let color = match (shown.color, shown.moving) {
+                // one color all over tells the runners of a row apart no better than none
+                (Some(_), true) if self.one_color && agent > 0 => palette::agent(agent, shown.side),
+                (Some(own), true) => palette::sided(own, shown.side),
+                (Some(own), false) => own,
+                (None, true) => palette::agent(agent, shown.side),
+                (None, false) => palette::linear(palette::WORLD),
+            };
+            frame.solids.push(Solid::new(shown.shape, pos + offset, rot, color, shown.alpha));
+        }
+        if agent == 0 {
+            for plane in &self.planes {
+                let (pos, rot) = placed(pose, plane.geom);
+                // a floor is endless in the simulation, whatever size it declares for viewers
+                let level = rot.z_axis.z > 0.999;
+                let half = if level { [0.0; 2] } else { plane.half };
+                frame.planes.push(Plane { pos, rot, half });
+            }
+        }
+        let at = |p: [f64; 3]| (DVec3::from_array(p) + offset).to_array();
+        frame.agents.push(AgentView { root: at(pose.root), com: at(pose.com) });
+    }
+}
+
+impl Frame {
+    /// The agents in the order of their `qpos`.
+    pub fn agents(&self) -> &[AgentView] {
+        &self.agents
+    }
+
+    /// Adds a shape that no model has: a target, an arrow, an obstacle.
+    ///
+    /// `mat` is its rotation, rows of three; `rgba` is sRGB, each in `0..=1`.
+    pub fn add(&mut self, shape: Shape, pos: [f64; 3], mat: [[f64; 3]; 3], rgba: [f32; 4]) {
+        let [r, g, b, alpha] = rgba.map(f64::from);
+        if alpha > 0.0 {
+            let color = DVec3::new(palette::to_linear(r), palette::to_linear(g), palette::to_linear(b));
+            let rot = DMat3::from_cols_array_2d(&mat).transpose();
+            self.solids.push(Solid::new(shape, DVec3::from_array(pos), rot, color, alpha.min(1.0)));
+        }
+    }
+}
+
+fn placed(pose: &Pose, geom: usize) -> (DVec3, DMat3) {
+    let pose = &pose.geoms[geom];
+    (DVec3::from_array(pose.pos), DMat3::from_cols_array_2d(&pose.mat).transpose())
+}
+
+fn shape_of(geom: &Geom) -> Option<Shape> {
+    let [x, y, _] = geom.size;
+    match geom.kind {
+        GeomType::Sphere => Some(Shape::Sphere { radius: x }),
+        GeomType::Capsule => Some(Shape::Capsule { radius: x, half: y }),
+        GeomType::Ellipsoid => Some(Shape::Ellipsoid { semi: geom.size }),
+        GeomType::Cylinder => Some(Shape::Cylinder { radius: x, half: y }),
+        GeomType::Box => Some(Shape::Box { half: geom.size }),
+        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => None,
+    }
+}
+
+/// Left or right by the geom's name, its bodies' names, or else where it is in the reference pose.
+fn side_of(model: &Model, geom: &Geom, rest_y: Option<f64>) -> Side {
+    let named = |name: &str| {
+        let name = name.to_ascii_lowercase();
+        match (name.contains("left"), name.contains("right")) {
+            (true, false) => Some(Side::Left),
+            (false, true) => Some(Side::Right),
+            _ => None,
+        }
+    };
+    let mut found = named(&geom.name);
+    let mut body = geom.body;
+    while body != 0 && found.is_none() {
+        found = named(&model.bodies[body].name);
+        body = model.bodies[body].parent;
+    }
+    found.unwrap_or(match rest_y {
+        Some(y) if y > 0.02 => Side::Left,
+        Some(y) if y < -0.02 => Side::Right,
+        _ => Side::Middle,
+    })
+}
+
+/// Radius about the center of mass, height and half width of the runner in its reference pose.
+fn measure(shown: &[Shown], pose: &Pose) -> (f64, f64, f64) {
+    let com = DVec3::from_array(pose.com);
+    let (mut radius, mut half_width) = (0.0_f64, 0.0_f64);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for shown in shown.iter().filter(|shown| shown.runner) {
+        let (pos, rot) = placed(pose, shown.geom);
+        let (a, b, r) = Solid::new(shown.shape, pos, rot, DVec3::ZERO, 1.0).soft_rod();
+        for end in [a, b] {
+            radius = radius.max((end - com).length() + r);
+            half_width = half_width.max((end.y - com.y).abs() + r);
+            low = low.min(end.z - r);
+            high = high.max(end.z + r);
+        }
+    }
+    if radius > 0.0 { (radius, high - low, half_width) } else { (1.0, 1.0, 0.5) }
+}

@@ -1,0 +1,146 @@
+"""Random states of MJCF models and what MuJoCo makes of them.
+
+Reads a JSON list of jobs from standard input, one per model:
+    {"xml": path, "states": n, "seed": s, "ground_only": bool, "near_floor": bool}
+and prints a JSON list with, per job, the states and MuJoCo's accelerations, forces, mass matrices, contact counts,
+sensor values and next states. States and controls are rounded to single precision so that both sides start alike.
+"""
+
+import json
+import sys
+
+import mujoco
+import numpy as np
+
+
+def ground_contacts_only(model):
+    """Keeps the contacts of moving geoms with static ones, as the geoms' masks have them, and no others."""
+    static = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0]
+    contype, conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
+    for g in range(model.ngeom):
+        if g in static:
+            continue
+        meets = any(
+            (contype[g] & conaffinity[s]) or (contype[s] & conaffinity[g]) for s in static
+        )
+        model.geom_contype[g] = 1 if meets else 0
+        model.geom_conaffinity[g] = 0
+    for s in static:
+        model.geom_contype[s] = 0
+        model.geom_conaffinity[s] = 1
+
+
+def lowest_point(model, data):
+    """Lower bound of the height of every moving geom that can touch the floor."""
+    low = np.inf
+    for g in range(model.ngeom):
+        kind = model.geom_type[g]
+        moving = model.body_weldid[model.geom_bodyid[g]] != 0
+        if not moving or not (model.geom_contype[g] or model.geom_conaffinity[g]):
+            continue
+        z_axis = abs(data.geom_xmat[g].reshape(3, 3)[2, 2])
+        size = model.geom_size[g]
+        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            reach = size[0] + size[1] * z_axis
+        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+            reach = float(np.abs(data.geom_xmat[g].reshape(3, 3)[2]) @ size)
+        else:
+            reach = size[0]
+        low = min(low, data.geom_xpos[g, 2] - reach)
+    return low
+
+
+def vertical_coordinate(model):
+    """Index of the coordinate that lifts the first tree, if there is one."""
+    for j in range(model.njnt):
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE:
+            return model.jnt_qposadr[j] + 2
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE and abs(model.jnt_axis[j][2]) > 0.99:
+            return model.jnt_qposadr[j]
+    return None
+
+
+def random_state(model, rng, near_floor):
+    q = model.qpos0.copy()
+    v = rng.normal(size=model.nv)
+    for j in range(model.njnt):
+        a, kind = model.jnt_qposadr[j], model.jnt_type[j]
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            q[a : a + 2] += rng.normal(size=2)
+            q[a + 3 : a + 7] = rng.normal(size=4)
+            q[a + 3 : a + 7] /= np.linalg.norm(q[a + 3 : a + 7])
+        elif kind == mujoco.mjtJoint.mjJNT_BALL:
+            q[a : a + 4] = rng.normal(size=4)
+            q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
+        elif model.jnt_limited[j]:
+            low, high = model.jnt_range[j]
+            slack = 0.05 * (high - low)
+            q[a] = rng.uniform(low - slack, high + slack)
+        else:
+            q[a] += rng.uniform(-1.5, 1.5)
+    z = vertical_coordinate(model)
+    if near_floor and z is not None:
+        data = mujoco.MjData(model)
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        low = lowest_point(model, data)
+        if np.isfinite(low):
+            # mostly just inside the floor, sometimes in the air
+            q[z] += -low + (-rng.uniform(0, 0.02) if rng.random() < 0.9 else 0.5)
+    low = np.where(model.actuator_ctrllimited, model.actuator_ctrlrange[:, 0], -1.0) if model.nu else np.zeros(0)
+    high = np.where(model.actuator_ctrllimited, model.actuator_ctrlrange[:, 1], 1.0) if model.nu else np.zeros(0)
+    u = rng.uniform(1.2 * low, 1.2 * high) if model.nu else np.zeros(0)
+    return [x.astype(np.float32).astype(np.float64) for x in (q, v, u)]
+
+
+def full_mass_matrix(model, data):
+    dense = np.zeros((model.nv, model.nv))
+    try:
+        mujoco.mj_fullM(model, dense, data.qM)
+    except (TypeError, AttributeError):
+        mujoco.mj_fullM(model, data, dense)
+    return dense
+
+
+def run(job):
+    model = mujoco.MjModel.from_xml_path(job["xml"])
+    if job.get("ground_only", True):
+        ground_contacts_only(model)
+    model.opt.tolerance = 1e-14
+    model.opt.ls_tolerance = 1e-10
+    model.opt.iterations = 200
+    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(job.get("seed", 0))
+    states = []
+    for _ in range(job["states"]):
+        q, v, u = random_state(model, rng, job.get("near_floor", True))
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        mujoco.mj_forward(model, data)
+        state = {
+            "qpos": q.tolist(),
+            "qvel": v.tolist(),
+            "ctrl": u.tolist(),
+            "qacc": data.qacc.tolist(),
+            "qfrc_constraint": data.qfrc_constraint.tolist(),
+            "qfrc_bias": data.qfrc_bias.tolist(),
+            "qfrc_applied": (data.qfrc_passive + data.qfrc_actuator).tolist(),
+            "qM": full_mass_matrix(model, data).ravel().tolist(),
+            # contacts in the gap exert no force and are not constraints
+            "ncon": int(np.sum(data.contact.exclude == 0)),
+            "sensordata": data.sensordata.tolist(),
+            "xpos": data.xpos.ravel().tolist(),
+            "geom_xpos": data.geom_xpos.ravel().tolist(),
+        }
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        mujoco.mj_step(model, data)
+        state["next_qpos"] = data.qpos.tolist()
+        state["next_qvel"] = data.qvel.tolist()
+        states.append(state)
+    return {"xml": job["xml"], "states": states}
+
+
+if __name__ == "__main__":
+    json.dump([run(job) for job in json.load(sys.stdin)], sys.stdout)
