@@ -95,7 +95,7 @@ def missing_libraries(folder):
 
 
 def build_empty_library(path, functions):
-    """A library whose functions fail with status 1, and whose texts are empty."""
+    """A library whose functions return CUDA's status 'no device', and whose texts are empty."""
     by_version = {}
     for function, version in functions.items():
         by_version.setdefault(version, []).append(function)
@@ -104,7 +104,7 @@ def build_empty_library(path, functions):
         code = ""
         for function in functions:
             text = re.search(r"String|Name", function)
-            code += f"const char *{function}(void) {{ return \"\"; }}\n" if text else f"long {function}(void) {{ return 1; }}\n"
+            code += f"const char *{function}(void) {{ return \"\"; }}\n" if text else f"long {function}(void) {{ return 100; }}\n"
         source.write_text(code)
         command = ["gcc", "-shared", "-fPIC", "-w", "-o", path, source, f"-Wl,-soname,{path.name}"]
         versions = {version: names for version, names in by_version.items() if version}
@@ -120,6 +120,7 @@ def main():
         return
     if importlib.util.find_spec("torch") is None:
         pip("--no-deps", TORCH)
+        importlib.invalidate_caches()
     pip(*DEPENDENCIES)
     folder = pathlib.Path(importlib.util.find_spec("torch").origin).parent / "lib"
     for name, functions in missing_libraries(folder).items():
