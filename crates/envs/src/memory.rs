@@ -162,8 +162,8 @@ mod tests {
         };
         // standing: nothing, ranges restart here
         assert_eq!(decide(true, true, 0.0, 0.0), 0.0);
-        // the right foot leaves: the change pays the left side, whose range is still 0, the base alone
-        assert!((decide(true, false, -0.1, 0.2) - 0.2).abs() < 1e-12, "range 0.1 of the left since standing, plus 0.1");
+        // the right foot leaves: the change pays the left side, which moved by 0.1 since standing
+        assert!((decide(true, false, -0.1, 0.2) - 0.2).abs() < 1e-12);
         // no change: fades
         assert!((decide(true, false, -0.2, 0.4) - 0.1).abs() < 1e-12);
         // the left leaves as the right lands: the right earns its swing, from 0 to 0.4

@@ -25,7 +25,10 @@ fn main() {
 }
 
 fn networks() {
-    println!("{:28} {:>9} {:>10} {:>9} {:>11} {:>12}", "network", "isa", "us/sample", "GFLOP/s", "forward us", "backward us");
+    println!(
+        "{:28} {:>9} {:>10} {:>9} {:>11} {:>12}",
+        "network", "isa", "us/sample", "GFLOP/s", "forward us", "backward us"
+    );
     for sizes in [&[31, 32, 32, 4][..], &[31, 64, 64, 4], &[88, 128, 64, 21], &[53, 256, 128, 8], &[54, 512, 512, 8]] {
         for activation in [Activation::Tanh, Activation::Swish] {
             for isa in [Isa::X16, Isa::X8, Isa::X4] {
@@ -70,8 +73,13 @@ fn network(sizes: &[usize], activation: Activation, isa: Isa) {
 }
 
 fn training() {
-    println!("\n{:28} {:>9} {:>8} {:>12} {:>14} {:>8}", "obs, act, hidden", "isa", "threads", "us/step", "steps/cpu-s", "update");
-    for (obs, act, hidden) in [(31, 4, vec![32, 32]), (31, 4, vec![64, 64]), (88, 21, vec![64, 64]), (88, 21, vec![256, 128])] {
+    println!(
+        "\n{:28} {:>9} {:>8} {:>12} {:>14} {:>8}",
+        "obs, act, hidden", "isa", "threads", "us/step", "steps/cpu-s", "update"
+    );
+    for (obs, act, hidden) in
+        [(31, 4, vec![32, 32]), (31, 4, vec![64, 64]), (88, 21, vec![64, 64]), (88, 21, vec![256, 128])]
+    {
         for (isa, threads) in [(Isa::X16, 1), (Isa::X16, 2), (Isa::X8, 1)] {
             if isa.supported() {
                 run(obs, act, &hidden, isa, threads);

@@ -43,7 +43,7 @@ impl Adam {
         scale: f64,
         lr: f64,
     ) {
-        assert!(range.len() == gradient.len() && range.len() % BLOCK == 0);
+        assert!(range.len() == gradient.len() && range.len().is_multiple_of(BLOCK));
         let step = Step {
             params: &mut params[range.clone()],
             m: &mut self.m[range.clone()],
@@ -91,7 +91,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Step<'_> {
 
 /// Adds up partial gradients in their order and returns the sum of squares of the result.
 pub fn reduce(isa: Isa, partials: &[&[f32]], out: &mut [f32]) -> f64 {
-    assert!(out.len() % BLOCK == 0 && partials.iter().all(|p| p.len() == out.len()));
+    assert!(out.len().is_multiple_of(BLOCK) && partials.iter().all(|p| p.len() == out.len()));
     f32_lanes!(isa, T => <T as Real>::enter(Reduce { partials, out }))
 }
 
@@ -123,7 +123,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Reduce<'_> {
 
 /// `sum += x`.
 pub fn add(isa: Isa, sum: &mut [f32], x: &[f32]) {
-    assert!(sum.len() == x.len() && sum.len() % BLOCK == 0);
+    assert!(sum.len() == x.len() && sum.len().is_multiple_of(BLOCK));
     f32_lanes!(isa, T => <T as Real>::enter(Add { sum, x }))
 }
 

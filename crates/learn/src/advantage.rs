@@ -86,11 +86,17 @@ mod tests {
     fn reference(reward: &[f64], value: &[f64], last: f64, done: &[bool], gamma: f64, lambda: f64) -> Vec<f64> {
         let n = reward.len();
         let mut out = vec![0.0; n];
-        for t in 0..n {
+        for (t, out) in out.iter_mut().enumerate() {
             let mut weight = 1.0;
             for k in t..n {
-                let next = if done[k] { 0.0 } else if k + 1 < n { value[k + 1] } else { last };
-                out[t] += weight * (reward[k] + gamma * next - value[k]);
+                let next = if done[k] {
+                    0.0
+                } else if k + 1 < n {
+                    value[k + 1]
+                } else {
+                    last
+                };
+                *out += weight * (reward[k] + gamma * next - value[k]);
                 weight *= gamma * lambda;
                 if done[k] {
                     break;
@@ -124,11 +130,13 @@ mod tests {
             let discounts = Discounts { gamma, lambda };
             f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> { rows: &mut rows, discounts, lanes: PhantomData }));
             for (b, lane) in [(0, 0), (1, 5), (2, 15)] {
-                let pick = |x: &[f32]| (0..horizon).map(|t| x[(t * blocks + b) * BLOCK + lane] as f64).collect::<Vec<_>>();
+                let pick =
+                    |x: &[f32]| (0..horizon).map(|t| x[(t * blocks + b) * BLOCK + lane] as f64).collect::<Vec<_>>();
                 let ended: Vec<bool> = (0..horizon).map(|t| done[t * blocks + b] >> lane & 1 == 1).collect();
                 let last = last_value[b * BLOCK + lane] as f64;
                 let want = reference(&pick(&reward), &pick(&value), last, &ended, gamma, lambda);
-                for ((a, w), (r, v)) in pick(&advantage).iter().zip(&want).zip(pick(&target).iter().zip(&pick(&value))) {
+                for ((a, w), (r, v)) in pick(&advantage).iter().zip(&want).zip(pick(&target).iter().zip(&pick(&value)))
+                {
                     assert!((a - w).abs() < 1e-5 && (r - w - v).abs() < 1e-5, "{a} {w}");
                 }
             }

@@ -199,14 +199,22 @@ impl PpoConfig {
             }
         }
         if !(self.max_std.is_finite() && self.max_std >= self.min_std) {
-            return Err(Error::config("max_std", self.max_std, format!("a number not below min_std = {}", self.min_std)));
+            return Err(Error::config(
+                "max_std",
+                self.max_std,
+                format!("a number not below min_std = {}", self.min_std),
+            ));
         }
         if !self.init_log_std.is_finite() {
             return Err(Error::config("init_log_std", self.init_log_std, "a finite number"));
         }
         let [low, high] = self.lr_range;
         if !(low > 0.0 && low <= high && high.is_finite()) {
-            return Err(Error::config("lr_range", format!("[{low}, {high}]"), "two positive numbers in ascending order"));
+            return Err(Error::config(
+                "lr_range",
+                format!("[{low}, {high}]"),
+                "two positive numbers in ascending order",
+            ));
         }
         Ok(())
     }

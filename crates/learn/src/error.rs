@@ -59,12 +59,7 @@ impl Error {
     pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Error::Io { path: path.into(), action, source }
     }
-    pub(crate) fn file(
-        path: &Path,
-        place: impl ToString,
-        found: impl ToString,
-        expected: impl ToString,
-    ) -> Self {
+    pub(crate) fn file(path: &Path, place: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
         let (place, found, expected) = (place.to_string(), found.to_string(), expected.to_string());
         Error::File { path: path.into(), place, found, expected }
     }

@@ -75,7 +75,10 @@ impl TensorWriter {
     pub fn bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
         let json = serde_json::to_string(document).expect("documents are plain data");
         let views = self.tensors.iter().map(|(name, dtype, shape, bytes)| {
-            (name.as_str(), TensorView::new(*dtype, shape.clone(), bytes).expect("tensors have as many numbers as places"))
+            (
+                name.as_str(),
+                TensorView::new(*dtype, shape.clone(), bytes).expect("tensors have as many numbers as places"),
+            )
         });
         let header = HashMap::from([(KEY.to_string(), json)]);
         safetensors::serialize(views, Some(header)).expect("named tensors in memory")

@@ -95,7 +95,9 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
 
     #[inline(always)]
     fn run(self) -> LossSums {
-        let Loss { objective, gaussian, samples, mean: (mean, d_mean), value: (value, d_value), d_log_std, rows, .. } = self;
+        let Loss {
+            objective, gaussian, samples, mean: (mean, d_mean), value: (value, d_value), d_log_std, rows, ..
+        } = self;
         let (zero, one) = (T::zero(), T::lit(1.0));
         let (low, high) = (T::lit(1.0 - objective.clip), T::lit(1.0 + objective.clip));
         let (shift, scale) = (T::lit(objective.advantage_mean), T::lit(objective.advantage_scale));

@@ -9,8 +9,8 @@
 
 use crate::activation::{self, Activation};
 use crate::buffer::Blocks;
-use crate::tiles;
 use crate::f32_lanes;
+use crate::tiles;
 use marathon_physics::lanes::{Isa, Kernel, Real};
 use std::marker::PhantomData;
 use std::ops::Range;

@@ -26,7 +26,6 @@ impl SplitMix {
         SplitMix(mix.next() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
     }
     /// The next word.
-    #[expect(clippy::should_implement_trait, reason = "an endless stream, not an iterator")]
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = self.0;

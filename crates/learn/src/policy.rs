@@ -131,7 +131,8 @@ impl Policy {
     ) -> Result<Self, Error> {
         let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
         let count: u64 = sizes.windows(2).map(|p| (p[0] as u64 + 1).saturating_mul(p[1] as u64)).sum();
-        let mismatch = |what: &str, found: String, expected: String| Error::Mismatch { what: what.into(), found, expected };
+        let mismatch =
+            |what: &str, found: String, expected: String| Error::Mismatch { what: what.into(), found, expected };
         if sizes.iter().any(|s| !(1..=1 << 16).contains(s)) || sizes.len() > 66 || count > 1 << 28 {
             return Err(mismatch("network", format!("widths {sizes:?}"), "positive widths of a practical size".into()));
         }
@@ -292,7 +293,7 @@ impl<'a> BlockPolicy<'a> {
     pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
         let (policy, clip) = (self.policy, self.policy.meta.action_clip);
         let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
-        assert!(obs.len() / obs_row * act_row == action.len() && obs.len() % obs_row == 0, "whole blocks");
+        assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
         for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
             f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
                 normalizer: &policy.normalizer,

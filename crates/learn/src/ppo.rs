@@ -36,6 +36,7 @@ use std::sync::{Mutex, RwLock};
 const MAX_GROUPS: usize = 32;
 
 /// What a finished run returns.
+#[derive(Debug)]
 pub struct TrainOutput {
     /// The trained policy.
     pub policy: Policy,
@@ -384,11 +385,14 @@ impl<'a> Run<'a> {
 
     /// Sums the worker's slice of the gradient over the groups; returns the sums of the whole minibatch.
     fn reduce(&self, id: usize, groups: usize) -> LossSums {
-        let partials: Vec<_> = self.partials[..groups].iter().map(|p| p.read().expect("no worker has panicked")).collect();
+        let partials: Vec<_> =
+            self.partials[..groups].iter().map(|p| p.read().expect("no worker has panicked")).collect();
         let mut slice = self.slices[id].write().expect("no worker has panicked");
         let Slice { gradient, squares } = &mut *slice;
         let mut rest = &mut gradient[..];
-        for (square, range) in squares.iter_mut().zip(&self.norm_blocks[share(self.norm_blocks.len(), self.workers(), id)]) {
+        for (square, range) in
+            squares.iter_mut().zip(&self.norm_blocks[share(self.norm_blocks.len(), self.workers(), id)])
+        {
             let (out, after) = rest.split_at_mut(range.len());
             let parts: [&[f32]; MAX_GROUPS] = std::array::from_fn(|g| match partials.get(g) {
                 Some(p) => &p.gradient[range.clone()],
@@ -510,4 +514,3 @@ fn share(n: usize, parts: usize, i: usize) -> Range<usize> {
 fn group_count(config: &PpoConfig, m: usize) -> usize {
     share(item_count(config), config.minibatches, m).len().div_ceil(CHUNK).clamp(1, MAX_GROUPS)
 }
-

@@ -8,6 +8,8 @@
 //! `x`, `y`, `dx`, `dy` are rows of sixteen, `[block][feature][16]`, blocks `*_stride` rows apart; weights are
 //! `[output][input]`.
 
+#![expect(clippy::needless_range_loop, reason = "plain counted loops over small arrays are what the compiler unrolls")]
+
 use crate::BLOCK;
 use marathon_physics::lanes::{Real, sum16};
 

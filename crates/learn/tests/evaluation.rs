@@ -3,8 +3,8 @@
 mod common;
 
 use common::{PuckTask, silent, small_config};
-use marathon_learn::{BlockPolicy, EvalOptions, Policy, PpoConfig, evaluate, train};
 use marathon_envs::{BLOCK, BlockStep, ShardFactory};
+use marathon_learn::{BlockPolicy, EvalOptions, Policy, PpoConfig, evaluate, train};
 use marathon_physics::lanes::Isa;
 
 /// A bad policy, so that episodes differ in length.

@@ -54,7 +54,8 @@ fn network_gradients_equal_finite_differences() {
             let net = Mlp::new(sizes, activation);
             let params: Vec<f64> = noise(net.len(), 3).iter().map(|x| x * 1.2).collect();
             let input = fill(&net, 40);
-            let targets: Vec<Vec<f64>> = (0..BLOCKS).map(|b| noise(sizes[sizes.len() - 1] * BLOCK, 70 + b as u64)).collect();
+            let targets: Vec<Vec<f64>> =
+                (0..BLOCKS).map(|b| noise(sizes[sizes.len() - 1] * BLOCK, 70 + b as u64)).collect();
             let (mut tape, mut gradient) = (net.tape(), vec![0.0; net.len()]);
             // half the squared distance to the targets
             let mut loss = |params: &[f64], gradient: Option<&mut [f64]>| {
@@ -92,7 +93,8 @@ impl Case {
     fn new(value_clip: Option<f64>) -> Self {
         let actor = Mlp::new(&[6, 10, 7, 3], Activation::Tanh);
         let critic = Mlp::new(&[6, 9, 1], Activation::Swish);
-        let objective = Objective { clip: 0.2, value_clip, entropy_coef: 0.013, advantage_mean: 0.1, advantage_scale: 1.7 };
+        let objective =
+            Objective { clip: 0.2, value_clip, entropy_coef: 0.013, advantage_mean: 0.1, advantage_scale: 1.7 };
         let row = |n, salt, scale| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<f64>>();
         let data = (0..BLOCKS as u64).map(|b| {
             // old log-probabilities around the new ones (about -2), so that ratios lie inside and outside the clip range

@@ -91,7 +91,7 @@ fn poisoned_observation_is_contained() {
 fn impossible_settings_are_refused_with_the_nearest_possible_one() {
     let refuse = |config: PpoConfig| {
         let result = train(&PuckTask::new(), Isa::best(), &config, None, &mut common::silent);
-        result.err().expect("an error").to_string()
+        result.expect_err("an error").to_string()
     };
     assert_eq!(
         refuse(PpoConfig { agents: 100, ..config() }),

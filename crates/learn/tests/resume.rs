@@ -65,7 +65,7 @@ fn finished_run_resumes_to_itself() {
 fn checkpoint_of_something_else_is_refused() {
     let checkpoint = run(&small_config(), None).unwrap();
     let refuse = |config: PpoConfig, text: &str| {
-        let error = run(&config, Some(checkpoint.clone())).err().expect("an error").to_string();
+        let error = run(&config, Some(checkpoint.clone())).expect_err("an error").to_string();
         assert!(error.contains(text), "{error}");
     };
     refuse(PpoConfig { agents: 96, ..small_config() }, "checkpoint: agents is for 80, expected 96");
@@ -86,7 +86,7 @@ fn damaged_checkpoints_are_refused() {
     let about: serde_json::Value = serde_json::from_str(&json).unwrap();
     let state = folder.join(about["state"]["name"].as_str().unwrap());
     let bytes = std::fs::read(&state).unwrap();
-    let error = || Checkpoint::load(folder).err().expect("an error").to_string();
+    let error = || Checkpoint::load(folder).expect_err("an error").to_string();
 
     std::fs::write(&state, &bytes[..bytes.len() / 2]).unwrap();
     assert!(error().contains("length: found"), "{}", error());

@@ -5,9 +5,9 @@ use marathon_learn::gaussian::Gaussian;
 use marathon_learn::loss::{Loss, LossSums, Objective, Samples};
 use marathon_learn::mlp::Mlp;
 use marathon_learn::{Activation, BLOCK};
+use marathon_physics::lanes::{F32x4, Real};
 #[cfg(target_arch = "x86_64")]
 use marathon_physics::lanes::{F32x8, F32x16};
-use marathon_physics::lanes::{F32x4, Real};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::marker::PhantomData;
@@ -67,13 +67,15 @@ impl Case {
         for b in 0..BLOCKS {
             input.block_mut(b).copy_from_slice(&noise(31 * BLOCK, 100 + b as u64));
         }
-        let row = |n: usize, salt: u64, scale: f32| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<_>>();
+        let row =
+            |n: usize, salt: u64, scale: f32| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<_>>();
         let data = (0..BLOCKS as u64).map(|b| {
             let log_prob = row(1, 30 + b, 1.0).iter().map(|x| x - 1.0).collect();
             [row(ACT, 20 + b, 1.0), log_prob, row(1, 50 + b, 2.0), row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
         });
         let scaled = |net: &Mlp, salt| noise(net.len(), salt).iter().map(|x| x * 0.25).collect();
-        let objective = Objective { clip: 0.2, value_clip, entropy_coef: 0.01, advantage_mean: 0.0, advantage_scale: 1.0 };
+        let objective =
+            Objective { clip: 0.2, value_clip, entropy_coef: 0.01, advantage_mean: 0.0, advantage_scale: 1.0 };
         Self {
             params: [scaled(&actor, 1), scaled(&critic, 2)],
             log_std: noise(ACT, 3).iter().map(|x| x * 0.5 - 0.3).collect(),
@@ -93,7 +95,8 @@ impl Case {
     fn request(&self) -> Value {
         let matrix = |k: usize| self.data.iter().flat_map(|d| Self::rows(&d[k])).collect::<Vec<_>>();
         let list = |k: usize| self.data.iter().flat_map(|d| d[k].clone()).collect::<Vec<f32>>();
-        let obs: Vec<Vec<f32>> = (0..BLOCKS).flat_map(|b| Self::rows(self.input.block(b)).collect::<Vec<_>>()).collect();
+        let obs: Vec<Vec<f32>> =
+            (0..BLOCKS).flat_map(|b| Self::rows(self.input.block(b)).collect::<Vec<_>>()).collect();
         json!({
             "activation": self.actor.activation().name(),
             "sizes": {"actor": self.actor.sizes(), "critic": self.critic.sizes()},
@@ -109,7 +112,8 @@ impl Case {
         let (mut actor, mut critic) = (self.actor.tape(), self.critic.tape());
         self.actor.forward_on::<T>(&self.params[0], &self.input, &mut actor, BLOCKS);
         self.critic.forward_on::<T>(&self.params[1], &self.input, &mut critic, BLOCKS);
-        let means: Vec<Value> = (0..BLOCKS).flat_map(|b| Self::rows(actor.output().block(b)).map(Value::from)).collect();
+        let means: Vec<Value> =
+            (0..BLOCKS).flat_map(|b| Self::rows(actor.output().block(b)).map(Value::from)).collect();
         let values: Vec<f32> = (0..BLOCKS).flat_map(|b| critic.output().block(b).to_vec()).collect();
         agree(&Value::from(means), &want["mean"], &format!("{place}: mean"));
         agree(&values.into(), &want["value"], &format!("{place}: value"));

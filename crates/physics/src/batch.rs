@@ -62,7 +62,14 @@ impl Batch {
             let sim = Sim::<T>::new(model, options.sim.clone())?;
             Box::new(LaneBatch::new(sim, agents, threads)) as Box<dyn Lanes>
         });
-        Ok(Batch { inner, agents, isa: options.isa, home: model.qpos0.clone(), model: Arc::new(model.clone()), quarantined: 0 })
+        Ok(Batch {
+            inner,
+            agents,
+            isa: options.isa,
+            home: model.qpos0.clone(),
+            model: Arc::new(model.clone()),
+            quarantined: 0,
+        })
     }
 
     /// The model.

@@ -163,7 +163,12 @@ fn add_candidates<T: Real>(
     let static_index = model.geoms.iter().position(|g| std::ptr::eq(g, fixed)).unwrap_or(0);
     if fixed.kind != GeomType::Plane {
         return refuse(
-            format!("contact of the static {:?} {} with {}", fixed.kind, label(model, static_index), label(model, geom)),
+            format!(
+                "contact of the static {:?} {} with {}",
+                fixed.kind,
+                label(model, static_index),
+                label(model, geom)
+            ),
             "only planes are simulated as static geometry",
         );
     }
@@ -174,7 +179,12 @@ fn add_candidates<T: Real>(
     }
     if params.condim != 1 && params.condim != 3 {
         return refuse(
-            format!("condim {} of the contact between {} and {}", params.condim, label(model, static_index), label(model, geom)),
+            format!(
+                "condim {} of the contact between {} and {}",
+                params.condim,
+                label(model, static_index),
+                label(model, geom)
+            ),
             "use condim 1 or 3",
         );
     }

@@ -79,8 +79,10 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
         if !motor.plain {
             let gear = T::splat(motor.gear[0]);
             let (length, rate) = (gear * group.qpos[motor.qpos], gear * group.qvel[motor.dofs.start]);
-            let gain = T::splat(motor.gain[2]).mul_add(rate, T::splat(motor.gain[1]).mul_add(length, T::splat(motor.gain[0])));
-            let bias = T::splat(motor.bias[2]).mul_add(rate, T::splat(motor.bias[1]).mul_add(length, T::splat(motor.bias[0])));
+            let gain =
+                T::splat(motor.gain[2]).mul_add(rate, T::splat(motor.gain[1]).mul_add(length, T::splat(motor.gain[0])));
+            let bias =
+                T::splat(motor.bias[2]).mul_add(rate, T::splat(motor.bias[1]).mul_add(length, T::splat(motor.bias[0])));
             force = u.mul_add(gain, bias);
         }
         if let Some((low, high)) = motor.force {

@@ -164,13 +164,13 @@ impl<'a, T: Real> Readings<'a, T> {
     fn mount_pos(&self, m: &Mount<T::Scalar>) -> V3<T> {
         match m.link {
             None => splat3(&m.pos),
-            Some(l) => add3(&self.from_reference(m, l), &self.work.reference[self.sim.links[l].tree]),
+            Some(l) => add3(&self.arm_of(m, l), &self.work.reference[self.sim.links[l].tree]),
         }
     }
 
     /// Position relative to the tree's reference point.
     #[inline(always)]
-    fn from_reference(&self, m: &Mount<T::Scalar>, link: usize) -> V3<T> {
+    fn arm_of(&self, m: &Mount<T::Scalar>, link: usize) -> V3<T> {
         rotate_add(&self.work.rot[link], &splat3(&m.pos), &self.work.pos[link])
     }
 
@@ -188,7 +188,7 @@ impl<'a, T: Real> Readings<'a, T> {
             None => [T::zero(); 3],
             Some(l) => {
                 let v = &self.work.vel[l];
-                cross_add(&ang(v), &self.from_reference(m, l), &lin(v))
+                cross_add(&ang(v), &self.arm_of(m, l), &lin(v))
             }
         }
     }
@@ -212,7 +212,7 @@ impl<'a, T: Real> Readings<'a, T> {
             }
             l = self.sim.links[i].parent;
         }
-        let r = self.from_reference(m, link);
+        let r = self.arm_of(m, link);
         let v = self.mount_velocity(m);
         let spin = ang(&self.work.vel[link]);
         let at_point = cross_add(&ang(&a), &r, &lin(&a));
@@ -370,16 +370,11 @@ pub fn rot_to_quat<T: Real>(r: &Rot<T>) -> [T; 4] {
     let (one, half) = (T::lit(1.0), T::lit(0.5));
     let (xx, yy, zz) = (r[0][0], r[1][1], r[2][2]);
     // four times the squares of the components; the largest one is safe to divide by
-    let squares =
-        [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
+    let squares = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
     let (wx, wy, wz) = (r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]);
     let (xy, xz, yz) = (r[1][0] + r[0][1], r[2][0] + r[0][2], r[2][1] + r[1][2]);
-    let candidates = [
-        [squares[0], wx, wy, wz],
-        [wx, squares[1], xy, xz],
-        [wy, xy, squares[2], yz],
-        [wz, xz, yz, squares[3]],
-    ];
+    let candidates =
+        [[squares[0], wx, wy, wz], [wx, squares[1], xy, xz], [wy, xy, squares[2], yz], [wz, xz, yz, squares[3]]];
     let (mut best, mut q) = (squares[0], candidates[0]);
     for k in 1..4 {
         let better = best.lt(squares[k]);

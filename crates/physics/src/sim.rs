@@ -338,8 +338,7 @@ impl<T: Real> Sim<T> {
                 first..first + floor.iter().filter(|c| c.geom == g).count()
             })
             .collect();
-        let damping: Vec<_> =
-            model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect();
+        let damping: Vec<_> = model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect();
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
         let rk4 = model.opt.integrator == Integrator::Rk4;
         let gravity = if flags.gravity { model.opt.gravity } else { [0.0; 3] };
@@ -404,10 +403,16 @@ fn refuse_unsupported(model: &Model) -> Result<(), SimError> {
         for (i, joint) in joints.iter().enumerate() {
             match joint.kind {
                 JointType::Free if joints.len() > 1 || body.parent != 0 => {
-                    return refuse(format!("free joint '{}' below another joint", joint.name), "free joints belong on top-level bodies");
+                    return refuse(
+                        format!("free joint '{}' below another joint", joint.name),
+                        "free joints belong on top-level bodies",
+                    );
                 }
                 JointType::Ball if i + 1 < joints.len() => {
-                    return refuse(format!("ball joint '{}' followed by another joint of its body", joint.name), "list the ball joint last");
+                    return refuse(
+                        format!("ball joint '{}' followed by another joint of its body", joint.name),
+                        "list the ball joint last",
+                    );
                 }
                 JointType::Ball if joint.limited => {
                     return refuse(format!("the limit of ball joint '{}'", joint.name), "use three hinges with limits");

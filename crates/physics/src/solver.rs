@@ -231,14 +231,7 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
 }
 
 #[inline(always)]
-fn push_limit<T: Real>(
-    dof: usize,
-    dist: T,
-    sign: T,
-    soft: &Softness<T::Scalar>,
-    group: &Group<T>,
-    work: &mut Work<T>,
-) {
+fn push_limit<T: Real>(dof: usize, dist: T, sign: T, soft: &Softness<T::Scalar>, group: &Group<T>, work: &mut Work<T>) {
     let on = dist.lt(T::splat(soft.margin));
     if !T::any(on) {
         return;

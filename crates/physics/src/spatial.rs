@@ -26,11 +26,7 @@ pub fn dot<T: Real>(a: &V3<T>, b: &V3<T>) -> T {
 /// Vector product.
 #[inline(always)]
 pub fn cross<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
-    [
-        a[2].neg_mul_add(b[1], a[1] * b[2]),
-        a[0].neg_mul_add(b[2], a[2] * b[0]),
-        a[1].neg_mul_add(b[0], a[0] * b[1]),
-    ]
+    [a[2].neg_mul_add(b[1], a[1] * b[2]), a[0].neg_mul_add(b[2], a[2] * b[0]), a[1].neg_mul_add(b[0], a[0] * b[1])]
 }
 
 /// `a x b + c`.

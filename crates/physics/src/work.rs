@@ -67,8 +67,8 @@ impl<T: Real> Group<T> {
     pub fn finite(&self) -> T::Mask {
         let mut sum = T::zero();
         for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
-            // x - x is 0, or NaN where x is not finite
-            sum += *x - *x;
+            // 0 x is 0, or NaN where x is not finite
+            sum += *x * T::zero();
         }
         sum.is_finite()
     }

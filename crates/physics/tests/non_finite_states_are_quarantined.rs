@@ -29,7 +29,10 @@ fn a_broken_agent_is_reset_and_its_neighbors_are_untouched() {
                 assert_eq!(sick.qpos(agent), healthy.qpos(agent), "{name}: agent {agent}");
                 assert_eq!(sick.qvel(agent), healthy.qvel(agent), "{name}: agent {agent}");
             }
-            assert!(sick.qpos(5).iter().chain(&sick.qvel(5)).all(|x| x.is_finite()), "{name}: only finite states are seen");
+            assert!(
+                sick.qpos(5).iter().chain(&sick.qvel(5)).all(|x| x.is_finite()),
+                "{name}: only finite states are seen"
+            );
         }
         assert_eq!(reported, [5], "{name}: reported once");
         assert_eq!(sick.quarantined(), before + 1, "{name}: counted");

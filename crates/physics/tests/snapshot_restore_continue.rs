@@ -14,7 +14,9 @@ fn a_restored_batch_has_the_same_future() {
         ..Default::default()
     };
     let mut batch = Batch::new(&model, &options).expect("supported");
-    let controls = |t: usize| -> Vec<f64> { (0..20 * model.nu).map(|i| ((i * 7919 + t * 104729) % 200) as f64 / 100.0 - 1.0).collect() };
+    let controls = |t: usize| -> Vec<f64> {
+        (0..20 * model.nu).map(|i| ((i * 7919 + t * 104729) % 200) as f64 / 100.0 - 1.0).collect()
+    };
     for t in 0..30 {
         batch.step(&controls(t), 5);
     }

@@ -27,6 +27,8 @@ fn python() -> PathBuf {
 fn oracle(input: &Value) -> Value {
     let mut child = Command::new(python())
         .arg(workspace().join("tests/oracle/poses.py"))
+        // MuJoCo leaves a log of its warnings where it runs
+        .current_dir(std::env::temp_dir())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

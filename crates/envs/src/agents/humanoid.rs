@@ -10,9 +10,9 @@
 //! | 67..88 | velocities of the 21 joints in the order of the actions, half turns per second |
 //! | 88..92 | `-v1` only: heights of the four foot capsules in the order of the sensors, m |
 //!
-//! `Humanoid-v0`: r = v/4 + upright bonuses of torso, lower waist and butt, /6 each + their forward bonuses, /4 /6 /6
-//! + phase bonus - (1.2 m - height) - min(0.5, thighs turned out) - 4 (joints at limit) - 0.05 effort, v and height of
-//! the torso; hip flexion and knees are free of effort.
+//! `Humanoid-v0`: r = v/4, upright bonuses of torso, lower waist and butt (/6 each), their forward bonuses (/4, /6, /6),
+//! phase bonus; less 1.2 m - height, min(0.5, thighs turned out), 4 (joints at limit), 0.05 effort. v and height are the
+//! torso's; hip flexion and knees are free of effort.
 //! `Humanoid-v1`: r = V + 0.02 (upright + forward + phase + height + limbs) + (1 - mean effort) min(V, 0.4),
 //! V = 0.4 v / 10 m/s.
 //! Fails when anything but feet and shins touches the ground.

@@ -49,7 +49,7 @@ impl ShardFactory for PuckTask {
     }
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
         let agent = |i: usize| Puck {
-            random: (seed ^ (first * BLOCK + i) as u64 * 0x9e37_79b9).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1,
+            random: (seed ^ ((first * BLOCK + i) as u64 * 0x9e37_79b9)).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1,
             ..Default::default()
         };
         let pucks = (0..blocks * BLOCK).map(agent).collect();

@@ -178,8 +178,8 @@ pub trait Real:
     /// Lanes that are neither infinite nor NaN.
     #[inline(always)]
     fn is_finite(self) -> Self::Mask {
-        // inf - inf and NaN - NaN are NaN, and a NaN compares false
-        (self - self).abs().lt(Self::lit(1.0))
+        // inf 0 and NaN 0 are NaN, and a NaN compares false
+        (self * Self::zero()).abs().lt(Self::lit(1.0))
     }
 }
 

@@ -253,7 +253,10 @@ mod tests {
                 c *= f32::EPSILON;
             }
             let (got, want) = (fused(a, b, c), a.mul_add(b, c));
-            assert!(got.to_bits() == want.to_bits() || (got.is_nan() && want.is_nan()), "{a} * {b} + {c}: {got} != {want}");
+            assert!(
+                got.to_bits() == want.to_bits() || (got.is_nan() && want.is_nan()),
+                "{a} * {b} + {c}: {got} != {want}"
+            );
         }
     }
 }

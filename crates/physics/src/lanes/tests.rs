@@ -17,9 +17,28 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Probe<'_, T> {
             let (s, c) = a.sin_cos();
             let m = a.lt(b);
             let all = [
-                a + b, a - b, a * b, -a, a.div(b), a.abs().sqrt(), a.abs(), a.max(b), a.min(b), a.round(), a.floor(),
-                a.mul_add(b, a), a.neg_mul_add(b, b), s, c, a.exp(), b.abs().max(T::lit(1e-30)).ln(), a.tanh(),
-                a.atan2(b), T::select(m, a, b), T::masked(T::not(m), a), T::masked(T::from_bits(T::bits(m)), b),
+                a + b,
+                a - b,
+                a * b,
+                -a,
+                a.div(b),
+                a.abs().sqrt(),
+                a.abs(),
+                a.max(b),
+                a.min(b),
+                a.round(),
+                a.floor(),
+                a.mul_add(b, a),
+                a.neg_mul_add(b, b),
+                s,
+                c,
+                a.exp(),
+                b.abs().max(T::lit(1e-30)).ln(),
+                a.tanh(),
+                a.atan2(b),
+                T::select(m, a, b),
+                T::masked(T::not(m), a),
+                T::masked(T::from_bits(T::bits(m)), b),
                 T::masked(a.is_finite(), a),
             ];
             self.out.resize(all.len(), Vec::new());
@@ -60,7 +79,12 @@ fn backends_agree_bit_for_bit() {
             for (i, (g, w)) in g.iter().zip(w).enumerate() {
                 // the sign and payload of a NaN are not part of the promise
                 let nan = f32::from_bits(*g).is_nan() && f32::from_bits(*w).is_nan();
-                assert!(g == w || nan, "{isa}: operation {k}, argument {i}: {} != {}", f32::from_bits(*g), f32::from_bits(*w));
+                assert!(
+                    g == w || nan,
+                    "{isa}: operation {k}, argument {i}: {} != {}",
+                    f32::from_bits(*g),
+                    f32::from_bits(*w)
+                );
             }
         }
     };

@@ -213,7 +213,7 @@ fn add_joint(model: &mut Model, body: usize, spec: &JointSpec) {
         dof_adr,
         limited: spec.limited,
         range: spec.range,
-        margin: spec.surface.margin,
+        margin: spec.margin,
         stiffness: spec.stiffness,
         solref_limit: spec.solref_limit,
         solimp_limit: spec.solimp_limit,

@@ -3,7 +3,7 @@
 use super::document::Element;
 use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
 use super::value::Attrs;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the outermost class.
 pub(crate) const MAIN: &str = "main";
@@ -64,7 +64,12 @@ impl<'a> Defaults<'a> {
     fn section(&mut self, section: &'a Element, name: &'a str) -> Result<(), MjcfError> {
         let mut class = self.classes.remove(name).unwrap_or_default();
         let settings = section.children.iter().filter(|e| e.name != "default");
+        let mut seen = BTreeSet::new();
         for element in settings {
+            if !seen.insert(element.name.as_str()) {
+                let message = format!("there is already a <{}> in this class", shorten(&element.name));
+                return Err(element.invalid(message));
+            }
             class.layers.entry(kind(&element.name)).or_default().push(element);
         }
         let actuators = class.layers.get("actuator").map_or(0, Vec::len);

@@ -388,7 +388,10 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
     parent.children.iter().try_for_each(|child| element(child, parent, rules))
 }
 
-/// An element of a `<default>` class: an element of the model without its name and class.
+/// Attributes that belong to one element and not to a class.
+const NOT_IN_CLASSES: &str = "name class target joint jointinparent geom1 geom2 fromto";
+
+/// An element of a `<default>` class: an element of the model without what is its own.
 fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
     const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];
     match child.name.as_str() {
@@ -398,14 +401,14 @@ fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
         }
         // meshes and equality constraints are refused where they are used
         "mesh" | "equality" => return Ok(()),
-        "tendon" => return checked(child, &TENDON[0], "name class"),
+        "tendon" => return checked(child, &TENDON[0], NOT_IN_CLASSES),
         _ => {}
     }
     let tables = [BODY, CONTACT, ASSET].map(|t| t.iter()).into_iter().flatten();
     let rule = tables.filter(|r| DEFAULTS.contains(&r.name)).chain(ACTUATOR).find(|r| r.name == child.name);
     match rule {
         Some(rule) => {
-            checked(child, rule, "name class")?;
+            checked(child, rule, NOT_IN_CLASSES)?;
             match &rule.inside {
                 Inside::Rules(inner) => descend(child, inner),
                 _ => Ok(()),

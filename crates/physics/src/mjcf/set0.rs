@@ -214,14 +214,15 @@ impl Tree {
             .collect();
         for joint in model.joints.iter().filter(|j| self.bodies.contains(&j.body)) {
             let start = joint.dof_adr - self.first;
-            let groups: &[std::ops::Range<usize>] = match joint.kind {
-                JointType::Free => &[0..3, 3..6],
-                JointType::Ball => &[0..3],
-                JointType::Slide | JointType::Hinge => &[0..1],
+            // number of groups of dofs that share a mean, and their size
+            let (groups, size) = match joint.kind {
+                JointType::Free => (2, 3),
+                JointType::Ball => (1, 3),
+                JointType::Slide | JointType::Hinge => (1, 1),
             };
-            for group in groups {
-                let range = start + group.start..start + group.end;
-                let mean = single[range.clone()].iter().sum::<f64>() / group.len() as f64;
+            for group in 0..groups {
+                let range = start + group * size..start + (group + 1) * size;
+                let mean = single[range.clone()].iter().sum::<f64>() / size as f64;
                 for i in range {
                     model.dofs[self.first + i].invweight0 = mean;
                 }

@@ -58,9 +58,13 @@ impl<'a> Attrs<'a> {
         let mut found = false;
         for element in self.chain() {
             let Some(attr) = element.attr(name) else { continue };
+            // as in MuJoCo, an empty text is no value
+            if attr.value.trim_ascii().is_empty() {
+                continue;
+            }
             let values = numbers(element, attr, at_least, out.len())?;
             out[..values.len()].copy_from_slice(&values);
-            found |= !values.is_empty();
+            found = true;
         }
         Ok(found)
     }
@@ -90,8 +94,8 @@ impl<'a> Attrs<'a> {
     /// One integer or the default.
     pub fn integer_or(&self, name: &str, default: i32) -> Result<i32, MjcfError> {
         match self.find(name) {
-            Some((element, attr)) => integer(element, attr),
-            None => Ok(default),
+            Some((element, attr)) if !attr.value.trim_ascii().is_empty() => integer(element, attr),
+            _ => Ok(default),
         }
     }
 
