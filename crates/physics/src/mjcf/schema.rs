@@ -389,7 +389,7 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 }
 
 /// Attributes that belong to one element and not to a class.
-const NOT_IN_CLASSES: &str = "name class target joint jointinparent geom1 geom2 fromto";
+const NOT_IN_CLASSES: &str = "name class target joint jointinparent geom1 geom2";
 
 /// An element of a `<default>` class: an element of the model without what is its own.
 fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
