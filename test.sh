@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
-# Runs all tests. Sets up what they need: a Python environment with the oracles (MuJoCo, Gymnasium, dm_control) in .venv.
+# Runs every test. Sets up what they need by itself: a Python environment in .venv with the oracles (MuJoCo, Gymnasium,
+# dm_control, PyTorch). Needs a Rust toolchain, Python 3.11 with venv, and a C compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  .venv/bin/python -m pip install --quiet --requirement tests/oracle/requirements.txt
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/oracle/requirements.txt
+  .venv/bin/python tests/oracle/install_torch.py
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
-cargo fmt --all --check || echo "note: formatting differs"
-cargo test --release --package marathon-physics
+cargo fmt --all --check
+cargo clippy --release --workspace --all-targets -- -D warnings
+cargo test --release --workspace

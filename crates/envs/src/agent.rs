@@ -27,7 +27,8 @@ pub struct Facts {
     pub id: &'static str,
     /// One line for listings.
     pub summary: &'static str,
-    /// The model, as MJCF text. A keyframe named `spawn`, if there is one, is the pose in which episodes start.
+    /// The model, as MJCF text. A keyframe named `spawn`, if there is one, is the pose and the
+    /// velocity with which episodes start.
     pub model: Cow<'static, str>,
     /// Physics steps per decision.
     pub frame_skip: usize,

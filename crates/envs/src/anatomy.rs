@@ -7,7 +7,7 @@ use marathon_physics::{Group, Readings, Sim, SimOptions, Work};
 use crate::agent::Facts;
 use crate::error::{EnvError, nearest};
 
-/// Name of the keyframe that holds the start pose.
+/// Name of the keyframe that holds the start pose and velocity.
 const SPAWN: &str = "spawn";
 
 /// What is resolved in double precision, before lanes come in.
@@ -15,6 +15,8 @@ pub(crate) struct Blueprint {
     pub model: Model,
     /// Start pose, length `nq`.
     pub spawn: Vec<f64>,
+    /// Start velocity, length `nv`.
+    pub spawn_velocity: Vec<f64>,
     /// Actuated joints that the reset makes noise on.
     pub joints: Vec<SpawnJoint>,
     /// Degrees of freedom that carry the root's linear velocity.
@@ -103,9 +105,9 @@ impl Blueprint {
             }
         }
 
-        let spawn = match model.keyframes.iter().find(|k| k.name == SPAWN) {
-            Some(key) => key.qpos.clone(),
-            None => model.qpos0.clone(),
+        let (spawn, spawn_velocity) = match model.keyframes.iter().find(|k| k.name == SPAWN) {
+            Some(key) => (key.qpos.clone(), key.qvel.clone()),
+            None => (model.qpos0.clone(), vec![0.0; model.nv]),
         };
         let mut joints: Vec<SpawnJoint> = Vec::new();
         for a in &model.actuators {
@@ -123,7 +125,7 @@ impl Blueprint {
                 _ => {}
             }
         }
-        Ok(Blueprint { model, spawn, joints, root_dofs })
+        Ok(Blueprint { model, spawn, spawn_velocity, joints, root_dofs })
     }
 }
 

@@ -167,18 +167,17 @@ impl<T: Real, A: Agent> LaneShard<T, A> {
         life.steps = 0;
         let mut rng = EpisodeRng::new(life.seed, life.agent, life.episode);
         self.qpos.clone_from(&blueprint.spawn);
-        self.qvel.clear();
-        self.qvel.resize(blueprint.model.nv, 0.0);
+        self.qvel.clone_from(&blueprint.spawn_velocity);
         for joint in &blueprint.joints {
             let q = &mut self.qpos[joint.qpos];
             *q += rng.around_zero(facts.reset.joint_position);
             if let Some([low, high]) = joint.range {
                 *q = q.max(low).min(high);
             }
-            self.qvel[joint.dof] = rng.around_zero(facts.reset.joint_velocity);
+            self.qvel[joint.dof] += rng.around_zero(facts.reset.joint_velocity);
         }
         for dof in &blueprint.root_dofs {
-            self.qvel[*dof] = rng.around_zero(facts.reset.root_velocity);
+            self.qvel[*dof] += rng.around_zero(facts.reset.root_velocity);
         }
         block.groups[agent / T::LANES].put(sim, agent % T::LANES, &self.qpos, &self.qvel);
     }

@@ -56,8 +56,10 @@ pub struct PpoConfig {
     pub gamma: f64,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
-    /// Clip range of the probability ratio.
+    /// Clip range of the probability ratio at the start.
     pub clip: f64,
+    /// Clip range of the probability ratio at the end, reached linearly; the same as at the start by default.
+    pub final_clip: Option<f64>,
     /// Clip range of the value's change (in units of the scaled return); none by default.
     pub value_clip: Option<f64>,
     /// Weight of the entropy bonus at the start.
@@ -67,8 +69,11 @@ pub struct PpoConfig {
 
     /// Logarithm of the standard deviation of the actions at the start.
     pub init_log_std: f64,
-    /// Smallest standard deviation.
+    /// Smallest standard deviation, at the start: a floor keeps a policy that has found one safe way from ceasing to
+    /// look for better ones.
     pub min_std: f64,
+    /// Smallest standard deviation at the end, reached linearly; the same as at the start by default.
+    pub final_min_std: Option<f64>,
     /// Largest standard deviation.
     pub max_std: f64,
 
@@ -108,11 +113,13 @@ impl Default for PpoConfig {
             gamma: 0.99,
             gae_lambda: 0.95,
             clip: 0.2,
+            final_clip: None,
             value_clip: None,
             entropy_coef: 0.002,
             final_entropy_coef: None,
             init_log_std: -0.5,
             min_std: 0.05,
+            final_min_std: None,
             max_std: 2.0,
             normalize_observations: true,
             observation_clip: 10.0,
@@ -176,8 +183,10 @@ impl PpoConfig {
             ("target_kl", self.target_kl),
             ("max_grad_norm", self.max_grad_norm),
             ("clip", self.clip),
+            ("final_clip", self.final_clip.unwrap_or(1.0)),
             ("value_clip", self.value_clip.unwrap_or(1.0)),
             ("min_std", self.min_std),
+            ("final_min_std", self.final_min_std.unwrap_or(self.min_std)),
             ("observation_clip", self.observation_clip),
             ("statistics_cap", self.statistics_cap),
         ];
@@ -198,12 +207,10 @@ impl PpoConfig {
                 return Err(Error::config(field, x, "a number not below 0"));
             }
         }
-        if !(self.max_std.is_finite() && self.max_std >= self.min_std) {
-            return Err(Error::config(
-                "max_std",
-                self.max_std,
-                format!("a number not below min_std = {}", self.min_std),
-            ));
+        let largest_min = self.min_std.max(self.final_min_std.unwrap_or(self.min_std));
+        if !(self.max_std.is_finite() && self.max_std >= largest_min) {
+            let expected = format!("a number not below the smallest deviation, {largest_min}");
+            return Err(Error::config("max_std", self.max_std, expected));
         }
         if !self.init_log_std.is_finite() {
             return Err(Error::config("init_log_std", self.init_log_std, "a finite number"));

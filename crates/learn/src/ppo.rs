@@ -270,12 +270,12 @@ impl<'a> Run<'a> {
     fn objective(&self, learner: &Learner, totals: &Totals) -> Objective {
         let config = self.config;
         let progress = learner.steps as f64 / config.total_steps as f64;
-        let last = config.final_entropy_coef.unwrap_or(config.entropy_coef);
+        let moved = |first: f64, last: Option<f64>| first + (last.unwrap_or(first) - first) * progress;
         let (mean, var) = totals.advantage();
         Objective {
-            clip: config.clip,
+            clip: moved(config.clip, config.final_clip),
             value_clip: config.value_clip,
-            entropy_coef: config.entropy_coef + (last - config.entropy_coef) * progress,
+            entropy_coef: moved(config.entropy_coef, config.final_entropy_coef),
             advantage_mean: mean,
             advantage_scale: 1.0 / var.max(1e-12).sqrt(),
         }
@@ -437,7 +437,10 @@ impl<'a> Run<'a> {
                 rest = after;
             }
         }
-        let [low, high] = [config.min_std, config.max_std].map(|s| Real::ln(s) as f32);
+        let progress = (learner.steps as f64 / config.total_steps as f64).min(1.0);
+        let final_min = config.final_min_std.unwrap_or(config.min_std);
+        let min_std = config.min_std + (final_min - config.min_std) * progress;
+        let [low, high] = [min_std, config.max_std].map(|s| Real::ln(s) as f32);
         learner.params[self.layout.log_std.clone()].iter_mut().for_each(|l| *l = l.clamp(low, high));
 
         if config.schedule == Schedule::Adaptive {

@@ -1,0 +1,220 @@
+//! From a behavior of a file to the trainer's configuration.
+
+use super::Loaded;
+use super::behavior::{Behavior, Notes};
+use super::error::ConfigError;
+use super::section::{Entry, Range, Section};
+use super::settings::{Decay, Settings};
+use marathon_learn::{Activation, BLOCK, PpoConfig, Schedule};
+use std::path::Path;
+
+/// Agents in a scene of the paper, which a file of its time does not say.
+const PAPER_AGENTS: u64 = 16;
+/// Most agents that are chosen without being asked for.
+const MOST_AGENTS: u64 = 1024;
+
+/// ML-Agents decays to these, not to zero.
+const LAST_BETA: f64 = 1e-5;
+const LAST_EPSILON: f64 = 0.1;
+/// Normalized observations lie within this.
+const OBSERVATION_CLIP: f64 = 5.0;
+/// ML-Agents clips a sample to [-3, 3] and divides it by 3, and its deviation starts at 1.
+const INIT_STD: f64 = 1.0 / 3.0;
+/// ML-Agents bounds neither the deviation nor the gradient: far out.
+const STD_RANGE: [f64; 2] = [1e-3, 1e3];
+const MAX_GRAD_NORM: f64 = 1e9;
+
+/// Keys of the section that only Marathon reads.
+const MARATHON: [&str; 25] = [
+    "agents",
+    "horizon",
+    "minibatches",
+    "actor_hidden",
+    "critic_hidden",
+    "activation",
+    "value_lr",
+    "schedule",
+    "target_kl",
+    "lr_range",
+    "max_grad_norm",
+    "value_clip",
+    "final_clip",
+    "final_entropy_coef",
+    "init_log_std",
+    "min_std",
+    "final_min_std",
+    "max_std",
+    "observation_clip",
+    "scale_rewards",
+    "statistics_cap",
+    "seed",
+    "threads",
+    "without",
+    "steps_per_agent",
+];
+
+/// The trainer's configuration, with ML-Agents' values for all that the file leaves out.
+///
+/// # Errors
+/// If a value is wrong, or the values do not go together.
+pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigError> {
+    let settings = Settings::read(&behavior)?;
+    let Behavior { top, hyperparameters, marathon, mut notes, seed, .. } = behavior;
+    marathon.only(&MARATHON)?;
+
+    let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
+    let agents = agents(&marathon, &settings, steps_per_agent)?;
+    // an update waits until the buffer is full
+    let horizon = marathon.count("horizon", 1..=1 << 31, settings.buffer_size.div_ceil(agents))?;
+    if let Some(entry) = hyperparameters.get("buffer_size").filter(|_| horizon != settings.buffer_size.div_ceil(agents))
+    {
+        notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
+    }
+    if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon) {
+        let why = "each of the N agents adds M decisions to a rollout and the values of the states reached stand for the rest";
+        notes.ignored(&entry, &why.replace("N", &agents.to_string()).replace("M", &horizon.to_string()));
+    }
+    let minibatches = (settings.buffer_size / settings.batch_size).max(1);
+    let scale = if steps_per_agent { agents } else { 1 };
+    if let Some(entry) = top.get("max_steps").filter(|_| scale > 1) {
+        let all = settings.max_steps.saturating_mul(scale);
+        notes.about(&entry, &format!("counts the steps of each agent: {all} steps of {scale} agents in all"));
+    }
+
+    let hidden = vec![settings.hidden_units as usize; settings.num_layers as usize];
+    let actor_hidden = widths(&marathon, "actor_hidden", hidden)?;
+    let last_epsilon = settings.epsilon.min(LAST_EPSILON);
+    let last_beta = settings.beta.min(LAST_BETA);
+    let defaults = PpoConfig::default();
+    let ppo = PpoConfig {
+        agents: agents as usize,
+        horizon: horizon as usize,
+        minibatches: marathon.count("minibatches", 1..=1 << 31, minibatches)? as usize,
+        epochs: settings.num_epoch as usize,
+        total_steps: settings.max_steps.saturating_mul(scale),
+
+        critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
+        actor_hidden,
+        activation: activation(&marathon)?,
+
+        lr: settings.learning_rate,
+        value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
+        schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
+        target_kl: marathon.number("target_kl", Range::Positive, defaults.target_kl)?,
+        lr_range: lr_range(&marathon, defaults.lr_range)?,
+        max_grad_norm: marathon.number("max_grad_norm", Range::Positive, MAX_GRAD_NORM)?,
+
+        gamma: settings.gamma,
+        gae_lambda: settings.lambd,
+        clip: settings.epsilon,
+        final_clip: end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
+        value_clip: match marathon.get("value_clip") {
+            Some(entry) if entry.node.is_null() => None,
+            Some(entry) => Some(entry.number(Range::Positive)?),
+            None => Some(settings.epsilon),
+        },
+        entropy_coef: settings.beta,
+        final_entropy_coef: end(
+            &marathon,
+            "final_entropy_coef",
+            Range::NotNegative,
+            settings.beta_schedule,
+            last_beta,
+        )?,
+
+        init_log_std: marathon.number("init_log_std", Range::Finite, INIT_STD.ln())?,
+        min_std: marathon.number("min_std", Range::Positive, STD_RANGE[0])?,
+        final_min_std: end(&marathon, "final_min_std", Range::Positive, Decay::Constant, STD_RANGE[0])?,
+        max_std: marathon.number("max_std", Range::Positive, STD_RANGE[1])?,
+
+        normalize_observations: settings.normalize,
+        observation_clip: marathon.number("observation_clip", Range::Positive, OBSERVATION_CLIP)?,
+        scale_rewards: marathon.flag("scale_rewards", false)?,
+        statistics_cap: marathon.number("statistics_cap", Range::Positive, defaults.statistics_cap)?,
+
+        seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(defaults.seed))?,
+        threads: marathon.count("threads", 0..=65_536, defaults.threads as u64)? as usize,
+    };
+    ppo.validate().map_err(|source| ConfigError::Combination {
+        path: path.into(),
+        agent: top.name().to_string(),
+        source,
+    })?;
+    Ok(Loaded {
+        ppo,
+        summary_freq: settings.summary_freq.saturating_mul(scale),
+        checkpoint_interval: settings.checkpoint_interval.saturating_mul(scale),
+        keep_checkpoints: settings.keep_checkpoints as usize,
+        notes: notes.0,
+    })
+}
+
+/// As many agents as fill the buffer with one stretch of `time_horizon` decisions each, where nobody says how many.
+fn agents(marathon: &Section<'_>, settings: &Settings, steps_per_agent: bool) -> Result<u64, ConfigError> {
+    let block = BLOCK as u64;
+    let default = match steps_per_agent {
+        true => PAPER_AGENTS,
+        false => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
+    };
+    let Some(entry) = marathon.get("agents") else { return Ok(default) };
+    let agents = entry.count(block..=1 << 31)?;
+    if !agents.is_multiple_of(block) {
+        let expected = format!("a multiple of {block}, such as {}", agents.next_multiple_of(block));
+        return Err(ConfigError::value(entry.place, entry.node.describe(), expected));
+    }
+    Ok(agents)
+}
+
+fn widths(marathon: &Section<'_>, key: &str, default: Vec<usize>) -> Result<Vec<usize>, ConfigError> {
+    let Some(entry) = marathon.get(key) else { return Ok(default) };
+    let items = entry.items("a list of widths such as [64, 64]")?;
+    items.iter().map(|item| Ok(item.count(1..=65_536)? as usize)).collect()
+}
+
+fn activation(marathon: &Section<'_>) -> Result<Activation, ConfigError> {
+    let Some(entry) = marathon.get("activation") else { return Ok(Activation::Swish) };
+    Ok(Activation::ALL[entry.word(&Activation::ALL.map(Activation::name))?])
+}
+
+/// The rate's schedule: ML-Agents', or the one that only Marathon has.
+fn schedule(
+    marathon: &Section<'_>,
+    hyperparameters: &Section<'_>,
+    decay: Decay,
+    notes: &mut Notes,
+) -> Result<Schedule, ConfigError> {
+    let of_file = match decay {
+        Decay::Constant => Schedule::Constant,
+        Decay::Linear => Schedule::Linear,
+    };
+    let Some(entry) = marathon.get("schedule") else { return Ok(of_file) };
+    let chosen =
+        [Schedule::Constant, Schedule::Linear, Schedule::Adaptive][entry.word(&["constant", "linear", "adaptive"])?];
+    // it still moves beta and epsilon
+    if let Some(entry) =
+        hyperparameters.get("learning_rate_schedule").filter(|_| decay == Decay::Linear && chosen != of_file)
+    {
+        notes.about(&entry, "does not move the learning rate: 'schedule' of the 'marathon:' section does");
+    }
+    Ok(chosen)
+}
+
+/// A value at the end of the run: Marathon's own, or where ML-Agents' decay ends, or none.
+fn end(marathon: &Section<'_>, key: &str, range: Range, decay: Decay, last: f64) -> Result<Option<f64>, ConfigError> {
+    match marathon.get(key) {
+        Some(entry) if entry.node.is_null() => Ok(None),
+        Some(entry) => entry.number(range).map(Some),
+        None => Ok((decay == Decay::Linear).then_some(last)),
+    }
+}
+
+fn lr_range(marathon: &Section<'_>, default: [f64; 2]) -> Result<[f64; 2], ConfigError> {
+    let Some(entry) = marathon.get("lr_range") else { return Ok(default) };
+    let expected = "two positive numbers in ascending order, such as [1e-5, 3e-3]";
+    let items: Vec<Entry<'_>> = entry.items(expected)?;
+    let numbers: Vec<f64> = items.iter().map(|item| item.number(Range::Positive)).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [low, high] if low <= high => Ok([low, high]),
+        _ => Err(ConfigError::value(entry.place, format!("{numbers:?}"), expected)),
+    }
+}

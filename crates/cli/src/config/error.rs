@@ -1,0 +1,149 @@
+//! What can be wrong with a configuration file.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A key of a configuration file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub file: PathBuf,
+    /// Line of the key, counted from 1.
+    pub line: usize,
+    /// Names of the sections and the key, joined by dots.
+    pub key: String,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}: {}", self.file.display(), self.line, self.key)
+    }
+}
+
+/// Why a configuration file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The file is not YAML, or uses what no configuration needs.
+    #[error("{}:{line}:{column}: {problem}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// What is wrong, and what was expected.
+        problem: String,
+    },
+    /// A key that neither ML-Agents nor Marathon knows.
+    #[error("{place}: unknown key; {}", suggestion(nearest, known))]
+    UnknownKey {
+        /// The key.
+        place: Place,
+        /// The known key closest to it, if one is close.
+        nearest: Option<String>,
+        /// All keys that may stand there, comma separated.
+        known: String,
+    },
+    /// A value of the wrong kind or out of range.
+    #[error("{place}: found {found}, expected {expected}")]
+    Value {
+        /// The key.
+        place: Place,
+        /// Its value.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
+    /// A feature of ML-Agents that Marathon does not have.
+    #[error("{place}: {feature} is not supported; found {found}, expected {expected}")]
+    Unsupported {
+        /// The key that asks for it.
+        place: Place,
+        /// The feature.
+        feature: &'static str,
+        /// The value.
+        found: String,
+        /// What makes the file usable.
+        expected: String,
+    },
+    /// The file says nothing about an agent.
+    #[error("{}: nothing about agent {agent}; {}the file has {names}; expected one of {accepted}, or {default}", path.display(), did_you_mean(nearest))]
+    NoSuchBehavior {
+        /// The file.
+        path: PathBuf,
+        /// The agent asked for.
+        agent: String,
+        /// The name in the file closest to the agent's, if one is close.
+        nearest: Option<String>,
+        /// Names in the file.
+        names: String,
+        /// Names under which the agent is looked for.
+        accepted: String,
+        /// Name of the section that serves all agents.
+        default: &'static str,
+    },
+    /// The values do not go together.
+    #[error("{}: {agent}: {source}", path.display())]
+    Combination {
+        /// The file.
+        path: PathBuf,
+        /// Name of the section.
+        agent: String,
+        /// The trainer's complaint.
+        source: marathon_learn::Error,
+    },
+}
+
+fn suggestion(nearest: &Option<String>, known: &str) -> String {
+    match nearest {
+        Some(nearest) => format!("did you mean '{nearest}'?"),
+        None => format!("expected one of {known}"),
+    }
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|n| format!("did you mean '{n}'? ")).unwrap_or_default()
+}
+
+impl ConfigError {
+    pub(super) fn syntax(path: &Path, line: usize, column: usize, problem: impl Into<String>) -> Self {
+        ConfigError::Syntax { path: path.into(), line, column, problem: problem.into() }
+    }
+    pub(super) fn value(place: Place, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        ConfigError::Value { place, found: found.into(), expected: expected.into() }
+    }
+    pub(super) fn unknown(place: Place, key: &str, known: &[&str]) -> Self {
+        let nearest = nearest(key, known.iter().copied()).map(Into::into);
+        ConfigError::UnknownKey { place, nearest, known: known.join(", ") }
+    }
+}
+
+/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error.
+pub(super) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = shown(name).to_lowercase();
+    known
+        .into_iter()
+        .map(|k| (strsim::damerau_levenshtein(&name, &k.to_lowercase()), k))
+        .filter(|(distance, k)| *distance <= 2.max(k.chars().count() / 3))
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, k)| k)
+}
+
+/// A text of a file as messages show it: on one line, and not too long.
+pub(super) fn shown(text: &str) -> String {
+    const MOST: usize = 60;
+    let mut line: String = text.chars().take(MOST).flat_map(|c| c.escape_debug()).collect();
+    if text.chars().nth(MOST).is_some() {
+        line.push_str("...");
+    }
+    line
+}

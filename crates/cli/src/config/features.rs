@@ -1,0 +1,162 @@
+//! Features of ML-Agents that Marathon lacks: refused where they would change what is learned, noted where they are
+//! harmless.
+
+use super::behavior::Notes;
+use super::error::{ConfigError, Place};
+use super::section::{Entry, Range, Section};
+
+/// Features that a file asks for and lets go again, under `marathon: without:`.
+pub struct Without<'a> {
+    names: Vec<&'static str>,
+    file_has_list: Option<Entry<'a>>,
+}
+
+/// What may be let go: the name in the list, and in messages.
+const FEATURES: [(&str, &str); 5] = [
+    ("curiosity", "curiosity"),
+    ("rnd", "random network distillation"),
+    ("gail", "imitation by GAIL"),
+    ("behavioral_cloning", "behavioral cloning"),
+    ("memory", "recurrent memory"),
+];
+
+impl<'a> Without<'a> {
+    /// Reads the list.
+    ///
+    /// # Errors
+    /// If it is no list of known features.
+    pub fn read(marathon: &Section<'a>) -> Result<Self, ConfigError> {
+        let Some(entry) = marathon.set("without") else {
+            return Ok(Without { names: Vec::new(), file_has_list: None });
+        };
+        let all = FEATURES.map(|(name, _)| name);
+        let items = entry.items(&format!("a list of some of {}", all.join(", ")))?;
+        let names: Result<Vec<_>, _> = items.iter().map(|item| item.word(&all).map(|i| all[i])).collect();
+        Ok(Without { names: names?, file_has_list: Some(entry) })
+    }
+
+    /// Refuses a feature that an entry asks for, or notes that it is left out.
+    ///
+    /// # Errors
+    /// Unless the file itself says that the feature may be left out.
+    pub fn feature(&self, name: &str, asks: &Entry<'_>, off: &str, notes: &mut Notes) -> Result<(), ConfigError> {
+        let (name, feature) = FEATURES.into_iter().find(|(n, _)| *n == name).expect("a feature of the table");
+        if self.names.contains(&name) {
+            let line = self.file_has_list.as_ref().map_or(0, |entry| entry.place.line);
+            notes.about(asks, &format!("asks for {feature}, which is left out as line {line} allows"));
+            return Ok(());
+        }
+        Err(ConfigError::Unsupported {
+            place: asks.place.clone(),
+            feature,
+            found: asks.node.describe(),
+            expected: format!("{off}, or 'marathon: {{without: [{name}]}}' beside it to train without"),
+        })
+    }
+}
+
+/// Refuses trainers other than PPO.
+///
+/// # Errors
+/// If the entry names one.
+pub fn only_ppo(trainer: Option<Entry<'_>>) -> Result<(), ConfigError> {
+    match trainer {
+        Some(entry) if entry.word(&["ppo"]).is_err() => Err(ConfigError::Unsupported {
+            feature: "a trainer other than PPO",
+            found: entry.node.describe(),
+            expected: "ppo".into(),
+            place: entry.place,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a feature that is asked for by a key with any value.
+///
+/// # Errors
+/// If the key is there.
+pub fn refuse(entry: Option<Entry<'_>>, feature: &'static str, expected: &str) -> Result<(), ConfigError> {
+    match entry {
+        Some(Entry { place, node, .. }) => {
+            Err(ConfigError::Unsupported { place, feature, found: node.describe(), expected: expected.into() })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a feature that is asked for by `true`.
+///
+/// # Errors
+/// If it is, or if the value is no truth value.
+pub fn off(section: &Section<'_>, key: &str, feature: &'static str) -> Result<(), ConfigError> {
+    match section.set(key) {
+        Some(entry) if entry.flag()? => refuse(Some(entry), feature, "false"),
+        _ => Ok(()),
+    }
+}
+
+/// An encoder of pictures, which no agent here sees.
+///
+/// # Errors
+/// If the value is unknown to ML-Agents too.
+pub fn visual(network: &Section<'_>, notes: &mut Notes) -> Result<(), ConfigError> {
+    if let Some(entry) = network.set("vis_encode_type")
+        && entry.word(&["simple", "nature_cnn", "resnet", "match3", "fully_connected"])? != 0
+    {
+        notes.ignored(&entry, "the agents see no pictures");
+    }
+    Ok(())
+}
+
+/// Acting while learning.
+///
+/// # Errors
+/// If the value is no truth value.
+pub fn threaded(top: &Section<'_>, notes: &mut Notes) -> Result<(), ConfigError> {
+    if let Some(entry) = top.set("threaded")
+        && entry.flag()?
+    {
+        notes.ignored(&entry, "acting and learning take turns, each on all threads");
+    }
+    Ok(())
+}
+
+/// The rewards: returns the section of the task's own and refuses the others.
+///
+/// # Errors
+/// If there are others, or the task's own is missing or has no strength.
+pub fn reward_signals<'a>(
+    top: &Section<'a>,
+    without: &Without<'_>,
+    notes: &mut Notes,
+) -> Result<Section<'a>, ConfigError> {
+    let signals = top.section("reward_signals")?;
+    let Some(whole) = top.set("reward_signals") else { return Ok(signals) };
+    signals.only(&["extrinsic", "curiosity", "rnd", "gail"])?;
+    for name in ["curiosity", "rnd", "gail"] {
+        let Some(entry) = signals.set(name) else { continue };
+        // a reward of strength zero is switched off
+        let section = signals.section(name)?;
+        if section.number("strength", Range::NotNegative, 1.0)? > 0.0 {
+            without.feature(name, &entry, "strength 0 or no such section", notes)?;
+        }
+    }
+    if signals.get("extrinsic").is_none() {
+        return Err(ConfigError::Unsupported {
+            place: Place { key: format!("{}.extrinsic", whole.place.key), ..whole.place },
+            feature: "training without the task's own reward",
+            found: "nothing".into(),
+            expected: "a section with gamma and strength".into(),
+        });
+    }
+    let extrinsic = signals.section("extrinsic")?;
+    extrinsic.only(&["gamma", "strength", "network_settings"])?;
+    let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
+    if let Some(entry) = extrinsic.get("strength").filter(|_| strength != 1.0) {
+        notes.ignored(&entry, "with one reward, its scale does not change the policy's gradient; it is taken as 1");
+    }
+    if let Some(entry) = extrinsic.set("network_settings") {
+        notes.ignored(&entry, "the task's own reward needs no network");
+    }
+    Ok(extrinsic)
+}

@@ -1,0 +1,102 @@
+//! The format of ML-Agents before version 0.16, that of the paper: a section per brain with flat keys, and `default:`
+//! below all of them.
+
+use super::behavior::{Behavior, Format, Notes, select};
+use super::current;
+use super::document::Map;
+use super::error::{ConfigError, Place, nearest};
+use super::features::{Without, only_ppo, refuse, reward_signals, threaded, visual};
+use super::section::{Range, Section};
+use std::path::Path;
+
+/// Keys of a section.
+const BRAIN: [&str; 33] = [
+    "trainer",
+    "batch_size",
+    "buffer_size",
+    "learning_rate",
+    "learning_rate_schedule",
+    "beta",
+    "beta_schedule",
+    "epsilon",
+    "epsilon_schedule",
+    "lambd",
+    "gamma",
+    "num_epoch",
+    "normalize",
+    "hidden_units",
+    "num_layers",
+    "max_steps",
+    "time_horizon",
+    "summary_freq",
+    "keep_checkpoints",
+    "use_recurrent",
+    "memory_size",
+    "sequence_length",
+    "use_curiosity",
+    "curiosity_strength",
+    "curiosity_enc_size",
+    "vis_encode_type",
+    "reward_signals",
+    "threaded",
+    "init_path",
+    "self_play",
+    "behavioral_cloning",
+    "pretraining",
+    "marathon",
+];
+
+/// Finds an agent's settings and refuses what is misspelled or not supported.
+///
+/// # Errors
+/// Says what, where, and what would do.
+pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a>, ConfigError> {
+    let mut notes = Notes::default();
+    let root = Section::root(path, map);
+    // a file in the present format whose only section is misspelled
+    if let Some(field) = map.entries.iter().find(|field| nearest(&field.key, current::TOP).is_some()) {
+        let place = Place { file: path.into(), line: field.line, key: field.key.clone() };
+        return Err(ConfigError::unknown(place, &field.key, &current::TOP));
+    }
+    let top = select(path, agent, &root, root.section("default")?, "default", &mut notes)?;
+    // the trainer first: others have other keys
+    only_ppo(top.get("trainer"))?;
+    top.only(&BRAIN)?;
+    let marathon = top.section("marathon")?;
+    let without = Without::read(&marathon)?;
+
+    if let Some(entry) = top.set("use_recurrent")
+        && entry.flag()?
+    {
+        without.feature("memory", &entry, "false", &mut notes)?;
+    }
+    if let Some(entry) = top.set("use_curiosity")
+        && entry.flag()?
+        && top.number("curiosity_strength", Range::NotNegative, 0.01)? > 0.0
+    {
+        without.feature("curiosity", &entry, "false", &mut notes)?;
+    }
+    for key in ["behavioral_cloning", "pretraining"] {
+        if let Some(entry) = top.set(key) {
+            without.feature("behavioral_cloning", &entry, "null", &mut notes)?;
+        }
+    }
+    visual(&top, &mut notes)?;
+    threaded(&top, &mut notes)?;
+    refuse(top.set("self_play"), "self-play", "null")?;
+    refuse(top.set("init_path"), "starting from another run", "null")?;
+    let extrinsic = reward_signals(&top, &without, &mut notes)?;
+    Ok(Behavior {
+        format: Format::Legacy,
+        hyperparameters: top.clone(),
+        network: top.clone(),
+        // the discount moved into the reward signals in version 0.9, and steps were counted for all agents together
+        // from 0.14 on; nothing tells the versions in between apart
+        steps_per_agent: extrinsic.is_empty(),
+        extrinsic: extrinsic.above(top.clone()),
+        marathon,
+        top,
+        seed: None,
+        notes,
+    })
+}

@@ -1,0 +1,100 @@
+//! Configuration files of the trainer, in the schema of ML-Agents.
+//!
+//! The way of a file: [`document`] makes a tree of the YAML text, [`current`] or [`legacy`] finds the agent's sections in
+//! it ([`behavior`], [`names`]) and refuses what is misspelled or missing here ([`features`]), [`settings`] reads
+//! ML-Agents' keys with its defaults, [`convert`] turns them into the trainer's configuration and adds what the
+//! `marathon:` section says. [`section`] is what all of them read values with.
+//!
+//! `docs/configs.md` has the tables.
+
+mod behavior;
+mod convert;
+mod current;
+mod document;
+mod error;
+mod features;
+mod legacy;
+mod names;
+mod section;
+mod settings;
+
+pub use error::ConfigError;
+
+use marathon_learn::PpoConfig;
+use std::path::Path;
+
+/// The configurations that come with the agents, by the agent's id without its version.
+const FAST: [(&str, &str); 4] = [
+    ("Hopper", include_str!("../../../../assets/configs/hopper-fast.yaml")),
+    ("Walker2d", include_str!("../../../../assets/configs/walker2d-fast.yaml")),
+    ("Humanoid", include_str!("../../../../assets/configs/humanoid-fast.yaml")),
+    ("Ant", include_str!("../../../../assets/configs/ant-fast.yaml")),
+];
+
+/// What a file says about the training of an agent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The trainer's configuration; it is valid.
+    pub ppo: PpoConfig,
+    /// Steps between summaries.
+    pub summary_freq: u64,
+    /// Steps between checkpoints.
+    pub checkpoint_interval: u64,
+    /// Policies on the way that are kept.
+    pub keep_checkpoints: usize,
+    /// What the user should know: settings that have no effect here, or not the one that they seem to have.
+    pub notes: Vec<String>,
+}
+
+impl Default for Loaded {
+    /// The trainer's own defaults.
+    fn default() -> Self {
+        Loaded {
+            ppo: PpoConfig::default(),
+            summary_freq: 50_000,
+            checkpoint_interval: 500_000,
+            keep_checkpoints: 5,
+            notes: Vec::new(),
+        }
+    }
+}
+
+/// Reads what a file says about an agent, which may go by any of its names.
+///
+/// # Errors
+/// If the file cannot be read, is no configuration, says nothing about the agent, or asks for what there is not. Messages
+/// name file, line and key, what was found and what was expected.
+pub fn load(path: &Path, agent: &str) -> Result<Loaded, ConfigError> {
+    let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
+    parse(path, &bytes, agent)
+}
+
+/// As [`load`], from bytes; the path is for messages.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigError> {
+    let map = document::parse(path, bytes)?;
+    let agent = names::id(agent);
+    let behavior = match map.keys().any(|key| current::TOP.contains(&key)) {
+        true => current::read(path, &map, &agent)?,
+        false => legacy::read(path, &map, &agent)?,
+    };
+    convert::convert(path, behavior)
+}
+
+/// The configuration that trains an agent fast; the trainer's own defaults for agents that have none.
+///
+/// # Panics
+/// If a configuration that is part of the program is wrong, which a test rules out.
+pub fn default_for(agent: &str) -> Loaded {
+    let id = names::id(agent);
+    let base = names::base(&id);
+    match FAST.iter().find(|(name, _)| name.eq_ignore_ascii_case(base)) {
+        Some((name, text)) => {
+            let path = format!("{}-fast.yaml", name.to_lowercase());
+            parse(path.as_ref(), text.as_bytes(), &id).expect("the program's own configurations are right")
+        }
+        None => Loaded::default(),
+    }
+}

@@ -1,0 +1,39 @@
+//! Agents under the names of other systems.
+
+/// Names of the paper's scenes and of the repository's later versions, without the agent's own. `(agent, names)`
+const BRAINS: [(&str, &[&str]); 4] = [
+    ("Hopper", &["DeepMindHopperBrain", "OpenAIHopperBrain", "HopperBrain"]),
+    ("Walker2d", &["Walker", "DeepMindWalkerBrain", "OpenAIWalker2dBrain", "OpenAIWalkerBrain", "WalkerBrain"]),
+    ("Humanoid", &["DeepMindHumanoidBrain", "OpenAIHumanoidBrain", "HumanoidBrain"]),
+    ("Ant", &["OpenAIAntBrain", "DeepMindAntBrain", "AntBrain"]),
+];
+
+/// The registered id of an agent's name; the name itself if no agent is registered under it.
+pub fn id(agent: &str) -> String {
+    marathon_envs::agent(agent).map_or_else(|_| agent.to_string(), |found| found.facts().id.to_string())
+}
+
+/// An id without its version.
+pub fn base(id: &str) -> &str {
+    match id.rsplit_once("-v") {
+        Some((base, version)) if version.parse::<u32>().is_ok() => base,
+        _ => id,
+    }
+}
+
+/// Names under which a file may speak of an agent, the most particular first.
+pub fn accepted(id: &str) -> Vec<&str> {
+    let base = base(id);
+    let mut names = vec![id];
+    if base != id {
+        names.push(base);
+    }
+    let brains = BRAINS.iter().find(|(agent, _)| agent.eq_ignore_ascii_case(base));
+    names.extend(brains.map_or(&[][..], |(_, names)| names));
+    names
+}
+
+/// The key among `keys` that speaks of an agent, ignoring case.
+pub fn find<'a>(id: &str, keys: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    accepted(id).into_iter().find_map(|name| keys.clone().find(|key| key.eq_ignore_ascii_case(name)))
+}

@@ -1,0 +1,88 @@
+//! What ML-Agents' own keys say, and its defaults for what they leave out.
+
+use super::behavior::{Behavior, Format};
+use super::error::ConfigError;
+use super::section::{Range, Section};
+
+/// Most of anything that is counted in a file.
+const MOST: u64 = 1 << 31;
+
+/// How a value moves over the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decay {
+    Constant,
+    Linear,
+}
+
+/// ML-Agents' settings of a PPO behavior that mean something here. The names are the file's.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    pub batch_size: u64,
+    pub buffer_size: u64,
+    pub learning_rate: f64,
+    pub learning_rate_schedule: Decay,
+    pub beta: f64,
+    pub beta_schedule: Decay,
+    pub epsilon: f64,
+    pub epsilon_schedule: Decay,
+    pub lambd: f64,
+    pub num_epoch: u64,
+    pub normalize: bool,
+    pub hidden_units: u64,
+    pub num_layers: u64,
+    pub gamma: f64,
+    pub max_steps: u64,
+    pub time_horizon: u64,
+    pub summary_freq: u64,
+    pub checkpoint_interval: u64,
+    pub keep_checkpoints: u64,
+}
+
+impl Settings {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// If a value is of the wrong kind or out of range.
+    pub fn read(behavior: &Behavior<'_>) -> Result<Self, ConfigError> {
+        let Behavior { top, hyperparameters, network, extrinsic, format, .. } = behavior;
+        // defaults that differ: steps in all, steps between summaries and checkpoints
+        let (max_steps, summary_freq, checkpoint_interval) = match format {
+            Format::Current => (500_000, 50_000, 500_000),
+            Format::Legacy => (50_000, 1_000, 50_000),
+        };
+        let learning_rate_schedule = decay(hyperparameters, "learning_rate_schedule", Decay::Linear)?;
+        let max_steps = top.count("max_steps", 1..=1 << 53, max_steps)?;
+        let keep_checkpoints = top.count("keep_checkpoints", 1..=MOST, 5)?;
+        let even = *format == Format::Current && top.flag("even_checkpoints", false)?;
+        let checkpoint_interval = match even {
+            true => (max_steps / keep_checkpoints).max(1),
+            false => top.count("checkpoint_interval", 1..=1 << 53, checkpoint_interval)?,
+        };
+        Ok(Settings {
+            batch_size: hyperparameters.count("batch_size", 16..=MOST, 1024)?,
+            buffer_size: hyperparameters.count("buffer_size", 16..=MOST, 10_240)?,
+            learning_rate: hyperparameters.number("learning_rate", Range::Positive, 3e-4)?,
+            learning_rate_schedule,
+            beta: hyperparameters.number("beta", Range::NotNegative, 5e-3)?,
+            beta_schedule: decay(hyperparameters, "beta_schedule", learning_rate_schedule)?,
+            epsilon: hyperparameters.number("epsilon", Range::Positive, 0.2)?,
+            epsilon_schedule: decay(hyperparameters, "epsilon_schedule", learning_rate_schedule)?,
+            lambd: hyperparameters.number("lambd", Range::Fraction, 0.95)?,
+            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, 3)?,
+            normalize: network.flag("normalize", false)?,
+            hidden_units: network.count("hidden_units", 1..=65_536, 128)?,
+            num_layers: network.count("num_layers", 1..=64, 2)?,
+            gamma: extrinsic.number("gamma", Range::Fraction, 0.99)?,
+            max_steps,
+            time_horizon: top.count("time_horizon", 1..=MOST, 64)?,
+            summary_freq: top.count("summary_freq", 1..=1 << 53, summary_freq)?,
+            checkpoint_interval,
+            keep_checkpoints,
+        })
+    }
+}
+
+fn decay(section: &Section<'_>, key: &str, default: Decay) -> Result<Decay, ConfigError> {
+    let Some(entry) = section.get(key) else { return Ok(default) };
+    Ok([Decay::Constant, Decay::Linear][entry.word(&["constant", "linear"])?])
+}

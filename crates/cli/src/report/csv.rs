@@ -1,0 +1,149 @@
+//! `progress.csv`: one row of numbers per iteration.
+
+use crate::error::CliError;
+use crate::folder::write_atomic;
+use marathon_learn::IterationStats;
+use std::fs::{File, OpenOptions};
+use std::path::{Path, PathBuf};
+
+/// First column, which orders the rows.
+const ITERATION: &str = "iteration";
+
+/// Appends rows, each of which reaches the file at once.
+pub struct CsvLog {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+/// Columns and values of an iteration; a value that there is none of (no episode ended) is an empty cell.
+pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) -> Vec<(String, Option<f64>)> {
+    let mut row: Vec<(String, Option<f64>)> = [
+        (ITERATION, Some(stats.iteration as f64)),
+        ("steps", Some(stats.steps as f64)),
+        ("wall_seconds", Some(stats.wall_seconds)),
+        ("cpu_seconds", Some(stats.cpu_seconds)),
+        ("steps_per_second", Some(steps_per_second)),
+        ("episodes", Some(stats.episodes as f64)),
+        ("return_mean", stats.return_mean),
+        ("length_mean", stats.length_mean),
+        ("speed_mean", stats.speed_mean),
+        ("fall_fraction", stats.fall_fraction),
+        ("diverged", Some(stats.diverged as f64)),
+        ("kl", Some(stats.kl)),
+        ("clip_fraction", Some(stats.clip_fraction)),
+        ("policy_loss", Some(stats.policy_loss)),
+        ("value_loss", Some(stats.value_loss)),
+        ("explained_variance", Some(stats.explained_variance)),
+        ("entropy", Some(stats.entropy)),
+        ("std_mean", Some(stats.std_mean)),
+        ("lr", Some(stats.lr)),
+        ("env_share", Some(stats.env_share)),
+        ("update_share", Some(stats.update_share)),
+        ("skipped_minibatches", Some(stats.skipped_minibatches as f64)),
+    ]
+    .map(|(name, x)| (name.to_string(), x))
+    .into();
+    row.extend(terms.iter().zip(&stats.reward_terms).map(|(term, x)| (format!("reward/{term}"), Some(*x))));
+    row
+}
+
+impl CsvLog {
+    /// Opens the file of a run that has done `iteration` iterations: rows after that are cut off.
+    ///
+    /// # Errors
+    /// If the file cannot be read or written.
+    pub fn open(path: &Path, iteration: u64) -> Result<Self, CliError> {
+        if path.exists() {
+            cut(path, iteration)?;
+        }
+        let file = OpenOptions::new().create(true).append(true).open(path).map_err(CliError::io(path, "open"))?;
+        Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file) })
+    }
+
+    /// Appends a row, and the head before the first.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn push(&mut self, row: &[(String, Option<f64>)]) -> Result<(), CliError> {
+        let head = std::fs::metadata(&self.path).is_ok_and(|m| m.len() == 0);
+        let mut write = || {
+            if head {
+                self.writer.write_record(row.iter().map(|(name, _)| name))?;
+            }
+            let cells = row.iter().map(|(_, x)| x.map_or(String::new(), |x| x.to_string()));
+            self.writer.write_record(cells)?;
+            self.writer.flush().map_err(csv::Error::from)
+        };
+        write().map_err(|e| failed(&self.path, "write", e))
+    }
+}
+
+/// Numbers of a finished or running run.
+#[derive(Debug, Default)]
+pub struct History {
+    names: Vec<String>,
+    rows: Vec<Vec<Option<f64>>>,
+}
+
+impl History {
+    /// Reads a file written by [`CsvLog`]; a row that is not whole ends it.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn read(path: &Path) -> Result<Self, CliError> {
+        let mut reader = csv::Reader::from_path(path).map_err(|e| failed(path, "read", e))?;
+        let names = reader.headers().map_err(|e| failed(path, "read", e))?.iter().map(String::from).collect();
+        let cell = |x: &str| if x.is_empty() { Some(None) } else { x.parse().ok().map(Some) };
+        let whole = reader.records().map_while(|row| row.ok()?.iter().map(cell).collect());
+        Ok(Self { names, rows: whole.collect() })
+    }
+    /// A column by its name, with `None` for empty cells; nothing if there is no such column.
+    pub fn column(&self, name: &str) -> Vec<Option<f64>> {
+        let Some(i) = self.names.iter().position(|n| n == name) else { return Vec::new() };
+        self.rows.iter().map(|row| row[i]).collect()
+    }
+}
+
+/// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too.
+fn cut(path: &Path, iteration: u64) -> Result<(), CliError> {
+    let text = std::fs::read_to_string(path).map_err(CliError::io(path, "read"))?;
+    let mut kept = String::with_capacity(text.len());
+    for (i, line) in text.split_inclusive('\n').enumerate() {
+        let number = line.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
+        let wanted = if i == 0 { line.starts_with(ITERATION) } else { number.is_some_and(|n| n <= iteration) };
+        if !(wanted && line.ends_with('\n')) {
+            break;
+        }
+        kept.push_str(line);
+    }
+    if kept.len() < text.len() { write_atomic(path, kept.as_bytes()) } else { Ok(()) }
+}
+
+fn failed(path: &Path, action: &'static str, error: csv::Error) -> CliError {
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => CliError::io(path, action)(source),
+        other => CliError::file(path, "table", format!("{other:?}"), "rows of equal length"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_after_a_checkpoint_are_cut_and_half_a_row_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("progress.csv");
+        let row = |i: f64| vec![(ITERATION.to_string(), Some(i)), ("a".into(), (i > 1.0).then_some(0.5 * i))];
+        let mut log = CsvLog::open(&path, 0).unwrap();
+        (1..=5).for_each(|i| log.push(&row(f64::from(i))).unwrap());
+        drop(log);
+        let mut log = CsvLog::open(&path, 3).unwrap();
+        log.push(&row(4.0)).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n3,1.5\n4,2\n");
+        std::fs::write(&path, "iteration,a\n1,\n2,").unwrap();
+        drop(CsvLog::open(&path, 9).unwrap());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n");
+        assert_eq!(History::read(&path).unwrap().column("a"), [None]);
+    }
+}

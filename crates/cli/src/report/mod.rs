@@ -1,0 +1,143 @@
+//! What a run leaves behind: rows, events, checkpoints, the curve, the summary.
+
+pub mod csv;
+pub mod curve;
+pub mod progress;
+pub mod summary;
+pub mod tensorboard;
+
+use crate::error::CliError;
+use crate::folder::{RunFile, RunFolder};
+use crate::interrupt;
+use csv::CsvLog;
+use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot};
+use progress::Progress;
+use std::path::PathBuf;
+use tensorboard::EventLog;
+
+pub use crate::console::print_json;
+
+/// Follows a run: shows progress, writes rows, events and checkpoints. Ends the run when the user asks for it, or when
+/// something cannot be written.
+pub struct Reporter<'a> {
+    folder: &'a RunFolder,
+    run: &'a RunFile,
+    terms: Vec<String>,
+    progress: Progress,
+    csv: CsvLog,
+    events: EventLog,
+    /// Steps at which the next checkpoint is due.
+    due: u64,
+    /// Steps and wall-clock seconds of the last iteration.
+    last: (u64, f64),
+    /// Why the run was ended, if by an error.
+    pub error: Option<CliError>,
+}
+
+impl<'a> Reporter<'a> {
+    /// For a run that goes on from a checkpoint, or begins. What its files say of later iterations is cut.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written.
+    pub fn new(
+        folder: &'a RunFolder,
+        run: &'a RunFile,
+        terms: &[String],
+        resume: Option<&Checkpoint>,
+    ) -> Result<Self, CliError> {
+        let (iteration, steps) = resume.map_or((0, 0), |c| (c.iteration(), c.steps()));
+        let csv = CsvLog::open(&folder.progress(), iteration)?;
+        let events = EventLog::open(folder, steps)?;
+        let wall = match iteration {
+            0 => 0.0,
+            _ => {
+                csv::History::read(&folder.progress())?.column("wall_seconds").last().copied().flatten().unwrap_or(0.0)
+            }
+        };
+        let mut reporter = Self {
+            folder,
+            run,
+            terms: terms.to_vec(),
+            progress: Progress::new(run.config.total_steps, steps, run.summary_freq),
+            csv,
+            events,
+            due: 0,
+            last: (steps, wall),
+            error: None,
+        };
+        reporter.plan(steps);
+        Ok(reporter)
+    }
+
+    /// Takes the progress bar away.
+    pub fn finish(&self) {
+        self.progress.finish();
+    }
+
+    fn plan(&mut self, steps: u64) {
+        self.due = (steps / self.run.checkpoint_interval + 1) * self.run.checkpoint_interval;
+    }
+
+    fn report(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Result<(), CliError> {
+        let (steps, wall) = self.last;
+        let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
+        self.last = (stats.steps, stats.wall_seconds);
+        self.csv.push(&csv::columns(stats, rate, &self.terms))?;
+        self.events.push(stats.steps, &tensorboard::scalars(stats, rate, &self.terms))?;
+        if stats.steps >= self.due {
+            self.plan(stats.steps);
+            save(self.folder, &snapshot.policy(), &snapshot.checkpoint())?;
+            self.keep(&snapshot.policy())?;
+        }
+        Ok(())
+    }
+
+    /// Keeps a policy in `policies/` and removes the oldest.
+    fn keep(&self, policy: &Policy) -> Result<(), CliError> {
+        if self.run.keep_checkpoints == 0 {
+            return Ok(());
+        }
+        let folder = self.folder.policies();
+        std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
+        let steps = policy.meta().training.as_ref().map_or(0, |t| t.steps);
+        policy.save(&folder.join(format!("policy-{steps}.safetensors")))?;
+        let mut kept = kept_policies(self.folder);
+        kept.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
+        for (_, path) in kept.drain(self.run.keep_checkpoints.min(kept.len())..) {
+            // one too many harms nobody
+            let _ = std::fs::remove_file(path);
+        }
+        Ok(())
+    }
+}
+
+impl Observer for Reporter<'_> {
+    fn iteration(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Control {
+        self.progress.update(stats);
+        if let Err(error) = self.report(stats, snapshot) {
+            self.error = Some(error);
+            return Control::Stop;
+        }
+        if interrupt::requested() { Control::Stop } else { Control::Continue }
+    }
+}
+
+/// Policies in `policies/` with their steps.
+pub fn kept_policies(folder: &RunFolder) -> Vec<(u64, PathBuf)> {
+    let entries = std::fs::read_dir(folder.policies()).into_iter().flatten().flatten();
+    let of = |path: PathBuf| {
+        let steps = path.file_stem()?.to_str()?.strip_prefix("policy-")?.parse().ok()?;
+        Some((steps, path))
+    };
+    entries.filter_map(|entry| of(entry.path())).collect()
+}
+
+/// Writes the checkpoint, then the policy.
+///
+/// # Errors
+/// If one of them cannot be written; the old one is whole then.
+pub fn save(folder: &RunFolder, policy: &Policy, checkpoint: &Checkpoint) -> Result<(), CliError> {
+    checkpoint.save(&folder.checkpoint())?;
+    policy.save(&folder.policy())?;
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! What a person sees while a run goes on: a bar in a terminal, a line now and then elsewhere. Both go to stderr.
+
+use crate::console::note;
+use crate::text::{duration, short, thousands};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use marathon_learn::IterationStats;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Seconds between two looks at the speed of a run.
+const WINDOW: f64 = 1.0;
+
+/// Shows progress.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    total: u64,
+    /// Steps between lines, and those at which the next is due.
+    every: u64,
+    due: u64,
+    rate: Rate,
+    shown: Episodes,
+    waiting: Episodes,
+}
+
+/// Means over episodes.
+#[derive(Clone, Copy, Default)]
+struct Episodes {
+    count: f64,
+    returns: f64,
+    lengths: f64,
+    speeds: f64,
+}
+
+/// Steps per second: of late, and since the start.
+struct Rate {
+    start: (Instant, u64),
+    last: (Instant, u64),
+    recent: Option<f64>,
+}
+
+impl Rate {
+    fn update(&mut self, steps: u64) {
+        let (then, before) = self.last;
+        let seconds = then.elapsed().as_secs_f64();
+        if seconds >= WINDOW {
+            self.recent = Some((steps - before) as f64 / seconds);
+            self.last = (Instant::now(), steps);
+        }
+    }
+    fn overall(&self, steps: u64) -> f64 {
+        (steps - self.start.1) as f64 / self.start.0.elapsed().as_secs_f64().max(1e-9)
+    }
+}
+
+impl Progress {
+    /// For a run of `total` steps of which `done` are done.
+    pub fn new(total: u64, done: u64, every: u64) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{wide_bar:.cyan/dim} {percent:>3}%  {msg}");
+            bar.set_style(style.expect("the template is a constant").progress_chars("━╸─"));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar.set_position(done);
+            bar
+        });
+        let start = (Instant::now(), done);
+        let rate = Rate { start, last: start, recent: None };
+        let (shown, waiting) = Default::default();
+        Self { bar, total, every, due: done + every, rate, shown, waiting }
+    }
+
+    /// After an iteration.
+    pub fn update(&mut self, stats: &IterationStats) {
+        self.rate.update(stats.steps);
+        self.waiting.add(stats);
+        match &self.bar {
+            Some(bar) => {
+                // enough episodes for a mean that does not flicker
+                if self.waiting.count >= 32.0 || self.shown.count == 0.0 {
+                    self.shown = std::mem::take(&mut self.waiting);
+                }
+                bar.set_position(stats.steps.min(self.total));
+                bar.set_message(self.line(stats.steps));
+            }
+            None if stats.steps >= self.due => {
+                self.due = (stats.steps / self.every + 1) * self.every;
+                if self.waiting.count > 0.0 {
+                    self.shown = std::mem::take(&mut self.waiting);
+                }
+                let of = format!("{} of {}", thousands(stats.steps), thousands(self.total));
+                note(format!("{of:>25} steps  {}", self.line(stats.steps)));
+            }
+            None => {}
+        }
+    }
+
+    fn line(&self, steps: u64) -> String {
+        let rate = self.rate.overall(steps);
+        let left = self.total.saturating_sub(steps) as f64 / rate.max(1e-9);
+        let rate = short(self.rate.recent.unwrap_or(rate));
+        let Episodes { count, returns, lengths, speeds } = self.shown;
+        let episodes = if count > 0.0 {
+            let [r, l, v] = [returns, lengths, speeds].map(|x| x / count);
+            format!("return {r:6.1}  length {l:4.0}  {v:5.2} m/s")
+        } else {
+            "no episode has ended yet".into()
+        };
+        format!("{rate:>6} steps/s  {episodes}  ETA {:>6}", duration(left))
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Episodes {
+    fn add(&mut self, stats: &IterationStats) {
+        let n = stats.episodes as f64;
+        if let (Some(r), Some(l), Some(v)) = (stats.return_mean, stats.length_mean, stats.speed_mean) {
+            self.count += n;
+            self.returns += n * r;
+            self.lengths += n * l;
+            self.speeds += n * v;
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! A run in numbers: `summary.json`, and the same for a person.
+
+use crate::text::{duration, short, thousands, unsigned_zero};
+use marathon_learn::{Evaluation, Policy};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Episodes of the evaluation at the end of a run.
+pub const EPISODES: usize = 100;
+
+/// What `summary.json` holds and `train --json` prints.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Summary {
+    /// Registry name of the agent.
+    pub agent: String,
+    /// Folder of the run.
+    pub folder: PathBuf,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Agent-steps done.
+    pub steps: u64,
+    /// Seconds of training, over all parts of an interrupted run; without evaluation and the writing of files.
+    pub wall_seconds: f64,
+    /// Processor seconds of all threads, in the same sense.
+    pub cpu_seconds: f64,
+    /// Agent-steps by processor seconds.
+    pub steps_per_cpu_second: f64,
+    /// Whether the run was stopped before its last step.
+    pub interrupted: bool,
+    /// How the policy does; none for an interrupted run.
+    pub eval: Option<Evaluation>,
+}
+
+impl Summary {
+    /// Of a run with its policy.
+    pub fn new(folder: PathBuf, policy: &Policy, interrupted: bool, eval: Option<Evaluation>) -> Self {
+        let meta = policy.meta();
+        let (mut seed, mut steps, mut wall_seconds, mut cpu_seconds) = (0, 0, 0.0, 0.0);
+        if let Some(training) = &meta.training {
+            (seed, steps) = (training.config.seed, training.steps);
+            (wall_seconds, cpu_seconds) = (training.wall_seconds, training.cpu_seconds);
+        }
+        let steps_per_cpu_second = if cpu_seconds > 0.0 { steps as f64 / cpu_seconds } else { 0.0 };
+        let agent = meta.agent.clone();
+        Self { agent, folder, seed, steps, wall_seconds, cpu_seconds, steps_per_cpu_second, interrupted, eval }
+    }
+
+    /// One line about the training.
+    pub fn training_line(&self) -> String {
+        format!(
+            "{}: {} steps in {} ({} of processor time, {} steps per processor second)",
+            self.agent,
+            thousands(self.steps),
+            duration(self.wall_seconds),
+            duration(self.cpu_seconds),
+            short(self.steps_per_cpu_second)
+        )
+    }
+}
+
+/// An evaluation as a small table; `limit` is the longest episode in decisions, `dt` their seconds.
+pub fn evaluation_table(e: &Evaluation, limit: usize, dt: f64) -> String {
+    let seconds = e.length_mean * dt;
+    let broken = match e.diverged {
+        0 => String::new(),
+        n => format!(" ({n} of them because the simulation broke down)"),
+    };
+    format!(
+        "  distance  {:.1} m in {seconds:.1} s\n\
+         \x20 speed     {:.2} m/s\n\
+         \x20 return    {:.1} ± {:.1}, from {:.1} to {:.1}\n\
+         \x20 length    {:.0} of {limit} decisions\n\
+         \x20 falls     {} of {} episodes{broken}",
+        unsigned_zero(e.distance_mean, 1),
+        unsigned_zero(e.speed_mean, 2),
+        e.return_mean,
+        e.return_std,
+        e.return_min,
+        e.return_max,
+        e.length_mean,
+        thousands(e.falls),
+        thousands(e.episodes),
+    )
+}

@@ -1,0 +1,77 @@
+//! Numbers and commands as people read them.
+
+use std::path::Path;
+
+/// `12345678` as `12,345,678`.
+pub fn thousands(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// A number with its thousands or millions as `k` and `M`: `512 k`, `1.25 M`.
+pub fn short(x: f64) -> String {
+    match x {
+        x if x >= 9.995e8 => format!("{:.2} G", x / 1e9),
+        x if x >= 9.995e5 => format!("{:.2} M", x / 1e6),
+        x if x >= 9.995e4 => format!("{:.0} k", x / 1e3),
+        x if x >= 9.995e2 => format!("{:.1} k", x / 1e3),
+        x => format!("{x:.0}"),
+    }
+}
+
+/// Seconds as `8.3 s`, `2 min 05 s` or `1 h 02 min`.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+/// Zero for a number that would be written as `-0.0` with so many decimals.
+pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
+    if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
+}
+
+/// The program as the user called it, so that a printed command can be pasted into the same shell.
+pub fn program() -> String {
+    let called = std::env::args().next().unwrap_or_default();
+    // a bare name was found by the shell and will be found again
+    if called.is_empty() { "marathon".into() } else { word(&called) }
+}
+
+/// A path as a word of a shell command.
+pub fn path_word(path: &Path) -> String {
+    word(&path.display().to_string())
+}
+
+fn word(text: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/\\._-+:~=,".contains(c);
+    if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{text}'") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
+        assert_eq!([12.0, 1500.0, 512_345.0, 1.25e6].map(short), ["12", "1.5 k", "512 k", "1.25 M"]);
+        assert_eq!([8.31, 59.96, 125.0, 3725.0].map(duration), ["8.3 s", "1 min 00 s", "2 min 05 s", "1 h 02 min"]);
+    }
+
+    #[test]
+    fn odd_paths_are_quoted() {
+        assert_eq!(path_word(Path::new("runs/hopper-1")), "runs/hopper-1");
+        assert_eq!(path_word(Path::new("my runs/a")), "'my runs/a'");
+    }
+}

@@ -1,0 +1,92 @@
+//! Runs the command in a folder of its own and reads what it leaves.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A short run: 64 agents make 4096 steps per iteration.
+pub const SMALL: [&str; 5] = ["train", "hopper", "--agents", "64", "--seed"];
+
+/// The command, to be run in `folder`.
+pub fn marathon(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_marathon"));
+    command.current_dir(folder).args(args);
+    command
+}
+
+/// Runs the command to its end.
+pub fn run(folder: &Path, args: &[&str]) -> Output {
+    marathon(folder, args).output().expect("the command starts")
+}
+
+/// Runs the command, which must succeed; returns its stdout.
+pub fn succeed(folder: &Path, args: &[&str]) -> String {
+    let output = run(folder, args);
+    assert!(output.status.success(), "{args:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).expect("stdout is text")
+}
+
+/// Runs the command, which must fail with `code`; returns its stderr.
+pub fn fail(folder: &Path, code: i32, args: &[&str]) -> String {
+    let output = run(folder, args);
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
+    assert!(output.stdout.is_empty(), "{args:?} writes on stdout: {}", String::from_utf8_lossy(&output.stdout));
+    stderr(&output)
+}
+
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Parses the one JSON object on stdout.
+pub fn json(stdout: &str) -> Value {
+    serde_json::from_str(stdout).unwrap_or_else(|e| panic!("{e} in {stdout}"))
+}
+
+pub fn read_json(path: &Path) -> Value {
+    json(&std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
+}
+
+/// Tensors of a policy, without the metadata, which hold times: `(name, shape, bytes)`.
+pub fn tensors(path: &Path) -> Vec<(String, Vec<usize>, Vec<u8>)> {
+    let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let file = safetensors::SafeTensors::deserialize(&bytes).expect("a safetensors file");
+    let mut all: Vec<_> =
+        file.iter().map(|(name, view)| (name.to_string(), view.shape().to_vec(), view.data().to_vec())).collect();
+    all.sort();
+    all
+}
+
+/// Rows of a CSV file without the columns of time, head included.
+pub fn timeless_rows(path: &Path) -> Vec<Vec<String>> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_path(path).expect("a CSV file");
+    let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
+    let timeless = |name: &str| !name.contains("second") && !name.ends_with("share");
+    let kept: Vec<usize> = (0..rows[0].len()).filter(|i| timeless(&rows[0][*i])).collect();
+    rows.iter().map(|row| kept.iter().map(|i| row[*i].to_string()).collect()).collect()
+}
+
+/// Event files of a run, in order.
+pub fn event_files(run: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = files(run).into_iter().filter(|f| f.to_string_lossy().contains("tfevents")).collect();
+    files.sort();
+    files
+}
+
+/// All files under a folder.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())) {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() { all.extend(files(&path)) } else { all.push(path) }
+    }
+    all
+}
+
+/// No file under a temporary name is left.
+pub fn assert_no_leftovers(folder: &Path) {
+    let left: Vec<_> = files(folder).into_iter().filter(|f| f.extension().is_some_and(|e| e == "tmp")).collect();
+    assert!(left.is_empty(), "left behind: {left:?}");
+}

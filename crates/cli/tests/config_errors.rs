@@ -1,0 +1,298 @@
+//! A file that is wrong is refused with file, line, key, what was found and what was expected; harmless settings without
+//! effect are noted.
+
+#[allow(dead_code, reason = "the program uses the rest")]
+#[path = "../src/config/mod.rs"]
+mod config;
+
+use config::{ConfigError, parse};
+use std::path::Path;
+
+fn error(text: &str) -> ConfigError {
+    parse(Path::new("a/test.yaml"), text.as_bytes(), "hopper").expect_err("an error")
+}
+
+fn notes(text: &str) -> Vec<String> {
+    parse(Path::new("a/test.yaml"), text.as_bytes(), "hopper").unwrap_or_else(|e| panic!("{e}")).notes
+}
+
+/// The whole message.
+fn refuse(text: &str, message: &str) {
+    assert_eq!(error(text).to_string(), message, "{text}");
+}
+
+/// A part of the message.
+fn refuse_with(text: &str, part: &str) {
+    let error = error(text).to_string();
+    let start: String = text.chars().take(500).collect();
+    assert!(error.starts_with("a/test.yaml:") && error.contains(part), "{start}: {error}");
+}
+
+#[test]
+fn missing_files_are_named() {
+    let error = config::load(Path::new("no/such.yaml"), "hopper").unwrap_err().to_string();
+    assert!(error.starts_with("no/such.yaml: cannot be read: "), "{error}");
+}
+
+#[test]
+fn what_is_not_yaml_is_refused_with_its_place() {
+    refuse_with("behaviors:\n  Hopper: [1, 2\n", "not YAML");
+    refuse_with("behaviors:\n\t- x: 3\n", "a/test.yaml:2:");
+    refuse("", "a/test.yaml:1:1: found nothing, expected a section such as 'behaviors:'");
+    refuse("- 1\n", "a/test.yaml:1:1: found a list, expected a mapping with a section such as 'behaviors:'");
+    refuse_with("a: 1\n---\nb: 2\n", "a second document, expected one");
+    refuse_with("a: 1\nb: 2\na: 3\n", "a/test.yaml:3:1: found the key 'a' twice");
+    refuse_with("a: &x [*x]\n", "contains itself");
+    refuse_with("a: !python/object x\n", "tag");
+    refuse_with("[a]: 3\n", "as a key, expected a name");
+    refuse_with("a: {<<: 3}\n", "after '<<', expected a mapping");
+    let bytes = parse(Path::new("t"), b"a: 1\nb: \xff\n", "hopper").unwrap_err().to_string();
+    assert_eq!(bytes, "t:2:1: found bytes that are no text, expected UTF-8");
+}
+
+#[test]
+fn bombs_are_refused() {
+    refuse_with(&"[".repeat(100), "levels");
+    refuse_with(&"- ".repeat(100_000), "levels");
+    // the parser's own limit
+    refuse_with(&"[".repeat(100_000), "not YAML");
+    refuse_with(&format!("a: {}", "{b: ".repeat(1000)), "levels");
+    // a billion laughs
+    let mut laughs = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_string();
+    for i in 1..10 {
+        laughs += &format!("a{i}: &a{i} [{}]\n", vec![format!("*a{}", i - 1); 10].join(", "));
+    }
+    refuse_with(&laughs, "values");
+    // aliases that nest deeper and deeper
+    let mut deep = "a0: &a0 [x]\n".to_string();
+    for i in 1..100 {
+        deep += &format!("a{i}: &a{i} [*a{}]\n", i - 1);
+    }
+    refuse_with(&deep, "levels");
+    refuse_with(&format!("a: {}", "x".repeat(2 << 20)), "bytes");
+}
+
+#[test]
+fn unknown_keys_have_a_nearest_one() {
+    refuse(
+        "behaviors:\n  Hopper:\n    hyperparameters:\n      batch_sise: 12\n",
+        "a/test.yaml:4: behaviors.Hopper.hyperparameters.batch_sise: unknown key; did you mean 'batch_size'?",
+    );
+    refuse_with(
+        "behaviors:\n  Hopper:\n    max_step: 12\n",
+        "3: behaviors.Hopper.max_step: unknown key; did you mean 'max_steps'?",
+    );
+    refuse_with("behaviors: {Hopper: {network_settings: {xyzzy: 1}}}", "expected one of normalize, hidden_units");
+    refuse_with("behaviors: {Hopper: {marathon: {agnts: 1}}}", "did you mean 'agents'?");
+    refuse_with("behaviors: {Hopper: {reward_signals: {extrinsc: {}}}}", "did you mean 'extrinsic'?");
+    refuse_with("behaviors: {Hopper: {reward_signals: {extrinsic: {gama: 1}}}}", "did you mean 'gamma'?");
+    refuse_with("default_settings:\n  treshold: 3\nbehaviors: {}\n", "2: default_settings.treshold: unknown key");
+    refuse_with(
+        "behaviors: {Hopper: {}}\nenv_setings: {}\n",
+        "2: env_setings: unknown key; did you mean 'env_settings'?",
+    );
+    refuse_with("behaviors: {Hopper: {}}\nenv_settings: {num_env: 3}\n", "did you mean 'num_envs'?");
+    refuse_with("behaviors: {Hopper: {}}\nengine_settings: {widht: 3}\n", "did you mean 'width'?");
+    refuse_with("behaviors: {Hopper: {}}\ncheckpoint_settings: {run_ids: 3}\n", "did you mean 'run_id'?");
+    refuse_with("behaviors: {Hopper: {}}\ntorch_settings: {devise: cpu}\n", "did you mean 'device'?");
+    refuse_with("Hopper:\n  num_epoc: 3\n", "2: Hopper.num_epoc: unknown key; did you mean 'num_epoch'?");
+    refuse_with("behaviours: {Hopper: {}}\n", "1: behaviours: unknown key; did you mean 'behaviors'?");
+}
+
+#[test]
+fn wrong_values_say_what_would_do() {
+    let of = |key: &str, value: &str| format!("behaviors:\n  Hopper:\n    hyperparameters:\n      {key}: {value}\n");
+    refuse(
+        &of("batch_size", "many"),
+        "a/test.yaml:4: behaviors.Hopper.hyperparameters.batch_size: found 'many', expected a whole number between 16 and 2147483648",
+    );
+    for (key, value, found, expected) in [
+        ("batch_size", "8", "'8'", "a whole number between 16"),
+        ("num_epoch", "2.5", "'2.5'", "a whole number"),
+        ("num_epoch", "", "nothing", "a whole number"),
+        ("num_epoch", "[3]", "a list", "a whole number"),
+        ("buffer_size", "{}", "a mapping", "a whole number"),
+        ("buffer_size", "-1", "'-1'", "a whole number"),
+        ("learning_rate", "0", "'0'", "a positive number"),
+        ("learning_rate", ".inf", "'.inf'", "a positive number"),
+        ("learning_rate", "inf", "'inf'", "a positive number"),
+        ("beta", "-0.1", "'-0.1'", "a number not below 0"),
+        ("lambd", "1.1", "'1.1'", "a number between 0 and 1"),
+        ("epsilon", "nan", "'nan'", "a positive number"),
+        ("learning_rate_schedule", "cosine", "'cosine'", "one of constant, linear"),
+        ("learning_rate_schedule", "null", "nothing", "one of constant, linear"),
+    ] {
+        refuse_with(
+            &of(key, value),
+            &format!("4: behaviors.Hopper.hyperparameters.{key}: found {found}, expected {expected}"),
+        );
+    }
+    let marathon = |text: &str| format!("behaviors: {{Hopper: {{marathon: {{{text}}}}}}}");
+    for (text, message) in [
+        ("agents: 100", "found '100', expected a multiple of 16, such as 112"),
+        ("agents: 1", "found '1', expected a whole number between 16"),
+        ("activation: gelu", "found 'gelu', expected one of swish, tanh, elu, relu"),
+        ("schedule: cosine", "found 'cosine', expected one of constant, linear, adaptive"),
+        ("lr_range: [3, 1]", "found [3.0, 1.0], expected two positive numbers in ascending order"),
+        ("lr_range: 3", "found '3', expected two positive numbers"),
+        ("lr_range: [1, x]", "found 'x', expected a positive number"),
+        ("actor_hidden: 64", "found '64', expected a list of widths"),
+        ("actor_hidden: [0]", "found '0', expected a whole number between 1 and 65536"),
+        ("scale_rewards: maybe", "found 'maybe', expected true or false"),
+        ("without: [self_play]", "found 'self_play', expected one of curiosity, rnd"),
+        ("without: curiosity", "found 'curiosity', expected a list"),
+    ] {
+        refuse_with(&marathon(text), message);
+    }
+    refuse_with("behaviors: {Hopper: {max_steps: 50e63}}", "found '50e63', expected a whole number");
+    refuse_with("behaviors: {Hopper: {hyperparameters: 3}}", "found '3', expected a mapping");
+    refuse_with("behaviors: {Hopper: 3}", "behaviors.Hopper: found '3', expected a mapping");
+    refuse_with("behaviors: 3", "behaviors: found '3', expected a mapping");
+    refuse_with("behaviors: {Hopper: {}}\nenv_settings: {seed: -2}", "found '-2', expected a whole number");
+    refuse_with("Hopper: {normalize: perhaps}", "1: Hopper.normalize: found 'perhaps', expected true or false");
+}
+
+#[test]
+fn values_that_do_not_go_together_are_refused() {
+    refuse(
+        "behaviors: {Hopper: {marathon: {min_std: 3, max_std: 2}}}",
+        "a/test.yaml: behaviors.Hopper: configuration: max_std is 2, expected a number not below the smallest deviation, 3",
+    );
+    let error = error("behaviors: {Hopper: {marathon: {agents: 16, horizon: 2, minibatches: 5}}}").to_string();
+    assert!(error.contains("minibatches is 5, expected at most 2"), "{error}");
+}
+
+#[test]
+fn agents_that_are_not_in_the_file_are_missed() {
+    let message = error("behaviors: {Crawler: {}, Worm: {}}").to_string();
+    assert!(
+        message.starts_with("a/test.yaml: nothing about agent Hopper-v0; the file has Crawler, Worm;"),
+        "{message}"
+    );
+    assert!(
+        message.contains("Hopper-v0, Hopper, DeepMindHopperBrain") && message.contains("default_settings"),
+        "{message}"
+    );
+    let message = error("Crawler: {num_epoch: 3}").to_string();
+    assert!(message.contains("the file has Crawler") && message.contains("or default"), "{message}");
+    let message = error("behaviors: {Hoper: {}}").to_string();
+    assert!(message.contains("did you mean 'Hopper' for 'Hoper'?"), "{message}");
+    assert!(error("behaviors: {}").to_string().contains("the file has none"));
+}
+
+#[test]
+fn features_that_are_not_here_are_refused() {
+    let behavior = |text: &str| format!("behaviors:\n  Hopper:\n    {text}\n");
+    refuse(
+        &behavior("trainer_type: sac"),
+        "a/test.yaml:3: behaviors.Hopper.trainer_type: a trainer other than PPO is not supported; found 'sac', expected ppo",
+    );
+    for (text, message) in [
+        (
+            "network_settings: {memory: {memory_size: 128}}",
+            "network_settings.memory: recurrent memory is not supported",
+        ),
+        (
+            "reward_signals: {extrinsic: {}, curiosity: {strength: 0.1}}",
+            "reward_signals.curiosity: curiosity is not supported",
+        ),
+        ("reward_signals: {extrinsic: {}, gail: {demo_path: x}}", "imitation by GAIL is not supported"),
+        ("reward_signals: {extrinsic: {}, rnd: {}}", "random network distillation is not supported"),
+        (
+            "reward_signals: {curiosity: {strength: 0}}",
+            "training without the task's own reward is not supported; found nothing",
+        ),
+        ("reward_signals: {extrinsic: {strength: 0}}", "extrinsic.strength: found '0', expected a positive number"),
+        ("behavioral_cloning: {demo_path: x}", "behavioral cloning is not supported"),
+        ("self_play: {window: 10}", "self-play is not supported; found a mapping, expected null"),
+        ("init_path: results/x", "starting from another run is not supported"),
+        (
+            "hyperparameters: {shared_critic: true}",
+            "one network for policy and value is not supported; found 'true', expected false",
+        ),
+    ] {
+        refuse_with(&behavior(text), message);
+        refuse_with(&behavior(text), "a/test.yaml:3:");
+    }
+    for (text, message) in [
+        (
+            "environment_parameters: {gravity: 3}",
+            "2: environment_parameters: a curriculum or randomized environment is not",
+        ),
+        ("checkpoint_settings: {resume: true}", "2: checkpoint_settings.resume: choosing by a file"),
+        (
+            "checkpoint_settings: {initialize_from: x}",
+            "2: checkpoint_settings.initialize_from: starting from another run",
+        ),
+    ] {
+        refuse_with(&format!("behaviors: {{Hopper: {{}}}}\n{text}\n"), message);
+    }
+    refuse_with("Hopper: {trainer: sac, tau: 0.005}", "a trainer other than PPO");
+    refuse_with(
+        "Hopper:\n  use_recurrent: true\n",
+        "2: Hopper.use_recurrent: recurrent memory is not supported; found 'true'",
+    );
+    refuse_with("Hopper:\n  use_curiosity: true\n", "or 'marathon: {without: [curiosity]}' beside it");
+}
+
+#[test]
+fn features_that_are_switched_off_do_no_harm() {
+    let off = "
+behaviors:
+  Hopper:
+    network_settings: {memory: null, vis_encode_type: simple, goal_conditioning_type: hyper, deterministic: false}
+    reward_signals: {extrinsic: {}, curiosity: {strength: 0.0}}
+    self_play: null
+    behavioral_cloning: ~
+    init_path:
+    threaded: false
+    hyperparameters: {shared_critic: false}
+environment_parameters: null
+checkpoint_settings: {resume: false, initialize_from: null}
+env_settings: {seed: -1, env_path: null}
+";
+    assert_eq!(notes(off), Vec::<String>::new());
+    assert_eq!(notes("Hopper: {use_curiosity: false, use_recurrent: false, memory_size: 256}"), Vec::<String>::new());
+    // switched off by the file itself
+    let without = notes(
+        "behaviors:\n  Hopper:\n    reward_signals: {extrinsic: {}, curiosity: {}}\n    marathon:\n      without: [curiosity]\n",
+    );
+    assert_eq!(
+        without,
+        ["line 3: behaviors.Hopper.reward_signals.curiosity asks for curiosity, which is left out as line 5 allows"]
+    );
+}
+
+#[test]
+fn settings_without_effect_are_noted() {
+    let text = "
+behaviors:
+  Hopper:
+    threaded: true
+    time_horizon: 1000
+    hyperparameters: {learning_rate_schedule: linear, buffer_size: 4096}
+    network_settings: {vis_encode_type: resnet, deterministic: true}
+    reward_signals: {extrinsic: {strength: 0.5}}
+    marathon: {agents: 32, horizon: 100, schedule: adaptive}
+env_settings: {num_envs: 4}
+engine_settings: {time_scale: 20}
+torch_settings: {device: cuda}
+checkpoint_settings: {run_id: x}
+";
+    let notes = notes(text).join("\n");
+    for part in [
+        "line 4: behaviors.Hopper.threaded has no effect",
+        "line 5: behaviors.Hopper.time_horizon has no effect: each of the 32 agents adds 100 decisions",
+        "line 6: behaviors.Hopper.hyperparameters.learning_rate_schedule does not move the learning rate",
+        "line 6: behaviors.Hopper.hyperparameters.buffer_size has no effect: 'horizon' of the 'marathon:' section makes rollouts of 3200",
+        "line 7: behaviors.Hopper.network_settings.vis_encode_type has no effect",
+        "line 7: behaviors.Hopper.network_settings.deterministic has no effect",
+        "line 8: behaviors.Hopper.reward_signals.extrinsic.strength has no effect",
+        "line 10: env_settings.num_envs has no effect",
+        "line 11: engine_settings has no effect",
+        "line 12: torch_settings has no effect",
+        "line 13: checkpoint_settings.run_id has no effect",
+    ] {
+        assert!(notes.contains(part), "{part}\n{notes}");
+    }
+}

@@ -1,0 +1,105 @@
+//! No bytes make the reader of configurations panic, and what it accepts is valid.
+
+#[allow(dead_code, reason = "the program uses the rest")]
+#[path = "../src/config/mod.rs"]
+mod config;
+
+use config::parse;
+use proptest::prelude::*;
+use std::path::Path;
+
+const FILES: [&str; 3] = [
+    include_str!("../../../assets/configs/paper-appendix-b.yaml"),
+    include_str!("../../../assets/configs/hopper-fast.yaml"),
+    "behaviors: &b\n  Hopper: {max_steps: 5, <<: *b}\ndefault_settings: {hyperparameters: {beta: !!float 3}}\n",
+];
+
+/// Pieces of which files are made.
+const PIECES: [&str; 36] = [
+    "behaviors:",
+    "Hopper:",
+    "DeepMindHopperBrain:",
+    "default:",
+    "default_settings:",
+    "hyperparameters:",
+    "marathon:",
+    "batch_size:",
+    "beta:",
+    "agents:",
+    "max_steps:",
+    "lr_range:",
+    "without:",
+    "reward_signals:",
+    "extrinsic:",
+    " ",
+    "\n",
+    "\n  ",
+    "\n    ",
+    "- ",
+    "{",
+    "}",
+    "[",
+    "]",
+    ",",
+    "&a ",
+    "*a",
+    "<<:",
+    "!!float ",
+    "!x ",
+    "\"",
+    "'",
+    "1e3",
+    "null",
+    "|\n",
+    "# ",
+];
+
+fn check(bytes: &[u8]) {
+    for agent in ["hopper", "no such agent"] {
+        match parse(Path::new("f.yaml"), bytes, agent) {
+            Ok(loaded) => loaded.ppo.validate().unwrap(),
+            Err(error) => assert!(error.to_string().starts_with("f.yaml"), "{error}"),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn on_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        check(&bytes);
+    }
+
+    #[test]
+    fn on_any_text(text in "\\PC{0,200}") {
+        check(text.as_bytes());
+    }
+
+    #[test]
+    fn on_pieces_of_yaml(pieces in prop::collection::vec(prop::sample::select(&PIECES[..]), 0..60)) {
+        check(pieces.concat().as_bytes());
+    }
+
+    #[test]
+    fn on_damaged_files(file in 0..FILES.len(), at in 0.0..1.0, cut in 0usize..12, put in "\\PC{0,6}|[\\n \\t:&*!{}\\[\\]-]{0,4}") {
+        let text: Vec<char> = FILES[file].chars().collect();
+        let at = (at * text.len() as f64) as usize;
+        let after = (at + cut).min(text.len());
+        let damaged: String = text[..at].iter().copied().chain(put.chars()).chain(text[after..].iter().copied()).collect();
+        check(damaged.as_bytes());
+    }
+
+    #[test]
+    fn on_files_cut_short(file in 0..FILES.len(), at in 0.0..1.0) {
+        let bytes = FILES[file].as_bytes();
+        check(&bytes[..(at * bytes.len() as f64) as usize]);
+    }
+
+    #[test]
+    fn on_any_value(key in prop::sample::select(&["max_steps", "beta", "agents", "buffer_size", "hidden_units"][..]), value in "[-+0-9.eE_]{0,24}") {
+        check(format!("Hopper: {{{key}: {value}, marathon: {{{key}: {value}}}}}").as_bytes());
+        check(format!("Hopper: {{{key}: {value}}}").as_bytes());
+        check(format!("behaviors: {{Hopper: {{{key}: {value}, hyperparameters: {{{key}: {value}}}, network_settings: {{{key}: {value}}}}}}}").as_bytes());
+    }
+}

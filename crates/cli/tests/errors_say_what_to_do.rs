@@ -1,0 +1,128 @@
+//! Every error names the thing and the place, what was expected, and the nearest valid choice.
+
+mod common;
+
+use common::{SMALL, fail, json, run, succeed};
+
+#[track_caller]
+fn says(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "no '{part}' in: {text}");
+    }
+    assert!(text.starts_with("error: "), "{text}");
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn unknown_names_come_with_the_nearest() {
+    let temp = tempfile::tempdir().unwrap();
+    says(&fail(temp.path(), 1, &["train", "hoper"]), &["agent 'hoper' does not exist", "did you mean 'Hopper-v0'?"]);
+    assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
+    says(&fail(temp.path(), 2, &["trian", "hopper"]), &["trian", "'train'"]);
+    says(&fail(temp.path(), 2, &["train", "hopper", "--sede", "3"]), &["--sede", "--seed"]);
+    says(&fail(temp.path(), 2, &["train"]), &["<AGENT>"]);
+    says(&fail(temp.path(), 2, &["train", "hopper", "--steps", "lots"]), &["lots", "4M"]);
+}
+
+#[test]
+fn a_broken_configuration_names_key_and_line() {
+    let temp = tempfile::tempdir().unwrap();
+    let config = "behaviors:\n  Hopper:\n    trainer_type: ppo\n    hyperparameters:\n      learning_rat: 3.0e-4\n";
+    std::fs::write(temp.path().join("bad.yaml"), config).unwrap();
+    let text = fail(temp.path(), 1, &["train", "hopper", "--config", "bad.yaml"]);
+    says(&text, &["bad.yaml", "5", "learning_rat", "learning_rate"]);
+    says(&fail(temp.path(), 1, &["train", "hopper", "--config", "none.yaml"]), &["none.yaml"]);
+    says(&fail(temp.path(), 1, &["train", "hopper", "--agents", "100"]), &["agents is 100", "multiple of 16", "96"]);
+    assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
+}
+
+#[test]
+fn runs_are_not_overwritten() {
+    let temp = tempfile::tempdir().unwrap();
+    let train = [&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat();
+    succeed(temp.path(), &train);
+    let policy = std::fs::read(temp.path().join("a/policy.safetensors")).unwrap();
+    says(&fail(temp.path(), 2, &train), &["--out a holds a run already", "train --resume a"]);
+    assert_eq!(std::fs::read(temp.path().join("a/policy.safetensors")).unwrap(), policy);
+
+    says(&fail(temp.path(), 1, &["train", "--resume", "b"]), &["b: --resume", "no such folder", "did you mean 'a'?"]);
+    says(&fail(temp.path(), 2, &["train", "--resume", "a", "--seed", "2"]), &["--seed", "--resume"]);
+
+    // two writers would mix their rows
+    let lock = std::fs::File::create(temp.path().join("a/.lock")).unwrap();
+    lock.lock().unwrap();
+    says(&fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "1M"]), &["a: run", "another process"]);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_found_before_training() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("file"), "").unwrap();
+    let train = |out: &'static str| [&SMALL[..], &["1", "--steps", "100G", "--out", out]].concat();
+    says(&fail(temp.path(), 1, &train("file/a")), &["file/a", "create folder"]);
+    std::fs::write(temp.path().join("runs"), "").unwrap();
+    says(&fail(temp.path(), 1, &["train", "hopper"]), &["runs", "create folder"]);
+}
+
+#[test]
+fn policies_must_fit_their_agent() {
+    let temp = tempfile::tempdir().unwrap();
+    succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat());
+    let wrong = "agent: found Hopper-v0, expected Ant-v0";
+    says(&fail(temp.path(), 1, &["eval", "a", "--agent", "ant"]), &["policy.safetensors", wrong]);
+    says(&fail(temp.path(), 1, &["render", "a", "--agent", "ant", "--out", "x.gif"]), &[wrong]);
+    says(&fail(temp.path(), 1, &["eval", "aa"]), &["aa: policy", "no such file", "did you mean 'a'?"]);
+    std::fs::write(temp.path().join("junk"), "junk").unwrap();
+    says(&fail(temp.path(), 1, &["eval", "junk"]), &["junk", "a safetensors file"]);
+    says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "0"]), &["--episodes", "1..=10000000"]);
+    assert!(!temp.path().join("x.gif").exists());
+
+    // damaged numbers are found before they act
+    let path = temp.path().join("a/checkpoint");
+    let state = common::files(&path).into_iter().find(|f| f.extension().is_some_and(|e| e == "safetensors")).unwrap();
+    let mut bytes = std::fs::read(&state).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    std::fs::write(&state, bytes).unwrap();
+    says(&fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "1M"]), &["state-", "checksum"]);
+}
+
+#[test]
+fn pictures_need_a_name_that_says_what_they_are() {
+    let temp = tempfile::tempdir().unwrap();
+    succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat());
+    says(&fail(temp.path(), 1, &["render", "a", "--out", "x.gfi"]), &["x.gfi", "did you mean 'gif'?"]);
+    says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--frames", "3"]), &["--frames is for .png"]);
+    says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--seconds", "-1"]), &["--seconds"]);
+    says(&fail(temp.path(), 1, &["render", "a", "--out", "none/x.gif"]), &["none/x.gif", "No such file"]);
+}
+
+#[test]
+fn json_carries_errors_too() {
+    let temp = tempfile::tempdir().unwrap();
+    let output = run(temp.path(), &["train", "hoper", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = json(&String::from_utf8(output.stdout).unwrap());
+    assert!(error["error"].as_str().unwrap().contains("did you mean 'Hopper-v0'?"));
+}
+
+#[test]
+fn help_is_worth_reading() {
+    let temp = tempfile::tempdir().unwrap();
+    for (args, parts) in [
+        (&["--help"][..], &["Examples:", "marathon train hopper", "--json"][..]),
+        (&["train", "--help"], &["--resume", "policy.safetensors", "Ctrl-C", "ML-Agents"]),
+        (&["render", "--help"], &[".gif", "--seconds", "[default"]),
+    ] {
+        let text = succeed(temp.path(), args);
+        for part in parts {
+            assert!(text.contains(part), "{part} in {args:?}");
+        }
+    }
+    let text = succeed(temp.path(), &["list"]);
+    for id in ["Hopper-v0", "Walker2d-v1", "Humanoid-v0", "Ant-v1"] {
+        assert!(text.contains(id), "{text}");
+    }
+    let agents = json(&succeed(temp.path(), &["list", "--json"]))["agents"].clone();
+    assert_eq!(agents[0]["id"], "Hopper-v0");
+    assert_eq!(agents[0]["observation"], 31);
+}

@@ -1,0 +1,222 @@
+//! An interrupted run, resumed, ends with the bits of a run that was never interrupted, and with its rows and events.
+
+#![cfg(unix)]
+
+mod common;
+
+use common::*;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const STEPS: &str = "400k";
+
+fn start(folder: &Path, args: &[&str]) -> Child {
+    marathon(folder, args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
+}
+
+/// Waits until a file has at least so many lines.
+fn wait_for_lines(path: &Path, lines: usize) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while std::fs::read_to_string(path).unwrap_or_default().lines().count() < lines {
+        assert!(Instant::now() < deadline, "{} does not grow", path.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn interrupt(child: &Child) {
+    let sent = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().expect("sh runs");
+    assert!(sent.success());
+}
+
+fn finish(child: Child) -> Output {
+    child.wait_with_output().expect("the command ends")
+}
+
+/// Steps and values of every scalar of a run, whatever file they are in. Times are left out.
+fn events(run: &Path) -> Vec<(u64, String, u32)> {
+    let mut all = Vec::new();
+    for path in event_files(run) {
+        let bytes = std::fs::read(&path).unwrap();
+        let mut rest = &bytes[..];
+        while let Some((length, after)) = rest.split_first_chunk::<8>() {
+            let (event, after) = after[4..].split_at(u64::from_le_bytes(*length) as usize);
+            rest = &after[4..];
+            let fields = fields(event);
+            let step = fields.iter().find(|f| f.0 == 2).map_or(0, |f| f.1);
+            for (_, _, summary) in fields.iter().filter(|f| f.0 == 5) {
+                for (_, _, value) in self::fields(summary) {
+                    let value = self::fields(value);
+                    let tag = String::from_utf8(value[0].2.to_vec()).unwrap();
+                    if !tag.contains("Second") {
+                        all.push((step, tag, value[1].1 as u32));
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Fields of a protocol buffer message: number, value, bytes.
+fn fields(mut message: &[u8]) -> Vec<(u64, u64, &[u8])> {
+    fn varint(bytes: &mut &[u8]) -> u64 {
+        let (mut x, mut shift) = (0, 0);
+        loop {
+            let byte = bytes[0];
+            *bytes = &bytes[1..];
+            x |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                return x;
+            }
+            shift += 7;
+        }
+    }
+    let mut all = Vec::new();
+    while !message.is_empty() {
+        let key = varint(&mut message);
+        let (value, length) = match key & 7 {
+            0 => (varint(&mut message), 0),
+            1 => (u64::from_le_bytes(message[..8].try_into().unwrap()), 8),
+            2 => (0, varint(&mut message) as usize),
+            5 => (u64::from(u32::from_le_bytes(message[..4].try_into().unwrap())), 4),
+            kind => panic!("wire type {kind}"),
+        };
+        let (bytes, after) = message.split_at(length);
+        message = after;
+        all.push((key >> 3, value, bytes));
+    }
+    all
+}
+
+#[test]
+fn a_resumed_run_equals_one_never_interrupted() {
+    let temp = tempfile::tempdir().unwrap();
+    let args = |out: &'static str| [&SMALL[..], &["5", "--steps", STEPS, "--out", out]].concat();
+    succeed(temp.path(), &args("whole"));
+
+    // interrupted after some iterations, resumed, interrupted again, resumed
+    let run = temp.path().join("parts");
+    let child = start(temp.path(), &[&args("parts")[..], &["--json"]].concat());
+    wait_for_lines(&run.join("progress.csv"), 8);
+    interrupt(&child);
+    let output = finish(child);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("train --resume parts"), "{text}");
+    assert!(text.contains("Ctrl-C again"), "{text}");
+    let summary = json(&String::from_utf8(output.stdout).unwrap());
+    assert_eq!((&summary["interrupted"], &summary["eval"]), (&true.into(), &serde_json::Value::Null));
+    assert_eq!(summary, read_json(&run.join("summary.json")));
+    let steps = summary["steps"].as_u64().unwrap();
+    assert!(steps < 400_000, "it was interrupted after {steps} steps");
+    // what is there can be used
+    assert_no_leftovers(&run);
+    succeed(temp.path(), &["eval", "parts", "--episodes", "2"]);
+
+    let rows = timeless_rows(&run.join("progress.csv")).len();
+    assert_eq!(rows as u64, 1 + steps / 4096);
+    let child = start(temp.path(), &["train", "--resume", "parts", "--threads", "1"]);
+    wait_for_lines(&run.join("progress.csv"), rows + 5);
+    interrupt(&child);
+    assert_eq!(finish(child).status.code(), Some(130));
+    // rows and events beyond the checkpoint, as a process that was killed leaves them
+    let mut table = std::fs::read_to_string(run.join("progress.csv")).unwrap();
+    let last = table.lines().last().unwrap().split_once(',').unwrap();
+    let next = format!("{},{}\n1", last.0.parse::<u64>().unwrap() + 1, last.1);
+    table.push_str(&next);
+    std::fs::write(run.join("progress.csv"), table).unwrap();
+    let events_file = event_files(&run).pop().unwrap();
+    let mut bytes = std::fs::read(&events_file).unwrap();
+    bytes.extend([1, 2, 3]);
+    std::fs::write(&events_file, bytes).unwrap();
+
+    succeed(temp.path(), &["train", "hopper", "--resume", "parts", "--threads", "2"]);
+    let whole = temp.path().join("whole");
+    assert_eq!(tensors(&run.join("policy.safetensors")), tensors(&whole.join("policy.safetensors")));
+    assert_eq!(timeless_rows(&run.join("progress.csv")), timeless_rows(&whole.join("progress.csv")));
+    assert_eq!(events(&run), events(&whole));
+    assert!(!events(&run).is_empty());
+    let eval = |run: &Path| read_json(&run.join("summary.json"))["eval"].clone();
+    assert_eq!(eval(&run), eval(&whole));
+}
+
+#[test]
+fn a_complete_run_goes_on_with_more_steps_only() {
+    let temp = tempfile::tempdir().unwrap();
+    succeed(temp.path(), &[&SMALL[..], &["5", "--steps", "20k"]].concat());
+    let text = fail(temp.path(), 2, &["train", "--resume", "runs/hopper-1"]);
+    assert!(text.contains("the run is complete with 20,480 steps") && text.contains("--steps 40,960"), "{text}");
+    let text = fail(temp.path(), 2, &["train", "--resume", "runs/hopper-1", "--steps", "8192"]);
+    assert!(text.contains("--steps is 8,192, but 20,480 steps are done"), "{text}");
+    let text = fail(temp.path(), 1, &["train", "ant", "--resume", "runs/hopper-1", "--steps", "40k"]);
+    assert!(text.contains("found Hopper-v0, expected Ant-v0"), "{text}");
+
+    succeed(temp.path(), &["train", "--resume", "runs/hopper-1", "--steps", "40,960"]);
+    let rows = timeless_rows(&temp.path().join("runs/hopper-1/progress.csv"));
+    let iterations: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
+    assert_eq!(iterations, ["1", "2", "3", "4", "5", "6", "7", "8", "9", "10"]);
+    assert_eq!(read_json(&temp.path().join("runs/hopper-1/summary.json"))["steps"], 40_960);
+}
+
+#[test]
+fn a_second_interruption_ends_at_once_and_breaks_nothing() {
+    let temp = tempfile::tempdir().unwrap();
+    // half a million steps on one thread take long enough for two signals
+    let args = ["train", "hopper", "--agents", "8192", "--threads", "1", "--steps", "100M", "--out", "a"];
+    let mut child = start(temp.path(), &args);
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.starts_with("training Hopper-v0")), "it listens to signals before it says so");
+    interrupt(&child);
+    assert!(lines.any(|line| line.contains("Ctrl-C again")));
+    interrupt(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(lines.any(|line| line == "aborted"));
+    // nothing was learned yet, so it begins again
+    assert!(!temp.path().join("a/policy.safetensors").exists());
+    assert_no_leftovers(&temp.path().join("a"));
+    succeed(temp.path(), &["train", "--resume", "a", "--steps", "500k"]);
+    assert_eq!(timeless_rows(&temp.path().join("a/progress.csv"))[1][0], "1");
+}
+
+/// A full disk, by a limit on the size of files.
+#[test]
+fn a_full_disk_stops_the_run_and_keeps_the_last_checkpoint() {
+    let temp = tempfile::tempdir().unwrap();
+    let run = temp.path().join("a");
+    succeed(temp.path(), &[&SMALL[..], &["5", "--steps", "40k", "--out", "a"]].concat());
+    let before = tensors(&run.join("policy.safetensors"));
+
+    // blocks of 1024 bytes: less than the policy and the checkpoint need
+    let script = "trap '' XFSZ; ulimit -f 12; exec \"$0\" train --resume a --steps 400k";
+    let command = |script: &str| {
+        let mut shell = Command::new("bash");
+        shell.args(["-c", script, env!("CARGO_BIN_EXE_marathon")]).current_dir(temp.path());
+        shell.output().expect("bash runs")
+    };
+    let output = command(script);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    // the table or the events, whichever reaches the limit first
+    assert!(text.contains("error: a/") && text.contains(": write: File too large"), "{text}");
+    assert!(text.contains("the last whole checkpoint has 40,960") && text.contains("train --resume a"), "{text}");
+    assert_eq!(tensors(&run.join("policy.safetensors")), before, "the old policy is whole");
+    assert_no_leftovers(&run);
+
+    // with room again it goes on, and nothing is missing
+    succeed(temp.path(), &["train", "--resume", "a", "--steps", "80k"]);
+    let rows = timeless_rows(&run.join("progress.csv"));
+    let iterations: Vec<String> = rows[1..].iter().map(|row| row[0].clone()).collect();
+    assert_eq!(iterations, (1..=20).map(|i| i.to_string()).collect::<Vec<_>>());
+}
+
+/// Nobody reads what it prints: that is no reason to lose a run.
+#[test]
+fn a_closed_pipe_does_not_end_a_run() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut child = start(temp.path(), &[&SMALL[..], &["5", "--steps", "100k", "--out", "a"]].concat());
+    drop((child.stdout.take(), child.stderr.take()));
+    assert!(child.wait().unwrap().success());
+    assert!(temp.path().join("a/summary.json").is_file());
+}

@@ -1,0 +1,59 @@
+//! The clip range moves linearly from `clip` to `final_clip` over the run's steps, also across an interruption.
+
+mod common;
+
+use common::{PuckTask, silent, small_config};
+use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_physics::lanes::Isa;
+
+fn parameters(config: &PpoConfig, resume: Option<Checkpoint>) -> Vec<f32> {
+    let output = train(&PuckTask::new(), Isa::best(), config, resume, &mut silent).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("policy.safetensors");
+    output.policy.save(&file).unwrap();
+    // the tensors alone: the header tells the configurations apart
+    let bytes = std::fs::read(&file).unwrap();
+    let header = u64::from_le_bytes(*bytes.first_chunk().unwrap()) as usize;
+    bytes[8 + header..].chunks_exact(4).map(|c| f32::from_le_bytes(*c.first_chunk().unwrap())).collect()
+}
+
+/// A run of `rollouts` rollouts; the first has no update, so update `i` happens at `i / rollouts` of the way. A fast rate,
+/// so that ratios do reach the clip range.
+fn config(rollouts: u64, clip: f64, final_clip: Option<f64>) -> PpoConfig {
+    let base = PpoConfig { lr: 1e-2, lr_range: [1e-2, 1e-2], ..small_config() };
+    PpoConfig { total_steps: rollouts * base.rollout_steps(), clip, final_clip, ..base }
+}
+
+#[test]
+fn halfway_the_range_is_the_mean() {
+    let mean = parameters(&config(2, 0.1875, None), None);
+    assert_eq!(parameters(&config(2, 0.25, Some(0.125)), None), mean);
+    assert_ne!(parameters(&config(2, 0.25, None), None), mean);
+    assert_ne!(parameters(&config(2, 0.125, None), None), mean);
+}
+
+#[test]
+fn without_an_end_the_range_stays() {
+    assert_eq!(parameters(&config(4, 0.2, None), None), parameters(&config(4, 0.2, Some(0.2)), None));
+}
+
+#[test]
+fn an_interruption_does_not_move_the_range() {
+    let config = config(4, 0.3, Some(0.05));
+    let mut half = None;
+    let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
+        half = (stats.iteration == 2).then(|| snapshot.checkpoint());
+        if half.is_some() { Control::Stop } else { Control::Continue }
+    };
+    train(&PuckTask::new(), Isa::best(), &config, None, &mut observer).unwrap();
+    assert_eq!(parameters(&config, half), parameters(&config, None));
+}
+
+#[test]
+fn the_end_must_be_positive() {
+    for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        let error = config(2, 0.2, Some(bad)).validate().unwrap_err().to_string();
+        assert!(error.contains("final_clip is") && error.contains("expected a positive number"), "{error}");
+    }
+    config(2, 0.2, Some(0.1)).validate().unwrap();
+}
