@@ -1,4 +1,4 @@
-"""MuJoCo's side of `marathon bench physics --against mujoco`: the same workload through `mujoco.rollout`.
+"""MuJoCo's side of `marathon bench physics`: the same workload through `mujoco.rollout`.
 
     bench_mujoco.py MODEL.xml [--agents 64] [--warmup 200] [--steps 400] [--threads 1]
 

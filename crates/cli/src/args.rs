@@ -78,7 +78,7 @@ pub struct TrainArgs {
     /// Threads; 0 means one per processor. The result does not depend on it.
     #[arg(long, value_name = "T")]
     pub threads: Option<usize>,
-    /// Folder for the results, new or empty [default: runs/<agent>-<n>].
+    /// Folder for the results, new or empty [default: runs/AGENT-N].
     #[arg(long, value_name = "DIR", conflicts_with = "resume")]
     pub out: Option<PathBuf>,
     /// Go on with the run in this folder; --steps may extend it.

@@ -535,11 +535,13 @@ fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Mask) -> (T, 
         f0 = du.mul_add(dry_force(f, f.u), f0);
     }
     let descent = f0 - g0;
-    let small = descent.lt(T::splat(sim.tolerance));
+    // an improvement below the rounding of its two parts is noise: searching along it leads anywhere
+    let noise = (f0.abs() + g0.abs()) * T::lit(4.0 * T::EPSILON);
+    let small = descent.lt(noise.max(T::splat(sim.tolerance)));
     let enough = descent.abs().mul_add(T::lit(LINE_SEARCH_TOLERANCE), T::lit(1e-30));
     let curvature = g1 - g0;
 
-    let (mut low, mut high) = (z, T::lit(1e10));
+    let (mut low, mut high) = (z, T::lit(LONGEST_SEARCH));
     let mut alpha = one;
     let mut settled = T::or(skip, small);
     for step in 0..sim.max_line_search {
@@ -578,18 +580,24 @@ fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Mask) -> (T, 
         if T::all(settled) || step + 1 == sim.max_line_search {
             break;
         }
-        // Newton step in one dimension, bisection where it leaves the bracket
+        // Newton step in one dimension; where it leaves the bracket, doubling up to the first point beyond the minimum
+        // and bisection after it
         let short = slope.lt(z);
         low = T::select(short, alpha, low);
         high = T::select(short, high, alpha);
         let newton = slope.div(second.max(T::lit(1e-30))).neg_mul_add(one, alpha);
         let inside = T::and(low.lt(newton), newton.lt(high));
         let middle = (low + high) * T::lit(0.5);
+        let middle = middle.min(alpha.max(one) * T::lit(2.0));
         let proposal = T::select(inside, newton, middle);
         alpha = T::select(settled, alpha, proposal);
     }
     (alpha, small)
 }
+
+/// Longest way of a line search in units of the Newton step. The minimum is hardly ever beyond a few; where it is, the
+/// next iteration goes on.
+const LONGEST_SEARCH: f64 = 64.0;
 
 /// Slope left over by the line search, as a fraction of the slope at its start.
 const LINE_SEARCH_TOLERANCE: f64 = 0.01;

@@ -65,6 +65,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     for _ in 0..(args.start / spec.dt).round() as usize {
         stage.step()?;
     }
+    let (begun, from) = (stage.seconds(), stage.distance());
     let times = shot.times(spec.dt);
     let (mut shown, mut decision) = (0, 0);
     for time in times {
@@ -88,6 +89,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     }
     recorder.finish()?;
 
+    let (seconds, distance) = (stage.seconds() - begun, stage.distance() - from);
     let report = Report {
         out: args.out.clone(),
         agent: spec.id.clone(),
@@ -95,9 +97,9 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
         frames: shown,
         width: shot.width,
         height: shot.height,
-        seconds: stage.seconds() - args.start,
-        distance_mean: stage.distance(),
-        speed_mean: stage.distance() / stage.seconds().max(spec.dt),
+        seconds,
+        distance_mean: distance,
+        speed_mean: distance / seconds.max(spec.dt),
         falls: stage.fallen.iter().filter(|f| f.is_some()).count(),
     };
     if json {

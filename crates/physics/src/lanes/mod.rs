@@ -53,6 +53,8 @@ pub trait Real:
     type Mask: Copy + Debug + Send + Sync + 'static;
     /// Number of lanes.
     const LANES: usize;
+    /// Distance from 1 to the next larger number of the scalar type.
+    const EPSILON: f64;
     /// Name of the instruction set, as printed by benchmarks.
     const ISA: &'static str;
 

@@ -88,6 +88,7 @@ impl Real for F32x4 {
     type Scalar = f32;
     type Mask = [bool; 4];
     const LANES: usize = 4;
+    const EPSILON: f64 = f32::EPSILON as f64;
     const ISA: &'static str = "baseline";
 
     fn supported() -> bool {

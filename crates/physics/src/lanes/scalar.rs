@@ -8,6 +8,7 @@ macro_rules! scalar_backend {
             type Scalar = $t;
             type Mask = bool;
             const LANES: usize = 1;
+            const EPSILON: f64 = $t::EPSILON as f64;
             const ISA: &'static str = $isa;
 
             fn supported() -> bool {

@@ -64,6 +64,7 @@ macro_rules! x86_backend {
             type Scalar = f32;
             type Mask = $mask;
             const LANES: usize = $n;
+            const EPSILON: f64 = f32::EPSILON as f64;
             const ISA: &'static str = $isa;
 
             fn supported() -> bool {

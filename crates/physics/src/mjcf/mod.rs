@@ -6,9 +6,9 @@
 //! # Ok::<(), marathon_physics::mjcf::MjcfError>(())
 //! ```
 //!
-//! The way of a file: [`document`] parses the XML and expands includes, [`schema`] refuses what is misspelled or not
-//! supported, [`defaults`] lays classes under elements, [`tree`] reads the bodies, [`inertia`] gives them mass,
-//! [`assemble`] puts the [`Model`] together, [`set0`] and [`statistics`] compute what follows from the reference
+//! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
+//! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
+//! `assemble` puts the [`Model`] together, `set0` and `statistics` compute what follows from the reference
 //! configuration.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.

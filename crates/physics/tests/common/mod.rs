@@ -23,6 +23,7 @@ pub fn python() -> PathBuf {
 }
 
 /// Feeds `input` to `tests/oracle/<script>` and returns what it prints.
+#[allow(dead_code)]
 pub fn oracle(script: &str, input: &serde_json::Value) -> serde_json::Value {
     let mut child = Command::new(python())
         .arg(workspace().join("tests/oracle").join(script))
