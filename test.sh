@@ -13,4 +13,5 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
 fi
 cargo fmt --all --check
 cargo clippy --release --workspace --all-targets -- -D warnings
+RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 cargo test --release --workspace

@@ -119,6 +119,7 @@ fn every_key_of_marathon_counts() {
       value_lr: 5e-4
       schedule: adaptive
       target_kl: 0.02
+      final_target_kl: 0.004
       lr_range: [1e-4, 2e-3]
       max_grad_norm: 0.5
       value_clip: 0.4
@@ -148,6 +149,7 @@ fn every_key_of_marathon_counts() {
         value_lr: 5e-4,
         schedule: Schedule::Adaptive,
         target_kl: 0.02,
+        final_target_kl: Some(0.004),
         lr_range: [1e-4, 2e-3],
         max_grad_norm: 0.5,
         gamma: 0.99,

@@ -45,8 +45,10 @@ pub struct PpoConfig {
     pub value_lr: f64,
     /// How the policy's learning rate moves.
     pub schedule: Schedule,
-    /// Divergence per update that the adaptive schedule aims at, nats.
+    /// Divergence per update that the adaptive schedule aims at, at the start, nats.
     pub target_kl: f64,
+    /// The same at the end, reached linearly; the same as at the start by default. Small steps at the end settle a gait.
+    pub final_target_kl: Option<f64>,
     /// Bounds of the adaptive schedule.
     pub lr_range: [f64; 2],
     /// Bound of the gradient's norm, for each network by itself.
@@ -108,6 +110,7 @@ impl Default for PpoConfig {
             value_lr: 1e-3,
             schedule: Schedule::Adaptive,
             target_kl: 0.015,
+            final_target_kl: None,
             lr_range: [1e-5, 3e-3],
             max_grad_norm: 1.0,
             gamma: 0.99,
@@ -181,6 +184,7 @@ impl PpoConfig {
             ("lr", self.lr),
             ("value_lr", self.value_lr),
             ("target_kl", self.target_kl),
+            ("final_target_kl", self.final_target_kl.unwrap_or(self.target_kl)),
             ("max_grad_norm", self.max_grad_norm),
             ("clip", self.clip),
             ("final_clip", self.final_clip.unwrap_or(1.0)),

@@ -445,9 +445,11 @@ impl<'a> Run<'a> {
 
         if config.schedule == Schedule::Adaptive {
             let kl = sums.kl * mean;
-            if kl > 2.0 * config.target_kl {
+            let target =
+                config.target_kl + (config.final_target_kl.unwrap_or(config.target_kl) - config.target_kl) * progress;
+            if kl > 2.0 * target {
                 learner.lr = (learner.lr / 1.5).max(config.lr_range[0]);
-            } else if kl < 0.5 * config.target_kl {
+            } else if kl < 0.5 * target {
                 learner.lr = (learner.lr * 1.2).min(config.lr_range[1]);
             }
         }

@@ -4,6 +4,7 @@
 //! the median of several repetitions; `spread` is the distance between its fastest and slowest repetition.
 
 mod env;
+mod gait;
 mod physics;
 mod row;
 mod train;
@@ -27,6 +28,8 @@ pub enum What {
     Env,
     /// Training with the agent's own configuration, everything included. A step is a decision.
     Train,
+    /// Processor seconds of training until the agent runs at --speed and hardly falls, for each of --seeds.
+    Gait,
 }
 
 /// Options of `bench`.
@@ -53,6 +56,21 @@ pub struct BenchArgs {
     /// Processor seconds of each thread for every row, more or less.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
+    /// Widths of both hidden layers in `train`, instead of the configuration's.
+    #[arg(long, value_name = "WIDTH", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub hidden: Option<u32>,
+    /// Seeds in `gait`: 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// Mean speed that `gait` asks for, m/s.
+    #[arg(long, value_name = "M/S", default_value_t = 2.0)]
+    pub speed: f64,
+    /// Episodes of 100 that may end in a fall in `gait`.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub falls: u64,
+    /// Steps between the evaluations of `gait`, which do not count.
+    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub every: u64,
 }
 
 /// What every benchmark needs to know.
@@ -61,6 +79,7 @@ struct Plan {
     isas: Vec<Isa>,
     threads: usize,
     seconds: f64,
+    hidden: Option<usize>,
 }
 
 /// The computer.
@@ -108,7 +127,11 @@ pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
         isas: isas(args)?,
         threads: if args.threads == 0 { machine.cores } else { args.threads as usize },
         seconds: args.seconds,
+        hidden: args.hidden.map(|w| w as usize),
     };
+    if what == What::Gait {
+        return gait::run(&plan, args, json);
+    }
     if !json {
         print_head(what, &machine, &plan);
     }
@@ -123,7 +146,7 @@ pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
     match what {
         What::Physics => physics::run(&plan, &args.model, &mut emit)?,
         What::Env => env::run(&plan, &mut emit)?,
-        What::Train => train::run(&plan, &mut emit)?,
+        What::Train | What::Gait => train::run(&plan, &mut emit)?,
     }
     if json {
         let version = env!("CARGO_PKG_VERSION");
@@ -139,7 +162,7 @@ fn print_head(what: What, machine: &Machine, plan: &Plan) {
     let step = match what {
         What::Physics => "a step is one physics step of one agent under random torques, nobody reset",
         What::Env => "a step is one decision of one agent: random actions, physics, observation, reward, resets",
-        What::Train => "a step is one decision of one agent, with all that learning from it takes",
+        What::Train | What::Gait => "a step is one decision of one agent, with all that learning from it takes",
     };
     println!("{step};\ntimes are processor time of {} thread(s); rows are medians\n", plan.threads);
     println!("{}", Row::header(what));
@@ -172,14 +195,14 @@ fn isas(args: &BenchArgs) -> Result<Vec<Isa>, CliError> {
             let (isa, best) = (isa.name(), Isa::best().name());
             return Err(CliError::Usage(format!("this processor cannot run '{isa}'; the best it has is '{best}'")));
         }
-        if *isa == Isa::F64 && args.what == What::Train {
+        if *isa == Isa::F64 && matches!(args.what, What::Train | What::Gait) {
             return Err(CliError::Usage(
                 "networks train in single precision; expected f32, baseline, avx2 or avx512".into(),
             ));
         }
     }
     Ok(match (&args.isa[..], args.what) {
-        ([], What::Train) => vec![Isa::best()],
+        ([], What::Train | What::Gait) => vec![Isa::best()],
         ([], _) => Isa::ALL.into_iter().filter(|isa| isa.supported()).collect(),
         (chosen, _) => chosen.to_vec(),
     })

@@ -25,7 +25,7 @@ const STD_RANGE: [f64; 2] = [1e-3, 1e3];
 const MAX_GRAD_NORM: f64 = 1e9;
 
 /// Keys of the section that only Marathon reads.
-const MARATHON: [&str; 25] = [
+const MARATHON: [&str; 26] = [
     "agents",
     "horizon",
     "minibatches",
@@ -35,6 +35,7 @@ const MARATHON: [&str; 25] = [
     "value_lr",
     "schedule",
     "target_kl",
+    "final_target_kl",
     "lr_range",
     "max_grad_norm",
     "value_clip",
@@ -101,6 +102,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
         schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
         target_kl: marathon.number("target_kl", Range::Positive, defaults.target_kl)?,
+        final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, defaults.target_kl)?,
         lr_range: lr_range(&marathon, defaults.lr_range)?,
         max_grad_norm: marathon.number("max_grad_norm", Range::Positive, MAX_GRAD_NORM)?,
 

@@ -106,7 +106,7 @@ impl Row {
         let more = match what {
             What::Physics => "  contacts  newton",
             What::Env => "  episode",
-            What::Train => "   env  update  physics steps/s",
+            What::Train | What::Gait => "   env  update  physics steps/s",
         };
         format!(
             "{:14} {:>8} {:>5}  {:>12}  {:>11}  {:>11}  {:>6}{more}",

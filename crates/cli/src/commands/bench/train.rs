@@ -28,7 +28,10 @@ pub fn run(plan: &Plan, emit: &mut dyn FnMut(Row)) -> Result<(), CliError> {
 
 fn measure(plan: &Plan, id: &str, isa: Isa) -> Result<Row, CliError> {
     let factory = registry::factory(id, isa)?;
-    let base = config::default_for(id).ppo;
+    let mut base = config::default_for(id).ppo;
+    if let Some(width) = plan.hidden {
+        (base.actor_hidden, base.critic_hidden) = (vec![width; 2], vec![width; 2]);
+    }
     let mut samples = Vec::new();
     let (mut shares, mut weight) = ([0.0; 2], 0.0);
     for seed in 0..REPETITIONS as u64 {

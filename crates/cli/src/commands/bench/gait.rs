@@ -1,0 +1,125 @@
+//! Processor seconds until a gait: training with the agent's own configuration, interrupted every so many steps by an
+//! evaluation that is off the clock, until all the episodes of one meet the demand.
+
+use super::{BenchArgs, Plan};
+use crate::config;
+use crate::error::CliError;
+use crate::report::print_json;
+use crate::text::short;
+use marathon_envs::registry;
+use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
+use serde::Serialize;
+
+/// Episodes of an evaluation.
+const EPISODES: usize = 100;
+
+/// One seed.
+#[derive(Serialize)]
+struct Run {
+    agent: String,
+    seed: u64,
+    /// Whether the demand was met before the configuration's steps were over.
+    reached: bool,
+    steps: u64,
+    cpu_seconds: f64,
+    wall_seconds: f64,
+    /// The last evaluation.
+    eval: Option<Evaluation>,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Document<'a> {
+    bench: &'static str,
+    threads: usize,
+    speed: f64,
+    falls: u64,
+    episodes: usize,
+    runs: &'a [Run],
+}
+
+/// Trains every agent with every seed.
+///
+/// # Errors
+/// If an agent cannot be simulated or trained.
+pub fn run(plan: &Plan, args: &BenchArgs, json: bool) -> Result<(), CliError> {
+    let mut runs = Vec::new();
+    if !json {
+        let BenchArgs { speed, falls, every, .. } = args;
+        println!("until {EPISODES} episodes run at {speed} m/s on average with at most {falls} falls, tried every");
+        println!("{} steps off the clock; seconds are those of {} thread(s)\n", short(*every as f64), plan.threads);
+        println!(
+            "{:14} {:>4} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6}",
+            "agent", "seed", "steps", "cpu s", "wall s", "return", "m/s", "falls"
+        );
+    }
+    for id in &plan.agents {
+        for seed in 1..=args.seeds {
+            let run = one(plan, args, id, seed)?;
+            if !json {
+                print(&run);
+            }
+            runs.push(run);
+        }
+        if !json {
+            let mut seconds: Vec<f64> = runs
+                .iter()
+                .filter(|r| r.agent == *id)
+                .map(|r| if r.reached { r.cpu_seconds } else { f64::INFINITY })
+                .collect();
+            seconds.sort_by(f64::total_cmp);
+            println!(
+                "{id:14} median {:.1}, largest {:.1} CPU seconds\n",
+                seconds[seconds.len() / 2],
+                seconds[seconds.len() - 1]
+            );
+        }
+    }
+    if json {
+        let BenchArgs { speed, falls, .. } = *args;
+        print_json(&Document { bench: "gait", threads: plan.threads, speed, falls, episodes: EPISODES, runs: &runs });
+    }
+    Ok(())
+}
+
+fn one(plan: &Plan, args: &BenchArgs, id: &str, seed: u64) -> Result<Run, CliError> {
+    let isa = plan.isas[0];
+    let factory = registry::factory(id, isa)?;
+    let config = PpoConfig { seed, threads: plan.threads, ..config::default_for(id).ppo };
+    let options = EvalOptions { episodes: EPISODES, ..Default::default() };
+    let mut next = args.every;
+    let mut failed = None;
+    let mut run =
+        Run { agent: id.into(), seed, reached: false, steps: 0, cpu_seconds: 0.0, wall_seconds: 0.0, eval: None };
+    let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
+        (run.steps, run.cpu_seconds, run.wall_seconds) = (stats.steps, stats.cpu_seconds, stats.wall_seconds);
+        if stats.steps < next {
+            return Control::Continue;
+        }
+        next += args.every;
+        match evaluate(&*factory, isa, &snapshot.policy(), &options) {
+            Ok(eval) => {
+                run.reached = eval.falls <= args.falls && eval.speed_mean > args.speed;
+                run.eval = Some(eval);
+            }
+            Err(error) => failed = Some(error),
+        }
+        if run.reached || failed.is_some() { Control::Stop } else { Control::Continue }
+    };
+    train(&*factory, isa, &config, None, &mut observer)?;
+    match failed {
+        Some(error) => Err(error.into()),
+        None => Ok(run),
+    }
+}
+
+fn print(run: &Run) {
+    let Run { agent, seed, steps, cpu_seconds, wall_seconds, .. } = run;
+    let steps = short(*steps as f64);
+    let eval = run
+        .eval
+        .as_ref()
+        .map_or(String::new(), |e| format!("{:>8.0} {:>6.2} {:>6}", e.return_mean, e.speed_mean, e.falls));
+    let note = if run.reached { "" } else { "  not reached" };
+    println!("{agent:14} {seed:>4} {steps:>8} {cpu_seconds:>8.1} {wall_seconds:>8.1} {eval}{note}");
+}
