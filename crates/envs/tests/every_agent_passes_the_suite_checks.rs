@@ -158,7 +158,8 @@ fn resets_stay_near_the_spawn_pose() {
                 }
             }
             let most = noise.joint_velocity.max(noise.root_velocity);
-            assert!(state.qvel.iter().all(|v| v.abs() <= most));
+            let velocities = state.qvel.iter().zip(&spawn.qvel);
+            assert!(velocities.into_iter().all(|(v, at_spawn)| (v - at_spawn).abs() <= most + 1e-6), "{id}");
         }
         // nothing touches the ground before the first step, and no touch is felt
         let feet = agent.facts().touch.len();
