@@ -204,8 +204,8 @@ fn physics_agrees_with_mujoco() {
                 check("qacc median 2e-6", c.qacc.median() < 2e-6 * slack);
                 check("qacc max 5e-4", c.qacc.max() < 5e-4 * slack);
                 check("constraint median 2e-6", c.constraint.0.is_empty() || c.constraint.median() < 2e-6 * slack);
-                // the worst state of 7,500 is a limit violated by a few roundings: 6e-4 (hopper), the goal being 5e-4
-                check("constraint max 1e-3", c.constraint.max() < 1e-3 * slack);
+                // the worst state of 7,500 is a limit violated by a few roundings: 5.05e-4 (hopper); the goal is 5e-4
+                check("constraint max 6e-4", c.constraint.max() < 6e-4 * slack);
                 check("mass 1e-5", c.mass.max() < 1e-5);
                 check("positions 1e-5", c.positions.max() < 1e-5);
             }
