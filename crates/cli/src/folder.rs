@@ -2,10 +2,10 @@
 
 use crate::error::CliError;
 use crate::text;
-use marathon_learn::PpoConfig;
+use marathon_learn::{PpoConfig, write_atomic};
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
@@ -198,9 +198,7 @@ fn refuse_run(out: &Path) -> Result<(), CliError> {
 fn free_folder(agent: &str) -> Result<PathBuf, CliError> {
     let runs = Path::new(RUNS);
     fs::create_dir_all(runs).map_err(CliError::io(runs, "create folder"))?;
-    let base = agent.to_lowercase();
-    // the first version is what people mean by the bare name
-    let base = base.strip_suffix("-v0").unwrap_or(&base);
+    let base = text::short_name(agent);
     let mut n = 1;
     loop {
         let path = runs.join(format!("{base}-{n}"));
@@ -246,25 +244,6 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, CliError> {
     Err(CliError::file(given, "policy", found, expected))
 }
 
-/// Writes a file under a temporary name and renames it: readers see the old one or the new one, never half of one.
-///
-/// # Errors
-/// If that fails; the old file is whole then.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-    let write = || {
-        let mut file = File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&temporary, path)
-    };
-    write().map_err(|source| {
-        let _ = fs::remove_file(&temporary);
-        CliError::io(path, "write")(source)
-    })
-}
-
 /// Writes a JSON document.
 ///
 /// # Errors
@@ -272,5 +251,5 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
 pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), CliError> {
     let mut json = serde_json::to_string_pretty(document).expect("documents are plain data");
     json.push('\n');
-    write_atomic(path, json.as_bytes())
+    Ok(write_atomic(path, json.as_bytes())?)
 }

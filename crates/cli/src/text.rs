@@ -15,6 +15,12 @@ pub fn thousands(n: u64) -> String {
     out
 }
 
+/// `Hopper-v0` as `hopper`: the first version is what people mean by the bare name.
+pub fn short_name(agent: &str) -> String {
+    let name = agent.to_lowercase();
+    name.strip_suffix("-v0").unwrap_or(&name).to_string()
+}
+
 /// A number with its thousands or millions as `k` and `M`: `512 k`, `1.25 M`.
 pub fn short(x: f64) -> String {
     match x {

@@ -11,6 +11,9 @@ use std::path::Path;
 const KEY: &str = "marathon";
 
 /// Writes a file under a temporary name and renames it, so that a reader never sees half of it.
+///
+/// # Errors
+/// If the file cannot be written; the old one is whole then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));

@@ -73,6 +73,7 @@ pub use checkpoint::Checkpoint;
 pub use config::{PpoConfig, Schedule};
 pub use error::Error;
 pub use eval::{EvalOptions, Evaluation, evaluate};
+pub use files::write_atomic;
 pub use marathon_envs::BLOCK;
 pub use normalize::Normalizer;
 pub use observer::{Control, IterationStats, Observer, Snapshot};

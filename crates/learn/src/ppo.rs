@@ -267,10 +267,15 @@ impl<'a> Run<'a> {
         actor.collect(&acting, &mut rollout)
     }
 
+    /// A setting on its linear way from `first` to `last` over the run; it stays where there is no `last`.
+    fn moved(&self, learner: &Learner, first: f64, last: Option<f64>) -> f64 {
+        let progress = learner.steps as f64 / self.config.total_steps as f64;
+        first + (last.unwrap_or(first) - first) * progress
+    }
+
     fn objective(&self, learner: &Learner, totals: &Totals) -> Objective {
         let config = self.config;
-        let progress = learner.steps as f64 / config.total_steps as f64;
-        let moved = |first: f64, last: Option<f64>| first + (last.unwrap_or(first) - first) * progress;
+        let moved = |first, last| self.moved(learner, first, last);
         let (mean, var) = totals.advantage();
         Objective {
             clip: moved(config.clip, config.final_clip),
@@ -437,16 +442,13 @@ impl<'a> Run<'a> {
                 rest = after;
             }
         }
-        let progress = (learner.steps as f64 / config.total_steps as f64).min(1.0);
-        let final_min = config.final_min_std.unwrap_or(config.min_std);
-        let min_std = config.min_std + (final_min - config.min_std) * progress;
+        let min_std = self.moved(learner, config.min_std, config.final_min_std);
         let [low, high] = [min_std, config.max_std].map(|s| Real::ln(s) as f32);
         learner.params[self.layout.log_std.clone()].iter_mut().for_each(|l| *l = l.clamp(low, high));
 
         if config.schedule == Schedule::Adaptive {
             let kl = sums.kl * mean;
-            let target =
-                config.target_kl + (config.final_target_kl.unwrap_or(config.target_kl) - config.target_kl) * progress;
+            let target = self.moved(learner, config.target_kl, config.final_target_kl);
             if kl > 2.0 * target {
                 learner.lr = (learner.lr / 1.5).max(config.lr_range[0]);
             } else if kl < 0.5 * target {

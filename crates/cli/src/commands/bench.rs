@@ -9,8 +9,8 @@ mod physics;
 mod row;
 mod train;
 
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::report::print_json;
 use clap::ValueEnum;
 use marathon_envs::registry;
 use marathon_physics::lanes::Isa;
@@ -139,7 +139,7 @@ pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
     let mut rows: Vec<Row> = Vec::new();
     let mut emit = |row: Row| {
         if !json {
-            println!("{}", row.line(what));
+            say(row.line(what));
         }
         rows.push(row);
     };
@@ -158,14 +158,14 @@ pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
 
 fn print_head(what: What, machine: &Machine, plan: &Plan) {
     let Machine { arch, os, cores, isas, best_isa } = machine;
-    println!("{arch} {os}, {cores} cores, instruction sets {} (best: {best_isa})", isas.join(", "));
+    say(format!("{arch} {os}, {cores} cores, instruction sets {} (best: {best_isa})", isas.join(", ")));
     let step = match what {
         What::Physics => "a step is one physics step of one agent under random torques, nobody reset",
         What::Env => "a step is one decision of one agent: random actions, physics, observation, reward, resets",
         What::Train | What::Gait => "a step is one decision of one agent, with all that learning from it takes",
     };
-    println!("{step};\ntimes are processor time of {} thread(s); rows are medians\n", plan.threads);
-    println!("{}", Row::header(what));
+    say(format!("{step};\ntimes are processor time of {} thread(s); rows are medians\n", plan.threads));
+    say(Row::header(what));
 }
 
 /// Ids of the agents to measure. By default all, but of those with the same model one, except where their tasks count.

@@ -84,7 +84,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     say(format!("\nits best actions over {EPISODES} episodes:"));
     say(evaluation_table(&eval, spec.max_episode_steps, spec.dt));
     say(format!("\nwritten to {path}: policy.safetensors, summary.json, progress.csv, curve.png, TensorBoard events"));
-    say(format!("see it by    {program} render {path} --out {}.gif", short_name(&run.agent)));
+    say(format!("see it by    {program} render {path} --out {}.gif", text::short_name(&run.agent)));
     Ok(())
 }
 
@@ -195,9 +195,4 @@ fn stopped(folder: &RunFolder, cause: CliError, saved: bool, steps: u64) -> CliE
 
 fn resume_command(folder: &Path) -> String {
     format!("{} train --resume {}", text::program(), text::path_word(folder))
-}
-
-/// `Hopper-v0` as `hopper`.
-fn short_name(agent: &str) -> String {
-    agent.to_lowercase().trim_end_matches("-v0").to_string()
 }

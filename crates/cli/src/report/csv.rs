@@ -1,8 +1,7 @@
 //! `progress.csv`: one row of numbers per iteration.
 
 use crate::error::CliError;
-use crate::folder::write_atomic;
-use marathon_learn::IterationStats;
+use marathon_learn::{IterationStats, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 
@@ -116,7 +115,10 @@ fn cut(path: &Path, iteration: u64) -> Result<(), CliError> {
         }
         kept.push_str(line);
     }
-    if kept.len() < text.len() { write_atomic(path, kept.as_bytes()) } else { Ok(()) }
+    if kept.len() < text.len() {
+        write_atomic(path, kept.as_bytes())?
+    }
+    Ok(())
 }
 
 fn failed(path: &Path, action: &'static str, error: csv::Error) -> CliError {

@@ -2,8 +2,9 @@
 
 use super::csv::History;
 use crate::error::CliError;
-use crate::folder::{RunFile, RunFolder, write_atomic};
+use crate::folder::{RunFile, RunFolder};
 use crate::text::{duration, short, thousands};
+use marathon_learn::write_atomic;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
@@ -213,5 +214,5 @@ fn write_png(path: &Path, rgb: &[u8]) -> Result<(), CliError> {
     let mut writer = encoder.write_header().map_err(refused)?;
     writer.write_image_data(rgb).map_err(refused)?;
     writer.finish().map_err(refused)?;
-    write_atomic(path, &bytes)
+    Ok(write_atomic(path, &bytes)?)
 }

@@ -86,8 +86,9 @@ impl<'a> Reporter<'a> {
         self.events.push(stats.steps, &tensorboard::scalars(stats, rate, &self.terms))?;
         if stats.steps >= self.due {
             self.plan(stats.steps);
-            save(self.folder, &snapshot.policy(), &snapshot.checkpoint())?;
-            self.keep(&snapshot.policy())?;
+            let policy = snapshot.policy();
+            save(self.folder, &policy, &snapshot.checkpoint())?;
+            self.keep(&policy)?;
         }
         Ok(())
     }

@@ -11,9 +11,9 @@
 //! ```
 
 use crate::error::CliError;
-use crate::folder::{EVENTS, RunFolder, write_atomic};
+use crate::folder::{EVENTS, RunFolder};
 use crc::{CRC_32_ISCSI, Crc, Table};
-use marathon_learn::IterationStats;
+use marathon_learn::{IterationStats, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -108,7 +108,10 @@ fn cut(path: &Path, steps: u64) -> Result<(), CliError> {
             kept.extend_from_slice(whole);
         }
     }
-    if kept.len() < bytes.len() { write_atomic(path, &kept) } else { Ok(()) }
+    if kept.len() < bytes.len() {
+        write_atomic(path, &kept)?
+    }
+    Ok(())
 }
 
 /// Whole records of a file and the data in each.

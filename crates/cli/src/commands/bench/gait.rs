@@ -3,8 +3,8 @@
 
 use super::{BenchArgs, Plan};
 use crate::config;
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::report::print_json;
 use crate::text::short;
 use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
@@ -46,12 +46,12 @@ pub fn run(plan: &Plan, args: &BenchArgs, json: bool) -> Result<(), CliError> {
     let mut runs = Vec::new();
     if !json {
         let BenchArgs { speed, falls, every, .. } = args;
-        println!("until {EPISODES} episodes run at {speed} m/s on average with at most {falls} falls, tried every");
-        println!("{} steps off the clock; seconds are those of {} thread(s)\n", short(*every as f64), plan.threads);
-        println!(
+        say(format!("until {EPISODES} episodes run at {speed} m/s on average with at most {falls} falls, tried every"));
+        say(format!("{} steps off the clock; seconds are those of {} thread(s)\n", short(*every as f64), plan.threads));
+        say(format!(
             "{:14} {:>4} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6}",
             "agent", "seed", "steps", "cpu s", "wall s", "return", "m/s", "falls"
-        );
+        ));
     }
     for id in &plan.agents {
         for seed in 1..=args.seeds {
@@ -68,11 +68,11 @@ pub fn run(plan: &Plan, args: &BenchArgs, json: bool) -> Result<(), CliError> {
                 .map(|r| if r.reached { r.cpu_seconds } else { f64::INFINITY })
                 .collect();
             seconds.sort_by(f64::total_cmp);
-            println!(
+            say(format!(
                 "{id:14} median {:.1}, largest {:.1} CPU seconds\n",
                 seconds[seconds.len() / 2],
                 seconds[seconds.len() - 1]
-            );
+            ));
         }
     }
     if json {
@@ -121,5 +121,5 @@ fn print(run: &Run) {
         .as_ref()
         .map_or(String::new(), |e| format!("{:>8.0} {:>6.2} {:>6}", e.return_mean, e.speed_mean, e.falls));
     let note = if run.reached { "" } else { "  not reached" };
-    println!("{agent:14} {seed:>4} {steps:>8} {cpu_seconds:>8.1} {wall_seconds:>8.1} {eval}{note}");
+    say(format!("{agent:14} {seed:>4} {steps:>8} {cpu_seconds:>8.1} {wall_seconds:>8.1} {eval}{note}"));
 }
