@@ -16,27 +16,46 @@ MODES = ["Fixed", "Track", "TrackCom", "TargetBody", "TargetBodyCom"]
 INTEGRATORS = {0: "Euler", 1: "Rk4", 2: "Implicit", 3: "ImplicitFast"}
 CONES = ["Pyramidal", "Elliptic"]
 FLAGS = [
-    "constraint", "limit", "contact", "frictionloss", "spring", "damper", "gravity", "clampctrl", "warmstart",
+    "constraint", "equality", "limit", "contact", "frictionloss", "spring", "damper", "gravity", "clampctrl", "warmstart",
     "actuation", "refsafe", "eulerdamp", "filterparent",
 ]
 SENSORS = {
-    "TOUCH": "Touch", "FRAMEPOS": "FramePos", "FRAMEQUAT": "FrameQuat", "FRAMEXAXIS": "FrameXAxis",
-    "FRAMEYAXIS": "FrameYAxis", "FRAMEZAXIS": "FrameZAxis", "FRAMELINVEL": "FrameLinVel",
-    "FRAMEANGVEL": "FrameAngVel", "FRAMELINACC": "FrameLinAcc", "FRAMEANGACC": "FrameAngAcc",
-    "SUBTREECOM": "SubtreeCom", "SUBTREELINVEL": "SubtreeLinVel", "VELOCIMETER": "Velocimeter", "GYRO": "Gyro",
-    "ACCELEROMETER": "Accelerometer", "JOINTPOS": "JointPos", "JOINTVEL": "JointVel", "ACTUATORFRC": "ActuatorFrc",
+    "TOUCH": "Touch", "ACCELEROMETER": "Accelerometer", "VELOCIMETER": "Velocimeter", "GYRO": "Gyro",
+    "FORCE": "Force", "TORQUE": "Torque", "MAGNETOMETER": "Magnetometer", "RANGEFINDER": "RangeFinder",
+    "JOINTPOS": "JointPos", "JOINTVEL": "JointVel", "TENDONPOS": "TendonPos", "TENDONVEL": "TendonVel",
+    "ACTUATORPOS": "ActuatorPos", "ACTUATORVEL": "ActuatorVel", "ACTUATORFRC": "ActuatorFrc",
+    "JOINTACTFRC": "JointActuatorFrc", "TENDONACTFRC": "TendonActuatorFrc", "BALLQUAT": "BallQuat",
+    "BALLANGVEL": "BallAngVel", "JOINTLIMITPOS": "JointLimitPos", "JOINTLIMITVEL": "JointLimitVel",
+    "JOINTLIMITFRC": "JointLimitFrc", "TENDONLIMITPOS": "TendonLimitPos", "TENDONLIMITVEL": "TendonLimitVel",
+    "TENDONLIMITFRC": "TendonLimitFrc", "FRAMEPOS": "FramePos", "FRAMEQUAT": "FrameQuat",
+    "FRAMEXAXIS": "FrameXAxis", "FRAMEYAXIS": "FrameYAxis", "FRAMEZAXIS": "FrameZAxis",
+    "FRAMELINVEL": "FrameLinVel", "FRAMEANGVEL": "FrameAngVel", "FRAMELINACC": "FrameLinAcc",
+    "FRAMEANGACC": "FrameAngAcc", "SUBTREECOM": "SubtreeCom", "SUBTREELINVEL": "SubtreeLinVel",
+    "SUBTREEANGMOM": "SubtreeAngMom", "INSIDESITE": "InsideSite", "GEOMDIST": "Distance", "GEOMNORMAL": "Normal",
+    "GEOMFROMTO": "FromTo", "CONTACT": "Contact", "E_POTENTIAL": "PotentialEnergy", "E_KINETIC": "KineticEnergy",
+    "CLOCK": "Clock",
 }
 OBJECTS = {
     "BODY": "Body", "XBODY": "XBody", "GEOM": "Geom", "SITE": "Site", "CAMERA": "Camera", "JOINT": "Joint",
-    "ACTUATOR": "Actuator",
+    "TENDON": "Tendon", "ACTUATOR": "Actuator",
 }
 GRAY = [0.5, 0.5, 0.5, 1.0]
 
 
-def first(values):
-    """The linear coefficient of a polynomial, or the number itself."""
-    values = np.atleast_1d(values)
-    return values[0]
+def actuated(m, kind, i):
+    """What actuators add to a joint or tendon: armature, damping and its two higher coefficients.
+
+    MuJoCo keeps them with the actuators and adds them, times the square of the gear, whenever it uses them.
+    """
+    transmissions = {
+        "joint": [mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT], "tendon": [mujoco.mjtTrn.mjTRN_TENDON],
+    }[kind]
+    total = np.zeros(4)
+    for a in range(m.nactuator):
+        if mujoco.mjtTrn(m.actuator_trntype[a]) in transmissions and m.actuator_trnid[a, 0] == i:
+            own = [m.actuator_armature[a], m.actuator_damping[a], *m.actuator_dampingpoly[a]]
+            total += np.array(own) * m.actuator_gear[m.actuator_outadr[a], 0] ** 2
+    return total
 
 
 def color(m, rgba, material):
@@ -57,6 +76,10 @@ def options(m):
         "timestep": o.timestep, "gravity": o.gravity, "integrator": INTEGRATORS[int(o.integrator)],
         "cone": CONES[int(o.cone)], "impratio": o.impratio, "iterations": o.iterations,
         "ls_iterations": o.ls_iterations, "tolerance": o.tolerance, "flags": {f: not disabled[f] for f in FLAGS},
+        "density": o.density, "viscosity": o.viscosity, "wind": o.wind, "magnetic": o.magnetic,
+        "contact_override": {
+            "margin": o.o_margin, "solref": o.o_solref, "solimp": o.o_solimp, "friction": o.o_friction,
+        } if o.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE) else "none",
     }
 
 
@@ -78,26 +101,31 @@ def joint(m, i):
         "name": name(m, mujoco.mjtObj.mjOBJ_JOINT, i), "kind": JOINTS[m.jnt_type[i]], "body": m.jnt_bodyid[i],
         "pos": m.jnt_pos[i], "axis": m.jnt_axis[i], "qpos_adr": m.jnt_qposadr[i], "dof_adr": m.jnt_dofadr[i],
         "limited": bool(m.jnt_limited[i]), "range": m.jnt_range[i], "margin": m.jnt_margin[i],
-        "stiffness": first(m.jnt_stiffness[i]), "solref_limit": m.jnt_solref[i], "solimp_limit": m.jnt_solimp[i],
+        "stiffness": m.jnt_stiffness[i], "stiffness_poly": m.jnt_stiffnesspoly[i],
+        "actuator_gravcomp": bool(m.jnt_actgravcomp[i]), "solref_limit": m.jnt_solref[i], "solimp_limit": m.jnt_solimp[i],
         "actuator_force_range": m.jnt_actfrcrange[i] if m.jnt_actfrclimited[i] else "none",
         "group": m.jnt_group[i],
     }
 
 
 def dof(m, i):
+    armature, damping, *poly = actuated(m, "joint", m.dof_jntid[i])
     return {
         "body": m.dof_bodyid[i], "joint": m.dof_jntid[i],
-        "parent": m.dof_parentid[i] if m.dof_parentid[i] >= 0 else "none", "armature": m.dof_armature[i],
-        "damping": first(m.dof_damping[i]), "frictionloss": m.dof_frictionloss[i],
+        "parent": m.dof_parentid[i] if m.dof_parentid[i] >= 0 else "none", "armature": m.dof_armature[i] + armature,
+        "damping": m.dof_damping[i] + damping, "damping_poly": m.dof_dampingpoly[i] + poly, "frictionloss": m.dof_frictionloss[i],
         "solref_friction": m.dof_solref[i], "solimp_friction": m.dof_solimp[i], "invweight0": m.dof_invweight0[i],
     }
 
 
 def geom(m, i):
     material = m.geom_matid[i]
+    # a mesh is not read, so its size and principal axes are not known
+    kind, mesh = SHAPES[m.geom_type[i]], m.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH
     return {
-        "name": name(m, mujoco.mjtObj.mjOBJ_GEOM, i), "kind": SHAPES[m.geom_type[i]], "body": m.geom_bodyid[i],
-        "pos": m.geom_pos[i], "quat": m.geom_quat[i], "size": m.geom_size[i],
+        "name": name(m, mujoco.mjtObj.mjOBJ_GEOM, i), "kind": kind, "body": m.geom_bodyid[i],
+        "pos": None if mesh else m.geom_pos[i], "quat": None if mesh else m.geom_quat[i],
+        "size": None if mesh else m.geom_size[i], "hfield": m.geom_dataid[i] if kind == "Hfield" else "none",
         "contype": int(m.geom_contype[i]) % 2**32, "conaffinity": int(m.geom_conaffinity[i]) % 2**32,
         "condim": m.geom_condim[i], "priority": m.geom_priority[i], "friction": m.geom_friction[i],
         "solmix": m.geom_solmix[i], "solref": m.geom_solref[i], "solimp": m.geom_solimp[i],
@@ -130,26 +158,114 @@ def light(m, i):
     }
 
 
+def hfield(m, i):
+    start, size = m.hfield_adr[i], m.hfield_nrow[i] * m.hfield_ncol[i]
+    return {
+        "name": name(m, mujoco.mjtObj.mjOBJ_HFIELD, i), "nrow": m.hfield_nrow[i], "ncol": m.hfield_ncol[i],
+        "size": m.hfield_size[i], "data": m.hfield_data[start : start + size],
+    }
+
+
+def tendon(m, i):
+    start, count = m.tendon_adr[i], m.tendon_num[i]
+    fixed = m.wrap_type[start] == mujoco.mjtWrap.mjWRAP_JOINT
+    path = [[m.wrap_objid[k], m.wrap_prm[k]] for k in range(start, start + count)]
+    armature, damping, *poly = actuated(m, "tendon", i)
+    return {
+        "name": name(m, mujoco.mjtObj.mjOBJ_TENDON, i), "kind": {"Fixed": path} if fixed else "Spatial",
+        "limited": bool(m.tendon_limited[i]), "range": m.tendon_range[i], "margin": m.tendon_margin[i],
+        "stiffness": m.tendon_stiffness[i], "stiffness_poly": m.tendon_stiffnesspoly[i],
+        "spring_length": m.tendon_lengthspring[i] if fixed else None, "damping": m.tendon_damping[i] + damping,
+        "damping_poly": m.tendon_dampingpoly[i] + poly, "frictionloss": m.tendon_frictionloss[i],
+        "armature": m.tendon_armature[i] + armature, "solref_limit": m.tendon_solref_lim[i],
+        "solimp_limit": m.tendon_solimp_lim[i], "solref_friction": m.tendon_solref_fri[i],
+        "solimp_friction": m.tendon_solimp_fri[i], "group": m.tendon_group[i],
+        "actuator_force_range": m.tendon_actfrcrange[i] if m.tendon_actfrclimited[i] else "none",
+        "length0": m.tendon_length0[i] if fixed else None,
+        "invweight0": m.tendon_invweight0[i] if fixed else None,
+    }
+
+
+def equality_kind(m, i):
+    kind, data = int(m.eq_type[i]), m.eq_data[i]
+    ends = [int(m.eq_obj1id[i]), int(m.eq_obj2id[i])]
+    optional = "none" if ends[1] < 0 else ends[1]
+    if kind == mujoco.mjtEq.mjEQ_JOINT:
+        return {"Joint": {"joint1": ends[0], "joint2": optional, "polycoef": data[:5]}}
+    if kind == mujoco.mjtEq.mjEQ_TENDON:
+        return {"Tendon": {"tendon1": ends[0], "tendon2": optional, "polycoef": data[:5]}}
+    weld = kind == mujoco.mjtEq.mjEQ_WELD
+    if m.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
+        joined = {
+            "bodies": m.site_bodyid[ends], "sites": ends, "anchors": m.site_pos[ends], "quats": m.site_quat[ends],
+        }
+    else:
+        # the first point of a connect belongs to the first body, that of a weld to the second
+        points = [data[0:3], data[3:6]]
+        joined = {
+            "bodies": ends, "sites": "none", "anchors": points[::-1] if weld else points,
+            "quats": [data[6:10], np.array([1.0, 0, 0, 0])],
+        }
+    if weld:
+        return {"Weld": {**joined, "torquescale": data[10]}}
+    del joined["quats"]
+    return {"Connect": joined}
+
+
+def equality(m, i):
+    return {
+        "name": name(m, mujoco.mjtObj.mjOBJ_EQUALITY, i), "kind": equality_kind(m, i),
+        "active": bool(m.eq_active0[i]), "solref": m.eq_solref[i], "solimp": m.eq_solimp[i],
+    }
+
+
+def dynamics(m, i):
+    constant = {"time_constant": m.actuator_dynprm[i, 0]}
+    return {
+        mujoco.mjtDyn.mjDYN_NONE: "None", mujoco.mjtDyn.mjDYN_INTEGRATOR: "Integrator",
+        mujoco.mjtDyn.mjDYN_FILTER: {"Filter": constant}, mujoco.mjtDyn.mjDYN_FILTEREXACT: {"FilterExact": constant},
+    }[mujoco.mjtDyn(m.actuator_dyntype[i])]
+
+
 def actuator(m, i):
     affine_gain = m.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_AFFINE
     affine_bias = m.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
     gain, bias = m.actuator_gainprm[i, :3], m.actuator_biasprm[i, :3]
+    transmission = {
+        mujoco.mjtTrn.mjTRN_JOINT: "Joint", mujoco.mjtTrn.mjTRN_JOINTINPARENT: "JointInParent",
+        mujoco.mjtTrn.mjTRN_TENDON: "Tendon",
+    }[mujoco.mjtTrn(m.actuator_trntype[i])]
     return {
-        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "joint": m.actuator_trnid[i, 0],
+        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: m.actuator_trnid[i, 0]},
         "gear": m.actuator_gear[i], "ctrl_limited": bool(m.actuator_ctrllimited[i]),
         "ctrl_range": m.actuator_ctrlrange[i], "force_limited": bool(m.actuator_forcelimited[i]),
         "force_range": m.actuator_forcerange[i],
         "gain": gain if affine_gain else [gain[0], 0, 0], "bias": bias if affine_bias else [0, 0, 0],
+        "dynamics": dynamics(m, i), "act": m.actuator_actadr[i] if m.actuator_actadr[i] >= 0 else "none",
+        "act_limited": bool(m.actuator_actlimited[i]), "act_range": m.actuator_actrange[i],
+        "act_early": bool(m.actuator_actearly[i]),
     }
+
+
+def sensor_object(kind, i):
+    kind = mujoco.mjtObj(kind).name.removeprefix("mjOBJ_")
+    return {OBJECTS[kind]: i} if i >= 0 else "None"
 
 
 def sensor(m, i):
     kind = mujoco.mjtSensor(m.sensor_type[i]).name.removeprefix("mjSENS_")
-    supported = kind in SENSORS and m.sensor_refid[i] < 0
-    target = mujoco.mjtObj(m.sensor_objtype[i]).name.removeprefix("mjOBJ_")
+    # strings through sites and meshes are not read
+    ends = [(m.sensor_objtype[i], m.sensor_objid[i]), (m.sensor_reftype[i], m.sensor_refid[i])]
+    mesh = any(t == mujoco.mjtObj.mjOBJ_GEOM and m.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH for t, k in ends)
+    string = any(
+        t == mujoco.mjtObj.mjOBJ_TENDON and m.wrap_type[m.tendon_adr[k]] != mujoco.mjtWrap.mjWRAP_JOINT for t, k in ends
+    )
+    supported = kind in SENSORS and not mesh and not string
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_SENSOR, i), "kind": SENSORS[kind] if supported else "Unsupported",
-        "object": {OBJECTS[target]: m.sensor_objid[i]} if supported else "None",
+        "object": sensor_object(*ends[0]) if supported else "None",
+        "reference": sensor_object(*ends[1]) if supported else "None",
+        "intprm": m.sensor_intprm[i, :3] if supported else [0, 0, 0],
         "adr": m.sensor_adr[i], "dim": m.sensor_dim[i], "cutoff": m.sensor_cutoff[i],
     }
 
@@ -157,7 +273,8 @@ def sensor(m, i):
 def keyframe(m, i):
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_KEY, i), "time": m.key_time[i], "qpos": m.key_qpos[i],
-        "qvel": m.key_qvel[i], "ctrl": m.key_ctrl[i],
+        "qvel": m.key_qvel[i], "ctrl": m.key_ctrl[i], "act": m.key_act[i],
+        "mpos": m.key_mpos[i].reshape(-1, 3), "mquat": m.key_mquat[i].reshape(-1, 4),
     }
 
 
@@ -181,16 +298,19 @@ def dump(m):
     def each(function, count):
         return [function(m, i) for i in range(count)]
 
+    meshes = any(m.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
     return {
         "name": bytes(m.names).split(b"\0")[0].decode(), "opt": options(m), "nq": m.nq, "nv": m.nv, "nu": m.nu,
+        "na": m.na, "hfields": each(hfield, m.nhfield), "tendons": each(tendon, m.ntendon),
+        "equalities": each(equality, m.neq),
         "bodies": each(body, m.nbody), "joints": each(joint, m.njnt), "dofs": each(dof, m.nv),
         "geoms": each(geom, m.ngeom), "sites": each(site, m.nsite), "cameras": each(camera, m.ncam),
         "lights": each(light, m.nlight), "actuators": each(actuator, m.nu), "sensors": each(sensor, m.nsensor),
         "keyframes": each(keyframe, m.nkey), "pairs": each(pair, m.npair), "excludes": each(exclude, m.nexclude),
         "numerics": each(numeric, m.nnumeric), "qpos0": m.qpos0, "qpos_spring": m.qpos_spring,
         "stat": {
-            "mean_inertia": m.stat.meaninertia, "mean_mass": m.stat.meanmass, "extent": m.stat.extent,
-            "center": m.stat.center,
+            "mean_inertia": m.stat.meaninertia, "mean_mass": m.stat.meanmass,
+            "extent": None if meshes else m.stat.extent, "center": None if meshes else m.stat.center,
         },
     }
 

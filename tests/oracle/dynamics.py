@@ -1,7 +1,7 @@
 """Random states of MJCF models and what MuJoCo makes of them.
 
 Reads a JSON list of jobs from standard input, one per model:
-    {"xml": path, "states": n, "seed": s, "ground_only": bool, "near_floor": bool}
+    {"xml": path, "states": n, "seed": s, "ground_only": bool, "near_floor": bool, "spread": x, "pushes": bool}
 and prints a JSON list with, per job, the states and MuJoCo's accelerations, forces, mass matrices, contact counts,
 sensor values and next states. States and controls are rounded to single precision so that both sides start alike.
 """
@@ -60,12 +60,17 @@ def vertical_coordinate(model):
     return None
 
 
-def random_state(model, rng, near_floor):
+def random_state(model, rng, near_floor, spread=None):
     q = model.qpos0.copy()
     v = rng.normal(size=model.nv)
     for j in range(model.njnt):
         a, kind = model.jnt_qposadr[j], model.jnt_type[j]
-        if kind == mujoco.mjtJoint.mjJNT_FREE:
+        if kind == mujoco.mjtJoint.mjJNT_FREE and spread is not None:
+            # near the reference, so that bodies meet each other and what stands around them
+            q[a : a + 3] += spread * rng.normal(size=3)
+            q[a + 3 : a + 7] = rng.normal(size=4)
+            q[a + 3 : a + 7] /= np.linalg.norm(q[a + 3 : a + 7])
+        elif kind == mujoco.mjtJoint.mjJNT_FREE:
             q[a : a + 2] += rng.normal(size=2)
             q[a + 3 : a + 7] = rng.normal(size=4)
             q[a + 3 : a + 7] /= np.linalg.norm(q[a + 3 : a + 7])
@@ -102,6 +107,32 @@ def full_mass_matrix(model, data):
     return dense
 
 
+def pushed(model, data):
+    """Joint forces of the forces on bodies."""
+    total = np.zeros(model.nv)
+    for b in range(1, model.nbody):
+        if np.any(data.xfrc_applied[b]):
+            mujoco.mj_applyFT(
+                model, data, data.xfrc_applied[b, :3], data.xfrc_applied[b, 3:], data.xipos[b], b, total
+            )
+    return total
+
+
+def deep_in_field(model, data):
+    """Whether a shape reaches into a height field with more than its rounding.
+
+    MuJoCo finds such contacts by iteration, and where two ways out are equally long the choice is a matter of rounding.
+    """
+    for c in data.contact:
+        kinds = [model.geom_type[g] for g in c.geom]
+        if mujoco.mjtGeom.mjGEOM_HFIELD in kinds:
+            other = c.geom[1 - kinds.index(mujoco.mjtGeom.mjGEOM_HFIELD)]
+            round_shape = model.geom_type[other] != mujoco.mjtGeom.mjGEOM_BOX
+            if c.dist < (-0.9 * model.geom_size[other, 0] if round_shape else 0):
+                return True
+    return False
+
+
 def run(job):
     model = mujoco.MjModel.from_xml_path(job["xml"])
     if job.get("ground_only", True):
@@ -113,19 +144,34 @@ def run(job):
     data = mujoco.MjData(model)
     rng = np.random.default_rng(job.get("seed", 0))
     states = []
+    # penetrations of height fields are found by iteration
+    model.opt.ccd_tolerance = 1e-12
+    model.opt.ccd_iterations = 200
     for _ in range(job["states"]):
-        q, v, u = random_state(model, rng, job.get("near_floor", True))
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        q, v, u = random_state(model, rng, job.get("near_floor", True), job.get("spread"))
+        act = rng.uniform(-0.5, 0.5, model.na).astype(np.float32)
+        push = np.zeros((model.nbody, 6))
+        if job.get("pushes"):
+            push[1:] = rng.normal(size=(model.nbody - 1, 6)).astype(np.float32)
+
+        def restart():
+            mujoco.mj_resetData(model, data)
+            data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = q, v, u, act
+            data.xfrc_applied[:] = push
+
+        restart()
         mujoco.mj_forward(model, data)
         state = {
+            "deep": deep_in_field(model, data),
+            "act": act.tolist(),
+            "xfrc": push.ravel().tolist(),
             "qpos": q.tolist(),
             "qvel": v.tolist(),
             "ctrl": u.tolist(),
             "qacc": data.qacc.tolist(),
             "qfrc_constraint": data.qfrc_constraint.tolist(),
             "qfrc_bias": data.qfrc_bias.tolist(),
-            "qfrc_applied": (data.qfrc_passive + data.qfrc_actuator).tolist(),
+            "qfrc_applied": (data.qfrc_passive + data.qfrc_actuator + pushed(model, data)).tolist(),
             "qM": full_mass_matrix(model, data).ravel().tolist(),
             # contacts in the gap exert no force and are not constraints
             "ncon": int(np.sum(data.contact.exclude == 0)),
@@ -133,9 +179,9 @@ def run(job):
             "xpos": data.xpos.ravel().tolist(),
             "geom_xpos": data.geom_xpos.ravel().tolist(),
         }
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        restart()
         mujoco.mj_step(model, data)
+        state["next_act"] = data.act.tolist()
         state["next_qpos"] = data.qpos.tolist()
         state["next_qvel"] = data.qvel.tolist()
         states.append(state)

@@ -1,7 +1,7 @@
 //! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
 
 use marathon_physics::lanes::Real;
-use marathon_physics::model::{JointType, Model};
+use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, Readings, Sim, SimOptions, Work};
 
 use crate::agent::Facts;
@@ -110,8 +110,8 @@ impl Blueprint {
             None => (model.qpos0.clone(), vec![0.0; model.nv]),
         };
         let mut joints: Vec<SpawnJoint> = Vec::new();
-        for a in &model.actuators {
-            let j = &model.joints[a.joint];
+        for joint in model.actuators.iter().filter_map(Actuator::joint) {
+            let j = &model.joints[joint];
             let scalar = matches!(j.kind, JointType::Hinge | JointType::Slide);
             if scalar && joints.iter().all(|known| known.dof != j.dof_adr) {
                 joints.push(SpawnJoint { qpos: j.qpos_adr, dof: j.dof_adr, range: j.limited.then_some(j.range) });
@@ -159,8 +159,8 @@ impl<T: Real> Anatomy<T> {
 
         let mut bodies: Vec<usize> = Vec::new();
         let mut motors = Vec::new();
-        for a in &model.actuators {
-            let j = &model.joints[a.joint];
+        for joint in model.actuators.iter().filter_map(Actuator::joint) {
+            let j = &model.joints[joint];
             let rotates = matches!(j.kind, JointType::Hinge | JointType::Ball);
             if rotates && !bodies.contains(&j.body) {
                 bodies.push(j.body);

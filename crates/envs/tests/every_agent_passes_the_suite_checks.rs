@@ -142,7 +142,7 @@ fn resets_stay_near_the_spawn_pose() {
         let mut env = make(&id, 64, 1, None, Autoreset::SameStep);
         let mut out = env.buffers();
         env.reset(None, &mut out.obs).unwrap();
-        let actuated = |joint: usize| model.actuators.iter().any(|a| a.joint == joint);
+        let actuated = |joint: usize| model.actuators.iter().any(|a| a.joint() == Some(joint));
         for agent in 0..64 {
             let state = env.state(agent).unwrap();
             for (i, joint) in model.joints.iter().enumerate() {

@@ -1,117 +1,103 @@
 //! The articulated-body recursion: solves `(M + sum_b K_b + diag) x = rhs - bias + wrenches` in linear time.
+//!
+//! It is a factorization `L D L'` in disguise. Going inward over the links, [`factorize`] finds for every degree of
+//! freedom the pivot (`D`), the gain by which a force on the outside reaches the inside (`L`), and the acceleration that
+//! its own share of the forces would cause (`drive`). Going outward, [`accelerate`] completes the solution. Featherstone's
+//! recursion with rank-one updates per degree of freedom is exact for joints of several degrees of freedom.
+//!
+//! Only links marked in `work.stale`, and their ancestors, are done anew by [`factorize`]: towards the end of an
+//! iteration few lanes still change anything, and most of the tree keeps its factors.
 
 use crate::lanes::Real;
-use crate::sim::{Link, Sim};
+use crate::sim::Sim;
+use crate::space::Space;
 use crate::spatial::*;
 use crate::work::Work;
 
-/// Solves for joint accelerations, into `next`, and the links' accelerations without bias, into `link_acc`.
+/// Factorizes the stale links and brings their forces inward.
 ///
 /// `M` without armature comes from the links' inertias; `work.diag` is added to its diagonal (armature, limit stiffness,
 /// implicit damping). `with_stiffness` adds the contact stiffness of the links that are in contact; their wrench is
-/// applied in either case. Featherstone's recursion with rank-one updates per degree of freedom; exact for joints of
-/// several degrees of freedom.
+/// applied in either case.
 #[inline(always)]
-pub(crate) fn articulated_solve<T: Real>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
-    let z = T::zero();
+pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
     for l in (0..sim.links.len()).rev() {
+        if !work.stale[l] {
+            continue;
+        }
         let link = &sim.links[l];
-        let mut k: Sym6<T> = if link.has_children { work.art[l] } else { [z; 21] };
+        let mut k: Sym6<T> = sym6_of_inertia(&work.inertia[l]);
         let mut f: V6<T> = work.bias_force[l];
-        sym6_add_inertia(&mut k, &work.inertia[l]);
         if work.in_contact[l] {
             if with_stiffness {
-                for i in 0..21 {
-                    k[i] += work.stiffness[l][i];
-                }
+                S::add_sym(&mut k, &work.stiffness[l]);
             }
-            for i in 0..6 {
-                f[i] -= work.wrench[l][i];
-            }
+            S::sub(&mut f, &work.wrench[l]);
         }
-        if link.has_children {
-            for i in 0..6 {
-                f[i] += work.art_force[l][i];
-            }
+        let mut child = link.last_child;
+        while let Some(c) = child {
+            S::add_sym(&mut k, &work.art[c]);
+            S::add(&mut f, &work.art_force[c]);
+            child = sim.links[c].sibling;
+        }
+        if let Some(p) = link.parent {
+            work.stale[p] = true;
         }
         if link.free_block {
             factor_free_root(link.dofs.start, link.tree, &k, work);
-            solve_free_root(link.dofs.start, link.tree, l, &f, work);
+            drive_free_root(link.dofs.start, link.tree, &f, work);
             continue;
         }
         for d in link.dofs.clone().rev() {
             let s = work.axis[d];
-            let u = sym6_mul(&k, &s);
-            let pivot = (dot6(&s, &u) + work.diag[d]).recip();
-            let force = work.rhs[d] - dot6(&s, &f);
-            let v = [u[0] * pivot, u[1] * pivot, u[2] * pivot, u[3] * pivot, u[4] * pivot, u[5] * pivot];
-            sym6_sub_outer(&mut k, &u, &v);
-            f = axpy6(&v, force, &f);
+            let u = S::mul(&k, &s);
+            let pivot = (S::dot(&s, &u) + work.diag[d]).recip();
+            let force = work.rhs[d] - S::dot(&s, &f);
+            let v = S::scale(&u, pivot);
+            S::sub_outer(&mut k, &u, &v);
+            f = S::axpy(&v, force, &f);
             work.gain[d] = v;
             work.pivot[d] = pivot;
-            work.next[d] = force * pivot;
+            work.drive[d] = force * pivot;
         }
-        if let Some(p) = link.parent {
-            if link.first_to_parent {
-                work.art[p] = k;
-            } else {
-                for i in 0..21 {
-                    work.art[p][i] += k[i];
-                }
-            }
-        }
-        hand_down(link, &f, work);
+        work.art[l] = k;
+        work.art_force[l] = f;
     }
-    accelerate(sim, work);
 }
 
-/// Solves again with the matrix of the last [`articulated_solve`] for other joint forces (`rhs`) and link forces: only
-/// the vector half of the recursion, a fraction of the cost.
+/// Brings other joint forces (`rhs`) and link forces (`link_force`) inward with the factors at hand: only the vector half
+/// of [`factorize`], a fraction of the cost.
 #[inline(always)]
-pub(crate) fn articulated_resolve<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(crate) fn bring_inward<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     for l in (0..sim.links.len()).rev() {
         let link = &sim.links[l];
         let mut f = work.link_force[l];
-        if link.has_children {
-            for i in 0..6 {
-                f[i] += work.art_force[l][i];
-            }
+        let mut child = link.last_child;
+        while let Some(c) = child {
+            S::add(&mut f, &work.art_force[c]);
+            child = sim.links[c].sibling;
         }
         if link.free_block {
-            solve_free_root(link.dofs.start, link.tree, l, &f, work);
+            drive_free_root(link.dofs.start, link.tree, &f, work);
             continue;
         }
         for d in link.dofs.clone().rev() {
-            let force = work.rhs[d] - dot6(&work.axis[d], &f);
-            f = axpy6(&work.gain[d], force, &f);
-            work.next[d] = force * work.pivot[d];
+            let force = work.rhs[d] - S::dot(&work.axis[d], &f);
+            f = S::axpy(&work.gain[d], force, &f);
+            work.drive[d] = force * work.pivot[d];
         }
-        hand_down(link, &f, work);
-    }
-    accelerate(sim, work);
-}
-
-/// Adds a link's force to its parent's.
-#[inline(always)]
-fn hand_down<T: Real>(link: &Link<T::Scalar>, f: &V6<T>, work: &mut Work<T>) {
-    if let Some(p) = link.parent {
-        if link.first_to_parent {
-            work.art_force[p] = *f;
-        } else {
-            for i in 0..6 {
-                work.art_force[p][i] += f[i];
-            }
-        }
+        work.art_force[l] = f;
     }
 }
 
-/// Outward pass: joint accelerations given the links' accelerations below them.
+/// Outward pass: joint accelerations into `next`, and the links' accelerations without bias into `link_acc`.
 #[inline(always)]
-fn accelerate<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(crate) fn accelerate<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
     for l in 0..sim.links.len() {
         let link = &sim.links[l];
         if link.free_block {
+            accelerate_free_root(link.dofs.start, link.tree, l, work);
             continue;
         }
         let mut a = match link.parent {
@@ -119,9 +105,21 @@ fn accelerate<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
             None => [z; 6],
         };
         for d in link.dofs.clone() {
-            let x = work.next[d] - dot6(&work.gain[d], &a);
+            let x = work.drive[d] - S::dot(&work.gain[d], &a);
             work.next[d] = x;
-            a = axpy6(&work.axis[d], x, &a);
+            a = S::axpy(&work.axis[d], x, &a);
+        }
+        work.link_acc[l] = a;
+    }
+}
+
+/// Links' accelerations without bias for the joint accelerations `acc`.
+#[inline(always)]
+pub(crate) fn link_accelerations<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
+    for (l, link) in sim.links.iter().enumerate() {
+        let mut a = link.parent.map_or([T::zero(); 6], |p| work.link_acc[p]);
+        for d in link.dofs.clone() {
+            a = S::axpy(&work.axis[d], work.acc[d], &a);
         }
         work.link_acc[l] = a;
     }
@@ -158,24 +156,41 @@ fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work
     work.root_factor[tree] = a;
 }
 
-/// Solves the six degrees of freedom of a free root together.
+/// Inward half of the six degrees of freedom of a free root: the pivots are on the factor's diagonal.
 #[inline(always)]
-fn solve_free_root<T: Real>(d: usize, tree: usize, l: usize, f: &V6<T>, work: &mut Work<T>) {
+fn drive_free_root<T: Real>(d: usize, tree: usize, f: &V6<T>, work: &mut Work<T>) {
     // torques are given along the body's axes, forces along the world's
-    let (x, r, a) = (&work.rhs, &work.axis, &work.root_factor[tree]);
+    let (x, r) = (&work.rhs, &work.axis);
     let mut y = [T::zero(); 6];
     for i in 0..3 {
         let torque = r[d + 3][i].mul_add(x[d + 3], r[d + 4][i].mul_add(x[d + 4], r[d + 5][i] * x[d + 5]));
         y[i] = torque - f[i];
         y[3 + i] = x[d + i] - f[3 + i];
     }
+    reduce_free_root(&work.root_factor[tree], &mut y);
+    for p in 0..6 {
+        work.pivot[d + p] = work.root_factor[tree][p][p];
+        work.drive[d + p] = y[p] * work.pivot[d + p];
+    }
+}
+
+/// Forward substitution with a free root's factor.
+#[inline(always)]
+pub(crate) fn reduce_free_root<T: Real>(a: &[[T; 6]; 6], y: &mut V6<T>) {
     for p in (0..6).rev() {
         for i in (0..p).rev() {
             y[i] = a[p][i].neg_mul_add(y[p], y[i]);
         }
     }
+}
+
+/// Outward half of a free root.
+#[inline(always)]
+fn accelerate_free_root<T: Real>(d: usize, tree: usize, l: usize, work: &mut Work<T>) {
+    let a = &work.root_factor[tree];
+    let mut y = [T::zero(); 6];
     for p in 0..6 {
-        let mut v = y[p] * a[p][p];
+        let mut v = work.drive[d + p];
         for i in 0..p {
             v = a[p][i].neg_mul_add(y[i], v);
         }

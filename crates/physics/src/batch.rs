@@ -307,17 +307,26 @@ impl<T: Real> Lanes for LaneBatch<T> {
     fn save(&self, agent: usize) -> Vec<f64> {
         let (g, lane) = Self::slot(agent);
         let group = &self.groups[g];
-        let parts = [&group.qpos, &group.qvel, &group.ctrl, &group.warm];
-        parts.into_iter().flatten().map(|x| T::widen(x.get(lane))).collect()
+        let parts = [&group.qpos, &group.qvel, &group.ctrl, &group.act, &group.warm];
+        let pushes = group.external.iter().flatten();
+        parts.into_iter().flatten().chain(pushes).map(|x| T::widen(x.get(lane))).collect()
     }
 
     fn load(&mut self, agent: usize, state: &[f64]) {
         let (g, lane) = Self::slot(agent);
         let group = &mut self.groups[g];
-        let parts = [&mut group.qpos, &mut group.qvel, &mut group.ctrl, &mut group.warm];
-        assert_eq!(state.len(), parts.iter().map(|p| p.len()).sum::<usize>(), "a snapshot of the same model");
-        for (x, s) in parts.into_iter().flatten().zip(state) {
-            x.set(lane, T::scalar(*s));
+        let plain = group.qpos.len() + group.qvel.len() + group.ctrl.len() + group.act.len() + group.warm.len();
+        let pushes = 6 * self.sim.model().bodies.len();
+        assert!(state.len() == plain || state.len() == plain + pushes, "a snapshot of the same model");
+        if state.len() > plain && group.external.is_empty() {
+            group.external = vec![[T::zero(); 6]; self.sim.model().bodies.len()];
+        }
+        let parts = [&mut group.qpos, &mut group.qvel, &mut group.ctrl, &mut group.act, &mut group.warm];
+        let pushes = group.external.iter_mut().flatten();
+        // an agent that was not pushed when it was saved is not pushed now
+        let state = state.iter().copied().chain(std::iter::repeat(0.0));
+        for (x, s) in parts.into_iter().flatten().chain(pushes).zip(state) {
+            x.set(lane, T::scalar(s));
         }
     }
 

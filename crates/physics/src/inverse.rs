@@ -9,12 +9,22 @@ use crate::spatial::*;
 impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
     pub fn bias_forces(&self) -> Vec<T> {
-        self.joint_space(self.work.bias_force.clone())
+        let mut forces = self.work.bias_force.clone();
+        for (f, x) in forces.iter_mut().zip(&self.work.external) {
+            for i in 0..6 {
+                f[i] += x[i];
+            }
+        }
+        self.joint_space(forces)
     }
 
-    /// Springs, dampers and actuators together (`qfrc_passive + qfrc_actuator`).
+    /// Springs, dampers, actuators, the medium and pushes together (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
     pub fn applied_forces(&self) -> Vec<T> {
-        self.work.tau.clone()
+        let mut sum = self.joint_space(self.work.external.clone());
+        for (s, t) in sum.iter_mut().zip(&self.work.tau) {
+            *s += *t;
+        }
+        sum
     }
 
     /// Contacts, limits and dry friction (`qfrc_constraint`).
@@ -26,7 +36,14 @@ impl<T: Real> Readings<'_, T> {
                 forces[c.link][i] += w[i];
             }
         }
+        let mut joints = vec![T::zero(); self.sim.model.nv];
+        for b in self.work.blocks.iter() {
+            b.exert(&mut forces, &mut joints);
+        }
         let mut out = self.joint_space(forces);
+        for (sum, f) in out.iter_mut().zip(joints) {
+            *sum += f;
+        }
         for l in &self.work.limits {
             out[l.dof] += l.sign * l.force;
         }
@@ -76,11 +93,14 @@ impl<T: Real> Readings<'_, T> {
         out
     }
 
-    /// Number of contacts with the floor per lane.
+    /// Number of contacts per lane.
     pub fn contact_count(&self) -> T {
         let mut n = T::zero();
-        for on in &self.work.touching {
-            n += T::masked(*on, T::lit(1.0));
+        for c in &self.work.contacts {
+            n += T::masked(c.on, T::lit(1.0));
+        }
+        for b in self.work.blocks.iter().filter(|b| !b.members.is_empty()) {
+            n += T::masked(b.on, T::lit(1.0));
         }
         n
     }

@@ -8,18 +8,24 @@
 mod articulated;
 mod batch;
 mod collision;
+mod equality;
+mod fluid;
 mod forces;
 mod inverse;
 mod kinematics;
 pub mod lanes;
 pub mod mjcf;
 pub mod model;
+mod narrow;
 mod readings;
 mod rigid;
 mod sim;
 mod solver;
+mod space;
 pub mod spatial;
 mod step;
+mod support;
+mod tendon;
 mod work;
 pub mod workload;
 

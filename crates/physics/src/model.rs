@@ -6,6 +6,18 @@
 
 use serde::{Deserialize, Serialize};
 
+mod actuator;
+mod coupling;
+mod sensor;
+mod shape;
+mod view;
+
+pub use actuator::{Actuator, Dynamics, Transmission};
+pub use coupling::{Equality, EqualityKind, Tendon, TendonKind};
+pub use sensor::{Sensor, SensorObject, SensorType};
+pub use shape::{Geom, GeomType, HField, Pair, Site};
+pub use view::{Camera, Light, TrackMode};
+
 /// A point or direction in metres (or unit free), `[x, y, z]`.
 pub type Vec3 = [f64; 3];
 /// A unit quaternion `[w, x, y, z]`.
@@ -24,6 +36,8 @@ pub struct Model {
     pub nv: usize,
     /// Number of actuators, the length of `ctrl`.
     pub nu: usize,
+    /// Number of activation states, the length of `act`.
+    pub na: usize,
     /// Bodies in depth-first order; a parent always precedes its children. `[0]` is the world.
     pub bodies: Vec<Body>,
     /// Joints, grouped by body, in the order of their addresses in `qpos`.
@@ -38,6 +52,12 @@ pub struct Model {
     pub cameras: Vec<Camera>,
     /// Lights; kept for viewers.
     pub lights: Vec<Light>,
+    /// Height fields (`<asset><hfield>`).
+    pub hfields: Vec<HField>,
+    /// Tendons.
+    pub tendons: Vec<Tendon>,
+    /// Equality constraints.
+    pub equalities: Vec<Equality>,
     /// Actuators in the order of `ctrl`.
     pub actuators: Vec<Actuator>,
     /// Sensors in the order of their values.
@@ -65,6 +85,14 @@ pub struct Options {
     pub timestep: f64,
     /// Gravity in m/s^2, world frame.
     pub gravity: Vec3,
+    /// Density of the medium, kg/m^3; 0: no lift and drag.
+    pub density: f64,
+    /// Viscosity of the medium, Pa s; 0: no viscous forces.
+    pub viscosity: f64,
+    /// Velocity of the medium, m/s, world frame.
+    pub wind: Vec3,
+    /// Magnetic flux, world frame; seen by magnetometers.
+    pub magnetic: Vec3,
     /// Integrator.
     pub integrator: Integrator,
     /// Friction cone.
@@ -77,8 +105,23 @@ pub struct Options {
     pub ls_iterations: usize,
     /// Solver tolerance: scaled cost improvement at which a lane counts as converged.
     pub tolerance: f64,
+    /// Parameters that replace those of every contact (`<flag override="enable"/>`), if any.
+    pub contact_override: Option<ContactOverride>,
     /// `<flag>` switches that this engine honours.
     pub flags: Flags,
+}
+
+/// Parameters that all contacts share when `<flag override="enable"/>` (MuJoCo `o_margin`, `o_solref`...).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactOverride {
+    /// Margin, m.
+    pub margin: f64,
+    /// Solver reference.
+    pub solref: SolRef,
+    /// Solver impedance.
+    pub solimp: SolImp,
+    /// Two sliding, one torsional, two rolling friction coefficients.
+    pub friction: [f64; 5],
 }
 
 /// Parts of the pipeline that `<option><flag .../>` may switch off. `true` means enabled, the default.
@@ -86,11 +129,13 @@ pub struct Options {
 pub struct Flags {
     /// All constraints.
     pub constraint: bool,
-    /// Joint limits.
+    /// Equality constraints.
+    pub equality: bool,
+    /// Joint and tendon limits.
     pub limit: bool,
     /// Contacts.
     pub contact: bool,
-    /// Dry friction in joints.
+    /// Dry friction in joints and tendons.
     pub frictionloss: bool,
     /// Joint springs (and dampers before MuJoCo 3.4 merged them under `passive`).
     pub spring: bool,
@@ -173,7 +218,7 @@ pub struct Body {
     pub root_id: usize,
     /// Mean inverse inertia at the reference configuration: `[translational 1/kg, rotational 1/(kg m^2)]`.
     pub invweight0: [f64; 2],
-    /// Gravity compensation factor; must be 0 for now.
+    /// Part of the body's weight that an upward force carries (1: weightless).
     pub gravcomp: f64,
     /// `mocap="true"`: a static body that the user may move.
     pub mocap: bool,
@@ -190,6 +235,17 @@ pub enum JointType {
     Slide,
     /// Rotation about `axis`.
     Hinge,
+}
+
+impl JointType {
+    /// Number of degrees of freedom: entries of `qvel`.
+    pub fn dofs(self) -> usize {
+        match self {
+            JointType::Free => 6,
+            JointType::Ball => 3,
+            JointType::Slide | JointType::Hinge => 1,
+        }
+    }
 }
 
 /// A joint.
@@ -217,12 +273,17 @@ pub struct Joint {
     pub margin: f64,
     /// Spring stiffness, N/m or N m/rad.
     pub stiffness: f64,
+    /// Higher orders of the stiffness (MuJoCo `jnt_stiffnesspoly`): at the displacement `x` from rest the spring's
+    /// stiffness is `stiffness + poly[0] |x| + poly[1] x^2`.
+    pub stiffness_poly: [f64; 2],
     /// `solreflimit`.
     pub solref_limit: SolRef,
     /// `solimplimit`.
     pub solimp_limit: SolImp,
     /// Limits of the total actuator force on this joint (`actuatorfrcrange`), if any.
     pub actuator_force_range: Option<[f64; 2]>,
+    /// Gravity compensation of this joint counts as an actuator force (`actuatorgravcomp`).
+    pub actuator_gravcomp: bool,
     /// User group, for viewers.
     pub group: i32,
 }
@@ -236,10 +297,13 @@ pub struct Dof {
     pub joint: usize,
     /// Next degree of freedom towards the root, if any.
     pub parent: Option<usize>,
-    /// Rotor inertia added to the diagonal of the mass matrix.
+    /// Rotor inertia added to the diagonal of the mass matrix, that of actuators (times gear squared) included.
     pub armature: f64,
-    /// Viscous damping, N s/m or N m s/rad.
+    /// Viscous damping, N s/m or N m s/rad, that of actuators (times gear squared) included.
     pub damping: f64,
+    /// Higher orders of the damping (MuJoCo `dof_dampingpoly`): at the velocity `v` the damping is
+    /// `damping + poly[0] |v| + poly[1] v^2`.
+    pub damping_poly: [f64; 2],
     /// Dry friction, N or N m.
     pub frictionloss: f64,
     /// `solreffriction` for the dry friction.
@@ -255,248 +319,6 @@ pub type SolRef = [f64; 2];
 /// `solimp`: dmin, dmax, width, midpoint, power.
 pub type SolImp = [f64; 5];
 
-/// Shape of a geom or site.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum GeomType {
-    /// Infinite plane, normal along its z axis.
-    Plane,
-    /// Height field; refused by the simulator for now.
-    Hfield,
-    /// `size[0]` radius.
-    Sphere,
-    /// `size[0]` radius, `size[1]` half length of the straight part, along z.
-    Capsule,
-    /// `size` semi-axes.
-    Ellipsoid,
-    /// `size[0]` radius, `size[1]` half length, along z.
-    Cylinder,
-    /// `size` half lengths.
-    Box,
-    /// Triangle mesh; refused by the loader.
-    Mesh,
-}
-
-/// A geometric shape attached to a body.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Geom {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// Shape.
-    pub kind: GeomType,
-    /// Body it is attached to.
-    pub body: usize,
-    /// Position in the body's frame.
-    pub pos: Vec3,
-    /// Orientation in the body's frame.
-    pub quat: Quat,
-    /// Size, see [`GeomType`].
-    pub size: Vec3,
-    /// Bit mask: what this geom is.
-    pub contype: u32,
-    /// Bit mask: what this geom collides with.
-    pub conaffinity: u32,
-    /// Dimension of the contact space: 1, 3, 4 or 6.
-    pub condim: usize,
-    /// Priority in the combination of contact parameters.
-    pub priority: i32,
-    /// Sliding, torsional, rolling friction.
-    pub friction: Vec3,
-    /// Weight in the mix of solver parameters.
-    pub solmix: f64,
-    /// Solver reference.
-    pub solref: SolRef,
-    /// Solver impedance.
-    pub solimp: SolImp,
-    /// Distance below which contacts are made.
-    pub margin: f64,
-    /// Contacts are reported up to margin + gap; beyond the margin they exert no force.
-    pub gap: f64,
-    /// Colour, each in 0..=1.
-    pub rgba: [f32; 4],
-    /// Material name, if any; for viewers.
-    pub material: Option<String>,
-    /// User group, for viewers.
-    pub group: i32,
-}
-
-/// A point of interest fixed to a body.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Site {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// Shape, used by touch sensors and viewers.
-    pub kind: GeomType,
-    /// Body it is attached to.
-    pub body: usize,
-    /// Position in the body's frame.
-    pub pos: Vec3,
-    /// Orientation in the body's frame.
-    pub quat: Quat,
-    /// Size, see [`GeomType`].
-    pub size: Vec3,
-    /// Colour.
-    pub rgba: [f32; 4],
-    /// User group, for viewers.
-    pub group: i32,
-}
-
-/// How a camera or light moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum TrackMode {
-    /// Fixed in the body's frame.
-    Fixed,
-    /// Keeps its offset from the body in world axes.
-    Track,
-    /// Keeps its offset from the subtree's centre of mass in world axes.
-    TrackCom,
-    /// Looks at a target body.
-    TargetBody,
-    /// Looks at a target's centre of mass.
-    TargetBodyCom,
-}
-
-/// A camera; it looks along its negative z axis, x to the right.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Camera {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// Body it is attached to.
-    pub body: usize,
-    /// Position in the body's frame.
-    pub pos: Vec3,
-    /// Orientation in the body's frame.
-    pub quat: Quat,
-    /// How it moves.
-    pub mode: TrackMode,
-    /// Vertical field of view in degrees.
-    pub fovy: f64,
-}
-
-/// A light; kept for viewers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Light {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// Body it is attached to.
-    pub body: usize,
-    /// Position in the body's frame.
-    pub pos: Vec3,
-    /// Direction in the body's frame.
-    pub dir: Vec3,
-    /// How it moves.
-    pub mode: TrackMode,
-    /// Parallel rays.
-    pub directional: bool,
-    /// Diffuse colour.
-    pub diffuse: [f32; 3],
-}
-
-/// An actuator acting on a joint: `force = gain * ctrl + bias`, torque = gear * force.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Actuator {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// Joint it acts on.
-    pub joint: usize,
-    /// Transmission ratio per degree of freedom of the joint.
-    pub gear: [f64; 6],
-    /// Whether `ctrl` is clamped to `ctrl_range`.
-    pub ctrl_limited: bool,
-    /// Range of the control signal.
-    pub ctrl_range: [f64; 2],
-    /// Whether the force is clamped to `force_range`.
-    pub force_limited: bool,
-    /// Range of the scalar force.
-    pub force_range: [f64; 2],
-    /// Gain: `gain[0] + gain[1] * length + gain[2] * velocity` (fixed gain: the last two are 0).
-    pub gain: [f64; 3],
-    /// Bias: `bias[0] + bias[1] * length + bias[2] * velocity`; all 0 for a motor.
-    pub bias: [f64; 3],
-}
-
-/// What a sensor measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SensorType {
-    /// Sum of contact normal forces (N) inside a site's volume; on a geom's whole body when the object is a geom.
-    Touch,
-    /// Position of a frame, 3.
-    FramePos,
-    /// Orientation of a frame, quaternion, 4.
-    FrameQuat,
-    /// X axis of a frame, 3.
-    FrameXAxis,
-    /// Y axis of a frame, 3.
-    FrameYAxis,
-    /// Z axis of a frame, 3.
-    FrameZAxis,
-    /// Linear velocity of a frame, world axes, 3.
-    FrameLinVel,
-    /// Angular velocity of a frame, world axes, 3.
-    FrameAngVel,
-    /// Linear acceleration of a frame, world axes, 3.
-    FrameLinAcc,
-    /// Angular acceleration of a frame, world axes, 3.
-    FrameAngAcc,
-    /// Centre of mass of a body's subtree, 3.
-    SubtreeCom,
-    /// Linear velocity of a subtree's centre of mass, 3.
-    SubtreeLinVel,
-    /// Linear velocity in a site's own axes, 3.
-    Velocimeter,
-    /// Angular velocity in a site's own axes, 3.
-    Gyro,
-    /// Acceleration minus gravity in a site's own axes, 3.
-    Accelerometer,
-    /// Position of a scalar joint.
-    JointPos,
-    /// Velocity of a scalar joint.
-    JointVel,
-    /// Force of an actuator.
-    ActuatorFrc,
-    /// A sensor that is kept by name but cannot be evaluated yet; reading it is an error.
-    Unsupported,
-}
-
-/// The object a sensor is attached to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SensorObject {
-    /// Body frame at its inertial frame (`objtype="body"`), by index.
-    Body(usize),
-    /// Body frame proper (`objtype="xbody"`), by index.
-    XBody(usize),
-    /// Geom, by index.
-    Geom(usize),
-    /// Site, by index.
-    Site(usize),
-    /// Camera, by index.
-    Camera(usize),
-    /// Joint, by index.
-    Joint(usize),
-    /// Actuator, by index.
-    Actuator(usize),
-    /// Nothing (only for [`SensorType::Unsupported`]).
-    None,
-}
-
-/// A sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Sensor {
-    /// Name; empty when the file gives none.
-    pub name: String,
-    /// XML element name, such as `touch`.
-    pub element: String,
-    /// Quantity.
-    pub kind: SensorType,
-    /// Object it is attached to.
-    pub object: SensorObject,
-    /// First value in the sensor vector.
-    pub adr: usize,
-    /// Number of values.
-    pub dim: usize,
-    /// Values are clamped to `+-cutoff` (or `[0, cutoff]` for touch) when positive.
-    pub cutoff: f64,
-}
-
 /// A stored state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Keyframe {
@@ -510,25 +332,12 @@ pub struct Keyframe {
     pub qvel: Vec<f64>,
     /// Controls, length `nu`.
     pub ctrl: Vec<f64>,
-}
-
-/// A declared geom pair and its contact parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pair {
-    /// The two geoms.
-    pub geoms: [usize; 2],
-    /// Contact dimension.
-    pub condim: usize,
-    /// Two sliding, one torsional, two rolling friction coefficients.
-    pub friction: [f64; 5],
-    /// Solver reference.
-    pub solref: SolRef,
-    /// Solver impedance.
-    pub solimp: SolImp,
-    /// Margin.
-    pub margin: f64,
-    /// Gap.
-    pub gap: f64,
+    /// Activations, length `na`.
+    pub act: Vec<f64>,
+    /// Positions of the mocap bodies, in the order of the bodies.
+    pub mpos: Vec<Vec3>,
+    /// Orientations of the mocap bodies.
+    pub mquat: Vec<Quat>,
 }
 
 /// `<statistic>`: given in the file or computed at the reference configuration.

@@ -117,47 +117,38 @@ impl<'a, T: Real> Readings<'a, T> {
         self.mount_axes(&self.sim.sites[site])
     }
 
-    /// Lanes in which a geom touches the floor, at the last physics step.
+    /// Lanes in which a geom touches the static world, at the last physics step.
     #[inline(always)]
     pub fn touching(&self, geom: usize) -> T::Mask {
-        self.any_candidate(geom, &self.work.touching)
+        self.work.touching[geom]
     }
 
-    /// Lanes in which a geom touched the floor at any physics step of the last call of [`Sim::step`].
+    /// Lanes in which a geom touched the static world at any physics step of the last call of [`Sim::step`].
     #[inline(always)]
     pub fn touched(&self, geom: usize) -> T::Mask {
-        self.any_candidate(geom, &self.work.touched)
+        self.work.touched[geom]
     }
 
-    /// Number of contacts of a body with the floor at the last physics step.
+    /// Lanes in which a geom touches another moving geom, at the last physics step.
+    #[inline(always)]
+    pub fn touching_bodies(&self, geom: usize) -> T::Mask {
+        self.work.touching_bodies[geom]
+    }
+
+    /// Number of contacts of a body with the static world at the last physics step.
     pub fn body_contacts(&self, body: usize) -> T {
         let mut n = T::zero();
-        for (c, on) in self.sim.floor.iter().zip(&self.work.touching) {
-            if self.sim.model.geoms[c.geom].body == body {
-                n += T::masked(*on, T::lit(1.0));
+        for (geom, count) in self.sim.model.geoms.iter().zip(&self.work.ground_contacts) {
+            if geom.body == body {
+                n += *count;
             }
         }
         n
     }
 
-    /// Normal force of a geom's contacts with the floor at the last physics step, N.
+    /// Normal force of a geom's contacts with the static world at the last physics step, N.
     pub fn normal_force(&self, geom: usize) -> T {
-        let mut f = T::zero();
-        for (c, force) in self.sim.floor.iter().zip(&self.work.normal_force) {
-            if c.geom == geom {
-                f += *force;
-            }
-        }
-        f
-    }
-
-    #[inline(always)]
-    fn any_candidate(&self, geom: usize, masks: &[T::Mask]) -> T::Mask {
-        let mut any = T::none();
-        for i in self.sim.geom_candidates[geom].clone() {
-            any = T::or(any, masks[i]);
-        }
-        any
+        self.work.normal_force[geom]
     }
 
     #[inline(always)]
@@ -222,6 +213,10 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Value of a sensor, `dim` numbers, clamped to its cutoff. `None` for a sensor that cannot be evaluated.
     pub fn sensor(&self, sensor: usize) -> Option<Vec<T>> {
         let s = &self.sim.model.sensors[sensor];
+        // values relative to another frame are not computed
+        if s.reference != SensorObject::None {
+            return None;
+        }
         let mut out = self.sensor_value(s.kind, s.object)?;
         if s.cutoff > 0.0 {
             let c = T::lit(s.cutoff);
@@ -298,8 +293,7 @@ impl<'a, T: Real> Readings<'a, T> {
         let (center, axes) = (self.site_pos(site), self.site_axes(site));
         let mut total = T::zero();
         for row in &self.work.contacts {
-            let candidate = &self.sim.floor[row.candidate];
-            if self.sim.model.geoms[candidate.geom].body != s.body {
+            if self.sim.model.geoms[row.geom].body != s.body {
                 continue;
             }
             let tree = self.sim.links[row.link].tree;

@@ -3,10 +3,16 @@
 //! Bodies without joints are merged into the body they are welded to, so the kernels only meet bodies that move
 //! ("links"). What this engine does not simulate is refused here by name, never ignored.
 
-use crate::collision::{Candidate, floor_candidates};
+use crate::collision::{Contacts, Field, contacts, fields};
+use crate::equality::{EqualitySpec, equalities};
+use crate::fluid::{Drag, Lift, drags, lifts};
+use crate::forces::{Motor, motors};
 use crate::lanes::Real;
 use crate::model::{Cone, Integrator, JointType, Model};
 use crate::rigid;
+use crate::solver::softness::{Softness, softness};
+use crate::support;
+use crate::tendon::{BallLimit, TendonSpec, ball_limits, tendons};
 use thiserror::Error;
 
 /// Why a model cannot be simulated.
@@ -34,28 +40,6 @@ pub struct SimOptions {
     pub max_newton: Option<usize>,
 }
 
-/// Solver parameters of one constraint: impedance and reference acceleration as functions of the violation.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Softness<C> {
-    /// Stiffness and damping of the reference acceleration, divided by `dmax` as MuJoCo does.
-    pub k: C,
-    pub b: C,
-    pub d0: C,
-    pub span: C,
-    pub inv_width: C,
-    pub midpoint: C,
-    pub power: C,
-    /// Normalizations of the two halves of the power curve.
-    pub low_scale: C,
-    pub high_scale: C,
-    /// `power` is 2 and the midpoint 1/2: the default, which needs no exponential.
-    pub quadratic: bool,
-    /// Violation is measured from here.
-    pub margin: C,
-    /// Approximate inverse inertia seen by the constraint.
-    pub diag: C,
-}
-
 /// A body that moves.
 #[derive(Clone, Debug)]
 pub(crate) struct Link<C> {
@@ -73,9 +57,9 @@ pub(crate) struct Link<C> {
     pub inertia_is_diagonal: bool,
     pub joints: std::ops::Range<usize>,
     pub dofs: std::ops::Range<usize>,
-    pub has_children: bool,
-    /// In a backward pass over the links this one is the first to reach its parent.
-    pub first_to_parent: bool,
+    /// Last child, and the child of the same parent before this one.
+    pub last_child: Option<usize>,
+    pub sibling: Option<usize>,
     /// A free joint whose six diagonal entries are equal in pairs: solved as one 6x6 block.
     pub free_block: bool,
 }
@@ -118,22 +102,6 @@ pub(crate) struct DryFriction<C> {
     pub soft: Softness<C>,
 }
 
-/// An actuator.
-#[derive(Clone, Debug)]
-pub(crate) struct Motor<C> {
-    /// Degrees of freedom and gears.
-    pub dofs: std::ops::Range<usize>,
-    pub gear: [C; 6],
-    /// Coordinate of the scalar joint it reads, for affine gains and biases.
-    pub qpos: usize,
-    pub ctrl: Option<(C, C)>,
-    pub force: Option<(C, C)>,
-    pub gain: [C; 3],
-    pub bias: [C; 3],
-    /// Plain motor: force = gain * ctrl.
-    pub plain: bool,
-}
-
 /// Where a body sits on its link: for reading poses of welded bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct Mount<C> {
@@ -149,24 +117,40 @@ pub struct Sim<T: Real> {
     pub(crate) model: Model,
     pub(crate) links: Vec<Link<T::Scalar>>,
     pub(crate) trees: usize,
+    /// Link of every degree of freedom.
+    pub(crate) dof_link: Vec<usize>,
     pub(crate) joints: Vec<LinkJoint<T::Scalar>>,
     pub(crate) armature: Vec<T::Scalar>,
     pub(crate) damping: Vec<T::Scalar>,
+    /// Damping is taken at the end of the step.
     pub(crate) implicit_damping: bool,
+    /// So are the actuators' forces that depend on velocity.
+    pub(crate) implicit_fast: bool,
     pub(crate) limits: Vec<LimitSpec<T::Scalar>>,
     pub(crate) dry: Vec<DryFriction<T::Scalar>>,
     pub(crate) motors: Vec<Motor<T::Scalar>>,
-    pub(crate) floor: Vec<Candidate<T::Scalar>>,
+    /// Bounds of what all actuators together exert on a degree of freedom.
+    pub(crate) joint_force_ranges: Vec<(usize, T::Scalar, T::Scalar)>,
+    pub(crate) equalities: Vec<EqualitySpec<T::Scalar>>,
+    pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
+    pub(crate) ball_limits: Vec<BallLimit<T::Scalar>>,
+    pub(crate) lifts: Vec<Lift<T::Scalar>>,
+    pub(crate) drags: Vec<Drag<T::Scalar>>,
+    pub(crate) wind: [T::Scalar; 3],
+    pub(crate) contacts: Contacts<T::Scalar>,
+    pub(crate) fields: Vec<Field<T::Scalar>>,
     /// Frames, centers of mass (inertial frames), geoms and sites as seen from the links they move with.
     pub(crate) bodies: Vec<Mount<T::Scalar>>,
     pub(crate) coms: Vec<Mount<T::Scalar>>,
     pub(crate) geoms: Vec<Mount<T::Scalar>>,
     pub(crate) sites: Vec<Mount<T::Scalar>>,
-    /// Floor candidates of each geom.
-    pub(crate) geom_candidates: Vec<std::ops::Range<usize>>,
     pub(crate) dt: T::Scalar,
     pub(crate) gravity: [T::Scalar; 3],
     pub(crate) rk4: bool,
+    /// All motion is in the x-z plane: see [`crate::space::Planar`].
+    pub(crate) planar: bool,
+    /// Contacts have elliptic cones.
+    pub(crate) elliptic: bool,
     pub(crate) warmstart: bool,
     pub(crate) max_newton: usize,
     pub(crate) max_line_search: usize,
@@ -180,7 +164,7 @@ impl<T: Real> Sim<T> {
     /// # Errors
     /// If the model uses something this engine does not simulate.
     pub fn new(model: &Model, options: SimOptions) -> Result<Sim<T>, SimError> {
-        refuse_unsupported(model)?;
+        support::check(model)?;
         let c = T::scalar;
         let c3 = |v: &[f64; 3]| [c(v[0]), c(v[1]), c(v[2])];
         let flags = model.opt.flags;
@@ -239,19 +223,17 @@ impl<T: Real> Sim<T> {
                 inertia_is_diagonal: lump.inertia[3..].iter().all(|x| x.abs() < 1e-12 * lump.inertia[0].abs()),
                 joints,
                 dofs,
-                has_children: false,
-                first_to_parent: false,
+                last_child: None,
+                sibling: None,
                 free_block: free && lossless,
             });
             if let Some(p) = parent {
-                links[p].has_children = true;
+                let me = links.len() - 1;
+                links[me].sibling = links[p].last_child.replace(me);
             }
         }
-        for i in 0..links.len() {
-            let later_sibling = links[i + 1..].iter().any(|l| l.parent == links[i].parent);
-            links[i].first_to_parent = links[i].parent.is_some() && !later_sibling;
-        }
 
+        let dof_link = model.dofs.iter().map(|d| link_of[d.body].expect("it moves")).collect();
         let joints = model
             .joints
             .iter()
@@ -281,7 +263,7 @@ impl<T: Real> Sim<T> {
 
         let mut limits = Vec::new();
         if flags.limit && flags.constraint {
-            for j in model.joints.iter().filter(|j| j.limited) {
+            for j in model.joints.iter().filter(|j| j.limited && j.kind != JointType::Ball) {
                 limits.push(LimitSpec {
                     qpos: j.qpos_adr,
                     dof: j.dof_adr,
@@ -305,64 +287,62 @@ impl<T: Real> Sim<T> {
                 dry.push(DryFriction { dof, loss: c(d.frictionloss), soft });
             }
         }
-        let mut motors = Vec::new();
-        if flags.actuation {
-            for a in &model.actuators {
-                let joint = &model.joints[a.joint];
-                let dofs = match joint.kind {
-                    JointType::Free => 6,
-                    JointType::Ball => 3,
-                    _ => 1,
-                };
-                let range = |on: bool, r: &[f64; 2]| on.then(|| (c(r[0]), c(r[1])));
-                motors.push(Motor {
-                    dofs: joint.dof_adr..joint.dof_adr + dofs,
-                    gear: a.gear.map(c),
-                    qpos: joint.qpos_adr,
-                    ctrl: range(a.ctrl_limited && flags.clampctrl, &a.ctrl_range),
-                    force: range(a.force_limited, &a.force_range),
-                    gain: a.gain.map(c),
-                    bias: a.bias.map(c),
-                    plain: a.gain[1..] == [0.0; 2] && a.bias == [0.0; 3],
-                });
+        let mut joint_force_ranges = Vec::new();
+        for j in &model.joints {
+            if let Some([low, high]) = j.actuator_force_range {
+                joint_force_ranges.push((j.dof_adr, c(low), c(high)));
             }
         }
-        let floor = if flags.contact && flags.constraint {
-            floor_candidates::<T>(model, &mounts, &link_of, &options)?
+        let tendons = tendons::<T>(model);
+        let equalities = if flags.equality && flags.constraint {
+            equalities::<T>(model, &mounts, &link_of, &tendons)
         } else {
             Vec::new()
         };
-        let geom_candidates = (0..model.geoms.len())
-            .map(|g| {
-                let first = floor.iter().position(|c| c.geom == g).unwrap_or(0);
-                first..first + floor.iter().filter(|c| c.geom == g).count()
-            })
-            .collect();
+        let contacts = if flags.contact && flags.constraint {
+            contacts::<T>(model, &mounts, &link_of, &options)?
+        } else {
+            Contacts::none()
+        };
         let damping: Vec<_> = model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect();
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
+        let implicit_fast = model.opt.integrator == Integrator::ImplicitFast;
         let rk4 = model.opt.integrator == Integrator::Rk4;
         let gravity = if flags.gravity { model.opt.gravity } else { [0.0; 3] };
+        let planar = is_planar(model, &links);
+        let lifts = lifts::<T>(model, &mounts, &links, &link_of);
         // MuJoCo scales cost changes by 1 / (meaninertia * nv); a Newton decrement is twice the predicted change
         let tolerance = 2.0 * model.opt.tolerance * model.stat.mean_inertia * model.nv.max(1) as f64;
         Ok(Sim {
             links,
             trees,
+            dof_link,
             joints,
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
-            implicit_damping: damped && flags.eulerdamp && !rk4,
+            implicit_damping: implicit_fast || (damped && flags.eulerdamp && !rk4),
+            implicit_fast,
             damping,
             limits,
             dry,
-            motors,
-            floor,
+            motors: motors::<T>(model),
+            joint_force_ranges,
+            equalities,
+            tendons,
+            ball_limits: ball_limits::<T>(model),
+            lifts,
+            drags: drags::<T>(model, &mounts, &link_of),
+            wind: c3(&model.opt.wind),
+            contacts,
+            fields: fields(model),
             bodies,
             coms,
             geoms,
             sites,
-            geom_candidates,
             dt: c(model.opt.timestep),
             gravity: c3(&gravity),
             rk4,
+            planar,
+            elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
             max_newton: options.max_newton.unwrap_or(model.opt.iterations),
             max_line_search: model.opt.ls_iterations,
@@ -377,103 +357,23 @@ impl<T: Real> Sim<T> {
     }
 }
 
+/// Whether every joint slides in the x-z plane or turns about y, and no link is turned out of that plane: exactly, as
+/// the lanes will see it.
+fn is_planar<C: Copy + PartialEq + Default>(model: &Model, links: &[Link<C>]) -> bool {
+    let zero = C::default();
+    let in_plane = |c: &[C; 3]| c[1] == zero;
+    let upright =
+        |l: &Link<C>| in_plane(&l.rot[0]) && in_plane(&l.rot[2]) && l.rot[1][0] == zero && l.rot[1][2] == zero;
+    links.iter().all(upright)
+        && model.joints.iter().all(|j| match j.kind {
+            JointType::Hinge => j.axis[0] == 0.0 && j.axis[2] == 0.0,
+            JointType::Slide => j.axis[1] == 0.0,
+            JointType::Ball | JointType::Free => false,
+        })
+}
+
 /// A number as the sum of its rounded value and the rest.
-fn split<T: Real>(x: f64) -> [T::Scalar; 2] {
+pub(crate) fn split<T: Real>(x: f64) -> [T::Scalar; 2] {
     let rounded = T::scalar(x);
     [rounded, T::scalar(x - T::widen(rounded))]
-}
-
-/// Refuses what the kernels do not simulate.
-fn refuse_unsupported(model: &Model) -> Result<(), SimError> {
-    let refuse = |what: String, remedy: &str| {
-        Err(SimError::Unsupported { model: model.name.clone(), what, remedy: remedy.into() })
-    };
-    match model.opt.integrator {
-        Integrator::Euler | Integrator::Rk4 => {}
-        other => return refuse(format!("integrator {other:?}"), "use Euler or RK4"),
-    }
-    if model.opt.cone == Cone::Elliptic && model.geoms.iter().any(|g| g.condim > 1) {
-        return refuse("the elliptic friction cone".into(), "use cone=\"pyramidal\"");
-    }
-    for body in &model.bodies {
-        if body.gravcomp != 0.0 {
-            return refuse(format!("gravcomp of body '{}'", body.name), "remove the attribute");
-        }
-        let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
-        for (i, joint) in joints.iter().enumerate() {
-            match joint.kind {
-                JointType::Free if joints.len() > 1 || body.parent != 0 => {
-                    return refuse(
-                        format!("free joint '{}' below another joint", joint.name),
-                        "free joints belong on top-level bodies",
-                    );
-                }
-                JointType::Ball if i + 1 < joints.len() => {
-                    return refuse(
-                        format!("ball joint '{}' followed by another joint of its body", joint.name),
-                        "list the ball joint last",
-                    );
-                }
-                JointType::Ball if joint.limited => {
-                    return refuse(format!("the limit of ball joint '{}'", joint.name), "use three hinges with limits");
-                }
-                _ => {}
-            }
-            if joint.actuator_force_range.is_some() {
-                return refuse(format!("actuatorfrcrange of joint '{}'", joint.name), "use the actuators' forcerange");
-            }
-        }
-    }
-    for a in &model.actuators {
-        let joint = &model.joints[a.joint];
-        let scalar = matches!(joint.kind, JointType::Hinge | JointType::Slide);
-        let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
-        if !scalar && affine {
-            return refuse(
-                format!("actuator '{}' with position or velocity feedback on joint '{}'", a.name, joint.name),
-                "only hinge and slide joints can be fed back",
-            );
-        }
-    }
-    Ok(())
-}
-
-/// Constants of MuJoCo's impedance and reference acceleration (documentation, "Solver parameters").
-pub(crate) fn softness<T: Real>(
-    model: &Model,
-    solref: &[f64; 2],
-    solimp: &[f64; 5],
-    margin: f64,
-    diag: f64,
-) -> Softness<T::Scalar> {
-    let c = T::scalar;
-    let (min, max) = (1e-4, 0.9999);
-    let (dmin, dmax) = (solimp[0].clamp(min, max), solimp[1].clamp(min, max));
-    let width = solimp[2].max(0.0);
-    let (midpoint, power) = (solimp[3].clamp(min, max), solimp[4].max(1.0));
-    let (k, b) = if solref[0] > 0.0 && solref[1] > 0.0 {
-        let floor = if model.opt.flags.refsafe { 2.0 * model.opt.timestep } else { 0.0 };
-        let time = solref[0].max(floor);
-        let ratio = solref[1];
-        (1.0 / (dmax * dmax * time * time * ratio * ratio).max(1e-15), 2.0 / (dmax * time).max(1e-15))
-    } else {
-        (-solref[0] / (dmax * dmax), -solref[1] / dmax)
-    };
-    // a flat curve is the mean impedance everywhere
-    let flat = dmin == dmax || width <= 1e-15;
-    let (d0, span) = if flat { (0.5 * (dmin + dmax), 0.0) } else { (dmin, dmax - dmin) };
-    Softness {
-        k: c(k),
-        b: c(b),
-        d0: c(d0),
-        span: c(span),
-        inv_width: c(1.0 / width.max(1e-15)),
-        midpoint: c(midpoint),
-        power: c(power),
-        low_scale: c(1.0 / midpoint.powf(power - 1.0)),
-        high_scale: c(1.0 / (1.0 - midpoint).powf(power - 1.0)),
-        quadratic: power == 2.0 && midpoint == 0.5,
-        margin: c(margin),
-        diag: c(diag.max(1e-15)),
-    }
 }

@@ -198,6 +198,13 @@ pub fn sym6_mul<T: Real>(k: &Sym6<T>, s: &V6<T>) -> V6<T> {
     ]
 }
 
+/// A rigid body's inertia as a symmetric 6x6 matrix.
+#[inline(always)]
+pub fn sym6_of_inertia<T: Real>(c: &Inertia<T>) -> Sym6<T> {
+    let z = T::zero();
+    [c[4], c[5], c[6], c[7], c[8], c[9], z, -c[3], c[2], c[3], z, -c[1], -c[2], c[1], z, c[0], c[0], c[0], z, z, z]
+}
+
 /// Adds a rigid body's inertia to a symmetric 6x6 matrix.
 #[inline(always)]
 pub fn sym6_add_inertia<T: Real>(k: &mut Sym6<T>, c: &Inertia<T>) {

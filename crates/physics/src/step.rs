@@ -1,14 +1,19 @@
 //! One step, stage by stage.
 
-use crate::articulated::articulated_solve;
-use crate::collision::collide;
-use crate::forces::applied_forces;
+use crate::articulated::{accelerate, factorize};
+use crate::collision::{collide_floor, collide_pairs};
+use crate::equality::equality_blocks;
+use crate::fluid::external_forces;
+use crate::forces::{advance_activations, applied_forces};
 use crate::kinematics::{kinematics, velocities};
 use crate::lanes::{Kernel, Real};
 use crate::model::JointType;
 use crate::sim::Sim;
-use crate::solver::{joint_rows, solve};
+use crate::solver::joint::joint_rows;
+use crate::solver::{apply_forces, solve};
+use crate::space::{Full, Planar, Space};
 use crate::spatial::*;
+use crate::tendon::tendon_blocks;
 use crate::work::{Group, Work};
 
 /// A stage of the step, compiled as a function of its own for each instruction set.
@@ -41,17 +46,30 @@ stage!(
 stage!(
     /// Contacts, limits, dry friction.
     constraint_stage, ConstraintStage, |sim, group, work| {
-        collide(sim, work);
+        work.blocks.clear();
+        collide_floor(sim, work);
         joint_rows(sim, group, work);
     }
 );
 stage!(
+    /// Contacts that are not points above a level floor.
+    pair_stage, PairStage, |sim, _group, work| collide_pairs(sim, work)
+);
+stage!(
     /// Constrained acceleration.
-    solver_stage, SolverStage, |sim, group, work| solve(sim, group, work)
+    solver_stage, SolverStage, |sim, group, work| solve::<T, Full>(sim, group, work)
+);
+stage!(
+    /// The same for a planar model.
+    planar_solver_stage, PlanarSolverStage, |sim, group, work| solve::<T, Planar>(sim, group, work)
 );
 stage!(
     /// Acceleration with the joint damping taken at the end of the step.
-    damping_stage, DampingStage, |sim, _group, work| implicit_damping(sim, work)
+    damping_stage, DampingStage, |sim, _group, work| implicit_damping::<T, Full>(sim, work)
+);
+stage!(
+    /// The same for a planar model.
+    planar_damping_stage, PlanarDampingStage, |sim, _group, work| implicit_damping::<T, Planar>(sim, work)
 );
 stage!(
     /// Positions and velocities only.
@@ -72,7 +90,8 @@ impl<T: Real> Kernel<T> for Integrate<'_, T> {
         for (v, a) in self.1.qvel.iter_mut().zip(acc) {
             *v = a.mul_add(dt, *v);
         }
-        let Group { qpos, qvel, .. } = self.1;
+        let Group { qpos, qvel, act, .. } = self.1;
+        advance_activations(self.0, act, &self.2.act_dot);
         integrate_positions(self.0, qpos, qvel, dt);
     }
 }
@@ -81,8 +100,24 @@ impl<T: Real> Sim<T> {
     /// Accelerations and constraint forces at the present state; the state does not change.
     pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
         smooth_stage(self, group, work);
+        if !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty() {
+            external_forces(self, group, work);
+        }
         constraint_stage(self, group, work);
-        solver_stage(self, group, work);
+        if !self.equalities.is_empty() {
+            equality_blocks(self, group, work);
+        }
+        if !self.tendons.is_empty() || !self.ball_limits.is_empty() {
+            tendon_blocks(self, group, work);
+        }
+        if !self.contacts.pairs.is_empty() {
+            pair_stage(self, group, work);
+        }
+        if self.planar {
+            planar_solver_stage(self, group, work);
+        } else {
+            solver_stage(self, group, work);
+        }
     }
 
     /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
@@ -97,7 +132,11 @@ impl<T: Real> Sim<T> {
             } else {
                 self.forward(work, group);
                 if self.implicit_damping {
-                    damping_stage(self, group, work);
+                    if self.planar {
+                        planar_damping_stage(self, group, work);
+                    } else {
+                        damping_stage(self, group, work);
+                    }
                 }
                 T::enter(Integrate(self, group, work));
             }
@@ -116,6 +155,7 @@ impl<T: Real> Sim<T> {
         let [start, sum] = stages.as_mut_slice() else { unreachable!("a model with RK4 has two stage states") };
         start.qpos.copy_from_slice(&group.qpos);
         start.qvel.copy_from_slice(&group.qvel);
+        start.act.copy_from_slice(&group.act);
         // weighted sums of velocities and accelerations live in `sum.qvel` and `sum.warm`
         let tableau = [(1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.0)];
         for (stage, (weight, reach_before, reach)) in tableau.into_iter().enumerate() {
@@ -160,10 +200,16 @@ impl<T: Real> Kernel<T> for RkStage<'_, T> {
             sum.qvel[d] = if first { v } else { sum.qvel[d] + v };
             sum.warm[d] = if first { a } else { sum.warm[d] + a };
         }
+        for (s, rate) in sum.act.iter_mut().zip(&work.act_dot) {
+            *s = if first { *rate * w } else { rate.mul_add(w, *s) };
+        }
         group.warm.copy_from_slice(&work.acc);
         group.qpos.copy_from_slice(&start.qpos);
         if reach > 0.0 {
             let h = dt * T::lit(reach);
+            for i in 0..group.act.len() {
+                group.act[i] = work.act_dot[i].mul_add(h, start.act[i]);
+            }
             integrate_positions(sim, &mut group.qpos, &rate, h);
             for d in 0..sim.model.nv {
                 group.qvel[d] = work.acc[d].mul_add(h, start.qvel[d]);
@@ -171,6 +217,11 @@ impl<T: Real> Kernel<T> for RkStage<'_, T> {
             start.warm.copy_from_slice(&rate);
         } else {
             let h = dt * T::lit(1.0 / 6.0);
+            for (mean, s) in work.act_dot.iter_mut().zip(&sum.act) {
+                *mean = *s * T::lit(1.0 / 6.0);
+            }
+            group.act.copy_from_slice(&start.act);
+            advance_activations(sim, &mut group.act, &work.act_dot);
             integrate_positions(sim, &mut group.qpos, &sum.qvel, h);
             for d in 0..sim.model.nv {
                 group.qvel[d] = sum.warm[d].mul_add(h, start.qvel[d]);
@@ -208,14 +259,16 @@ fn correct_rotations<T: Real>(sim: &Sim<T>, before: &[T], rate: &mut [T], h: T) 
 
 /// Solves `(M + dt B) a = tau - bias + J' f` for the forces of the constraint solver, into `next`.
 #[inline(always)]
-fn implicit_damping<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let dt = T::splat(sim.dt);
     for d in 0..sim.model.nv {
-        work.diag[d] = T::splat(sim.damping[d]).mul_add(dt, T::splat(sim.armature[d]));
+        work.diag[d] = work.rate[d].mul_add(dt, T::splat(sim.armature[d]));
         work.rhs[d] = work.tau[d];
     }
-    crate::solver::apply_forces(work);
-    articulated_solve(sim, work, false);
+    apply_forces::<T, S>(work);
+    work.stale.fill(true);
+    factorize::<T, S>(sim, work, false);
+    accelerate::<T, S>(sim, work);
 }
 
 /// `qpos` moved along `qvel` for `h` seconds; quaternions stay normalized.

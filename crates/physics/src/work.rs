@@ -2,8 +2,12 @@
 
 use crate::lanes::Real;
 use crate::model::JointType;
+use crate::narrow::Touch;
 use crate::sim::Sim;
-use crate::solver::{ContactRow, DryRow, LimitRow};
+use crate::solver::block::Block;
+use crate::solver::coupled::Coupling;
+use crate::solver::floor::FloorRow;
+use crate::solver::joint::{DryRow, LimitRow};
 use crate::spatial::{Inertia, Rot, Sym6, V3, V6};
 
 /// State of `T::LANES` agents that share a model: everything their future depends on.
@@ -15,8 +19,12 @@ pub struct Group<T: Real> {
     pub qvel: Vec<T>,
     /// Controls, one per actuator; kept until changed.
     pub ctrl: Vec<T>,
+    /// Activations of the actuators that have one.
+    pub act: Vec<T>,
     /// Acceleration of the last step: where the constraint solver starts from.
     pub warm: Vec<T>,
+    /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
+    pub external: Vec<V6<T>>,
 }
 
 impl<T: Real> Group<T> {
@@ -28,11 +36,27 @@ impl<T: Real> Group<T> {
             qpos: m.qpos0.iter().map(|x| T::lit(*x)).collect(),
             qvel: vec![zero; m.nv],
             ctrl: vec![zero; m.nu],
+            act: vec![zero; m.na],
+            external: Vec::new(),
             warm: vec![zero; m.nv],
         }
     }
 
-    /// Puts one agent into a state; its controls and warm start are cleared. Quaternions are normalized.
+    /// Pushes a body of one agent until told otherwise: force, N, and torque, N m, in world axes at its center of mass.
+    ///
+    /// # Panics
+    /// If the body does not exist.
+    pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+        if self.external.is_empty() {
+            self.external = vec![[T::zero(); 6]; sim.model.bodies.len()];
+        }
+        for i in 0..3 {
+            self.external[body][i].set(lane, T::scalar(torque[i]));
+            self.external[body][3 + i].set(lane, T::scalar(force[i]));
+        }
+    }
+
+    /// Puts one agent into a state; its controls, activations, pushes and warm start are cleared. Quaternions are normalized.
     ///
     /// # Panics
     /// If a slice's length is not the model's `nq` or `nv`.
@@ -58,7 +82,9 @@ impl<T: Real> Group<T> {
         for (v, x) in self.qvel.iter_mut().zip(qvel) {
             v.set(lane, T::scalar(*x));
         }
-        for v in self.warm.iter_mut().chain(&mut self.ctrl) {
+        for v in
+            self.warm.iter_mut().chain(&mut self.ctrl).chain(&mut self.act).chain(self.external.iter_mut().flatten())
+        {
             v.set(lane, T::scalar(0.0));
         }
     }
@@ -66,7 +92,7 @@ impl<T: Real> Group<T> {
     /// Lanes whose state is finite.
     pub fn finite(&self) -> T::Mask {
         let mut sum = T::zero();
-        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
+        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm).chain(&self.act) {
             // 0 x is 0, or NaN where x is not finite
             sum += *x * T::zero();
         }
@@ -95,6 +121,14 @@ pub struct Work<T: Real> {
     pub(crate) bias_force: Vec<V6<T>>,
     /// Applied joint forces: springs, dampers, actuators.
     pub(crate) tau: Vec<T>,
+    /// Derivative of the damping forces, negative: what `implicitfast` takes at the end of the step.
+    pub(crate) rate: Vec<T>,
+    /// Rate of change of the activations.
+    pub(crate) act_dot: Vec<T>,
+    pub(crate) tendon_length: Vec<T>,
+    pub(crate) tendon_velocity: Vec<T>,
+    /// Forces on links from outside; already in `bias_force`.
+    pub(crate) external: Vec<V6<T>>,
     /// Force of each actuator.
     pub(crate) actuator_force: Vec<T>,
     /// Joint accelerations, after a solve.
@@ -117,21 +151,72 @@ pub struct Work<T: Real> {
     /// Per degree of freedom: articulated momentum times the inverse pivot, and the inverse pivot.
     pub(crate) gain: Vec<V6<T>>,
     pub(crate) pivot: Vec<T>,
+    /// Acceleration of every degree of freedom if its link's parent did not accelerate.
+    pub(crate) drive: Vec<T>,
+    /// The same before the coupled blocks' correction.
+    pub(crate) tree_drive: Vec<T>,
+    /// Links whose matrix or forces changed since they were factorized.
+    pub(crate) stale: Vec<bool>,
     /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
     pub(crate) root_factor: Vec<[[T; 6]; 6]>,
-    /// Forces on links for [`crate::articulated::articulated_resolve`].
+    /// Forces on links for [`crate::articulated::bring_inward`].
     pub(crate) link_force: Vec<V6<T>>,
-    pub(crate) contacts: Vec<ContactRow<T>>,
+    pub(crate) contacts: Vec<FloorRow<T>>,
     pub(crate) limits: Vec<LimitRow<T>>,
     pub(crate) dry: Vec<DryRow<T>>,
-    /// Per floor candidate: in contact at the last physics step, and at any step of the last `step` call.
+    pub(crate) blocks: Blocks<T>,
+    pub(crate) coupling: Coupling<T>,
+    /// Per geom: lanes that touch the static world at the last physics step, and at any step of the last `step` call.
     pub(crate) touching: Vec<T::Mask>,
     pub(crate) touched: Vec<T::Mask>,
-    /// Per floor candidate: normal force at the last physics step, N.
+    /// Per geom: number of contacts with the static world, and their normal force, N, at the last physics step.
+    pub(crate) ground_contacts: Vec<T>,
     pub(crate) normal_force: Vec<T>,
+    /// Per geom: lanes that touch another moving geom at the last physics step.
+    pub(crate) touching_bodies: Vec<T::Mask>,
+    /// Contacts of one pair of geoms.
+    pub(crate) touches: Vec<Touch<T>>,
     /// States of the Runge-Kutta stages.
     pub(crate) stages: Vec<Group<T>>,
     pub(crate) stats: SolverStats,
+}
+
+/// The blocks of a step; their memory is kept from step to step.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks<T: Real> {
+    items: Vec<Block<T>>,
+    len: usize,
+}
+
+impl<T: Real> Blocks<T> {
+    /// Forgets all blocks.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds a block, whose contents are those of some earlier one, and returns its index.
+    pub fn add(&mut self) -> usize {
+        if self.len == self.items.len() {
+            self.items.push(Block::new());
+        }
+        self.len += 1;
+        self.len - 1
+    }
+}
+
+impl<T: Real> std::ops::Deref for Blocks<T> {
+    type Target = [Block<T>];
+    #[inline(always)]
+    fn deref(&self) -> &[Block<T>] {
+        &self.items[..self.len]
+    }
+}
+
+impl<T: Real> std::ops::DerefMut for Blocks<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [Block<T>] {
+        &mut self.items[..self.len]
+    }
 }
 
 /// Counts of the constraint solver's work, summed over steps since the work was made.
@@ -169,6 +254,11 @@ impl<T: Real> Work<T> {
             bias_acc: vec![[z; 6]; nl],
             bias_force: vec![[z; 6]; nl],
             tau: vec![z; nv],
+            rate: vec![z; nv],
+            act_dot: vec![z; sim.model.na],
+            tendon_length: vec![z; sim.tendons.len()],
+            tendon_velocity: vec![z; sim.tendons.len()],
+            external: vec![[z; 6]; nl],
             actuator_force: vec![z; sim.model.nu],
             acc: vec![z; nv],
             next: vec![z; nv],
@@ -182,17 +272,33 @@ impl<T: Real> Work<T> {
             art_force: vec![[z; 6]; nl],
             gain: vec![[z; 6]; nv],
             pivot: vec![z; nv],
+            drive: vec![z; nv],
+            tree_drive: vec![z; nv],
+            stale: vec![true; nl],
             root_factor: vec![[[z; 6]; 6]; sim.trees],
             link_force: vec![[z; 6]; nl],
-            contacts: Vec::with_capacity(sim.floor.len()),
+            contacts: Vec::with_capacity(sim.contacts.floor.len()),
             limits: Vec::with_capacity(2 * sim.limits.len()),
             dry: Vec::with_capacity(sim.dry.len()),
-            touching: vec![T::none(); sim.floor.len()],
-            touched: vec![T::none(); sim.floor.len()],
-            normal_force: vec![z; sim.floor.len()],
+            blocks: Blocks { items: Vec::new(), len: 0 },
+            coupling: Coupling::new(nl, nv),
+            touching: vec![T::none(); sim.geoms.len()],
+            touched: vec![T::none(); sim.geoms.len()],
+            ground_contacts: vec![z; sim.geoms.len()],
+            normal_force: vec![z; sim.geoms.len()],
+            touching_bodies: vec![T::none(); sim.geoms.len()],
+            touches: Vec::new(),
             stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
             stats: SolverStats::default(),
         }
+    }
+
+    /// A geom touches the static world in the lanes `on`.
+    #[inline(always)]
+    pub(crate) fn touch_ground(&mut self, geom: usize, on: T::Mask) {
+        self.touching[geom] = T::or(self.touching[geom], on);
+        self.touched[geom] = T::or(self.touched[geom], on);
+        self.ground_contacts[geom] += T::masked(on, T::lit(1.0));
     }
 
     /// Counts of the constraint solver's work.

@@ -145,14 +145,9 @@ fn what_is_not_supported_is_refused_by_name() {
     for (content, parts) in [
         ("<geom size='1' adhesion='2'/>", &["attribute 'adhesion'", "'2' is not supported, only '0'"][..]),
         ("<geom size='1' shellinertia='true'/>", &["attribute 'shellinertia'", "only 'false'"]),
-        ("<geom type='mesh' mesh='m'/>", &["<geom> attribute 'mesh'"]),
-        ("<geom type='mesh'/>", &["meshes are not supported; use a capsule"]),
-        ("<geom type='hfield'/>", &["height fields"]),
+        ("<geom type='sdf'/>", &["<geom> attribute 'type'", "meshes are not supported unless they neither collide"]),
         ("<geom size='1'><plugin/></geom>", &["plugins are not supported"]),
-        ("<joint stiffness='1 2'/>", &["attribute 'stiffness'", "only the linear term"]),
-        ("<joint damping='1 0 3'/>", &["attribute 'damping'", "only the linear term"]),
         ("<joint springyield='1'/>", &["attribute 'springyield'"]),
-        ("<body gravcomp='1'/>", &["attribute 'gravcomp'"]),
         ("<replicate count='2'/>", &["<replicate>", "save the expanded model from MuJoCo"]),
         ("<composite/>", &["<composite>"]),
         ("<attach/>", &["<attach>"]),
@@ -162,25 +157,31 @@ fn what_is_not_supported_is_refused_by_name() {
         check(&in_body(content), &[&["bad.xml:5:"], parts].concat());
     }
     for (section, parts) in [
-        ("<equality><weld body1='b'/></equality>", &["<weld>: equality constraints are not supported"][..]),
-        ("<tendon><fixed stiffness='1'/></tendon>", &["<fixed> attribute 'stiffness'"]),
+        ("<equality><flex flex='b'/></equality>", &["<flex>: deformable bodies are not supported"][..]),
+        ("<tendon><spatial stiffness='1'/></tendon>", &["<spatial> attribute 'stiffness'", "use a fixed tendon"]),
+        ("<tendon><spatial springyield='1'/></tendon>", &["<spatial> attribute 'springyield'"]),
         ("<tendon><spatial limited='true' range='0 1'/></tendon>", &["<spatial> attribute 'limited'"]),
         ("<tendon><spatial range='0 1'/></tendon>", &["<spatial> attribute 'range'"]),
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin/></extension>", &["plugins are not supported"]),
         ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
-        ("<actuator><motor tendon='t'/></actuator>", &["<motor> attribute 'tendon'"]),
-        ("<actuator><motor joint='j' armature='1'/></actuator>", &["<motor> attribute 'armature'"]),
-        ("<actuator><position joint='j' timeconst='1'/></actuator>", &["<position> attribute 'timeconst'"]),
-        ("<actuator><general joint='j' dyntype='filter'/></actuator>", &["attribute 'dyntype'", "only 'none'"]),
+        ("<actuator><motor site='s'/></actuator>", &["<motor> attribute 'site'"]),
+        ("<actuator><motor cranksite='s' slidersite='s'/></actuator>", &["<motor> attribute 'cranksite'"]),
+        ("<actuator><general body='b'/></actuator>", &["<general> attribute 'body'"]),
+        ("<actuator><motor joint='j' delay='.1' nsample='2'/></actuator>", &["<motor> attribute 'delay'", "only '0'"]),
+        ("<actuator><pid joint='j'/></actuator>", &["<pid>: only the actuators motor"]),
+        (
+            "<actuator><general joint='j' dyntype='muscle'/></actuator>",
+            &["attribute 'dyntype'", "only none, integrator"],
+        ),
         ("<actuator><general joint='j' gaintype='muscle'/></actuator>", &["attribute 'gaintype'"]),
         ("<actuator><general joint='j' gainprm='1 2 3 4'/></actuator>", &["only the first three"]),
-        ("<keyframe><key act='1'/></keyframe>", &["<key> attribute 'act'"]),
-        ("<option viscosity='1'/>", &["<option> attribute 'viscosity'", "only '0'"]),
-        ("<option density='1.2'/>", &["<option> attribute 'density'"]),
+        ("<keyframe><key plastic='1'/></keyframe>", &["<key> attribute 'plastic'"]),
+        ("<option actuatorgroupdisable='1'/>", &["<option> attribute 'actuatorgroupdisable'"]),
         ("<option noslip_iterations='3'/>", &["<option> attribute 'noslip_iterations'"]),
         ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
-        ("<option><flag override='enable'/></option>", &["<flag> attribute 'override'", "only 'disable'"]),
+        ("<option><flag speculative='enable'/></option>", &["<flag> attribute 'speculative'", "only 'disable'"]),
+        ("<option><flag nativeccd='disable'/></option>", &["<flag> attribute 'nativeccd'", "only 'enable'"]),
         ("<compiler coordinate='global'/>", &["global coordinates are not supported"]),
         ("<compiler fusestatic='true'/>", &["attribute 'fusestatic'"]),
         ("<contact><pair geom1='g' geom2='g' solreffriction='1 1'/></contact>", &["attribute 'solreffriction'"]),
@@ -191,8 +192,135 @@ fn what_is_not_supported_is_refused_by_name() {
             "line of {section}"
         );
     }
-    let error = Model::from_xml_str(&with_section("<equality><weld/></equality>"), "bad.xml").unwrap_err();
+    let error = Model::from_xml_str(&with_section("<equality><flex/></equality>"), "bad.xml").unwrap_err();
     assert!(matches!(error.kind, MjcfErrorKind::Unsupported { attribute: None, .. }));
+}
+
+/// What only matters together with something else is refused where that is there.
+#[test]
+fn what_is_not_supported_together() {
+    let string = "<tendon><spatial name='t'><site site='s'/><site site='s'/></spatial></tendon>";
+    let with_string = |section: &str| with_section(&format!("{string}{section}"));
+    check(&with_string("<actuator><motor tendon='t'/></actuator>"), &["attribute 'tendon'", "'t' is a spatial tendon"]);
+    check(&with_string("<equality><tendon tendon1='t'/></equality>"), &["attribute 'tendon1'", "spatial tendon"]);
+    let meshes = |geom: &str| {
+        with_section("<asset><mesh name='m' file='m.obj'/></asset>")
+            .replace("<joint name=", &format!("{geom}<joint name="))
+    };
+    let refused = &["bad.xml:4:", "attribute 'mesh'", "unless they neither collide"];
+    check(&meshes("<geom type='mesh' mesh='m'/>"), refused);
+    check(&meshes("<geom type='mesh' mesh='m' contype='0' conaffinity='0'/>"), refused);
+    check(&meshes("<geom type='box' mesh='m' contype='0' conaffinity='0' mass='0'/>"), refused);
+    let shown = meshes("<geom name='m' type='mesh' mesh='m' contype='0' conaffinity='0' mass='0'/>");
+    assert!(Model::from_xml_str(&shown, "good.xml").is_ok());
+    let pair = shown.replace("<asset>", "<contact><pair geom1='g' geom2='m'/></contact><asset>");
+    check(&pair, &["<pair> attribute 'geom2'", "unless they neither collide"]);
+    let fish = with_section("<option density='1000'/>").replace("size=\"1\"", "size='1' fluidshape='ellipsoid'");
+    check(&fish, &["bad.xml:4:", "attribute 'fluidshape'", "only fluidshape=\"none\""]);
+    assert!(Model::from_xml_str(&fish.replace("1000", "0"), "good.xml").is_ok());
+}
+
+#[test]
+fn tendons_and_equality_constraints() {
+    let tendon = |content: &str| with_section(&format!("<tendon>{content}</tendon>"));
+    check(&tendon("<fixed name='t'/>"), &["bad.xml:8:", "<fixed name=\"t\">: the tendon runs over no joint"]);
+    check(&tendon("<fixed><joint joint='j'/></fixed>"), &["<joint>: the attribute 'coef' is missing"]);
+    check(&tendon("<fixed><joint joint='k' coef='1'/></fixed>"), &["there is no joint 'k'", "did you mean 'j'?"]);
+    let twice = "<fixed><joint joint='j' coef='1'/><joint joint='j' coef='1'/></fixed>";
+    check(&tendon(twice), &["the joint 'j' is repeated"]);
+    let ball = tendon("<fixed><joint joint='j' coef='1'/></fixed>").replace("name=\"j\"", "name='j' type='ball'");
+    check(&ball, &["the joint 'j' is neither a hinge nor a slide"]);
+    let one = |attrs: &str| tendon(&format!("<fixed {attrs}><joint joint='j' coef='1'/></fixed>"));
+    check(&one("springlength='2 1'"), &["'springlength' goes from 2 to 1"]);
+    check(&one("springlength='1 2 3'"), &["'springlength' is '1 2 3'"]);
+    check(&one("armature='-1'"), &["armature must not be negative"]);
+    check(&one("limited='true'"), &["'range' goes from 0 to 0"]);
+    check(&one("stifness='1'"), &["did you mean 'stiffness'?"]);
+    check("<mujoco><default>\n<tendon springlength='a'/></default></mujoco>", &["bad.xml:2:", "'springlength' is 'a'"]);
+
+    let equality = |content: &str| with_section(&format!("<equality>{content}</equality>"));
+    check(&equality("<connect body1='b'/>"), &["bad.xml:8:", "<connect>: the attribute 'anchor' is missing"]);
+    check(&equality("<connect body1='b' body2='c' anchor='0 0 0'/>"), &["there is no body 'c'", "did you mean 'b'?"]);
+    check(&equality("<connect body1='b' body2='b' anchor='0 0 0'/>"), &["both ends are the same"]);
+    check(&equality("<connect body1='b' anchor='0 0'/>"), &["expected 3 numbers"]);
+    check(&equality("<weld site1='s'/>"), &["the attribute 'site2' is missing"]);
+    check(&equality("<weld/>"), &["the attribute 'body1' is missing"]);
+    check(&equality("<weld site1='s' site2='s' anchor='0 0 0'/>"), &["both sites and 'anchor'"]);
+    check(&equality("<weld body1='b' relpose='0 0 0 1e-300 0 0 0'/>"), &["the quaternion of 'relpose'"]);
+    check(&equality("<joint joint1='j' joint2='j'/>"), &["both ends are the same"]);
+    check(&equality("<joint joint1='j' polycoef='1 2 3 4 5 6'/>"), &["up to 5 numbers"]);
+    check(&equality("<joint joint1='j' active='yes'/>"), &["expected one of false, true"]);
+    check(&equality("<tendon tendon1='t'/>"), &["there is no tendon 't'"]);
+    check(
+        &equality("<joint name='x' joint1='j'/><joint name='x' joint1='j'/>"),
+        &["already a constraint of this name"],
+    );
+    check("<mujoco><default>\n<equality solref='a'/></default></mujoco>", &["bad.xml:2:", "up to 2 numbers"]);
+    check("<mujoco><default><equality anchor='0 0 0'/></default></mujoco>", &["has no attribute 'anchor'"]);
+}
+
+#[test]
+fn activations() {
+    let actuator = |content: &str| with_section(&format!("<actuator>{content}</actuator>"));
+    check(&actuator("<motor joint='j' jointinparent='j'/>"), &["there are both 'joint' and 'jointinparent'"]);
+    check(&actuator("<motor tendon='t'/>"), &["there is no tendon 't'"]);
+    check(&actuator("<general joint='j' actrange='0 1'/>"), &["a range of activations, but no activation"]);
+    check(&actuator("<general joint='j' dyntype='filter' actlimited='true'/>"), &["'actrange' goes from 0 to 0"]);
+    check(&actuator("<general joint='j' dyntype='filter' actdim='2'/>"), &["'actdim' is '2'; expected 1"]);
+    check(&actuator("<general joint='j' dyntype='filtr'/>"), &["did you mean 'filter'?"]);
+    check(&actuator("<position joint='j' timeconst='-1'/>"), &["timeconst must not be negative"]);
+    check(&actuator("<position joint='j' inheritrange='1'/>"), &["'inheritrange' needs a range of 'j'"]);
+    check(
+        &actuator("<intvelocity joint='j' inheritrange='1' actrange='0 1'/>"),
+        &["both 'actrange' and 'inheritrange'"],
+    );
+    check(&actuator("<damper joint='j' kv='1'/>"), &["'ctrlrange' goes from 0 to 0"]);
+    check(&actuator("<damper joint='j' kv='1' ctrlrange='-1 1'/>"), &["control range of a damper"]);
+    check(&actuator("<damper joint='j' kv='-1' ctrlrange='0 1'/>"), &["kv must not be negative"]);
+    check(&actuator("<cylinder joint='j' bias='1'/>"), &["'bias' is '1'; expected 3 numbers"]);
+    check(&actuator("<motor joint='j' armature='-1'/>"), &["armature must not be negative"]);
+    let key = "<keyframe><key act='1'/></keyframe>";
+    check(&with_section(key), &["'act' is '1'"]);
+    check(&with_section("<keyframe><key mpos='1 2 3'/></keyframe>"), &["'mpos' is '1 2 3'"]);
+}
+
+#[test]
+fn height_fields() {
+    let files = |name: &str| match name {
+        "maps/short.bin" => Ok(vec![2, 0, 0, 0, 2, 0, 0, 0, 0]),
+        "maps/huge.bin" => Ok([[255, 255, 255, 127], [255, 255, 255, 127]].concat()),
+        "maps/nan.bin" => Ok([2i32, 2, -1, -1, -1, -1].map(i32::to_le_bytes).concat()),
+        "maps/bad.png" => Ok(b"not an image".to_vec()),
+        _ => Err("no such file".to_owned()),
+    };
+    let mistake = |hfield: &str, geom: &str, parts: &[&str]| {
+        let xml = format!(
+            "<mujoco><compiler assetdir='maps/'/>\n<asset>{hfield}</asset>\n<worldbody>{geom}</worldbody></mujoco>"
+        );
+        let message = Model::from_xml_str_with(&xml, "bad.xml", &files).unwrap_err().to_string();
+        for part in parts {
+            assert!(message.contains(part), "'{part}' is missing in {message}");
+        }
+    };
+    let good = "<hfield name='h' nrow='2' ncol='2' size='1 1 1 1'/>";
+    mistake("<hfield name='h' nrow='2' ncol='2'/>", "", &["bad.xml:2:", "the attribute 'size' is missing"]);
+    mistake("<hfield name='h' nrow='2' ncol='2' size='1 1 0 1'/>", "", &["must be greater than zero"]);
+    mistake("<hfield name='h' nrow='2' size='1 1 1 1'/>", "", &["'file' or a positive 'ncol' is missing"]);
+    mistake("<hfield name='h' nrow='1' ncol='9' size='1 1 1 1'/>", "", &["at least 2 rows and columns, not 1 x 9"]);
+    mistake("<hfield name='h' nrow='99999' ncol='99999' size='1 1 1 1'/>", "", &["a grid has at most"]);
+    mistake("<hfield name='h' nrow='2' ncol='2' size='1 1 1 1' elevation='1 2 3'/>", "", &["expected 4 numbers"]);
+    mistake("<hfield nrow='2' ncol='2' size='1 1 1 1'/>", "", &["the attribute 'name' is missing"]);
+    mistake(&good.repeat(2), "", &["already a height field of this name"]);
+    let file = |name: &str| format!("<hfield name='h' file='{name}' size='1 1 1 1'/>");
+    mistake(&file("none.bin"), "", &["bad.xml:2:", "cannot read the file", "'maps/none.bin': no such file"]);
+    mistake(&file("short.bin"), "", &["2 x 2 elevations take 24 bytes, but there are 9"]);
+    mistake(&file("huge.bin"), "", &["a grid has at most"]);
+    mistake(&file("nan.bin"), "", &["an elevation is not a finite number"]);
+    mistake(&file("bad.png"), "", &["'maps/bad.png'"]);
+    mistake(good, "<geom type='hfield'/>", &["bad.xml:3:", "needs the attribute 'hfield'"]);
+    mistake(good, "<geom type='hfield' hfield='g'/>", &["there is no height field 'g'", "did you mean 'h'?"]);
+    mistake(good, "<geom size='1' hfield='h'/>", &["'hfield' needs type=\"hfield\""]);
+    mistake(good, "<site type='hfield'/>", &["a site cannot be a plane, a height field or a mesh"]);
 }
 
 #[test]
@@ -200,12 +328,12 @@ fn settings_without_effect_are_accepted() {
     for content in [
         "<geom size='1' adhesion='0' surfacevel='0 0 0 0 0 0' shellinertia='false' user='1 2' castshadow='false'/>",
         "<joint axis='1 0 0' damping='1 0 0' springyield='0' actuatorgravcomp='false'/>",
-        "<body gravcomp='0.0'><geom size='1'/></body>",
+        "<body gravcomp='0.0'><geom size='1' fluidshape='ellipsoid'/></body>",
     ] {
         Model::from_xml_str(&in_body(content), "good.xml").unwrap();
     }
     for section in [
-        "<option density='0' solver='PGS' jacobian='sparse' wind='1 0 0' o_margin='1'/>",
+        "<option density='0' solver='PGS' jacobian='sparse' wind='1 0 0' o_margin='1' noslip_iterations='0'/>",
         "<tendon><fixed><joint joint='j' coef='1'/></fixed></tendon><equality/><deformable/>",
         "<asset><mesh name='unused' file='a.stl'/><texture type='2d' builtin='checker'/></asset>",
         "<actuator><general joint='j' dyntype='none' actlimited='false' delay='0'/></actuator>",
@@ -249,7 +377,8 @@ fn includes() {
     };
     let load = |file: &str| {
         let xml = format!("<mujoco>\n<include file='{file}'/>\n</mujoco>");
-        Model::from_xml_str_with(&xml, "main.xml", &files).map_err(|e| e.to_string())
+        Model::from_xml_str_with(&xml, "main.xml", &|name| files(name).map(String::into_bytes))
+            .map_err(|e| e.to_string())
     };
     assert_eq!(load("parts/c.xml").unwrap().opt.timestep, 0.5);
     assert_eq!(load("parts/../parts/./c.xml").unwrap().opt.timestep, 0.5);
@@ -265,6 +394,6 @@ fn includes() {
             assert!(message.contains(part), "'{part}' is missing in {message}");
         }
     }
-    check("<mujoco><include file='a.xml'/></mujoco>", &["a model given as text has no files to include"]);
+    check("<mujoco><include file='a.xml'/></mujoco>", &["a model given as text has no other files"]);
     check("<mujoco><include/></mujoco>", &["the attribute 'file' is missing"]);
 }

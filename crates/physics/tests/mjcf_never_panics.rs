@@ -3,6 +3,7 @@
 //! A model that comes out is sound: lengths agree, indices are in range, and every number is finite.
 
 use marathon_physics::Model;
+use marathon_physics::model::{EqualityKind, TendonKind, Transmission};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -16,7 +17,9 @@ fn corpus() -> Vec<String> {
 
 /// Loads the text and checks what comes out.
 fn load(text: &str) -> Result<(), TestCaseError> {
-    let Ok(model) = Model::from_xml_str(text, "damaged.xml") else { return Ok(()) };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models/mjcf");
+    let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    let Ok(model) = Model::from_xml_str_with(text, "damaged.xml", &read) else { return Ok(()) };
     let coordinates = |m: &Model| m.joints.iter().map(|j| j.qpos_adr).max().is_none_or(|last| last < m.nq);
     prop_assert!(model.qpos0.len() == model.nq && model.qpos_spring.len() == model.nq && coordinates(&model));
     prop_assert_eq!(model.dofs.len(), model.nv);
@@ -34,7 +37,42 @@ fn load(text: &str) -> Result<(), TestCaseError> {
     }
     prop_assert!(model.dofs.iter().all(|d| d.invweight0.is_finite() && d.damping.is_finite()));
     prop_assert!(model.geoms.iter().all(|g| g.pos.iter().chain(&g.quat).all(|x| x.is_finite())));
-    prop_assert!(model.actuators.iter().all(|a| a.joint < model.joints.len() && a.bias.iter().all(|x| x.is_finite())));
+    let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+    for actuator in &model.actuators {
+        let target = match actuator.transmission {
+            Transmission::Joint(j) | Transmission::JointInParent(j) => j < model.joints.len(),
+            Transmission::Tendon(t) => t < model.tendons.len(),
+        };
+        prop_assert!(target && finite(&actuator.bias) && finite(&actuator.act_range));
+        prop_assert!(actuator.act.is_none_or(|a| a < model.na));
+    }
+    for tendon in &model.tendons {
+        let TendonKind::Fixed(path) = &tendon.kind else { continue };
+        prop_assert!(!path.is_empty() && path.iter().all(|(j, coef)| *j < model.joints.len() && coef.is_finite()));
+        prop_assert!(finite(&tendon.spring_length) && finite(&[tendon.length0, tendon.invweight0, tendon.damping]));
+    }
+    for equality in &model.equalities {
+        match &equality.kind {
+            EqualityKind::Connect { bodies, anchors, .. } | EqualityKind::Weld { bodies, anchors, .. } => {
+                prop_assert!(bodies.iter().all(|b| *b < model.bodies.len()) && finite(&anchors.concat()));
+            }
+            EqualityKind::Joint { joint1, joint2, .. } => {
+                prop_assert!(joint2.iter().chain([joint1]).all(|j| *j < model.joints.len()));
+            }
+            EqualityKind::Tendon { tendon1, tendon2, .. } => {
+                prop_assert!(tendon2.iter().chain([tendon1]).all(|t| *t < model.tendons.len()));
+            }
+        }
+    }
+    for hfield in &model.hfields {
+        prop_assert_eq!(hfield.data.len(), hfield.nrow * hfield.ncol);
+        prop_assert!(hfield.data.iter().all(|x| (0.0..=1.0).contains(x)));
+    }
+    prop_assert!(model.geoms.iter().all(|g| g.hfield.is_none_or(|h| h < model.hfields.len())));
+    let values: usize = model.sensors.iter().map(|s| s.dim).sum();
+    prop_assert!(model.sensors.iter().all(|s| s.adr + s.dim <= values));
+    let mocap = model.bodies.iter().filter(|b| b.mocap).count();
+    prop_assert!(model.keyframes.iter().all(|k| k.act.len() == model.na && k.mpos.len() == mocap));
     prop_assert!(model.pairs.iter().all(|p| p.geoms.iter().all(|&g| g < model.geoms.len())));
     prop_assert!(model.keyframes.iter().all(|k| k.qpos.len() == model.nq && k.qvel.len() == model.nv));
     let stat = &model.stat;
@@ -43,7 +81,7 @@ fn load(text: &str) -> Result<(), TestCaseError> {
 }
 
 /// Pieces that MJCF is made of, to be strung together at random.
-const PIECES: [&str; 40] = [
+const PIECES: [&str; 52] = [
     "<mujoco>",
     "</mujoco>",
     "<worldbody>",
@@ -79,6 +117,18 @@ const PIECES: [&str; 40] = [
     "<actuator>",
     "<motor joint='a'/>",
     "</actuator>",
+    "<tendon><fixed name='a'>",
+    "<joint joint='a' coef='2'/>",
+    "</fixed></tendon>",
+    "<equality>",
+    "<weld body1='a'/>",
+    "<connect body1='a' anchor='1 2 3'/>",
+    "<joint joint1='a'/>",
+    "</equality>",
+    "<intvelocity tendon='a' kp='1'/>",
+    "<asset><hfield name='a' nrow='2' ncol='2' size='1 1 1 1'/></asset>",
+    "<sensor><framepos objtype='body' objname='a'/></sensor>",
+    "hfield='a'",
     "<!--",
     "-->",
     "&lt;",

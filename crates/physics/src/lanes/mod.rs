@@ -48,7 +48,7 @@ pub trait Real:
     + MulAssign
 {
     /// The number in one lane: `f32` or `f64`. Constants are stored like this and broadcast at use.
-    type Scalar: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 'static;
+    type Scalar: Real<Scalar = Self::Scalar> + Default + PartialEq + PartialOrd;
     /// One truth value per lane.
     type Mask: Copy + Debug + Send + Sync + 'static;
     /// Number of lanes.

@@ -15,9 +15,6 @@ pub struct F32x4(pub [f32; 4]);
 /// least 24 + 2 (Boldo and Melquiond, "Emulation of FMA and correctly rounded sums", 2008).
 #[inline(always)]
 fn fused(a: f32, b: f32, c: f32) -> f32 {
-    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
-        return a.mul_add(b, c);
-    }
     let (p, c) = (a as f64 * b as f64, c as f64);
     let s = p + c;
     let t = s - p;
@@ -28,6 +25,15 @@ fn fused(a: f32, b: f32, c: f32) -> f32 {
     let odd = if outward { bits.wrapping_add(1) } else { bits.wrapping_sub(1) };
     f64::from_bits(if inexact { odd } else { bits }) as f32
 }
+
+/// The emulation in four lanes. A call per product keeps the kernels' code small, which matters more than the call.
+#[inline(never)]
+fn fused4(a: &[f32; 4], b: &[f32; 4], c: &[f32; 4]) -> [f32; 4] {
+    [fused(a[0], b[0], c[0]), fused(a[1], b[1], c[1]), fused(a[2], b[2], c[2]), fused(a[3], b[3], c[3])]
+}
+
+/// Whether the target has the instruction in every processor.
+const HARDWARE: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
 macro_rules! lanewise {
     (|$($x:ident),*| $e:expr) => {{
@@ -94,7 +100,7 @@ impl Real for F32x4 {
     fn supported() -> bool {
         true
     }
-    #[inline]
+    #[inline(never)]
     fn enter<K: Kernel<Self>>(kernel: K) -> K::Output {
         kernel.run()
     }
@@ -129,12 +135,11 @@ impl Real for F32x4 {
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         let a = self;
-        lanewise!(|a, b, c| fused(a, b, c))
+        if HARDWARE { lanewise!(|a, b, c| a.mul_add(b, c)) } else { F32x4(fused4(&a.0, &b.0, &c.0)) }
     }
     #[inline(always)]
     fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        let a = self;
-        lanewise!(|a, b, c| fused(-a, b, c))
+        (-self).mul_add(b, c)
     }
     #[inline(always)]
     fn div(self, by: Self) -> Self {

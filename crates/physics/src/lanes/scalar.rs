@@ -20,6 +20,7 @@ macro_rules! scalar_backend {
                 {
                     /// Same code, compiled with the fused multiply-add instruction.
                     #[target_feature(enable = "fma")]
+                    #[inline(never)]
                     fn with_fma<K: Kernel<$t>>(kernel: K) -> K::Output {
                         kernel.run()
                     }

@@ -73,6 +73,7 @@ macro_rules! x86_backend {
             #[inline]
             fn enter<K: Kernel<Self>>(kernel: K) -> K::Output {
                 #[target_feature(enable = $features)]
+                #[inline(never)]
                 fn inner<K: Kernel<$t>>(kernel: K) -> K::Output {
                     kernel.run()
                 }

@@ -1,119 +1,17 @@
-//! `<actuator>`: motors and servos on joints.
+//! `<actuator>`: motors and servos on joints and tendons.
 
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
 use super::joint::{check_limit, is_limited};
-use super::math::MIN_VAL;
+use super::law::{Law, Limits};
+use super::math::{MIN_VAL, rotate};
 use super::names::Registry;
 use super::set0::MassMatrix;
 use super::settings::{Settings, entries};
-use super::value::Attrs;
-use crate::model::{Actuator, JointType, Model};
-
-/// Gain and bias as the elements of a class and the actuator itself set them, one after the other.
-#[derive(Clone, Copy)]
-struct Law<'a> {
-    /// Element that set the law last.
-    element: &'a str,
-    gain: [f64; 3],
-    gain_affine: bool,
-    bias: [f64; 3],
-    bias_affine: bool,
-}
-
-impl<'a> Law<'a> {
-    const GENERAL: Law<'static> =
-        Law { element: "general", gain: [1.0, 0.0, 0.0], gain_affine: false, bias: [0.0; 3], bias_affine: false };
-
-    /// The law of an actuator: the classes' elements in order, then its own.
-    ///
-    /// `ends` counts the elements up to the end of each class, outermost first.
-    fn compile(attrs: &Attrs<'a>, ends: &[usize]) -> Result<Self, MjcfError> {
-        let mut law: Law = Law::GENERAL;
-        let mut enclosing: Vec<Law> = Vec::new();
-        for (i, element) in attrs.chain().enumerate() {
-            // the element's own class, the last one, stays open for it
-            while enclosing.len() + 1 < ends.len() && ends[enclosing.len()] <= i {
-                enclosing.push(law);
-            }
-            law.apply(element, &enclosing)?;
-        }
-        Ok(law)
-    }
-
-    /// Whether a shortcut element can take its parameters from this law.
-    fn serves(&self, shortcut: &str) -> bool {
-        self.element == shortcut || (self.element == "general" && !self.gain_affine)
-    }
-
-    /// Applies one element. What a shortcut does not set it takes from the law so far, else from the nearest enclosing
-    /// class with a law of its own kind or a general one.
-    fn apply(&mut self, element: &'a Element, enclosing: &[Law<'a>]) -> Result<(), MjcfError> {
-        let attrs = Attrs::plain(element);
-        let name = element.name.as_str();
-        if name == "general" {
-            return self.general(element, &attrs);
-        }
-        if !self.serves(name) {
-            *self = enclosing.iter().rev().find(|law| law.serves(name)).copied().unwrap_or(Law::GENERAL);
-        }
-        let kept = self.gain[0];
-        match name {
-            "position" => {
-                let kp = attrs.number_or("kp", kept)?;
-                let kv: Option<[f64; 1]> = attrs.array("kv")?;
-                let ratio: Option<[f64; 1]> = attrs.array("dampratio")?;
-                let damping = match (kv, ratio) {
-                    (Some(_), Some(_)) => return Err(element.invalid("there are both 'kv' and 'dampratio'")),
-                    (Some([kv]), None) if kv < 0.0 => return Err(element.invalid("kv must not be negative")),
-                    (None, Some([r])) if r < 0.0 => return Err(element.invalid("dampratio must not be negative")),
-                    (Some([kv]), None) => -kv,
-                    // a positive number marks a damping ratio, which the inertia turns into damping later
-                    (None, Some([ratio])) => ratio,
-                    (None, None) => self.bias[2],
-                };
-                (self.gain, self.bias) = ([kp, 0.0, 0.0], [0.0, -kp, damping]);
-            }
-            "velocity" => {
-                let kv = attrs.number_or("kv", kept)?;
-                (self.gain, self.bias) = ([kv, 0.0, 0.0], [0.0, 0.0, -kv]);
-            }
-            _ => *self = Law::GENERAL,
-        }
-        (self.element, self.gain_affine, self.bias_affine) = (name, false, name != "motor");
-        Ok(())
-    }
-
-    /// `<general>` changes what it gives and keeps the rest.
-    fn general(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
-        self.element = "general";
-        for (name, values) in [("gainprm", &mut self.gain), ("biasprm", &mut self.bias)] {
-            let mut all = [0.0; 10];
-            all[..3].copy_from_slice(values);
-            attrs.overlay(name, 0, &mut all)?;
-            if all[3..].iter().any(|x| *x != 0.0) {
-                return Err(element.unsupported(Some(name), "only the first three numbers are supported"));
-            }
-            values.copy_from_slice(&all[..3]);
-        }
-        let gains = [("fixed", Some(false)), ("affine", Some(true)), ("muscle", None), ("user", None)];
-        let biases = [("none", Some(false)), ("affine", Some(true)), ("muscle", None), ("user", None)];
-        for (name, choices, affine) in
-            [("gaintype", gains, &mut self.gain_affine), ("biastype", biases, &mut self.bias_affine)]
-        {
-            match attrs.keyword(name, &choices)? {
-                Some(Some(value)) => *affine = value,
-                Some(None) => {
-                    let reason = "only constant and affine laws are supported";
-                    return Err(element.unsupported(Some(name), reason));
-                }
-                None => {}
-            }
-        }
-        Ok(())
-    }
-}
+use super::tendon::{self, polynomial, require_fixed};
+use super::value::{Attrs, Tristate};
+use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
 
 /// All elements of `<actuator>` sections.
 pub(crate) fn elements(root: &Element) -> impl Iterator<Item = &Element> {
@@ -122,119 +20,185 @@ pub(crate) fn elements(root: &Element) -> impl Iterator<Item = &Element> {
 
 /// Checks the values of an actuator element that sets defaults.
 pub(crate) fn check_default(attrs: &Attrs) -> Result<(), MjcfError> {
-    Law::compile(attrs, &[])?;
-    ranges(attrs).map(|_| ())
+    polynomial(attrs, "damping")?;
+    attrs.array::<1>("armature")?;
+    read(attrs, &[]).map(|_| ())
 }
 
-/// Control and force limits: whether they apply, and from where to where.
-struct Ranges {
-    gear: [f64; 6],
-    ctrl_limited: bool,
-    ctrl: [f64; 2],
-    force_limited: bool,
-    force: [f64; 2],
-}
-
-fn ranges(attrs: &Attrs) -> Result<Ranges, MjcfError> {
-    let ctrl = attrs.array_or("ctrlrange", [0.0; 2])?;
-    let force = attrs.array_or("forcerange", [0.0; 2])?;
-    Ok(Ranges {
+/// Everything that does not depend on the rest of the model.
+fn read(attrs: &Attrs, ends: &[usize]) -> Result<Actuator, MjcfError> {
+    let law = Law::compile(attrs, ends)?;
+    let Limits { ctrl_limited, ctrl_range, act_limited, act_range, act_early } = Limits::read(attrs)?;
+    let force_range = attrs.array_or("forcerange", [0.0; 2])?;
+    Ok(Actuator {
+        name: attrs.element.text("name").unwrap_or_default().to_owned(),
+        transmission: Transmission::Joint(0),
         gear: attrs.partial_or("gear", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])?,
-        ctrl_limited: is_limited(attrs, "ctrllimited", ctrl)?,
-        ctrl,
-        force_limited: is_limited(attrs, "forcelimited", force)?,
-        force,
+        ctrl_limited: applies(ctrl_limited, ctrl_range),
+        ctrl_range,
+        force_limited: is_limited(attrs, "forcelimited", force_range)?,
+        force_range,
+        gain: law.gain,
+        bias: law.bias,
+        dynamics: law.dynamics(),
+        act: None,
+        act_limited: applies(act_limited, act_range),
+        act_range,
+        act_early,
     })
 }
 
-/// Compiles all actuators.
+/// Whether a range applies: as switched, or as it is given when the switch is `auto`.
+fn applies(switch: Tristate, range: [f64; 2]) -> bool {
+    switch == Tristate::True || (switch == Tristate::Auto && range[0] < range[1])
+}
+
+/// Compiles all actuators into the model, with what they add to joints and tendons.
 pub(crate) fn compile(
     root: &Element,
     defaults: &Defaults,
     names: &Registry,
     settings: &Settings,
-    model: &Model,
-) -> Result<Vec<Actuator>, MjcfError> {
-    elements(root).map(|element| actuator(element, defaults, names, settings, model)).collect()
+    model: &mut Model,
+) -> Result<(), MjcfError> {
+    for element in elements(root) {
+        let (attrs, ends) = defaults.actuator(element)?;
+        let mut actuator = actuator(&attrs, ends, names, settings, model)?;
+        if actuator.dynamics != Dynamics::None {
+            actuator.act = Some(model.na);
+            model.na += 1;
+        }
+        reflect(&attrs, &actuator, model)?;
+        model.actuators.push(actuator);
+    }
+    model.nu = model.actuators.len();
+    Ok(())
 }
 
 fn actuator(
-    element: &Element,
-    defaults: &Defaults,
+    attrs: &Attrs,
+    ends: &[usize],
     names: &Registry,
     settings: &Settings,
     model: &Model,
 ) -> Result<Actuator, MjcfError> {
-    let (attrs, ends) = defaults.actuator(element)?;
-    let joint = target(element, names, model)?;
-    let law = Law::compile(&attrs, ends)?;
-    let mut ranges = ranges(&attrs)?;
-    check_limit(&attrs, "forcelimited", "forcerange", ranges.force, settings)?;
-    match inherited_range(&attrs)? {
-        Some(part) => {
-            let [low, high] = model.joints[joint].range;
-            if !(low < high) {
-                let message = format!("'inheritrange' needs a range of the joint '{}'", model.joints[joint].name);
-                return Err(element.invalid(message));
+    let element = attrs.element;
+    let mut actuator = read(attrs, ends)?;
+    actuator.transmission = target(element, names, model)?;
+    check_limit(attrs, "forcelimited", "forcerange", actuator.force_range, settings)?;
+    inherit_range(attrs, ends, &mut actuator, model)?;
+    let Limits { ctrl_limited, act_limited, .. } = Limits::read(attrs)?;
+    check_range(attrs, ("ctrllimited", ctrl_limited), ("ctrlrange", actuator.ctrl_range), settings)?;
+    check_range(attrs, ("actlimited", act_limited), ("actrange", actuator.act_range), settings)?;
+    let stateful = actuator.dynamics != Dynamics::None;
+    if actuator.act_limited && !stateful {
+        return Err(element.invalid("there is a range of activations, but no activation: dyntype is none"));
+    }
+    if let Some((owner, attr)) = attrs.find("actdim") {
+        let expected = i32::from(stateful);
+        if ![-1, expected].contains(&attrs.integer_or("actdim", -1)?) {
+            return Err(owner.bad_value(attr, format!("{expected}, the number of activations of this actuator")));
+        }
+    }
+    Ok(actuator)
+}
+
+/// Checks a range of the model, as [`check_limit`] does, with the switch that shortcuts may set.
+fn check_range(
+    attrs: &Attrs,
+    (switch, state): (&str, Tristate),
+    (name, range): (&str, [f64; 2]),
+    settings: &Settings,
+) -> Result<(), MjcfError> {
+    if state == Tristate::Auto && range != [0.0; 2] && !settings.autolimits {
+        let message = format!("there is '{name}' but not '{switch}', and the compiler's autolimits is false");
+        return Err(attrs.element.invalid(message));
+    }
+    if applies(state, range) && !(range[0] < range[1]) {
+        let [low, high] = range;
+        return Err(attrs.element.invalid(format!("'{name}' goes from {low} to {high}; the first must be smaller")));
+    }
+    Ok(())
+}
+
+/// What the actuator drives.
+fn target(element: &Element, names: &Registry, model: &Model) -> Result<Transmission, MjcfError> {
+    let given: Vec<&str> =
+        ["joint", "jointinparent", "tendon"].into_iter().filter(|name| element.attr(name).is_some()).collect();
+    match given.as_slice() {
+        [] => Err(element.invalid("the attribute 'joint' is missing")),
+        ["joint"] => names.joints.required(element, "joint").map(Transmission::Joint),
+        ["jointinparent"] => names.joints.required(element, "jointinparent").map(Transmission::JointInParent),
+        ["tendon"] => {
+            let tendon = names.tendons.required(element, "tendon")?;
+            require_fixed(element, "tendon", &model.tendons[tendon])?;
+            Ok(Transmission::Tendon(tendon))
+        }
+        several => Err(element.invalid(format!("there are both '{}'", several.join("' and '")))),
+    }
+}
+
+/// Takes the range of the joint or tendon over, if `inheritrange` says so: for the control of a position servo, or for
+/// the activation of an integrated one.
+fn inherit_range(attrs: &Attrs, ends: &[usize], actuator: &mut Actuator, model: &Model) -> Result<(), MjcfError> {
+    let element = attrs.element;
+    let law = Law::compile(attrs, ends)?;
+    let part = law.inherited_range;
+    if !law.is_position_servo() || part == 0.0 {
+        return Ok(());
+    }
+    let of_activation = actuator.dynamics == Dynamics::Integrator;
+    let scalar = |j: usize| matches!(model.joints[j].kind, JointType::Hinge | JointType::Slide);
+    let (range, name) = match actuator.transmission {
+        Transmission::Joint(j) if scalar(j) => (model.joints[j].range, &model.joints[j].name),
+        Transmission::Tendon(t) => (model.tendons[t].range, &model.tendons[t].name),
+        _ => {
+            return Err(
+                element.invalid("'inheritrange' needs a hinge, a slide or a tendon, given as 'joint' or 'tendon'")
+            );
+        }
+    };
+    let [low, high] = range;
+    if !(low < high) {
+        return Err(element.invalid(format!("'inheritrange' needs a range of '{name}'")));
+    }
+    let (middle, radius) = ((low + high) / 2.0, part * (high - low) / 2.0);
+    let range = [middle - radius, middle + radius];
+    let Limits { ctrl_limited, act_limited, .. } = Limits::read(attrs)?;
+    if of_activation {
+        (actuator.act_range, actuator.act_limited) = (range, applies(act_limited, range));
+    } else {
+        (actuator.ctrl_range, actuator.ctrl_limited) = (range, applies(ctrl_limited, range));
+    }
+    Ok(())
+}
+
+/// Adds the damping and armature of an actuator to its joint or tendon, times the square of the gear.
+fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), MjcfError> {
+    let (damping, damping_poly) = polynomial(attrs, "damping")?;
+    let armature = attrs.number_or("armature", 0.0)?;
+    if armature < 0.0 {
+        return Err(attrs.element.invalid("armature must not be negative"));
+    }
+    let square = actuator.gear[0] * actuator.gear[0];
+    let add = |to: (&mut f64, &mut f64, &mut [f64; 2])| {
+        *to.0 += armature * square;
+        *to.1 += damping * square;
+        to.2.iter_mut().zip(damping_poly).for_each(|(sum, x)| *sum += x * square);
+    };
+    match actuator.transmission {
+        Transmission::Joint(j) | Transmission::JointInParent(j) => {
+            let joint = &model.joints[j];
+            for dof in &mut model.dofs[joint.dof_adr..joint.dof_adr + joint.kind.dofs()] {
+                add((&mut dof.armature, &mut dof.damping, &mut dof.damping_poly));
             }
-            let (middle, radius) = ((low + high) / 2.0, part * (high - low) / 2.0);
-            ranges.ctrl = [middle - radius, middle + radius];
-            ranges.ctrl_limited = is_limited(&attrs, "ctrllimited", ranges.ctrl)?;
         }
-        None => check_limit(&attrs, "ctrllimited", "ctrlrange", ranges.ctrl, settings)?,
-    }
-    // without its type an affine law has no effect, so it is not stored
-    Ok(Actuator {
-        name: element.text("name").unwrap_or_default().to_owned(),
-        joint,
-        gear: ranges.gear,
-        ctrl_limited: ranges.ctrl_limited,
-        ctrl_range: ranges.ctrl,
-        force_limited: ranges.force_limited,
-        force_range: ranges.force,
-        gain: if law.gain_affine { law.gain } else { [law.gain[0], 0.0, 0.0] },
-        bias: if law.bias_affine { law.bias } else { [0.0; 3] },
-    })
-}
-
-/// The joint that the actuator drives.
-fn target(element: &Element, names: &Registry, model: &Model) -> Result<usize, MjcfError> {
-    if element.attr("jointinparent").is_none() {
-        return names.joints.required(element, "joint");
-    }
-    if element.attr("joint").is_some() {
-        return Err(element.invalid("there are both 'joint' and 'jointinparent'"));
-    }
-    let joint = names.joints.required(element, "jointinparent")?;
-    match model.joints[joint].kind {
-        // the two transmissions differ only for joints with a quaternion
-        JointType::Hinge | JointType::Slide => Ok(joint),
-        JointType::Ball | JointType::Free => {
-            let reason = "only hinge and slide joints can be driven in the parent's frame";
-            Err(element.unsupported(Some("jointinparent"), reason))
+        Transmission::Tendon(t) => {
+            let tendon = &mut model.tendons[t];
+            add((&mut tendon.armature, &mut tendon.damping, &mut tendon.damping_poly));
         }
     }
-}
-
-/// Which part of the joint's range the control range is, if it is inherited: the innermost of `ctrlrange` and
-/// `inheritrange` counts.
-fn inherited_range(attrs: &Attrs) -> Result<Option<f64>, MjcfError> {
-    if matches!(attrs.element.name.as_str(), "motor" | "velocity") {
-        return Ok(None);
-    }
-    for element in attrs.chain().rev() {
-        let part = Attrs::plain(element).number_or("inheritrange", 0.0)?;
-        if part < 0.0 {
-            return Err(element.invalid("inheritrange must not be negative"));
-        }
-        match (part > 0.0, element.attr("ctrlrange").is_some()) {
-            (true, true) => return Err(element.invalid("there are both 'ctrlrange' and 'inheritrange'")),
-            (true, false) => return Ok(Some(part)),
-            (false, true) => return Ok(None),
-            (false, false) => {}
-        }
-    }
-    Ok(None)
+    Ok(())
 }
 
 /// Turns damping ratios of position servos into damping.
@@ -242,18 +206,34 @@ fn inherited_range(attrs: &Attrs) -> Result<Option<f64>, MjcfError> {
 /// Critical damping is `2 sqrt(kp m)`, where `1/m` is the inverse mass seen through the gear. Source: MuJoCo,
 /// `dampratio`.
 pub(crate) fn resolve_damping(model: &mut Model, mass: &MassMatrix) {
-    for actuator in &mut model.actuators {
+    for i in 0..model.actuators.len() {
+        let actuator = &model.actuators[i];
         let (kp, ratio) = (actuator.gain[0], actuator.bias[2]);
         if kp != -actuator.bias[1] || ratio <= 0.0 {
             continue;
         }
-        let joint = &model.joints[actuator.joint];
-        let count = match joint.kind {
-            JointType::Free => 6,
-            JointType::Ball => 3,
-            JointType::Slide | JointType::Hinge => 1,
-        };
-        let inverse = mass.inverse_form(joint.dof_adr, &actuator.gear[..count]);
-        actuator.bias[2] = -2.0 * ratio * (kp / inverse.max(MIN_VAL)).max(0.0).sqrt();
+        let inverse = mass.inverse_form(&moments(model, actuator));
+        let inertia = if inverse > MIN_VAL { 1.0 / inverse } else { 0.0 };
+        model.actuators[i].bias[2] = -2.0 * ratio * (kp * inertia).max(0.0).sqrt();
+    }
+}
+
+/// The actuator's moment arms in the reference configuration, as `(dof, arm)`.
+fn moments(model: &Model, actuator: &Actuator) -> Vec<(usize, f64)> {
+    let gear = actuator.gear;
+    match actuator.transmission {
+        Transmission::Tendon(t) => {
+            tendon::moments(model, &model.tendons[t]).into_iter().map(|(dof, arm)| (dof, arm * gear[0])).collect()
+        }
+        Transmission::Joint(j) | Transmission::JointInParent(j) => {
+            let joint = &model.joints[j];
+            let mut arms = gear[..joint.kind.dofs()].to_vec();
+            // a ball joint is at its identity; the orientation of a free joint turns the torque into its own axes
+            if joint.kind == JointType::Free && matches!(actuator.transmission, Transmission::JointInParent(_)) {
+                let [w, x, y, z] = model.bodies[joint.body].quat;
+                arms[3..].copy_from_slice(&rotate([w, -x, -y, -z], [gear[3], gear[4], gear[5]]));
+            }
+            arms.into_iter().enumerate().map(|(k, arm)| (joint.dof_adr + k, arm)).collect()
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! From the parts of the file to the [`Model`].
 
-use super::defaults::Defaults;
+use super::asset::ReadFile;
+use super::defaults::{ACTUATORS, Defaults};
 use super::document::Element;
 use super::error::MjcfError;
 use super::geom::GeomSpec;
@@ -9,20 +10,24 @@ use super::math::{Frame, IDENTITY, MIN_VAL};
 use super::names::{Names, Registry};
 use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
-use super::{actuator, contact, custom, geom, inertia, schema, sensor, set0, settings, statistics, tree};
+use super::{
+    actuator, asset, contact, custom, equality, geom, inertia, schema, sensor, set0, settings, statistics, tendon, tree,
+};
 use crate::model::*;
 use std::collections::BTreeMap;
 
-/// Compiles the document.
-pub(crate) fn compile(root: &Element) -> Result<Model, MjcfError> {
+/// Compiles the document; `file` reads the files that it refers to.
+pub(crate) fn compile(root: &Element, file: &ReadFile) -> Result<Model, MjcfError> {
     schema::check(root)?;
-    let settings = Settings::read(root)?;
     let opt = settings::options(root)?;
+    let mut settings = Settings::read(root)?;
+    settings.medium = opt.density != 0.0 || opt.viscosity != 0.0;
     let given = settings::statistics(root)?;
     let defaults = Defaults::read(root)?;
     check_defaults(&defaults, &settings)?;
 
-    let mut bodies = tree::read(root, &defaults, &settings)?;
+    let assets = asset::read(root, &settings, file)?;
+    let mut bodies = tree::read(root, &defaults, &settings, &assets)?;
     inertia::compile(&mut bodies, &settings)?;
     let materials = materials(root, &defaults)?;
     let mut model = Model {
@@ -31,6 +36,7 @@ pub(crate) fn compile(root: &Element) -> Result<Model, MjcfError> {
         nq: 0,
         nv: 0,
         nu: 0,
+        na: 0,
         bodies: Vec::new(),
         joints: Vec::new(),
         dofs: Vec::new(),
@@ -38,6 +44,9 @@ pub(crate) fn compile(root: &Element) -> Result<Model, MjcfError> {
         sites: Vec::new(),
         cameras: Vec::new(),
         lights: Vec::new(),
+        hfields: Vec::new(),
+        tendons: Vec::new(),
+        equalities: Vec::new(),
         actuators: Vec::new(),
         sensors: Vec::new(),
         keyframes: Vec::new(),
@@ -58,19 +67,21 @@ pub(crate) fn compile(root: &Element) -> Result<Model, MjcfError> {
 
     let names = registry(root, &bodies)?;
     check_targets(&bodies, &names)?;
-    custom::check_tendons(root, &defaults, &names, &settings)?;
+    model.hfields = assets.hfields;
+    model.tendons = tendon::compile(root, &defaults, &names, &settings, &model)?;
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
-    model.actuators = actuator::compile(root, &defaults, &names, &settings, &model)?;
-    model.nu = model.actuators.len();
-    model.sensors = sensor::compile(root, &names)?;
+    actuator::compile(root, &defaults, &names, &settings, &mut model)?;
+    model.sensors = sensor::compile(root, &names, &model)?;
     model.keyframes = custom::keyframes(root, &model)?;
 
     let pose = set0::Pose::new(&model);
+    model.equalities = equality::compile(root, &defaults, &names, &model, &pose)?;
     let simple: Vec<bool> = bodies.iter().map(|b| b.simple).collect();
     let mass_matrix =
         set0::weights(&mut model, &pose, &simple).map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
+    tendon::weights(&mut model, &mass_matrix);
     actuator::resolve_damping(&mut model, &mass_matrix);
     spring_dampers(&mut model, &bodies);
     check_finite(&model, &bodies)?;
@@ -90,7 +101,7 @@ fn check_finite(model: &Model, bodies: &[BodySpec]) -> Result<(), MjcfError> {
             && finite(&[body.mass, body.subtree_mass])
             && geoms.iter().all(|g| finite(&g.pos) && finite(&g.quat) && finite(&g.size))
             && joints.iter().all(|j| finite(&j.pos) && finite(&[j.stiffness]) && finite(&j.range))
-            && dofs.iter().all(|d| finite(&[d.invweight0, d.damping]));
+            && dofs.iter().all(|d| finite(&[d.invweight0, d.damping, d.armature]) && finite(&d.damping_poly));
         if !sound {
             return Err(spec.element.invalid("its numbers are too large to compute with"));
         }
@@ -100,8 +111,24 @@ fn check_finite(model: &Model, bodies: &[BodySpec]) -> Result<(), MjcfError> {
     if !finite(&[stat.mean_inertia, stat.mean_mass, stat.extent]) || !finite(&stat.center) {
         return Err(root.invalid("the extent of the model is too large to compute with"));
     }
-    if model.actuators.iter().any(|a| !finite(&a.bias)) {
-        return Err(root.invalid("the damping of an actuator is too large to compute with"));
+    if !model.actuators.iter().all(|a| finite(&a.bias) && finite(&a.ctrl_range) && finite(&a.act_range)) {
+        return Err(root.invalid("the damping or range of an actuator is too large to compute with"));
+    }
+    let sound = |t: &Tendon| {
+        finite(&t.spring_length) && finite(&[t.length0, t.invweight0, t.armature, t.damping]) && finite(&t.damping_poly)
+    };
+    if let Some(tendon) = model.tendons.iter().find(|t| !sound(t)) {
+        return Err(root.invalid(format!("the numbers of tendon '{}' are too large to compute with", tendon.name)));
+    }
+    let sound = |e: &Equality| match &e.kind {
+        EqualityKind::Connect { anchors, .. } => finite(&anchors.concat()),
+        EqualityKind::Weld { anchors, quats, .. } => finite(&anchors.concat()) && finite(&quats.concat()),
+        EqualityKind::Joint { .. } | EqualityKind::Tendon { .. } => true,
+    };
+    if let Some(equality) = model.equalities.iter().find(|e| !sound(e)) {
+        return Err(
+            root.invalid(format!("the numbers of constraint '{}' are too large to compute with", equality.name))
+        );
     }
     Ok(())
 }
@@ -114,7 +141,9 @@ fn check_defaults(defaults: &Defaults, settings: &Settings) -> Result<(), MjcfEr
             "joint" => JointSpec::read(&attrs, &frame, settings).map(|_| ())?,
             "geom" | "site" => geom::check_default(&attrs, settings)?,
             "pair" => contact::check_default(&attrs)?,
-            "general" | "motor" | "position" | "velocity" => actuator::check_default(&attrs)?,
+            "equality" => equality::check_default(&attrs)?,
+            "tendon" => tendon::check_default(&attrs)?,
+            name if ACTUATORS.contains(&name) => actuator::check_default(&attrs)?,
             _ => {}
         }
     }
@@ -178,7 +207,7 @@ fn add_body(
             model.bodies[parent].root_id
         },
         invweight0: [0.0; 2],
-        gravcomp: 0.0,
+        gravcomp: spec.gravcomp,
         mocap: spec.mocap,
     };
     let weld = body.weld_id;
@@ -214,10 +243,12 @@ fn add_joint(model: &mut Model, body: usize, spec: &JointSpec) {
         limited: spec.limited,
         range: spec.range,
         margin: spec.margin,
-        stiffness: spec.stiffness,
+        stiffness: spec.stiffness.0,
+        stiffness_poly: spec.stiffness.1,
         solref_limit: spec.solref_limit,
         solimp_limit: spec.solimp_limit,
         actuator_force_range: spec.actuator_force_range,
+        actuator_gravcomp: spec.actuator_gravcomp,
         group: spec.group,
     });
     let rest = match spec.kind {
@@ -242,7 +273,8 @@ fn add_joint(model: &mut Model, body: usize, spec: &JointSpec) {
             joint,
             parent,
             armature: spec.armature,
-            damping: spec.damping,
+            damping: spec.damping.0,
+            damping_poly: spec.damping.1,
             frictionloss: spec.frictionloss,
             solref_friction: spec.solref_friction,
             solimp_friction: spec.solimp_friction,
@@ -290,6 +322,7 @@ fn convert_geom(spec: &GeomSpec, body: usize, materials: &BTreeMap<&str, Option<
         pos: spec.shape.frame.pos,
         quat: spec.shape.frame.quat,
         size: spec.shape.size,
+        hfield: spec.shape.hfield,
         contype: spec.surface.contype,
         conaffinity: spec.surface.conaffinity,
         condim: spec.surface.condim,
@@ -356,7 +389,7 @@ fn registry<'a>(root: &'a Element, bodies: &[BodySpec<'a>]) -> Result<Registry<'
         geoms: Names::collect("geom", bodies.iter().flat_map(|b| &b.geoms).map(|g| g.element))?,
         sites: Names::collect("site", bodies.iter().flat_map(|b| &b.sites).map(|s| s.element))?,
         cameras: Names::collect("camera", bodies.iter().flat_map(|b| &b.cameras).map(|c| c.element))?,
-        tendons: Names::collect("tendon", entries(root, "tendon"))?,
+        tendons: Names::collect("tendon", tendon::elements(root))?,
         actuators: Names::collect("actuator", actuator::elements(root))?,
     })
 }
@@ -383,7 +416,8 @@ fn spring_dampers(model: &mut Model, bodies: &[BodySpec]) {
         let mass = dofs.len() as f64 / weights.sum::<f64>().max(MIN_VAL);
         joint.stiffness = mass / (time * time * ratio * ratio).max(MIN_VAL);
         for dof in &mut model.dofs[dofs] {
-            dof.damping = 2.0 * mass / time.max(MIN_VAL);
+            // what actuators add stays
+            dof.damping += 2.0 * mass / time.max(MIN_VAL) - spec.damping.0;
         }
     }
 }

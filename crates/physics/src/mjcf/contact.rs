@@ -3,11 +3,12 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
+use super::geom::NO_MESH;
 use super::joint::{SOLIMP, SOLREF};
 use super::names::{Names, Registry};
 use super::settings::entries;
 use super::value::Attrs;
-use crate::model::{Geom, Pair};
+use crate::model::{Geom, GeomType, Pair};
 
 /// Parameters of a `<pair>`; they do not depend on the geoms.
 fn parameters(attrs: &Attrs) -> Result<Pair, MjcfError> {
@@ -44,6 +45,9 @@ pub(crate) fn pairs(
     for element in elements() {
         let mut pair = parameters(&defaults.attrs(element, None)?)?;
         pair.geoms = [names.geoms.required(element, "geom1")?, names.geoms.required(element, "geom2")?];
+        if let Some(i) = (0..2).find(|&i| geoms[pair.geoms[i]].kind == GeomType::Mesh) {
+            return Err(element.unsupported(Some(["geom1", "geom2"][i]), NO_MESH));
+        }
         if geoms[pair.geoms[0]].body > geoms[pair.geoms[1]].body {
             pair.geoms.reverse();
         }

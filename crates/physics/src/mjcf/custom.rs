@@ -1,12 +1,11 @@
-//! `<custom>` numbers, `<keyframe>` states and tendons that exert no force.
+//! `<custom>` numbers and `<keyframe>` states.
 
-use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
 use super::math::{EPS, quat_norm};
-use super::names::{Names, Registry};
-use super::settings::{Settings, entries, sections};
-use super::value::{Attrs, Tristate, numbers};
+use super::names::Names;
+use super::settings::{entries, sections};
+use super::value::{Attrs, numbers};
 use crate::model::{JointType, Keyframe, Model, Quat};
 
 /// More keyframes or numbers than this are a mistake in the file.
@@ -44,12 +43,16 @@ pub(crate) fn numerics(root: &Element) -> Result<Vec<(String, Vec<f64>)>, MjcfEr
 pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, MjcfError> {
     let elements = || entries(root, "keyframe").filter(|e| e.name == "key");
     Names::collect("keyframe", elements())?;
+    let mocap = || model.bodies.iter().filter(|b| b.mocap);
     let reference = || Keyframe {
         name: String::new(),
         time: 0.0,
         qpos: model.qpos0.clone(),
         qvel: vec![0.0; model.nv],
         ctrl: vec![0.0; model.nu],
+        act: vec![0.0; model.na],
+        mpos: mocap().map(|b| b.pos).collect(),
+        mquat: mocap().map(|b| b.quat).collect(),
     };
     let mut keys = Vec::new();
     for element in elements() {
@@ -57,9 +60,26 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
         let mut key = reference();
         key.name = element.text("name").unwrap_or_default().to_owned();
         key.time = attrs.number_or("time", 0.0)?;
-        for (name, values) in [("qpos", &mut key.qpos), ("qvel", &mut key.qvel), ("ctrl", &mut key.ctrl)] {
+        for (name, values) in
+            [("qpos", &mut key.qpos), ("qvel", &mut key.qvel), ("act", &mut key.act), ("ctrl", &mut key.ctrl)]
+        {
             let length = values.len();
             attrs.overlay(name, length, values)?;
+        }
+        let mut places = key.mpos.concat();
+        let length = places.len();
+        attrs.overlay("mpos", length, &mut places)?;
+        key.mpos.iter_mut().zip(places.chunks_exact(3)).for_each(|(pos, given)| pos.copy_from_slice(given));
+        let mut turns = key.mquat.concat();
+        let length = turns.len();
+        attrs.overlay("mquat", length, &mut turns)?;
+        for (quat, given) in key.mquat.iter_mut().zip(turns.chunks_exact(4)) {
+            quat.copy_from_slice(given);
+            let length = quat_norm(*quat);
+            if !(length >= EPS) {
+                return Err(element.invalid("a quaternion of 'mquat' is zero"));
+            }
+            *quat = quat.map(|x| x / length);
         }
         for joint in &model.joints {
             let adr = match joint.kind {
@@ -86,40 +106,4 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
         keys.resize_with(keys.len().max(count), reference);
     }
     Ok(keys)
-}
-
-/// Checks the tendons: those that exert no force are accepted and left out of the model.
-pub(crate) fn check_tendons(
-    root: &Element,
-    defaults: &Defaults,
-    names: &Registry,
-    settings: &Settings,
-) -> Result<(), MjcfError> {
-    for element in entries(root, "tendon") {
-        let attrs = defaults.attrs(element, None)?;
-        let refuse = |attribute: &str| {
-            let reason = "a tendon that exerts a force is not supported; only tendons without effect are accepted";
-            Err(element.unsupported(Some(attribute), reason))
-        };
-        for name in ["stiffness", "damping", "frictionloss", "armature", "springyield"] {
-            if attrs.partial_or(name, [0.0; 3])? != [0.0; 3] {
-                return refuse(name);
-            }
-        }
-        let range: [f64; 2] = attrs.array_or("range", [0.0; 2])?;
-        match attrs.tristate("limited")? {
-            Tristate::True => return refuse("limited"),
-            Tristate::Auto if settings.autolimits && range[0] < range[1] => return refuse("range"),
-            _ => {}
-        }
-        for part in &element.children {
-            match part.name.as_str() {
-                "joint" => names.joints.required(part, "joint")?,
-                "site" => names.sites.required(part, "site")?,
-                "geom" => names.geoms.required(part, "geom")?,
-                _ => 0,
-            };
-        }
-    }
-    Ok(())
 }

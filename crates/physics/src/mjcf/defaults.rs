@@ -119,6 +119,16 @@ impl<'a> Defaults<'a> {
         Ok(Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) })
     }
 
+    /// The same for an element whose defaults are kept under a name of their own, such as `equality`.
+    pub fn of_kind<'d>(&'d self, kind: &str, element: &'d Element) -> Result<Attrs<'d>, MjcfError>
+    where
+        'a: 'd,
+    {
+        let class = self.named(element, "class")?.unwrap_or(MAIN);
+        let layers = self.classes.get(class).and_then(|c| c.layers.get(kind));
+        Ok(Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) })
+    }
+
     /// Attributes of an actuator, and the number of its default elements up to the end of each class that encloses it.
     pub fn actuator<'d>(&'d self, element: &'d Element) -> Result<(Attrs<'d>, &'d [usize]), MjcfError>
     where

@@ -1,5 +1,6 @@
 //! `<geom>` and `<site>`: shape, place, mass and inertia.
 
+use super::asset::Assets;
 use super::document::Element;
 use super::error::MjcfError;
 use super::joint::{SOLIMP, SOLREF};
@@ -22,6 +23,10 @@ const TYPES: [(&str, Option<GeomType>); 9] = [
     ("sdf", None),
 ];
 
+/// Why a mesh is refused.
+pub(crate) const NO_MESH: &str = "meshes are not supported unless they neither collide (contype and conaffinity 0) nor \
+                                  weigh; use a capsule, box, sphere, cylinder or ellipsoid";
+
 /// Color of shapes that give neither color nor material.
 const GRAY: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
 
@@ -30,6 +35,8 @@ pub(crate) struct ShapeSpec {
     pub kind: GeomType,
     pub frame: Frame,
     pub size: Vec3,
+    /// Height field that it shows.
+    pub hfield: Option<usize>,
     /// Color of its own, if it differs from the default.
     pub rgba: [f32; 4],
     pub group: i32,
@@ -94,11 +101,26 @@ pub(crate) fn check_default(attrs: &Attrs, settings: &Settings) -> Result<(), Mj
 
 impl GeomSpec<'_> {
     /// Reads a geom with its defaults; `outer` is the frame of enclosing `<frame>` elements.
-    pub fn read<'a>(attrs: &Attrs<'a>, outer: &Frame, settings: &Settings) -> Result<GeomSpec<'a>, MjcfError> {
+    pub fn read<'a>(
+        attrs: &Attrs<'a>,
+        outer: &Frame,
+        settings: &Settings,
+        assets: &Assets,
+    ) -> Result<GeomSpec<'a>, MjcfError> {
+        let ellipsoid = attrs.keyword("fluidshape", &[("none", false), ("ellipsoid", true)])?.unwrap_or(false);
+        if let Some((element, _)) = attrs.find("fluidshape").filter(|_| ellipsoid && settings.medium) {
+            let reason = "the ellipsoid model of the medium's forces is not supported; only fluidshape=\"none\" is";
+            return Err(element.unsupported(Some("fluidshape"), reason));
+        }
+        let shape = ShapeSpec::read(attrs, outer, settings, [0.0; 3], Some(assets))?;
+        let surface = Surface::read(attrs)?;
+        if shape.kind == GeomType::Mesh && (surface.contype != 0 || surface.conaffinity != 0) {
+            return Err(attrs.element.unsupported(Some("mesh"), NO_MESH));
+        }
         Ok(GeomSpec {
             element: attrs.element,
-            shape: ShapeSpec::read(attrs, outer, settings, [0.0; 3])?,
-            surface: Surface::read(attrs)?,
+            shape,
+            surface,
             material: attrs.text("material"),
             mass: attrs.array::<1>("mass")?.map(|m| m[0]),
             density: attrs.number_or("density", 1000.0)?,
@@ -107,6 +129,9 @@ impl GeomSpec<'_> {
 
     /// Mass and principal moments in the geom's own frame.
     pub fn mass_and_inertia(&self) -> Result<(f64, Vec3), MjcfError> {
+        if self.shape.kind == GeomType::Mesh && self.mass.unwrap_or(self.density) != 0.0 {
+            return Err(self.element.unsupported(Some("mesh"), NO_MESH));
+        }
         let volume = self.shape.volume();
         let mass = match self.mass {
             Some(mass) if mass == 0.0 || volume > EPS => mass,
@@ -146,21 +171,34 @@ impl ShapeValues {
 }
 
 impl ShapeSpec {
-    /// Reads type, size, place and color. `size` is the default size.
-    pub fn read(attrs: &Attrs, outer: &Frame, settings: &Settings, size: Vec3) -> Result<Self, MjcfError> {
+    /// Reads type, size, place and color. `size` is the default size; a site has no `assets` to show.
+    pub fn read(
+        attrs: &Attrs,
+        outer: &Frame,
+        settings: &Settings,
+        size: Vec3,
+        assets: Option<&Assets>,
+    ) -> Result<Self, MjcfError> {
         let element = attrs.element;
         let values = ShapeValues::read(attrs, settings, size)?;
-        let kind = match values.kind {
-            Some(GeomType::Hfield) => {
-                return Err(element.unsupported(Some("type"), "height fields in a model file are not supported"));
-            }
-            Some(GeomType::Mesh) | None => {
-                let reason = "meshes are not supported; use a capsule, box, sphere, cylinder or ellipsoid";
-                return Err(element.unsupported(Some("type"), reason));
-            }
-            Some(kind) => kind,
+        let Some(kind) = values.kind else {
+            return Err(element.unsupported(Some("type"), NO_MESH));
         };
-        let mut size = values.size;
+        let (mut size, mut hfield) = (values.size, None);
+        let on_asset = matches!(kind, GeomType::Hfield | GeomType::Mesh);
+        match assets {
+            Some(assets) => {
+                hfield = shown_asset(attrs, kind, assets)?;
+                if let Some(hfield) = hfield {
+                    let [x, y, top, base] = assets.hfields[hfield].size;
+                    size = [x, y, 0.25 * top + 0.5 * base];
+                }
+            }
+            None if on_asset || kind == GeomType::Plane => {
+                return Err(element.invalid("a site cannot be a plane, a height field or a mesh"));
+            }
+            None => {}
+        }
         let local = match values.ends {
             None => Frame { pos: values.pos, quat: values.quat.unwrap_or(IDENTITY) },
             Some(_) if values.pos != [0.0; 3] => {
@@ -168,8 +206,13 @@ impl ShapeSpec {
             }
             Some(ends) => from_to(element, kind, ends, &mut size)?,
         };
-        check_size(element, kind, size)?;
-        Ok(ShapeSpec { kind, frame: outer.compose(&local), size, rgba: values.rgba, group: values.group })
+        if kind == GeomType::Mesh {
+            // its extent is unknown
+            size = [0.0; 3];
+        } else {
+            check_size(element, kind, size)?;
+        }
+        Ok(ShapeSpec { kind, frame: outer.compose(&local), size, hfield, rgba: values.rgba, group: values.group })
     }
 
     /// Whether the color is the default, in which case a material's color counts.
@@ -185,8 +228,9 @@ impl ShapeSpec {
             GeomType::Capsule => PI * (a * a * 2.0 * b + 4.0 * a * a * a / 3.0),
             GeomType::Cylinder => PI * a * a * 2.0 * b,
             GeomType::Ellipsoid => 4.0 * PI * a * b * c / 3.0,
-            GeomType::Box => 8.0 * a * b * c,
-            GeomType::Plane | GeomType::Hfield | GeomType::Mesh => 0.0,
+            // as in MuJoCo, a height field weighs as much as a box of its size
+            GeomType::Box | GeomType::Hfield => 8.0 * a * b * c,
+            GeomType::Plane | GeomType::Mesh => 0.0,
         }
     }
 
@@ -211,9 +255,28 @@ impl ShapeSpec {
                 [across, across, a * a / 2.0]
             }
             GeomType::Ellipsoid => [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 5.0),
-            GeomType::Box => [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 3.0),
-            GeomType::Plane | GeomType::Hfield | GeomType::Mesh => [0.0; 3],
+            GeomType::Box | GeomType::Hfield => [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 3.0),
+            GeomType::Plane | GeomType::Mesh => [0.0; 3],
         }
+    }
+}
+
+/// The height field that a geom shows; checks that its type and its asset agree.
+fn shown_asset(attrs: &Attrs, kind: GeomType, assets: &Assets) -> Result<Option<usize>, MjcfError> {
+    let element = attrs.element;
+    let given = |name: &str| attrs.find(name).filter(|(_, attr)| !attr.value.is_empty());
+    match (kind, given("hfield")) {
+        (GeomType::Hfield, Some((owner, _))) => return assets.hfield_names.required(owner, "hfield").map(Some),
+        (GeomType::Hfield, None) => return Err(element.invalid("a height field needs the attribute 'hfield'")),
+        (_, Some(_)) => return Err(element.invalid("'hfield' needs type=\"hfield\"")),
+        (_, None) => {}
+    }
+    match (kind, given("mesh")) {
+        (GeomType::Mesh, Some((owner, _))) => assets.mesh_names.required(owner, "mesh").map(|_| None),
+        (GeomType::Mesh, None) => Err(element.invalid("a mesh needs the attribute 'mesh'")),
+        // a primitive fitted to a mesh
+        (_, Some((owner, _))) => Err(owner.unsupported(Some("mesh"), NO_MESH)),
+        (_, None) => Ok(None),
     }
 }
 

@@ -38,9 +38,9 @@ pub(crate) fn compile(bodies: &mut [BodySpec], settings: &Settings) -> Result<()
 fn from_geoms(body: &mut BodySpec, settings: &Settings) -> Result<(), MjcfError> {
     let [low, high] = settings.inertiagrouprange;
     let mut parts = Vec::new();
-    for geom in &body.geoms {
+    for geom in body.geoms.iter().filter(|g| (low..=high).contains(&g.shape.group)) {
         let (mass, inertia) = geom.mass_and_inertia()?;
-        if (low..=high).contains(&geom.shape.group) && mass > 0.0 {
+        if mass > 0.0 {
             parts.push((mass, inertia, geom.shape.frame));
         }
     }

@@ -4,6 +4,7 @@ use super::document::Element;
 use super::error::MjcfError;
 use super::math::{EPS, Frame, rotate, unit};
 use super::settings::Settings;
+use super::tendon::polynomial;
 use super::value::{Attrs, Tristate};
 use crate::model::{JointType, SolImp, SolRef, Vec3};
 
@@ -26,8 +27,8 @@ pub(crate) struct JointSpec<'a> {
     pub limited: bool,
     pub range: [f64; 2],
     pub margin: f64,
-    pub stiffness: f64,
-    pub damping: f64,
+    pub stiffness: (f64, [f64; 2]),
+    pub damping: (f64, [f64; 2]),
     pub armature: f64,
     pub frictionloss: f64,
     /// Time constant and damping ratio from which stiffness and damping follow.
@@ -37,6 +38,7 @@ pub(crate) struct JointSpec<'a> {
     pub solref_friction: SolRef,
     pub solimp_friction: SolImp,
     pub actuator_force_range: Option<[f64; 2]>,
+    pub actuator_gravcomp: bool,
     pub group: i32,
 }
 
@@ -63,8 +65,8 @@ impl JointSpec<'_> {
             limited: false,
             range: [0.0; 2],
             margin: 0.0,
-            stiffness: 0.0,
-            damping: 0.0,
+            stiffness: (0.0, [0.0; 2]),
+            damping: (0.0, [0.0; 2]),
             armature: 0.0,
             frictionloss: 0.0,
             springdamper: None,
@@ -73,6 +75,7 @@ impl JointSpec<'_> {
             solref_friction: SOLREF,
             solimp_friction: SOLIMP,
             actuator_force_range: None,
+            actuator_gravcomp: false,
             group: attrs.integer_or("group", 0)?,
         })
     }
@@ -112,8 +115,8 @@ impl JointSpec<'_> {
             // as in MuJoCo, a range that does not apply is not converted
             range: if limited { range.map(angle) } else { range },
             margin: attrs.number_or("margin", 0.0)?,
-            stiffness: linear(attrs, "stiffness")?,
-            damping: linear(attrs, "damping")?,
+            stiffness: polynomial(attrs, "stiffness")?,
+            damping: polynomial(attrs, "damping")?,
             armature: attrs.number_or("armature", 0.0)?,
             frictionloss: attrs.number_or("frictionloss", 0.0)?,
             springdamper: Some(attrs.array_or("springdamper", [0.0; 2])?).filter(|s| s[0] > 0.0 && s[1] > 0.0),
@@ -122,6 +125,7 @@ impl JointSpec<'_> {
             solref_friction: attrs.partial_or("solreffriction", SOLREF)?,
             solimp_friction: attrs.partial_or("solimpfriction", SOLIMP)?,
             actuator_force_range: (force_limited && scalar).then_some(force_range),
+            actuator_gravcomp: attrs.flag_or("actuatorgravcomp", false)?,
             group: attrs.integer_or("group", 0)?,
         };
         Ok(spec)
@@ -142,16 +146,6 @@ impl JointSpec<'_> {
         }
         Ok(())
     }
-}
-
-/// Stiffness or damping, of which only the linear term is supported.
-fn linear(attrs: &Attrs, name: &str) -> Result<f64, MjcfError> {
-    let terms: [f64; 3] = attrs.partial_or(name, [0.0; 3])?;
-    if terms[1] != 0.0 || terms[2] != 0.0 {
-        let element = attrs.find(name).map_or(attrs.element, |(e, _)| e);
-        return Err(element.unsupported(Some(name), "only the linear term is supported; leave the others out"));
-    }
-    Ok(terms[0])
 }
 
 /// Whether a range applies: as switched, or as it is given when the switch is `auto`.

@@ -8,21 +8,24 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `assemble` puts the [`Model`] together, `set0` and `statistics` compute what follows from the reference
+//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together, `set0` and `statistics` compute what follows from the reference
 //! configuration.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.
 
 mod actuator;
 mod assemble;
+mod asset;
 mod contact;
 mod custom;
 mod defaults;
 mod document;
+mod equality;
 mod error;
 mod geom;
 mod inertia;
 mod joint;
+mod law;
 mod math;
 mod names;
 mod orientation;
@@ -31,6 +34,7 @@ mod sensor;
 mod set0;
 mod settings;
 mod statistics;
+mod tendon;
 mod tree;
 mod value;
 
@@ -57,35 +61,38 @@ impl Model {
         })?;
         let dir: PathBuf = path.parent().map(Path::to_owned).unwrap_or_default();
         let root = document::parse(&text, &shown, &|file| read(&dir.join(file)))?;
-        assemble::compile(&root)
+        assemble::compile(&root, &|file| std::fs::read(dir.join(file)).map_err(|e| e.to_string()))
     }
 
-    /// Compiles a model given as text, without includes. `name` stands for the file in messages.
+    /// Compiles a model given as text, without other files. `name` stands for the file in messages.
     ///
     /// # Errors
     ///
     /// The text is not a valid, supported model.
     pub fn from_xml_str(xml: &str, name: &str) -> Result<Model, MjcfError> {
-        Self::from_xml_str_with(xml, name, &|_| Err("a model given as text has no files to include".to_owned()))
+        Self::from_xml_str_with(xml, name, &|_| Err("a model given as text has no other files".to_owned()))
     }
 
-    /// Compiles a model given as text. `resolve` returns the text of an included file, given its path relative to the
-    /// model, or why there is none.
+    /// Compiles a model given as text. `resolve` returns the content of an included file or a height field, given its
+    /// path relative to the model, or why there is none.
     ///
     /// # Errors
     ///
-    /// The text or an included file is not a valid, supported model.
+    /// The text or another file is not a valid, supported model.
     pub fn from_xml_str_with(
         xml: &str,
         name: &str,
-        resolve: &dyn Fn(&str) -> Result<String, String>,
+        resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Model, MjcfError> {
-        let root = document::parse(xml, name, resolve)?;
-        assemble::compile(&root)
+        let root = document::parse(xml, name, &|file| utf8(resolve(file)?))?;
+        assemble::compile(&root, resolve)
     }
 }
 
 fn read(path: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    utf8(std::fs::read(path).map_err(|e| e.to_string())?)
+}
+
+fn utf8(bytes: Vec<u8>) -> Result<String, String> {
     String::from_utf8(bytes).map_err(|e| format!("the file is not UTF-8 text: {e}"))
 }

@@ -27,7 +27,14 @@ impl<'a> Names<'a> {
 
     /// Adds the object `index` under the element's name, if it has one.
     pub fn add(&mut self, element: &'a Element, index: usize) -> Result<(), MjcfError> {
-        let Some(name) = element.text("name").filter(|n| !n.is_empty()) else { return Ok(()) };
+        match element.text("name").filter(|n| !n.is_empty()) {
+            Some(name) => self.add_as(name, element, index),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds the object `index` under a name that follows from the element.
+    pub fn add_as(&mut self, name: &'a str, element: &Element, index: usize) -> Result<(), MjcfError> {
         if self.index.insert(name, index).is_some() {
             return Err(element.invalid(format!("there is already a {} of this name", self.kind)));
         }

@@ -59,10 +59,9 @@ const TOP: &[Rule] = &[
     containing(
         rule(
             "compiler",
-            "angle autolimits balanceinertia boundinertia boundmass coordinate eulerseq inertiafromgeom \
-             inertiagrouprange settotalmass",
-            "assetdir conflict discardvisual fitaabb meshdir passthrough savecanonical savecompiled saveinertial \
-             strippath texturedir usethread",
+            "angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq inertiafromgeom \
+             inertiagrouprange meshdir settotalmass strippath",
+            "conflict discardvisual fitaabb passthrough savecanonical savecompiled saveinertial texturedir usethread",
             "alignfree=false fusestatic=false",
         ),
         &[rule(
@@ -75,18 +74,19 @@ const TOP: &[Rule] = &[
     containing(
         rule(
             "option",
-            "timestep gravity integrator cone impratio iterations ls_iterations tolerance solver jacobian",
+            "timestep gravity density viscosity wind magnetic integrator cone impratio iterations ls_iterations \
+             tolerance solver jacobian o_margin o_solref o_solimp o_friction",
             // each of these has an effect only together with something that is refused
-            "ls_tolerance magnetic ccd_iterations ccd_tolerance noslip_tolerance sdf_initpoints sdf_iterations \
-             sleep_tolerance wind o_margin o_solref o_solimp o_friction",
-            "density=0 viscosity=0 noslip_iterations=0 actuatorgroupdisable",
+            "ls_tolerance ccd_iterations ccd_tolerance noslip_tolerance sdf_initpoints sdf_iterations sleep_tolerance",
+            "noslip_iterations=0 actuatorgroupdisable",
         ),
         &[rule(
             "flag",
-            "constraint limit contact frictionloss spring damper gravity clampctrl warmstart actuation refsafe \
-             eulerdamp filterparent",
-            "equality autoreset energy fwdinv invdiscrete island midphase multiccd nativeccd",
-            "sensor=enable override=disable sleep=disable diagexact=disable ipc=disable speculative=disable",
+            "constraint equality limit contact frictionloss spring damper gravity clampctrl warmstart actuation \
+             refsafe eulerdamp filterparent override",
+            "autoreset energy fwdinv invdiscrete island midphase",
+            "sensor=enable multiccd=enable nativeccd=enable sleep=disable diagexact=disable ipc=disable \
+             speculative=disable",
         )],
     ),
     rule(
@@ -109,7 +109,7 @@ const TOP: &[Rule] = &[
     section("actuator", "", ACTUATOR),
     section("sensor", "", SENSOR),
     section("custom", "", CUSTOM),
-    section("keyframe", "", &[rule("key", "name time qpos qvel ctrl", "", "act mpos mquat plastic")]),
+    section("keyframe", "", &[rule("key", "name time qpos qvel act ctrl mpos mquat", "", "plastic")]),
 ];
 
 const VISUAL: &[Rule] = &[
@@ -146,10 +146,11 @@ const VISUAL: &[Rule] = &[
     ),
 ];
 
-// assets that nothing refers to are of no consequence; geoms that refer to meshes are refused
+// assets that nothing refers to are of no consequence; geoms that refer to meshes are refused unless they neither
+// collide nor weigh
 const ASSET: &[Rule] = &[
     anything("mesh"),
-    anything("hfield"),
+    rule("hfield", "name nrow ncol size elevation file content_type", "", ""),
     anything("skin"),
     anything("model"),
     rule(
@@ -171,25 +172,26 @@ const ASSET: &[Rule] = &[
 ];
 
 const BODY: &[Rule] = &[
-    rule("body", "name childclass mocap simple pos quat axisangle euler xyaxes zaxis", "user fuse sleep", "gravcomp=0"),
+    rule("body", "name childclass mocap gravcomp simple pos quat axisangle euler xyaxes zaxis", "user fuse sleep", ""),
     rule("frame", "name childclass pos quat axisangle euler xyaxes zaxis", "scaling", "scale=1 massscale=1"),
     rule("inertial", "pos mass diaginertia fullinertia quat axisangle euler xyaxes zaxis", "", ""),
     rule(
         "joint",
         "name class type pos axis range limited margin ref springref stiffness damping armature frictionloss \
          springdamper solreflimit solimplimit solreffriction solimpfriction actuatorfrcrange actuatorfrclimited \
-         group",
+         actuatorgravcomp group",
         "user",
-        "springyield=0 actuatorgravcomp=false",
+        "springyield=0",
     ),
     rule("freejoint", "name group", "", "align=false|auto"),
     containing(
         rule(
             "geom",
             "name class type pos quat axisangle euler xyaxes zaxis fromto size mass density contype conaffinity \
-             condim priority friction solmix solref solimp margin gap group rgba material",
-            "castshadow fitscale fluidcoef fluidshape user",
-            "adhesion=0 surfacevel=0 shellinertia=false hfield mesh",
+             condim priority friction solmix solref solimp margin gap group rgba material \
+             hfield mesh fluidshape",
+            "castshadow fitscale fluidcoef user",
+            "adhesion=0 surfacevel=0 shellinertia=false",
         ),
         &[NO_PLUGIN],
     ),
@@ -223,37 +225,28 @@ const CONTACT: &[Rule] = &[
     rule("exclude", "name body1 body2", "", ""),
 ];
 
+/// Attributes of every tendon.
+macro_rules! tendon_reads {
+    () => {
+        "name class stiffness damping frictionloss armature limited range margin springlength actuatorfrclimited \
+         actuatorfrcrange solreflimit solimplimit solreffriction solimpfriction group"
+    };
+}
 const TENDON: &[Rule] = &[
     containing(
-        rule(
-            "spatial",
-            "name class stiffness damping frictionloss armature springyield limited range",
-            "actuatorfrclimited actuatorfrcrange group margin material rgba solimpfriction solimplimit \
-             solreffriction solreflimit springlength user width",
-            "",
-        ),
+        rule("spatial", tendon_reads!(), "material rgba user width", "springyield=0"),
         &[rule("site", "site", "", ""), rule("geom", "geom", "sidesite", ""), rule("pulley", "", "divisor", "")],
     ),
-    containing(
-        rule(
-            "fixed",
-            "name class stiffness damping frictionloss armature springyield limited range",
-            "actuatorfrclimited actuatorfrcrange group margin solimpfriction solimplimit solreffriction solreflimit \
-             springlength user",
-            "",
-        ),
-        &[rule("joint", "joint", "coef", "")],
-    ),
+    containing(rule("fixed", tendon_reads!(), "user", "springyield=0"), &[rule("joint", "joint coef", "", "")]),
 ];
 
-const NO_EQUALITY: &str = "equality constraints are not supported";
 const EQUALITY: &[Rule] = &[
-    refused("connect", NO_EQUALITY),
-    refused("weld", NO_EQUALITY),
-    refused("joint", NO_EQUALITY),
-    refused("tendon", NO_EQUALITY),
-    refused("flex", NO_EQUALITY),
-    refused("flexstrain", NO_EQUALITY),
+    rule("connect", "name class active solref solimp body1 body2 site1 site2 anchor", "", ""),
+    rule("weld", "name class active solref solimp body1 body2 site1 site2 anchor relpose torquescale", "", ""),
+    rule("joint", "name class active solref solimp joint1 joint2 polycoef", "", ""),
+    rule("tendon", "name class active solref solimp tendon1 tendon2 polycoef", "", ""),
+    refused("flex", NO_FLEX),
+    refused("flexstrain", NO_FLEX),
 ];
 
 /// Attributes of every actuator that have an effect only with something that is refused.
@@ -262,39 +255,54 @@ macro_rules! actuator_ignores {
         "cranklength group interp lengthrange user"
     };
 }
-/// Attributes of every actuator that are refused: other transmissions, inertia, damping and delay.
+/// Attributes of every actuator that are refused: other transmissions, and delay.
 macro_rules! actuator_refuses {
     () => {
-        "armature=0 damping=0 delay=0 nsample=0 site refsite slidersite cranksite tendon"
+        "delay=0 nsample=0 site refsite slidersite cranksite"
     };
 }
 /// Attributes of every actuator that are read.
 macro_rules! actuator_reads {
     () => {
-        "name class joint jointinparent gear ctrllimited ctrlrange forcelimited forcerange"
+        "name class joint jointinparent tendon gear ctrllimited ctrlrange forcelimited forcerange damping armature"
     };
 }
-const NO_ACTUATOR: &str = "only the actuators motor, position, velocity and general are supported";
+const NO_ACTUATOR: &str =
+    "only the actuators motor, position, velocity, intvelocity, damper, cylinder and general are supported";
 const ACTUATOR: &[Rule] = &[
     rule(
         "general",
-        concat!(actuator_reads!(), " gainprm gaintype biasprm biastype inheritrange"),
-        concat!(actuator_ignores!(), " dynprm actearly actrange"),
-        concat!(actuator_refuses!(), " body dyntype=none actdim=0|-1 actlimited=false|auto ffrange velrange input"),
+        concat!(
+            actuator_reads!(),
+            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange"
+        ),
+        actuator_ignores!(),
+        concat!(actuator_refuses!(), " body ffrange velrange input"),
     ),
     rule("motor", actuator_reads!(), actuator_ignores!(), actuator_refuses!()),
     rule(
         "position",
-        concat!(actuator_reads!(), " kp kv dampratio inheritrange"),
+        concat!(actuator_reads!(), " kp kv dampratio timeconst inheritrange"),
         actuator_ignores!(),
-        concat!(actuator_refuses!(), " timeconst=0"),
+        actuator_refuses!(),
     ),
     rule("velocity", concat!(actuator_reads!(), " kv"), actuator_ignores!(), actuator_refuses!()),
-    refused("intvelocity", NO_ACTUATOR),
+    rule(
+        "intvelocity",
+        concat!(actuator_reads!(), " kp kv dampratio actlimited actrange inheritrange"),
+        actuator_ignores!(),
+        actuator_refuses!(),
+    ),
+    // MuJoCo's damper has no switch for its control range
+    rule("damper", concat!(actuator_reads!(), " kv"), actuator_ignores!(), actuator_refuses!()),
+    rule(
+        "cylinder",
+        concat!(actuator_reads!(), " timeconst area diameter bias"),
+        actuator_ignores!(),
+        actuator_refuses!(),
+    ),
     refused("orientation", NO_ACTUATOR),
     refused("pid", NO_ACTUATOR),
-    refused("damper", NO_ACTUATOR),
-    refused("cylinder", NO_ACTUATOR),
     refused("muscle", NO_ACTUATOR),
     refused("adhesion", NO_ACTUATOR),
     refused("dcmotor", NO_ACTUATOR),
@@ -389,7 +397,7 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 }
 
 /// Attributes that belong to one element and not to a class.
-const NOT_IN_CLASSES: &str = "name class target joint jointinparent geom1 geom2";
+const NOT_IN_CLASSES: &str = "name class target joint jointinparent tendon geom1 geom2";
 
 /// An element of a `<default>` class: an element of the model without what is its own.
 fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
@@ -399,8 +407,9 @@ fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
             checked(child, &section("default", "class", &[]), "")?;
             return child.children.iter().try_for_each(|inner| default(inner, child));
         }
-        // meshes and equality constraints are refused where they are used
-        "mesh" | "equality" => return Ok(()),
+        // meshes are refused where they are used
+        "mesh" => return Ok(()),
+        "equality" => return checked(child, &rule("equality", "active solref solimp", "", ""), ""),
         "tendon" => return checked(child, &TENDON[0], NOT_IN_CLASSES),
         _ => {}
     }

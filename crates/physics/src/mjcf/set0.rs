@@ -4,7 +4,8 @@
 //! the mass matrix falls into one dense block per kinematic tree.
 
 use super::math::*;
-use crate::model::{JointType, Model, Vec3};
+use super::tendon::moments;
+use crate::model::{JointType, Model, Tendon, Vec3};
 
 /// A tree with more degrees of freedom than this is refused: its dense mass matrix would not fit.
 const MAX_TREE_DOFS: usize = 4096;
@@ -69,13 +70,18 @@ pub(crate) struct MassMatrix {
 }
 
 impl MassMatrix {
-    /// `v inv(M) v'` for a vector that is zero except for `values` from the dof `first` on, all of one tree.
-    pub fn inverse_form(&self, first: usize, values: &[f64]) -> f64 {
-        let block = self.blocks.partition_point(|(start, ..)| *start <= first);
-        let Some((start, n, factor)) = block.checked_sub(1).map(|b| &self.blocks[b]) else { return 0.0 };
-        let mut rhs = vec![0.0; *n];
-        rhs[first - start..first - start + values.len()].copy_from_slice(values);
-        solve_lower(factor, *n, rhs).iter().map(|x| x * x).sum()
+    /// `v inv(M) v'` for a vector that is zero except for some dofs, given as `(dof, value)`.
+    pub fn inverse_form(&self, values: &[(usize, f64)]) -> f64 {
+        let within = |start: usize, n: usize| values.iter().filter(move |(dof, _)| (start..start + n).contains(dof));
+        let block = |(start, n, factor): &(usize, usize, Vec<f64>)| {
+            if within(*start, *n).next().is_none() {
+                return 0.0;
+            }
+            let mut rhs = vec![0.0; *n];
+            within(*start, *n).for_each(|(dof, value)| rhs[dof - start] += value);
+            solve_lower(factor, *n, rhs).iter().map(|x| x * x).sum()
+        };
+        self.blocks.iter().map(block).sum()
     }
 }
 
@@ -123,7 +129,12 @@ fn is_lone_slider(model: &Model, index: usize) -> bool {
     let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
+    let pulled = |j: &crate::model::Joint| {
+        let mut heavy = model.tendons.iter().filter(|t| t.armature != 0.0);
+        heavy.any(|t| moments(model, t).iter().any(|(dof, _)| *dof == j.dof_adr))
+    };
     !joints.is_empty()
+        && !joints.iter().any(pulled)
         && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, EPS) && aligned(j.axis))
         && small(&body.ipos, FRAME_EPS)
         && small(&body.iquat[1..], FRAME_EPS)
@@ -197,7 +208,27 @@ impl Tree {
             }
             mass[i * n + i] += model.dofs[self.first + i].armature;
         }
+        for tendon in model.tendons.iter().filter(|t| t.armature != 0.0) {
+            self.add_armature(model, tendon, &mut mass);
+        }
         mass
+    }
+
+    /// Adds the inertia of a tendon. As in MuJoCo it couples only dofs of which one is an ancestor of the other: the
+    /// mass matrix has no other entries.
+    fn add_armature(&self, model: &Model, tendon: &Tendon, mass: &mut [f64]) {
+        let n = self.motions.len();
+        let moments = moments(model, tendon);
+        let own = || moments.iter().filter(|(dof, _)| (self.first..self.first + n).contains(dof));
+        for (i, at_i) in own() {
+            let mut ancestor = Some(*i);
+            while let Some(j) = ancestor {
+                if let Some((_, at_j)) = own().find(|(dof, _)| *dof == j) {
+                    mass[(i - self.first) * n + j - self.first] += tendon.armature * at_i * at_j;
+                }
+                ancestor = model.dofs[j].parent;
+            }
+        }
     }
 
     /// Mean diagonals of `J inv(M) J'`, for each joint and for the center of mass of each body.

@@ -2,8 +2,9 @@
 
 use super::document::Element;
 use super::error::MjcfError;
+use super::joint::{SOLIMP, SOLREF};
 use super::value::{Attrs, Tristate};
-use crate::model::{Cone, Flags, Integrator, Options, Vec3};
+use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Vec3};
 
 /// One of the three Euler rotations.
 #[derive(Clone, Copy, Debug)]
@@ -26,12 +27,27 @@ pub(crate) struct Settings {
     pub settotalmass: f64,
     pub inertiafromgeom: Tristate,
     pub inertiagrouprange: [i32; 2],
+    /// Folder of height fields and meshes, relative to the model.
+    pub meshdir: String,
+    /// The medium has density or viscosity.
+    pub medium: bool,
+    /// Files are looked up by their last path component.
+    pub strippath: bool,
 }
 
 impl Settings {
     /// The angle in radians.
     pub fn angle(&self, given: f64) -> f64 {
         if self.degree { given * std::f64::consts::PI / 180.0 } else { given }
+    }
+
+    /// Path of a mesh or height field file, relative to the model.
+    pub fn asset_path(&self, file: &str) -> String {
+        let file = if self.strippath { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
+        if self.meshdir.is_empty() || file.starts_with('/') {
+            return file.to_owned();
+        }
+        format!("{}/{file}", self.meshdir.trim_end_matches(['/', '\\']))
     }
 
     /// Reads all `<compiler>` sections; of an attribute given several times the last counts.
@@ -46,6 +62,9 @@ impl Settings {
             settotalmass: -1.0,
             inertiafromgeom: Tristate::Auto,
             inertiagrouprange: [0, 5],
+            meshdir: String::new(),
+            medium: false,
+            strippath: false,
         };
         for element in sections(root, "compiler") {
             settings.section(element)?;
@@ -71,6 +90,13 @@ impl Settings {
         if let Some(range) = attrs.array::<2>("inertiagrouprange")? {
             self.inertiagrouprange = range.map(|x| x as i32);
         }
+        // meshdir takes precedence over assetdir
+        for name in ["assetdir", "meshdir"] {
+            if let Some(folder) = element.text(name) {
+                self.meshdir = folder.to_owned();
+            }
+        }
+        self.strippath = attrs.flag_or("strippath", self.strippath)?;
         if let Some(attr) = element.attr("eulerseq") {
             let turn = |c: char| {
                 let axis = "xyz".find(c.to_ascii_lowercase())?;
@@ -100,14 +126,20 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
     let mut opt = Options {
         timestep: 0.002,
         gravity: [0.0, 0.0, -9.81],
+        density: 0.0,
+        viscosity: 0.0,
+        wind: [0.0; 3],
+        magnetic: [0.0, -0.5, 0.0],
         integrator: Integrator::Euler,
         cone: Cone::Pyramidal,
         impratio: 1.0,
         iterations: 100,
         ls_iterations: 50,
         tolerance: 1e-8,
+        contact_override: None,
         flags: Flags {
             constraint: true,
+            equality: true,
             limit: true,
             contact: true,
             frictionloss: true,
@@ -122,13 +154,21 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
             filterparent: true,
         },
     };
+    // the parameters of the override are read whether it is on or not
+    let mut given =
+        ContactOverride { margin: 0.0, solref: SOLREF, solimp: SOLIMP, friction: [1.0, 1.0, 0.005, 0.0001, 0.0001] };
+    let mut replace = false;
     for element in sections(root, "option") {
-        option(element, &mut opt)?;
+        option(element, &mut opt, &mut given)?;
+        for flag in element.children.iter().filter(|e| e.name == "flag") {
+            replace = flags(flag, &mut opt.flags)?.unwrap_or(replace);
+        }
     }
+    opt.contact_override = replace.then_some(given);
     Ok(opt)
 }
 
-fn option(element: &Element, opt: &mut Options) -> Result<(), MjcfError> {
+fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> Result<(), MjcfError> {
     let attrs = Attrs::plain(element);
     let at_least_zero = |name: &str, value: f64| match element.attr(name) {
         Some(attr) if value < 0.0 => Err(element.bad_value(attr, "a number that is not negative")),
@@ -139,6 +179,14 @@ fn option(element: &Element, opt: &mut Options) -> Result<(), MjcfError> {
         return Err(element.bad_value(attr, "a number greater than zero"));
     }
     opt.gravity = attrs.array_or("gravity", opt.gravity)?;
+    opt.density = at_least_zero("density", attrs.number_or("density", opt.density)?)?;
+    opt.viscosity = at_least_zero("viscosity", attrs.number_or("viscosity", opt.viscosity)?)?;
+    opt.wind = attrs.array_or("wind", opt.wind)?;
+    opt.magnetic = attrs.array_or("magnetic", opt.magnetic)?;
+    given.margin = attrs.number_or("o_margin", given.margin)?;
+    given.solref = attrs.partial_or("o_solref", given.solref)?;
+    given.solimp = attrs.partial_or("o_solimp", given.solimp)?;
+    given.friction = attrs.partial_or("o_friction", given.friction)?;
     opt.impratio = attrs.number_or("impratio", opt.impratio)?;
     if let Some(attr) = element.attr("impratio").filter(|_| opt.impratio <= 0.0) {
         return Err(element.bad_value(attr, "a number greater than zero"));
@@ -170,17 +218,17 @@ fn option(element: &Element, opt: &mut Options) -> Result<(), MjcfError> {
     // every solver finds the same forces; only the spelling is checked
     attrs.keyword("solver", &[("PGS", ()), ("CG", ()), ("Newton", ())])?;
     attrs.keyword("jacobian", &[("dense", ()), ("sparse", ()), ("auto", ())])?;
-    for child in element.children.iter().filter(|e| e.name == "flag") {
-        flags(child, &mut opt.flags)?;
-    }
     Ok(())
 }
 
-fn flags(element: &Element, flags: &mut Flags) -> Result<(), MjcfError> {
+/// Reads `<flag>`; returns whether the contact override is on, if the element says so.
+fn flags(element: &Element, flags: &mut Flags) -> Result<Option<bool>, MjcfError> {
     let attrs = Attrs::plain(element);
+    let mut replace = None;
     for attr in &element.attrs {
         let slot = match attr.name.as_str() {
             "constraint" => Some(&mut flags.constraint),
+            "equality" => Some(&mut flags.equality),
             "limit" => Some(&mut flags.limit),
             "contact" => Some(&mut flags.contact),
             "frictionloss" => Some(&mut flags.frictionloss),
@@ -196,11 +244,14 @@ fn flags(element: &Element, flags: &mut Flags) -> Result<(), MjcfError> {
             _ => None,
         };
         let value = attrs.keyword(&attr.name, &[("disable", false), ("enable", true)])?;
+        if attr.name == "override" {
+            replace = value;
+        }
         if let (Some(slot), Some(value)) = (slot, value) {
             *slot = value;
         }
     }
-    Ok(())
+    Ok(replace)
 }
 
 /// `<statistic>`: only what the file gives.

@@ -18,7 +18,7 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
     for site in &model.sites {
         bounds.include(pose.body[site.body].point(site.pos), 0.0);
     }
-    let radii: Vec<f64> = model.geoms.iter().map(bounding_radius).collect();
+    let radii: Vec<f64> = model.geoms.iter().map(|g| bounding_radius(model, g)).collect();
     for (geom, &radius) in model.geoms.iter().zip(&radii) {
         // a plane counts with a tenth of the size that is drawn, an infinite one with a centimeter
         let drawn = geom.size[0].max(geom.size[1]);
@@ -69,8 +69,8 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
     stat.center = given.center.unwrap_or(stat.center);
 }
 
-/// Radius of the sphere about a geom's center that contains it; 0 for a plane.
-fn bounding_radius(geom: &Geom) -> f64 {
+/// Radius of the sphere about a geom's center that contains it; 0 for a plane, and for a mesh, whose size is not known.
+fn bounding_radius(model: &Model, geom: &Geom) -> f64 {
     let [a, b, c] = geom.size;
     match geom.kind {
         GeomType::Sphere => a,
@@ -78,7 +78,11 @@ fn bounding_radius(geom: &Geom) -> f64 {
         GeomType::Cylinder => (a * a + b * b).sqrt(),
         GeomType::Ellipsoid => a.max(b).max(c),
         GeomType::Box => norm(geom.size),
-        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => 0.0,
+        GeomType::Hfield => geom.hfield.map_or(0.0, |h| {
+            let [x, y, top, base] = model.hfields[h].size;
+            norm([x, y, top.max(base)])
+        }),
+        GeomType::Plane | GeomType::Mesh => 0.0,
     }
 }
 

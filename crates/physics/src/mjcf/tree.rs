@@ -1,5 +1,6 @@
 //! `<worldbody>`: the tree of bodies, read depth first.
 
+use super::asset::Assets;
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
@@ -17,6 +18,7 @@ pub(crate) struct BodySpec<'a> {
     pub parent: usize,
     pub frame: Frame,
     pub mocap: bool,
+    pub gravcomp: f64,
     /// `simple="auto"`: inverse weights may be those of a lone sliding body, see [`super::set0`].
     pub simple: bool,
     /// `<inertial>`, in the body's frame.
@@ -78,8 +80,9 @@ pub(crate) fn read<'a>(
     root: &'a Element,
     defaults: &'a Defaults<'a>,
     settings: &Settings,
+    assets: &Assets,
 ) -> Result<Vec<BodySpec<'a>>, MjcfError> {
-    let mut reader = Reader { defaults, settings, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY)] };
+    let mut reader = Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY)] };
     for section in sections(root, "worldbody") {
         if let Some(attr) = section.attrs.first() {
             return Err(section.invalid(format!("the world has no attributes, but there is '{}'", attr.name)));
@@ -96,6 +99,7 @@ impl<'a> BodySpec<'a> {
             parent,
             frame,
             mocap: false,
+            gravcomp: 0.0,
             simple: true,
             inertial: None,
             joints: Vec::new(),
@@ -114,6 +118,7 @@ impl<'a> BodySpec<'a> {
 struct Reader<'a, 's> {
     defaults: &'a Defaults<'a>,
     settings: &'s Settings,
+    assets: &'s Assets<'s>,
     bodies: Vec<BodySpec<'a>>,
 }
 
@@ -145,7 +150,7 @@ impl<'a> Reader<'a, '_> {
                 }
                 "freejoint" => self.joint(JointSpec::free(element)?, body)?,
                 "geom" => {
-                    let geom = GeomSpec::read(&attrs()?, frame, self.settings)?;
+                    let geom = GeomSpec::read(&attrs()?, frame, self.settings, self.assets)?;
                     self.bodies[body].geoms.push(geom);
                 }
                 "site" => {
@@ -183,6 +188,7 @@ impl<'a> Reader<'a, '_> {
         let attrs = Attrs::plain(element);
         let class = self.defaults.named(element, "childclass")?.or(childclass);
         let mut body = BodySpec::new(element, parent, frame.compose(&self.frame(&attrs)?));
+        body.gravcomp = attrs.number_or("gravcomp", 0.0)?;
         body.mocap = attrs.flag_or("mocap", false)?;
         body.simple = attrs.keyword("simple", &[("false", false), ("auto", true)])?.unwrap_or(true);
         let index = self.bodies.len();
@@ -263,7 +269,7 @@ impl<'a> Reader<'a, '_> {
 
 impl SiteSpec<'_> {
     pub fn read<'a>(attrs: &Attrs<'a>, frame: &Frame, settings: &Settings) -> Result<SiteSpec<'a>, MjcfError> {
-        let shape = ShapeSpec::read(attrs, frame, settings, [0.005; 3])?;
+        let shape = ShapeSpec::read(attrs, frame, settings, [0.005; 3], None)?;
         Ok(SiteSpec { element: attrs.element, shape, material: attrs.text("material") })
     }
 }

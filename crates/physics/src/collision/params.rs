@@ -1,0 +1,112 @@
+//! Which geoms collide, and with which parameters.
+
+use crate::model::{Geom, Model, Pair};
+use crate::rigid::BodyMount;
+
+/// Smallest friction coefficient (MuJoCo's `mjMINMU`).
+const LEAST_FRICTION: f64 = 1e-5;
+
+/// Parameters of a contact between two geoms.
+pub(super) struct ContactParams {
+    pub condim: usize,
+    /// Two sliding, one torsional, two rolling coefficients.
+    pub friction: [f64; 5],
+    pub solref: [f64; 2],
+    pub solimp: [f64; 5],
+    /// Distance below which the constraint acts. (A gap only makes MuJoCo report contacts beyond it, without force.)
+    pub margin: f64,
+}
+
+impl ContactParams {
+    /// Parameters of the contacts of geoms `i` and `j`, or `None` if they never collide.
+    pub fn of(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> Option<Self> {
+        let declared = model.pairs.iter().find(|p| p.geoms == [i, j] || p.geoms == [j, i]);
+        let mut params = match declared {
+            Some(pair) => ContactParams::declared(pair),
+            None if may_collide(model, mounts, i, j) => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
+            None => return None,
+        };
+        if let Some(all) = &model.opt.contact_override {
+            params.margin = all.margin;
+            params.solref = all.solref;
+            params.solimp = all.solimp;
+            params.friction = all.friction;
+        }
+        params.friction = params.friction.map(|f| f.max(LEAST_FRICTION));
+        Some(params)
+    }
+
+    /// MuJoCo's combination rule: the geom of higher priority decides, equals are mixed.
+    fn combine(a: &Geom, b: &Geom) -> Self {
+        let margin = a.margin + b.margin;
+        if a.priority != b.priority {
+            let g = if a.priority > b.priority { a } else { b };
+            let friction = spread(&g.friction);
+            return ContactParams { condim: g.condim, friction, solref: g.solref, solimp: g.solimp, margin };
+        }
+        const TINY: f64 = 1e-15;
+        let mix = match (a.solmix >= TINY, b.solmix >= TINY) {
+            (true, true) => a.solmix / (a.solmix + b.solmix),
+            (false, false) => 0.5,
+            (true, false) => 1.0,
+            (false, true) => 0.0,
+        };
+        let blend = |x: f64, y: f64| mix * x + (1.0 - mix) * y;
+        let standard = a.solref[0] > 0.0 && b.solref[0] > 0.0;
+        let mut solref = [0.0; 2];
+        for i in 0..2 {
+            let (x, y) = (a.solref[i], b.solref[i]);
+            solref[i] = if standard { blend(x, y) } else { x.min(y) };
+        }
+        let mut solimp = [0.0; 5];
+        for i in 0..5 {
+            solimp[i] = blend(a.solimp[i], b.solimp[i]);
+        }
+        let mut friction = [0.0; 3];
+        for i in 0..3 {
+            friction[i] = a.friction[i].max(b.friction[i]);
+        }
+        ContactParams { condim: a.condim.max(b.condim), friction: spread(&friction), solref, solimp, margin }
+    }
+
+    fn declared(pair: &Pair) -> Self {
+        ContactParams {
+            condim: pair.condim,
+            friction: pair.friction,
+            solref: pair.solref,
+            solimp: pair.solimp,
+            margin: pair.margin,
+        }
+    }
+}
+
+/// A geom's sliding, torsional and rolling friction as a contact's five coefficients.
+fn spread(f: &[f64; 3]) -> [f64; 5] {
+    [f[0], f[0], f[1], f[2], f[2]]
+}
+
+/// MuJoCo's filters: masks, same body, parent and child, excluded bodies.
+fn may_collide(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> bool {
+    let (a, b) = (&model.geoms[i], &model.geoms[j]);
+    if a.contype & b.conaffinity == 0 && b.contype & a.conaffinity == 0 {
+        return false;
+    }
+    let (wa, wb) = (mounts[a.body].body, mounts[b.body].body);
+    if wa == wb {
+        return false;
+    }
+    let parent = |w: usize| mounts[model.bodies[w].parent].body;
+    if model.opt.flags.filterparent && wa != 0 && wb != 0 && (parent(wa) == wb || parent(wb) == wa) {
+        return false;
+    }
+    let pair = [a.body.min(b.body), a.body.max(b.body)];
+    !model.excludes.contains(&pair)
+}
+
+/// "'name'", or the number of a nameless geom.
+pub(super) fn label(model: &Model, geom: usize) -> String {
+    match model.geoms[geom].name.as_str() {
+        "" => format!("#{geom} of body '{}'", model.bodies[model.geoms[geom].body].name),
+        name => format!("'{name}'"),
+    }
+}

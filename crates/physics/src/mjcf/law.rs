@@ -1,0 +1,299 @@
+//! What an actuator makes of its control: gain, bias and activation, put together from classes and shortcuts.
+
+use super::document::Element;
+use super::error::MjcfError;
+use super::value::{Attrs, Tristate};
+use crate::model::Dynamics;
+use std::f64::consts::PI;
+
+/// Kind of activation dynamics; the time constant is kept apart, as in MuJoCo.
+#[derive(Clone, Copy, PartialEq)]
+enum Activation {
+    None,
+    Integrator,
+    Filter,
+    FilterExact,
+}
+
+/// Gain, bias and activation as the elements of a class and the actuator itself set them, one after the other.
+#[derive(Clone, Copy)]
+pub(crate) struct Law<'a> {
+    /// Element that set the law last.
+    element: &'a str,
+    pub gain: [f64; 3],
+    gain_affine: bool,
+    pub bias: [f64; 3],
+    bias_affine: bool,
+    activation: Activation,
+    time_constant: f64,
+    /// Part of the range of the joint or tendon that a position servo takes over; 0: none.
+    pub inherited_range: f64,
+}
+
+impl<'a> Law<'a> {
+    const GENERAL: Law<'static> = Law {
+        element: "general",
+        gain: [1.0, 0.0, 0.0],
+        gain_affine: false,
+        bias: [0.0; 3],
+        bias_affine: false,
+        activation: Activation::None,
+        time_constant: 1.0,
+        inherited_range: 0.0,
+    };
+
+    /// The law of an actuator: the classes' elements in order, then its own.
+    ///
+    /// `ends` counts the elements up to the end of each class, outermost first.
+    pub fn compile(attrs: &Attrs<'a>, ends: &[usize]) -> Result<Self, MjcfError> {
+        let mut law: Law = Law::GENERAL;
+        let mut enclosing: Vec<Law> = Vec::new();
+        for (i, element) in attrs.chain().enumerate() {
+            // the element's own class, the last one, stays open for it
+            while enclosing.len() + 1 < ends.len() && ends[enclosing.len()] <= i {
+                enclosing.push(law);
+            }
+            law.apply(element, &enclosing)?;
+        }
+        // without its type an affine law has no effect, so it is not stored
+        if !law.gain_affine {
+            law.gain = [law.gain[0], 0.0, 0.0];
+        }
+        if !law.bias_affine {
+            law.bias = [0.0; 3];
+        }
+        Ok(law)
+    }
+
+    /// How the activation follows the control.
+    pub fn dynamics(&self) -> Dynamics {
+        let time_constant = self.time_constant;
+        match self.activation {
+            Activation::None => Dynamics::None,
+            Activation::Integrator => Dynamics::Integrator,
+            Activation::Filter => Dynamics::Filter { time_constant },
+            Activation::FilterExact => Dynamics::FilterExact { time_constant },
+        }
+    }
+
+    /// Whether this is a servo that drives the length to its input, which may inherit a range.
+    pub fn is_position_servo(&self) -> bool {
+        !self.gain_affine && self.bias_affine && self.gain[0] == -self.bias[1]
+    }
+
+    /// Whether a shortcut element can take its parameters from this law.
+    fn serves(&self, shortcut: &str) -> bool {
+        self.element == shortcut || (self.element == "general" && !self.gain_affine)
+    }
+
+    /// Applies one element. What a shortcut does not set it takes from the law so far, else from the nearest enclosing
+    /// class with a law of its own kind or a general one.
+    fn apply(&mut self, element: &'a Element, enclosing: &[Law<'a>]) -> Result<(), MjcfError> {
+        let attrs = Attrs::plain(element);
+        let name = element.name.as_str();
+        if name == "general" {
+            self.general(element, &attrs)?;
+            return self.inherit(element, &attrs);
+        }
+        if !self.serves(name) {
+            *self = enclosing.iter().rev().find(|law| law.serves(name)).copied().unwrap_or(Law::GENERAL);
+        }
+        // of the activation of a general actuator a shortcut keeps only what it could have set itself
+        let known = name == "cylinder" || (name == "position" && self.activation == Activation::FilterExact);
+        if self.element != name && !known {
+            (self.activation, self.time_constant) = (Activation::None, Law::GENERAL.time_constant);
+        }
+        let kept = self.gain[0];
+        match name {
+            "position" | "intvelocity" => self.servo(element, &attrs)?,
+            "velocity" => {
+                let kv = attrs.number_or("kv", kept)?;
+                (self.gain, self.bias) = ([kv, 0.0, 0.0], [0.0, 0.0, -kv]);
+                self.activation = Activation::None;
+            }
+            "damper" => {
+                let kept = if self.gain_affine { -self.gain[2] } else { 0.0 };
+                let kv = attrs.number_or("kv", kept)?;
+                if kv < 0.0 {
+                    return Err(element.invalid("kv must not be negative"));
+                }
+                (self.gain, self.bias) = ([0.0, 0.0, -kv], [0.0; 3]);
+                self.activation = Activation::None;
+            }
+            "cylinder" => {
+                let area = attrs.number_or("area", kept)?;
+                let area =
+                    attrs.array::<1>("diameter")?.map_or(area, |[d]| if d >= 0.0 { PI / 4.0 * d * d } else { area });
+                (self.gain, self.bias) = ([area, 0.0, 0.0], attrs.array_or("bias", self.bias)?);
+                self.time_constant = attrs.number_or("timeconst", self.time_constant)?;
+                self.activation = Activation::Filter;
+            }
+            _ => *self = Law::GENERAL,
+        }
+        (self.element, self.gain_affine, self.bias_affine) =
+            (name, name == "damper", !matches!(name, "motor" | "damper"));
+        Ok(())
+    }
+
+    /// `<position>` and `<intvelocity>`: a servo on the length, and the same driven by the integral of the control.
+    fn servo(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
+        let kp = attrs.number_or("kp", self.gain[0])?;
+        let kv: Option<[f64; 1]> = attrs.array("kv")?;
+        let ratio: Option<[f64; 1]> = attrs.array("dampratio")?;
+        let damping = match (kv, ratio) {
+            (Some(_), Some(_)) => return Err(element.invalid("there are both 'kv' and 'dampratio'")),
+            (Some([kv]), None) if kv < 0.0 => return Err(element.invalid("kv must not be negative")),
+            (None, Some([r])) if r < 0.0 => return Err(element.invalid("dampratio must not be negative")),
+            (Some([kv]), None) => -kv,
+            // a positive number marks a damping ratio, which the inertia turns into damping later
+            (None, Some([ratio])) => ratio,
+            (None, None) => self.bias[2],
+        };
+        (self.gain, self.bias) = ([kp, 0.0, 0.0], [0.0, -kp, damping]);
+        if let Some([time]) = attrs.array("timeconst")? {
+            if time < 0.0 {
+                return Err(element.invalid("timeconst must not be negative"));
+            }
+            self.time_constant = time;
+            self.activation = if time == 0.0 { Activation::None } else { Activation::FilterExact };
+        }
+        if element.name == "intvelocity" {
+            self.activation = Activation::Integrator;
+        }
+        self.inherit(element, attrs)
+    }
+
+    /// `inheritrange`, unless a range of its own comes later: that of the control, or of the integrated activation.
+    fn inherit(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
+        let own = if self.activation == Activation::Integrator { "actrange" } else { "ctrlrange" };
+        let part = attrs.array::<1>("inheritrange")?.map_or(0.0, |p| p[0]);
+        if part < 0.0 {
+            return Err(element.invalid("inheritrange must not be negative"));
+        }
+        match (part > 0.0, element.attr(own).is_some()) {
+            (true, true) if element.name != "general" => {
+                return Err(element.invalid(format!("there are both '{own}' and 'inheritrange'")));
+            }
+            (true, _) => self.inherited_range = part,
+            (false, true) => self.inherited_range = 0.0,
+            (false, false) => {}
+        }
+        Ok(())
+    }
+
+    /// `<general>` changes what it gives and keeps the rest.
+    fn general(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
+        self.element = "general";
+        for (name, values) in [("gainprm", &mut self.gain), ("biasprm", &mut self.bias)] {
+            let mut all = [0.0; 10];
+            all[..3].copy_from_slice(values);
+            attrs.overlay(name, 0, &mut all)?;
+            if all[3..].iter().any(|x| *x != 0.0) {
+                return Err(element.unsupported(Some(name), "only the first three numbers are supported"));
+            }
+            values.copy_from_slice(&all[..3]);
+        }
+        let mut dynamics = [0.0; 10];
+        dynamics[0] = self.time_constant;
+        attrs.overlay("dynprm", 0, &mut dynamics)?;
+        self.time_constant = dynamics[0];
+        let gains = [
+            ("fixed", Some(false)),
+            ("affine", Some(true)),
+            ("muscle", None),
+            ("dcmotor", None),
+            ("so3", None),
+            ("pid", None),
+            ("user", None),
+        ];
+        let biases = [
+            ("none", Some(false)),
+            ("affine", Some(true)),
+            ("muscle", None),
+            ("dcmotor", None),
+            ("so3", None),
+            ("user", None),
+        ];
+        let activations = [
+            ("none", Some(Activation::None)),
+            ("integrator", Some(Activation::Integrator)),
+            ("filter", Some(Activation::Filter)),
+            ("filterexact", Some(Activation::FilterExact)),
+            ("muscle", None),
+            ("dcmotor", None),
+            ("pid", None),
+            ("user", None),
+        ];
+        let refuse = |name: &str, reason: &str| Err(element.unsupported(Some(name), reason));
+        let affine = "only constant and affine laws are supported";
+        match attrs.keyword("gaintype", &gains)? {
+            Some(None) => return refuse("gaintype", affine),
+            given => self.gain_affine = given.flatten().unwrap_or(self.gain_affine),
+        }
+        match attrs.keyword("biastype", &biases)? {
+            Some(None) => return refuse("biastype", affine),
+            given => self.bias_affine = given.flatten().unwrap_or(self.bias_affine),
+        }
+        match attrs.keyword("dyntype", &activations)? {
+            Some(None) => return refuse("dyntype", "only none, integrator, filter and filterexact are supported"),
+            given => self.activation = given.flatten().unwrap_or(self.activation),
+        }
+        Ok(())
+    }
+}
+
+/// Limits of control and activation, and switches that shortcuts set whatever came before them.
+pub(crate) struct Limits {
+    /// Whether the control is limited.
+    pub ctrl_limited: Tristate,
+    /// `ctrlrange`.
+    pub ctrl_range: [f64; 2],
+    /// Whether the activation is limited.
+    pub act_limited: Tristate,
+    /// `actrange`.
+    pub act_range: [f64; 2],
+    /// `actearly`.
+    pub act_early: bool,
+}
+
+impl Limits {
+    /// Follows the classes' elements in order, then the actuator's own.
+    pub fn read(attrs: &Attrs) -> Result<Self, MjcfError> {
+        let mut all = Limits {
+            ctrl_limited: Tristate::Auto,
+            ctrl_range: [0.0; 2],
+            act_limited: Tristate::Auto,
+            act_range: [0.0; 2],
+            act_early: false,
+        };
+        attrs.chain().try_for_each(|element| all.apply(element))?;
+        Ok(all)
+    }
+
+    fn apply(&mut self, element: &Element) -> Result<(), MjcfError> {
+        let own = Attrs::plain(element);
+        for (name, switch) in [("ctrllimited", &mut self.ctrl_limited), ("actlimited", &mut self.act_limited)] {
+            if element.attr(name).is_some() {
+                *switch = own.tristate(name)?;
+            }
+        }
+        self.ctrl_range = own.array_or("ctrlrange", self.ctrl_range)?;
+        self.act_range = own.array_or("actrange", self.act_range)?;
+        self.act_early = own.flag_or("actearly", self.act_early)?;
+        if element.name != "general" {
+            (self.act_limited, self.act_early) = (Tristate::Auto, false);
+        }
+        // a range that is to be inherited replaces the one so far
+        let inherits = own.number_or("inheritrange", 0.0)? > 0.0;
+        match element.name.as_str() {
+            "position" if inherits => self.ctrl_range = [0.0; 2],
+            "intvelocity" if inherits => self.act_range = [0.0; 2],
+            "damper" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
+                return Err(element.invalid("the control range of a damper must not be negative"));
+            }
+            "damper" => self.ctrl_limited = Tristate::True,
+            _ => {}
+        }
+        Ok(())
+    }
+}

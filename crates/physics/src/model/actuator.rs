@@ -1,0 +1,78 @@
+//! Actuators.
+
+use serde::{Deserialize, Serialize};
+
+/// What an actuator's force acts on (MuJoCo `actuator_trntype`, `actuator_trnid`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Transmission {
+    /// A joint, by index. The torque on a ball joint and the wrench on a free joint are given in the body's frame.
+    Joint(usize),
+    /// A ball or free joint whose torque is given in the parent body's frame; on other joints the same as `Joint`.
+    JointInParent(usize),
+    /// A tendon, by index.
+    Tendon(usize),
+}
+
+/// How an actuator's activation follows its control (MuJoCo `actuator_dyntype`, `actuator_dynprm`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Dynamics {
+    /// No activation: the control itself is the input of the force.
+    None,
+    /// `act' = ctrl`.
+    Integrator,
+    /// `act' = (ctrl - act) / time_constant`, Euler steps.
+    Filter {
+        /// Seconds.
+        time_constant: f64,
+    },
+    /// The same, integrated exactly over a step.
+    FilterExact {
+        /// Seconds.
+        time_constant: f64,
+    },
+}
+
+/// An actuator: `force = gain * input + bias`, where the input is the control or, with [`Dynamics`], the activation;
+/// the transmission receives `gear * force`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Actuator {
+    /// Name; empty when the file gives none.
+    pub name: String,
+    /// What it acts on.
+    pub transmission: Transmission,
+    /// Transmission ratio per degree of freedom of the joint; a tendon has the first only.
+    pub gear: [f64; 6],
+    /// Whether `ctrl` is clamped to `ctrl_range`.
+    pub ctrl_limited: bool,
+    /// Range of the control signal.
+    pub ctrl_range: [f64; 2],
+    /// Whether the force is clamped to `force_range`.
+    pub force_limited: bool,
+    /// Range of the scalar force.
+    pub force_range: [f64; 2],
+    /// Gain: `gain[0] + gain[1] * length + gain[2] * velocity` (fixed gain: the last two are 0). Length and velocity
+    /// are those of the transmission, times the gear.
+    pub gain: [f64; 3],
+    /// Bias: `bias[0] + bias[1] * length + bias[2] * velocity`; all 0 for a motor.
+    pub bias: [f64; 3],
+    /// How the activation follows the control.
+    pub dynamics: Dynamics,
+    /// Index of the activation in `act`, if the actuator has one (MuJoCo `actuator_actadr`).
+    pub act: Option<usize>,
+    /// Whether the activation is clamped to `act_range`.
+    pub act_limited: bool,
+    /// Range of the activation.
+    pub act_range: [f64; 2],
+    /// The force follows the activation at the end of the step, not that at its start (`actearly`).
+    pub act_early: bool,
+}
+
+impl Actuator {
+    /// Joint that the actuator acts on, in either frame; `None` when it acts on something else.
+    pub fn joint(&self) -> Option<usize> {
+        match self.transmission {
+            Transmission::Joint(joint) | Transmission::JointInParent(joint) => Some(joint),
+            Transmission::Tendon(_) => None,
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! What couples degrees of freedom: tendons and equality constraints.
+
+use super::{Quat, SolImp, SolRef, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// What a tendon runs over.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TendonKind {
+    /// `length = sum(coef * qpos)` over hinge and slide joints, as `(joint, coef)`. A joint occurs once.
+    Fixed(Vec<(usize, f64)>),
+    /// A string through sites and around geoms. Only such as exert no force pass the loader; their `length0`,
+    /// `spring_length` and `invweight0` are 0, not MuJoCo's.
+    Spatial,
+}
+
+/// A tendon (MuJoCo `tendon_*`). Its length is in the units of the joints (m, rad or a mix) times the coefficients.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tendon {
+    /// Name; empty when the file gives none.
+    pub name: String,
+    /// What it runs over.
+    pub kind: TendonKind,
+    /// Whether `range` is enforced.
+    pub limited: bool,
+    /// Limits of the length.
+    pub range: [f64; 2],
+    /// Distance from the limit at which the constraint becomes active.
+    pub margin: f64,
+    /// Spring stiffness per unit of length.
+    pub stiffness: f64,
+    /// Higher orders of the stiffness, see [`Joint::stiffness_poly`](super::Joint::stiffness_poly).
+    pub stiffness_poly: [f64; 2],
+    /// The spring is slack between these lengths and pulls towards them from outside (MuJoCo `tendon_lengthspring`).
+    pub spring_length: [f64; 2],
+    /// Viscous damping per unit of velocity, that of actuators included.
+    pub damping: f64,
+    /// Higher orders of the damping, see [`Dof::damping_poly`](super::Dof::damping_poly).
+    pub damping_poly: [f64; 2],
+    /// Dry friction.
+    pub frictionloss: f64,
+    /// Inertia of the tendon's velocity, that of actuators included: adds `armature * J' J` to the mass matrix, but only
+    /// where one of the two dofs is the other or its ancestor; MuJoCo's matrix has no other entries.
+    pub armature: f64,
+    /// `solreflimit`.
+    pub solref_limit: SolRef,
+    /// `solimplimit`.
+    pub solimp_limit: SolImp,
+    /// `solreffriction`.
+    pub solref_friction: SolRef,
+    /// `solimpfriction`.
+    pub solimp_friction: SolImp,
+    /// Limits of the total actuator force on this tendon (`actuatorfrcrange`), if any.
+    pub actuator_force_range: Option<[f64; 2]>,
+    /// Length in the reference configuration.
+    pub length0: f64,
+    /// Inverse inertia seen by the tendon in the reference configuration, `J inv(M) J'`.
+    pub invweight0: f64,
+    /// User group, for viewers.
+    pub group: i32,
+}
+
+/// What an equality constraint keeps equal (MuJoCo `eq_type`, `eq_data`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum EqualityKind {
+    /// A point of one body stays on a point of another: 3 rows, world axes.
+    Connect {
+        /// The two bodies; 0 is the world.
+        bodies: [usize; 2],
+        /// The two sites, if the constraint was given with sites; their places are in `anchors`.
+        sites: Option<[usize; 2]>,
+        /// The point in the first body's frame and in the second's.
+        anchors: [Vec3; 2],
+    },
+    /// A frame of one body stays on a frame of another: 3 rows for the position as in `Connect`, then 3 for the
+    /// orientation, `torquescale` times the vector part of `conj(q[1]) * q[0]` where `q[i]` is the orientation of
+    /// `bodies[i]` times `quats[i]`.
+    Weld {
+        /// The two bodies; 0 is the world.
+        bodies: [usize; 2],
+        /// The two sites, if the constraint was given with sites; their places are in `anchors` and `quats`.
+        sites: Option<[usize; 2]>,
+        /// The point in the first body's frame and in the second's.
+        anchors: [Vec3; 2],
+        /// The orientation in the first body's frame and in the second's. With bodies the first is the relative
+        /// orientation `relpose` and the second the identity.
+        quats: [Quat; 2],
+        /// Ratio of angular to linear error, m.
+        torquescale: f64,
+    },
+    /// `q1 - q1_0 = p(q2 - q2_0)`, where `_0` marks the reference configuration and `p` is the polynomial; without a
+    /// second joint `q1 - q1_0 = polycoef[0]`. Hinge and slide joints only.
+    Joint {
+        /// The joint that follows.
+        joint1: usize,
+        /// The joint that leads, if any.
+        joint2: Option<usize>,
+        /// Coefficients of the quartic, constant first.
+        polycoef: [f64; 5],
+    },
+    /// The same for the lengths of tendons, measured from `length0`.
+    Tendon {
+        /// The tendon that follows.
+        tendon1: usize,
+        /// The tendon that leads, if any.
+        tendon2: Option<usize>,
+        /// Coefficients of the quartic, constant first.
+        polycoef: [f64; 5],
+    },
+}
+
+/// An equality constraint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Equality {
+    /// Name; empty when the file gives none.
+    pub name: String,
+    /// What it keeps equal.
+    pub kind: EqualityKind,
+    /// Whether it holds from the start (MuJoCo `eq_active0`).
+    pub active: bool,
+    /// Solver reference.
+    pub solref: SolRef,
+    /// Solver impedance.
+    pub solimp: SolImp,
+}

@@ -1,0 +1,220 @@
+//! Narrow phase: where two shapes touch.
+//!
+//! Every function takes two shapes in the order of MuJoCo's shape types (plane, height field, sphere, capsule,
+//! ellipsoid, cylinder, box) and finds MuJoCo's contacts between them: the same features, the same number, and the same
+//! frames. Positions are relative to some point near the shapes that the caller chooses, which keeps single precision
+//! accurate far from the world's origin. Pairs without a function here are those that only iteration can find.
+//!
+//! Pairs whose contacts have fixed places ([`round`], [`plane`], and spheres on boxes) work on all lanes at once. The
+//! others ([`capsule_box`], [`box_box`], [`height`]) choose among many features, so they are written for one agent at a
+//! time, with branches, and fill a [`Touches`].
+
+pub(crate) mod box_box;
+pub(crate) mod capsule_box;
+pub(crate) mod height;
+pub(crate) mod plane;
+mod prism;
+mod prism_box;
+pub(crate) mod round;
+#[cfg(test)]
+mod tests;
+
+use crate::lanes::Real;
+use crate::model::GeomType;
+use crate::spatial::*;
+
+/// Length below which MuJoCo takes a vector for zero.
+const TINY: f64 = 1e-15;
+
+/// A contact, or in some lanes none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Touch<T: Real> {
+    /// Lanes in contact: those where `dist` is below the margin. The other fields mean nothing in other lanes.
+    pub on: T::Mask,
+    /// Distance of the surfaces, negative if they overlap.
+    pub dist: T,
+    /// Midway between the surfaces.
+    pub pos: V3<T>,
+    /// Unit vector from the first shape to the second.
+    pub normal: V3<T>,
+    /// First tangent, a unit vector; the second is `normal x tangent`.
+    pub tangent: V3<T>,
+}
+
+impl<T: Real> Touch<T> {
+    /// No contact in any lane.
+    #[inline(always)]
+    pub(crate) fn none() -> Self {
+        let (zero, one) = (T::zero(), T::lit(1.0));
+        Touch { on: T::none(), dist: zero, pos: [zero; 3], normal: [one, zero, zero], tangent: [zero, one, zero] }
+    }
+
+    /// A contact at `pos`, in lanes where `dist < margin`, with MuJoCo's tangent.
+    #[inline(always)]
+    fn new(dist: T, pos: V3<T>, normal: V3<T>, margin: T) -> Self {
+        let on = dist.lt(margin);
+        let tangent = if T::any(on) { first_tangent(&normal) } else { normal };
+        Touch { on, dist, pos, normal, tangent }
+    }
+}
+
+/// Contacts of one pair of shapes of one agent.
+#[derive(Clone, Debug)]
+pub(crate) struct Touches<S: Real> {
+    items: [Touch<S>; Touches::<f64>::CAPACITY],
+    len: usize,
+}
+
+impl<S: Real> Touches<S> {
+    /// MuJoCo's limit per pair; further contacts are left out.
+    pub(crate) const CAPACITY: usize = 50;
+
+    pub(crate) fn new() -> Self {
+        Touches { items: [Touch::none(); Touches::<f64>::CAPACITY], len: 0 }
+    }
+    pub(crate) fn as_slice(&self) -> &[Touch<S>] {
+        &self.items[..self.len]
+    }
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+    /// Whether there is no room left.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.len == self.items.len()
+    }
+    /// Adds a contact if it is one and there is room.
+    #[inline(always)]
+    fn push(&mut self, touch: Touch<S>) {
+        if S::any(touch.on) && !self.is_full() {
+            self.items[self.len] = touch;
+            self.len += 1;
+        }
+    }
+}
+
+/// A half-space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane<T: Real> {
+    /// Any point of the surface.
+    pub point: V3<T>,
+    /// Unit vector out of the solid half.
+    pub normal: V3<T>,
+}
+
+/// A ball.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sphere<T: Real> {
+    pub center: V3<T>,
+    pub radius: T,
+}
+
+/// The points within `radius` of a segment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Capsule<T: Real> {
+    pub center: V3<T>,
+    /// Unit vector along the segment.
+    pub axis: V3<T>,
+    pub radius: T,
+    /// Half the length of the segment.
+    pub half: T,
+}
+
+/// A solid cylinder.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cylinder<T: Real> {
+    pub center: V3<T>,
+    /// The third is the axis of symmetry; the others matter where the axis is parallel to a plane's normal.
+    pub axes: Rot<T>,
+    pub radius: T,
+    /// Half the length.
+    pub half: T,
+}
+
+/// A solid box or ellipsoid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block<T: Real> {
+    pub center: V3<T>,
+    pub axes: Rot<T>,
+    /// Half the extent along each axis.
+    pub half: V3<T>,
+}
+
+/// Radius of the smallest ball about a shape's center that contains it, from its sizes in MJCF's order; infinite for
+/// planes and height fields.
+pub(crate) fn bounding_radius(kind: GeomType, size: &[f64; 3]) -> f64 {
+    let [x, y, z] = *size;
+    match kind {
+        GeomType::Sphere => x,
+        GeomType::Capsule => x + y,
+        GeomType::Ellipsoid => x.max(y).max(z),
+        GeomType::Cylinder => (x * x + y * y).sqrt(),
+        GeomType::Box => (x * x + y * y + z * z).sqrt(),
+        _ => f64::INFINITY,
+    }
+}
+
+/// Lanes where balls about `a` and `b` come closer than `reach`, the sum of their radii and the margin.
+#[inline(always)]
+pub(crate) fn near<T: Real>(a: &V3<T>, b: &V3<T>, reach: T) -> T::Mask {
+    let d = sub3(a, b);
+    dot(&d, &d).lt(reach * reach)
+}
+
+/// MuJoCo's first tangent for a unit normal: the y axis made perpendicular to it, or the z axis if y is too close.
+#[inline(always)]
+pub(crate) fn first_tangent<T: Real>(n: &V3<T>) -> V3<T> {
+    let from_y = n[1].abs().lt(T::lit(0.5));
+    // the part of the seed perpendicular to n has length s and component s^2 along the seed
+    let s2 = {
+        let other = T::select(from_y, n[2], n[1]);
+        n[0].mul_add(n[0], other * other)
+    };
+    let inv = s2.sqrt().recip();
+    let k = -(T::select(from_y, n[1], n[2]) * inv);
+    let along = s2 * inv;
+    [n[0] * k, T::select(from_y, along, n[1] * k), T::select(from_y, n[2] * k, along)]
+}
+
+/// `a` where the mask is set, else `b`.
+#[inline(always)]
+fn select3<T: Real>(mask: T::Mask, a: &V3<T>, b: &V3<T>) -> V3<T> {
+    [T::select(mask, a[0], b[0]), T::select(mask, a[1], b[1]), T::select(mask, a[2], b[2])]
+}
+
+/// `a s + c`.
+#[inline(always)]
+fn axpy3<T: Real>(a: &V3<T>, s: T, c: &V3<T>) -> V3<T> {
+    [a[0].mul_add(s, c[0]), a[1].mul_add(s, c[1]), a[2].mul_add(s, c[2])]
+}
+
+/// `a s`.
+#[inline(always)]
+fn scale3<T: Real>(a: &V3<T>, s: T) -> V3<T> {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+/// `x` in a rotated frame.
+#[inline(always)]
+fn into_frame<T: Real>(axes: &Rot<T>, x: &V3<T>) -> V3<T> {
+    [dot(&axes[0], x), dot(&axes[1], x), dot(&axes[2], x)]
+}
+
+/// `x` limited to [-`limit`, `limit`].
+#[inline(always)]
+fn clamp<T: Real>(x: T, limit: T) -> T {
+    x.max(-limit).min(limit)
+}
+
+/// `x` with the sign bit of choice: `-x` where the mask is set.
+#[inline(always)]
+fn negate_where<T: Real>(mask: T::Mask, x: T) -> T {
+    T::select(mask, -x, x)
+}
+
+/// Comparison of two numbers of one lane.
+#[inline(always)]
+fn less<S: Real>(a: S, b: S) -> bool {
+    S::any(a.lt(b))
+}

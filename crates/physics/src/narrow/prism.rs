@@ -1,0 +1,254 @@
+//! The closest points of a segment and a prism: three upright columns of different heights over a triangle.
+//!
+//! Coordinates are relative to the middle of the segment. A ball or a capsule is a segment (of length zero) with a
+//! radius, so this is all that they need to meet a height field.
+
+use super::*;
+
+/// The solid between a slanted triangle and a level base below it.
+pub(super) struct Prism<S: Real> {
+    /// Upper corners, counterclockwise seen from above.
+    pub top: [V3<S>; 3],
+    /// Height of the base.
+    pub base: S,
+}
+
+/// Signed distance of a segment from a prism, negative by the length of the shortest way out.
+pub(super) struct Gap<S: Real> {
+    pub dist: S,
+    /// Unit vector from the prism to the segment.
+    pub normal: V3<S>,
+    /// Place of the closest point on the segment, from -1 to 1.
+    pub along: S,
+}
+
+/// A face's plane: outward unit normal, and the signed distance of the point `t arm` as `middle + slope t`.
+#[derive(Clone, Copy)]
+pub(super) struct Face<S: Real> {
+    pub normal: V3<S>,
+    pub middle: S,
+    slope: S,
+}
+
+impl<S: Real> Face<S> {
+    #[inline(always)]
+    fn new(normal: V3<S>, through: &V3<S>, arm: &V3<S>) -> Self {
+        Face { normal, middle: -dot(&normal, through), slope: dot(&normal, arm) }
+    }
+    #[inline(always)]
+    fn at(&self, along: S) -> S {
+        self.slope.mul_add(along, self.middle)
+    }
+    /// The least distance of the segment's points.
+    #[inline(always)]
+    fn nearest(&self) -> S {
+        self.middle - self.slope.abs()
+    }
+}
+
+impl<S: Real> Prism<S> {
+    /// Lower corner below upper corner `i`.
+    #[inline(always)]
+    pub(super) fn foot(&self, i: usize) -> V3<S> {
+        [self.top[i][0], self.top[i][1], self.base]
+    }
+
+    /// The slanted top.
+    #[inline(always)]
+    pub(super) fn slope(&self, arm: &V3<S>) -> Face<S> {
+        let t = &self.top;
+        let up = cross(&sub3(&t[1], &t[0]), &sub3(&t[2], &t[0]));
+        Face::new(scale3(&up, dot(&up, &up).sqrt().recip()), &t[0], arm)
+    }
+
+    /// The five faces: top, three walls, base.
+    #[inline(always)]
+    pub(super) fn faces(&self, slope: Face<S>, arm: &V3<S>) -> [Face<S>; 5] {
+        let (zero, one) = (S::zero(), S::lit(1.0));
+        let t = &self.top;
+        let mut faces = [slope; 5];
+        for i in 0..3 {
+            let (p, q) = (&t[i], &t[(i + 1) % 3]);
+            let (x, y) = (q[1] - p[1], p[0] - q[0]);
+            let inv = x.mul_add(x, y * y).sqrt().recip();
+            faces[1 + i] = Face::new([x * inv, y * inv, zero], p, arm);
+        }
+        faces[4] = Face::new([zero, zero, -one], &self.foot(0), arm);
+        faces
+    }
+
+    /// Edge `i`: three of the top, three of the base, three upright; from a corner, along a vector.
+    #[inline(always)]
+    pub(super) fn edge(&self, i: usize) -> (V3<S>, V3<S>) {
+        let (k, next) = (i % 3, (i + 1) % 3);
+        match i / 3 {
+            0 => (self.top[k], sub3(&self.top[next], &self.top[k])),
+            1 => (self.foot(k), sub3(&self.foot(next), &self.foot(k))),
+            _ => (self.foot(k), sub3(&self.top[k], &self.foot(k))),
+        }
+    }
+
+    /// Distance of the segment from `-arm` to `arm`; none if it is above `limit`.
+    #[inline(always)]
+    pub(super) fn gap(&self, arm: &V3<S>, limit: S) -> Option<Gap<S>> {
+        let one = S::lit(1.0);
+        let slope = self.slope(arm);
+        if less(limit, slope.nearest()) {
+            return None;
+        }
+        let faces = self.faces(slope, arm);
+        // part of the segment that is inside, and the quick way out: wholly beyond the limit of one face
+        let (mut from, mut to) = (-one, one);
+        let mut inside = true;
+        for face in &faces {
+            if less(limit, face.nearest()) {
+                return None;
+            }
+            if less(S::zero(), face.slope.abs()) {
+                let root = (-face.middle).div(face.slope);
+                if less(S::zero(), face.slope) {
+                    to = to.min(root);
+                } else {
+                    from = from.max(root);
+                }
+            } else {
+                inside &= !less(S::zero(), face.middle);
+            }
+        }
+        if inside && !less(to, from) {
+            return Some(self.exit(arm, &faces, (from + to) * S::lit(0.5)));
+        }
+        self.over_face(&faces).or_else(|| self.beside_edge(arm, limit))
+    }
+
+    /// An end of the segment whose closest point is within a face, which no other point of the segment can beat if the
+    /// segment does not come down toward that face.
+    #[inline(always)]
+    fn over_face(&self, faces: &[Face<S>; 5]) -> Option<Gap<S>> {
+        let (zero, one) = (S::zero(), S::lit(1.0));
+        for f in 0..5 {
+            let along = if less(zero, faces[f].slope) { -one } else { one };
+            let dist = faces[f].at(along);
+            if !less(zero, dist) {
+                continue;
+            }
+            let mut within = true;
+            for g in 0..5 {
+                // distance of the projected point from the other face
+                let other = dot(&faces[f].normal, &faces[g].normal).neg_mul_add(dist, faces[g].at(along));
+                within &= g == f || !less(zero, other);
+            }
+            if within {
+                return Some(Gap { dist, normal: faces[f].normal, along });
+            }
+        }
+        None
+    }
+
+    /// The closest pair of the segment and an edge.
+    #[inline(always)]
+    fn beside_edge(&self, arm: &V3<S>, limit: S) -> Option<Gap<S>> {
+        let mut best2 = if less(S::zero(), limit) { limit * limit } else { return None };
+        let mut best = None;
+        let base_is_far = less(limit, -arm[2].abs() - self.base);
+        for i in 0..9 {
+            if base_is_far && i / 3 == 1 {
+                continue;
+            }
+            let (corner, edge) = self.edge(i);
+            let (t, w) = closest_places(arm, &corner, &edge);
+            let d = sub3(&scale3(arm, t), &axpy3(&edge, w, &corner));
+            let d2 = dot(&d, &d);
+            if less(d2, best2) {
+                best2 = d2;
+                best = Some((d, t));
+            }
+        }
+        let (d, along) = best?;
+        let dist = best2.sqrt();
+        if !less(S::lit(TINY), dist) {
+            return None;
+        }
+        Some(Gap { dist, normal: scale3(&d, dist.recip()), along })
+    }
+
+    /// The shortest way out for a segment that is partly inside, about at `inner`.
+    #[inline(always)]
+    fn exit(&self, arm: &V3<S>, faces: &[Face<S>; 5], inner: S) -> Gap<S> {
+        let (zero, one) = (S::zero(), S::lit(1.0));
+        let mut best = Gap { dist: S::lit(-1e30), normal: [zero, zero, one], along: zero };
+        for face in faces {
+            // an end goes deepest, or all of a segment along the face
+            let level = less(face.slope.abs(), S::lit(4.0 * S::EPSILON) * face.middle.abs());
+            let along = if level {
+                inner
+            } else if less(zero, face.slope) {
+                -one
+            } else {
+                one
+            };
+            let dist = face.nearest();
+            if less(best.dist, dist) {
+                best = Gap { dist, normal: face.normal, along };
+            }
+        }
+        let length2 = dot(arm, arm);
+        for i in 0..9 {
+            let (corner, edge) = self.edge(i);
+            let n = cross(arm, &edge);
+            let n2 = dot(&n, &n);
+            if !less(length2 * dot(&edge, &edge) * S::lit(1e-12), n2) {
+                continue;
+            }
+            let mut n = scale3(&n, n2.sqrt().recip());
+            // this edge supports the prism along n or -n, or is no edge to leave by
+            let reach = dot(&n, &corner);
+            if !less(best.dist, -reach.abs()) {
+                continue;
+            }
+            let (mut above, mut below) = (false, false);
+            let size =
+                corner[0].abs() + corner[1].abs() + corner[2].abs() + edge[0].abs() + edge[1].abs() + edge[2].abs();
+            let slack = size * S::lit(8.0 * S::EPSILON);
+            for k in 0..3 {
+                for p in [self.top[k], self.foot(k)] {
+                    let d = dot(&n, &p) - reach;
+                    above |= less(slack, d);
+                    below |= less(d, -slack);
+                }
+            }
+            if above && below {
+                continue;
+            }
+            let mut dist = -reach;
+            if above {
+                n = [-n[0], -n[1], -n[2]];
+                dist = reach;
+            }
+            if less(best.dist, dist) {
+                let (t, _) = closest_places(arm, &corner, &edge);
+                best = Gap { dist, normal: n, along: t };
+            }
+        }
+        best
+    }
+}
+
+/// Places of the closest points of the segments `[-1, 1] arm` and `corner + [0, 1] edge`.
+#[inline(always)]
+pub(super) fn closest_places<S: Real>(arm: &V3<S>, corner: &V3<S>, edge: &V3<S>) -> (S, S) {
+    let (zero, one) = (S::zero(), S::lit(1.0));
+    let (aa, ae, ee) = (dot(arm, arm), dot(arm, edge), dot(edge, edge));
+    let (ac, ec) = (dot(arm, corner), dot(edge, corner));
+    let n = cross(arm, edge);
+    let det = dot(&n, &n);
+    let mut t = zero;
+    if less(aa * ee * S::lit(1e-14), det) {
+        t = clamp((ee * ac - ae * ec).div(det), one);
+    }
+    let w = (ae * t - ec).div(ee).max(zero).min(one);
+    if less(zero, aa) {
+        t = clamp((ae * w + ac).div(aa), one);
+    }
+    (t, w)
+}

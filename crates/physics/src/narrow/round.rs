@@ -1,0 +1,155 @@
+//! Spheres, capsules and what a sphere meets: pairs whose contacts follow from closest points.
+
+use super::*;
+
+/// Contact of two balls; `fallback` is the normal where their centers coincide.
+#[inline(always)]
+fn balls<T: Real>(p1: &V3<T>, r1: T, p2: &V3<T>, r2: T, margin: T, fallback: &V3<T>) -> Touch<T> {
+    let d = sub3(p2, p1);
+    let len = dot(&d, &d).sqrt();
+    // axes that cross (as those of a planar model do) are apart by no more than rounding
+    let tiny = T::lit(TINY.max(4.0 * T::EPSILON));
+    let apart = tiny.lt(len);
+    let inv = len.max(tiny).recip();
+    let normal = select3::<T>(apart, &scale3(&d, inv), fallback);
+    let dist = len - r1 - r2;
+    let pos = axpy3(&normal, dist.mul_add(T::lit(0.5), r1), p1);
+    Touch::new(dist, pos, normal, margin)
+}
+
+/// The x axis.
+#[inline(always)]
+fn x_axis<T: Real>() -> V3<T> {
+    [T::lit(1.0), T::zero(), T::zero()]
+}
+
+/// One contact; coinciding centers get the x axis for a normal.
+#[inline(always)]
+pub(crate) fn sphere_sphere<T: Real>(a: &Sphere<T>, b: &Sphere<T>, margin: T) -> Touch<T> {
+    balls(&a.center, a.radius, &b.center, b.radius, margin, &x_axis())
+}
+
+/// One contact.
+#[inline(always)]
+pub(crate) fn sphere_capsule<T: Real>(a: &Sphere<T>, b: &Capsule<T>, margin: T) -> Touch<T> {
+    let along = clamp(dot(&b.axis, &sub3(&a.center, &b.center)), b.half);
+    balls(&a.center, a.radius, &axpy3(&b.axis, along, &b.center), b.radius, margin, &x_axis())
+}
+
+/// Square of the sine up to which the axes of two capsules count as parallel.
+const PARALLEL: f64 = 1e-8;
+
+/// One contact, at the closest points of the axes. Where these are parallel there is no one closest pair, and both
+/// ends of the stretch along which the capsules overlap are contacts: the first capsule's lower end, then its upper,
+/// each moved along to the second capsule if it lies beyond.
+#[inline(always)]
+pub(crate) fn capsule_capsule<T: Real>(a: &Capsule<T>, b: &Capsule<T>, margin: T) -> [Touch<T>; 2] {
+    let d = sub3(&b.center, &a.center);
+    let c = dot(&a.axis, &b.axis);
+    let (da, db) = (dot(&a.axis, &d), dot(&b.axis, &d));
+    // sin^2 by the vector product, which does not cancel where the axes are almost parallel
+    let n = cross(&a.axis, &b.axis);
+    let sin2 = dot(&n, &n);
+    let crossing = T::lit(PARALLEL).lt(sin2);
+    let fallback = crossing_normal(&n, sin2);
+    let s = clamp(c.neg_mul_add(db, da).div(T::select(crossing, sin2, T::lit(1.0))), a.half);
+    // each in turn the closest point to the other; the distance is convex, so this ends at the minimum
+    let t = clamp(c.mul_add(s, -db), b.half);
+    let s = clamp(c.mul_add(t, da), a.half);
+    if T::all(crossing) {
+        return [axis_points(a, s, b, t, margin, &fallback), Touch::none()];
+    }
+    let (s0, t0) = beside(-a.half, c, da, db, a.half, b.half);
+    let (s1, t1) = beside(a.half, c, da, db, a.half, b.half);
+    let (s0, t0) = (T::select(crossing, s, s0), T::select(crossing, t, t0));
+    let mut second = axis_points(a, s1, b, t1, margin, &fallback);
+    second.on = T::and(second.on, T::not(crossing));
+    [axis_points(a, s0, b, t0, margin, &fallback), second]
+}
+
+/// The place `end` of a capsule's axis and the place on a parallel one beside it, which may have to be moved onto both.
+#[inline(always)]
+fn beside<T: Real>(end: T, c: T, da: T, db: T, half_a: T, half_b: T) -> (T, T) {
+    let free = c.mul_add(end, -db);
+    let t = clamp(free, half_b);
+    let moved = half_b.lt(free.abs());
+    (T::select(moved, clamp(c.mul_add(t, da), half_a), end), t)
+}
+
+/// Contact of the balls at given places of two capsules' axes.
+#[inline(always)]
+fn axis_points<T: Real>(a: &Capsule<T>, s: T, b: &Capsule<T>, t: T, margin: T, fallback: &V3<T>) -> Touch<T> {
+    let (p, q) = (axpy3(&a.axis, s, &a.center), axpy3(&b.axis, t, &b.center));
+    balls(&p, a.radius, &q, b.radius, margin, fallback)
+}
+
+/// Normal of capsules whose axes cross: perpendicular to both; the x axis if they are parallel too.
+#[inline(always)]
+fn crossing_normal<T: Real>(n: &V3<T>, sin2: T) -> V3<T> {
+    let turned = T::lit(TINY * TINY).lt(sin2);
+    let inv = T::select(turned, sin2, T::lit(1.0)).sqrt().recip();
+    select3::<T>(turned, &scale3(n, inv), &x_axis())
+}
+
+/// One contact; a center inside the box leaves by the nearest face.
+#[inline(always)]
+pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Block<T>, margin: T) -> Touch<T> {
+    let (zero, one) = (T::zero(), T::lit(1.0));
+    let c = into_frame(&b.axes, &sub3(&a.center, &b.center));
+    let to = [clamp(c[0], b.half[0]) - c[0], clamp(c[1], b.half[1]) - c[1], clamp(c[2], b.half[2]) - c[2]];
+    let len = dot(&to, &to).sqrt();
+    let outside = T::lit(TINY).lt(len);
+    let mut normal = scale3(&to, len.max(T::lit(TINY)).recip());
+    let mut dist = len;
+    if !T::all(outside) {
+        // inward normal of the nearest face, the lower one of each axis first
+        let mut depth = b.half[0] - c[0].abs();
+        let mut inward = [negate_where::<T>(zero.lt(c[0]), one), zero, zero];
+        for i in 1..3 {
+            let d = b.half[i] - c[i].abs();
+            let nearer = d.lt(depth);
+            depth = T::select(nearer, d, depth);
+            let mut face = [zero; 3];
+            face[i] = negate_where::<T>(zero.lt(c[i]), one);
+            inward = select3::<T>(nearer, &face, &inward);
+        }
+        normal = select3::<T>(outside, &normal, &inward);
+        dist = T::select(outside, len, -depth);
+    }
+    let normal = rotate(&b.axes, &normal);
+    let dist = dist - a.radius;
+    let pos = axpy3(&normal, dist.mul_add(T::lit(0.5), a.radius), &a.center);
+    Touch::new(dist, pos, normal, margin)
+}
+
+/// One contact, with the side, a cap or a rim; a center inside leaves by the nearer of side and cap.
+#[inline(always)]
+pub(crate) fn sphere_cylinder<T: Real>(a: &Sphere<T>, b: &Cylinder<T>, margin: T) -> Touch<T> {
+    let zero = T::zero();
+    let axis = &b.axes[2];
+    let d = sub3(&a.center, &b.center);
+    let x = dot(axis, &d);
+    let out = axpy3(axis, -x, &d);
+    let rho = dot(&out, &out).sqrt();
+    let (above, outside) = (x.abs() - b.half, rho - b.radius);
+    let level = above.lt(zero);
+    let within = outside.lt(zero);
+    // inside, the larger of two negative distances is the nearer surface
+    let cap_nearer = outside.lt(above);
+    let cap = T::and(within, T::or(T::not(level), cap_nearer));
+    let side = T::and(level, T::or(T::not(within), T::not(cap_nearer)));
+    let outward = select3::<T>(T::lit(TINY).lt(rho), &scale3(&out, rho.max(T::lit(TINY)).recip()), &b.axes[0]);
+    let up = {
+        let down = T::not(zero.lt(x));
+        [negate_where::<T>(down, axis[0]), negate_where::<T>(down, axis[1]), negate_where::<T>(down, axis[2])]
+    };
+    // rim: the offset has components `above` along the axis and `outside` across it
+    let gap = above.mul_add(above, outside * outside).sqrt();
+    let inv = gap.max(T::lit(TINY)).recip();
+    let rim = axpy3(&outward, outside * inv, &scale3(&up, above * inv));
+    let away = select3::<T>(side, &outward, &select3::<T>(cap, &up, &rim));
+    let dist = T::select(side, outside, T::select(cap, above, gap)) - a.radius;
+    let normal = [-away[0], -away[1], -away[2]];
+    let pos = axpy3(&normal, dist.mul_add(T::lit(0.5), a.radius), &a.center);
+    Touch::new(dist, pos, normal, margin)
+}

@@ -1,0 +1,219 @@
+//! The solver's stages over all [`Block`]s.
+//!
+//! Many models have none, so these are functions of their own: the solver's inner loop stays small.
+
+use crate::lanes::{Kernel, Real};
+use crate::sim::Sim;
+use crate::solver::Row;
+use crate::solver::block::{Block, Jacobian, Side, at};
+use crate::spatial::*;
+use crate::work::Work;
+
+/// A function compiled on its own for each instruction set.
+macro_rules! out_of_line {
+    ($(#[$doc:meta])* $name:ident, $kernel:ident, ($($arg:ident: $type:ty),*) -> $out:ty, $body:block) => {
+        struct $kernel<'a, T: Real> { $($arg: $type),*, _life: std::marker::PhantomData<&'a T> }
+        impl<'a, T: Real> Kernel<T> for $kernel<'a, T> {
+            type Output = $out;
+            #[inline(always)]
+            fn run(self) -> $out {
+                let $kernel { $($arg),*, .. } = self;
+                $body
+            }
+        }
+        $(#[$doc])*
+        pub(crate) fn $name<'a, T: Real>($($arg: $type),*) -> $out {
+            T::enter($kernel { $($arg),*, _life: std::marker::PhantomData })
+        }
+    };
+}
+pub(super) use out_of_line;
+
+/// Whether some block does not fit the tree.
+pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
+    work.blocks.iter().any(|b| b.coupled)
+}
+
+out_of_line!(
+    /// Values and zones at the warm start; marks the links that are touched.
+    start, Start, (work: &'a mut Work<T>) -> (), {
+        for b in work.blocks.iter_mut() {
+            if let Jacobian::Points { sides, .. } = &b.jacobian {
+                for (link, _) in sides.iter().flat_map(|s| &s.links) {
+                    work.in_contact[*link] = true;
+                }
+            }
+            let ja = b.of_motion(&work.link_acc, &work.acc);
+            for k in 0..b.dim {
+                b.u[k] = ja[k] + b.u0[k];
+            }
+            b.force = [T::zero(); 6];
+            b.activate();
+        }
+    }
+);
+
+out_of_line!(
+    /// The blocks' share of the system: everything if they fit the tree, only constant forces if they are coupled.
+    assemble, Assemble, (sim: &'a Sim<T>, work: &'a mut Work<T>) -> (), {
+        for b in work.blocks.iter() {
+            match &b.jacobian {
+                Jacobian::Joints(terms) => {
+                    for (dof, coefficient) in terms {
+                        if work.stale[sim.dof_link[*dof]] {
+                            work.rhs[*dof] = coefficient.mul_add(b.hold, work.rhs[*dof]);
+                        }
+                    }
+                }
+                Jacobian::Points { sides, .. } if !b.coupled => {
+                    if sides[1].links.iter().any(|(l, _)| work.stale[*l]) {
+                        add_to_links(b, &sides[1], &work.stale, &mut work.stiffness, &mut work.wrench);
+                    }
+                }
+                Jacobian::Points { .. } => {}
+            }
+        }
+    }
+);
+
+/// Adds a block's stiffness and right-hand side to the links that carry its second side.
+#[inline(always)]
+fn add_to_links<T: Real>(
+    b: &Block<T>,
+    side: &Side<T>,
+    stale: &[bool],
+    stiffness: &mut [Sym6<T>],
+    wrench: &mut [V6<T>],
+) {
+    // G W G' for the motion directions G of the rows
+    let mut k = [T::zero(); 21];
+    let mut columns = [[T::zero(); 6]; 6];
+    for i in 0..b.dim {
+        columns[i] = b.wrench(i, &side.r);
+    }
+    for i in 0..b.dim {
+        let mut h = [T::zero(); 6];
+        for j in 0..b.dim {
+            let w = if j <= i { b.stiffness[at(i, j)] } else { b.stiffness[at(j, i)] };
+            h = axpy6(&columns[j], -w, &h);
+        }
+        // the sum over all rows is symmetric, and one triangle of it is what is kept
+        sym6_sub_outer(&mut k, &columns[i], &h);
+    }
+    let w = b.total_wrench(&b.linear_force(&b.u0), &side.r);
+    for (link, lanes) in &side.links {
+        if stale[*link] {
+            for i in 0..21 {
+                stiffness[*link][i] += T::masked(*lanes, k[i]);
+            }
+            for i in 0..6 {
+                wrench[*link][i] += T::masked(*lanes, w[i]);
+            }
+        }
+    }
+}
+
+out_of_line!(
+    /// Moves to the Newton point; lanes where some block's linear model does not hold there.
+    newton_point, NewtonPoint, (work: &'a mut Work<T>) -> T::Mask, {
+        let mut changed = T::none();
+        for b in work.blocks.iter_mut() {
+            changed = T::or(changed, b.newton_point(&work.link_acc, &work.next));
+        }
+        changed
+    }
+);
+
+out_of_line!(
+    /// Moves lanes that are not `done`; marks the links whose system changed.
+    advance, Advance,
+    (sim: &'a Sim<T>, work: &'a mut Work<T>, done: T::Mask, exact: T::Mask, alpha: T) -> (), {
+        for b in work.blocks.iter_mut() {
+            if !T::any(b.advance(done, exact, alpha)) {
+                continue;
+            }
+            match &b.jacobian {
+                Jacobian::Points { sides, .. } if !b.coupled => {
+                    for (link, _) in &sides[1].links {
+                        work.stale[*link] = true;
+                    }
+                }
+                Jacobian::Joints(terms) => {
+                    for (dof, _) in terms {
+                        work.stale[sim.dof_link[*dof]] = true;
+                    }
+                }
+                Jacobian::Points { .. } => {}
+            }
+        }
+    }
+);
+
+out_of_line!(
+    /// Sums of [`Row::ends`].
+    ends, Ends, (work: &'a Work<T>) -> [T; 3], {
+        let mut sums = [T::zero(); 3];
+        for b in work.blocks.iter() {
+            let e = b.ends();
+            for i in 0..3 {
+                sums[i] += e[i];
+            }
+        }
+        sums
+    }
+);
+
+out_of_line!(
+    /// Sums of [`Row::slope`].
+    slope, Slope, (work: &'a Work<T>, alpha: T) -> [T; 2], {
+        let mut sums = [T::zero(); 2];
+        for b in work.blocks.iter() {
+            let s = b.slope(alpha);
+            sums[0] += s[0];
+            sums[1] += s[1];
+        }
+        sums
+    }
+);
+
+out_of_line!(
+    /// True forces at the present point.
+    true_forces, TrueForces, (work: &'a mut Work<T>) -> (), {
+        for b in work.blocks.iter_mut() {
+            b.force = b.true_force(&b.u);
+        }
+    }
+);
+
+out_of_line!(
+    /// Adds the refinement's accelerations to the row values of the lanes in `arrived`.
+    add_refinement, AddRefinement, (work: &'a mut Work<T>, arrived: T::Mask) -> (), {
+        for b in work.blocks.iter_mut() {
+            let du = b.of_motion(&work.link_acc, &work.next);
+            for k in 0..b.dim {
+                b.u[k] += T::masked(arrived, du[k]);
+            }
+        }
+    }
+);
+
+out_of_line!(
+    /// Puts the blocks' forces on links and joints.
+    apply_forces, ApplyForces, (work: &'a mut Work<T>) -> (), {
+        for b in work.blocks.iter() {
+            b.exert(&mut work.wrench, &mut work.rhs);
+        }
+    }
+);
+
+out_of_line!(
+    /// Adds the normal forces of contacts with the static world to their geoms.
+    report_forces, ReportForces, (sim: &'a Sim<T>, work: &'a mut Work<T>) -> (), {
+        for b in work.blocks.iter().filter(|b| !b.coupled) {
+            for (pair, lanes) in &b.members {
+                let geom = sim.contacts.pairs[*pair].moving();
+                work.normal_force[geom] += T::masked(*lanes, b.force[0]);
+            }
+        }
+    }
+);

@@ -1,0 +1,185 @@
+//! Contacts with a level plane, pyramidal cone: the case that walking consists of, and the one that is fast.
+//!
+//! The other side stands still, so the contact adds a symmetric 6x6 to its own link and nothing else.
+
+use crate::lanes::Real;
+use crate::solver::Row;
+use crate::space::Space;
+use crate::spatial::*;
+
+/// A contact with the floor: a pyramid of four edges. Vectors are along (normal, tangent 1, tangent 2).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FloorRow<T: Real> {
+    pub link: usize,
+    pub geom: usize,
+    /// Contact point relative to the tree's reference point.
+    pub r: V3<T>,
+    /// First tangent in the plane.
+    pub tx: T,
+    pub ty: T,
+    pub mu: [T::Scalar; 2],
+    /// Stiffness of an edge, 0 in lanes without this contact.
+    pub d: T,
+    /// Minus the reference acceleration.
+    pub u0: V3<T>,
+    /// `J a - aref` at the present point and at the Newton point.
+    pub u: V3<T>,
+    pub next: V3<T>,
+    /// Force of the present point in the sense of the solver's first identity.
+    pub force: V3<T>,
+    /// Edges that push.
+    pub active: [T::Mask; 4],
+    pub on: T::Mask,
+}
+
+impl<T: Real> FloorRow<T> {
+    /// Row values of a motion of the link.
+    #[inline(always)]
+    pub fn of_motion(&self, w: &V6<T>) -> V3<T> {
+        let v = cross_add(&ang(w), &self.r, &lin(w));
+        [v[2], v[0].mul_add(self.tx, v[1] * self.ty), v[1].mul_add(self.tx, -(v[0] * self.ty))]
+    }
+
+    /// Values along the four edges of the pyramid.
+    #[inline(always)]
+    pub fn edges(&self, u: &V3<T>) -> [T; 4] {
+        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        [m1.mul_add(u[1], u[0]), m1.neg_mul_add(u[1], u[0]), m2.mul_add(u[2], u[0]), m2.neg_mul_add(u[2], u[0])]
+    }
+
+    /// Total of forces along the edges.
+    #[inline(always)]
+    fn total(&self, f: &[T; 4]) -> V3<T> {
+        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        [(f[0] + f[1]) + (f[2] + f[3]), m1 * (f[0] - f[1]), m2 * (f[2] - f[3])]
+    }
+
+    /// Force of the row's linear model with the present active set, at `u`.
+    #[inline(always)]
+    pub fn linear_force(&self, u: &V3<T>) -> V3<T> {
+        let e = self.edges(u);
+        let mut f = [T::zero(); 4];
+        for k in 0..4 {
+            f[k] = -(T::masked(self.active[k], self.d) * e[k]);
+        }
+        self.total(&f)
+    }
+
+    /// The force that the row exerts at `u`.
+    #[inline(always)]
+    pub fn true_force(&self, u: &V3<T>) -> V3<T> {
+        let e = self.edges(u);
+        let mut f = [T::zero(); 4];
+        for k in 0..4 {
+            f[k] = -(self.d * e[k].min(T::zero()));
+        }
+        self.total(&f)
+    }
+
+    /// A force in the contact frame as a wrench about the reference point.
+    #[inline(always)]
+    pub fn wrench(&self, f: &V3<T>) -> V6<T> {
+        let world = [f[1].mul_add(self.tx, -(f[2] * self.ty)), f[1].mul_add(self.ty, f[2] * self.tx), f[0]];
+        let t = cross(&self.r, &world);
+        [t[0], t[1], t[2], world[0], world[1], world[2]]
+    }
+
+    /// Sets the edges that push at `u`; returns the lanes where that is a change.
+    #[inline(always)]
+    pub fn activate(&mut self) -> T::Mask {
+        let e = self.edges(&self.u);
+        let mut changed = T::none();
+        for k in 0..4 {
+            let active = T::and(e[k].lt(T::zero()), self.on);
+            changed = T::or(changed, T::xor(active, self.active[k]));
+            self.active[k] = active;
+        }
+        changed
+    }
+
+    /// Moves to the Newton point; returns the lanes whose active edges differ there.
+    #[inline(always)]
+    pub fn newton_point(&mut self, link_acc: &V6<T>) -> T::Mask {
+        let ja = self.of_motion(link_acc);
+        self.next = add3(&ja, &self.u0);
+        let e = self.edges(&self.next);
+        let mut changed = T::none();
+        for k in 0..4 {
+            let active = T::and(e[k].lt(T::zero()), self.on);
+            changed = T::or(changed, T::xor(active, self.active[k]));
+        }
+        changed
+    }
+
+    /// Moves lanes that are not `done`: `exact` lanes to the Newton point, the others by `alpha` of the way. Returns the
+    /// lanes whose active edges changed.
+    #[inline(always)]
+    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+        let linear = self.linear_force(&self.next);
+        for i in 0..3 {
+            let moved = T::select(exact, self.next[i], alpha.mul_add(self.next[i] - self.u[i], self.u[i]));
+            self.u[i] = T::select(done, self.u[i], moved);
+            let force = T::select(exact, linear[i], alpha.mul_add(linear[i] - self.force[i], self.force[i]));
+            self.force[i] = T::select(done, self.force[i], force);
+        }
+        self.activate()
+    }
+
+    /// Adds the active edges' stiffness to the link's 6x6 matrix.
+    #[inline(always)]
+    pub fn add_stiffness<S: Space>(&self, k: &mut Sym6<T>) {
+        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        let mut s = [T::zero(); 4];
+        for e in 0..4 {
+            s[e] = T::masked(self.active[e], self.d);
+        }
+        // the 3x3 block in the contact frame, turned into world axes
+        let nn = (s[0] + s[1]) + (s[2] + s[3]);
+        let (n1, n2) = (m1 * (s[0] - s[1]), m2 * (s[2] - s[3]));
+        let (t11, t22) = (m1 * m1 * (s[0] + s[1]), m2 * m2 * (s[2] + s[3]));
+        let (tx, ty) = (self.tx, self.ty);
+        let (cxx, cyy, cxy) = (tx * tx, ty * ty, tx * ty);
+        let xx = t11.mul_add(cxx, t22 * cyy);
+        let yy = t11.mul_add(cyy, t22 * cxx);
+        let xy = (t11 - t22) * cxy;
+        let xz = n1.mul_add(tx, -(n2 * ty));
+        let yz = n1.mul_add(ty, n2 * tx);
+        // moment arms: [r] W and [r] W [r]'
+        let r = &self.r;
+        let c0 = cross(r, &[xx, xy, xz]);
+        let c1 = cross(r, &[xy, yy, yz]);
+        let c2 = cross(r, &[xz, yz, nn]);
+        let q0 = cross(r, &[c0[0], c1[0], c2[0]]);
+        let q1 = cross(r, &[c0[1], c1[1], c2[1]]);
+        let q2 = cross(r, &[c0[2], c1[2], c2[2]]);
+        S::add_sym(
+            k,
+            &[
+                q0[0], q1[1], q2[2], q0[1], q0[2], q1[2], c0[0], c1[0], c2[0], c0[1], c1[1], c2[1], c0[2], c1[2],
+                c2[2], xx, yy, nn, xy, xz, yz,
+            ],
+        );
+    }
+}
+
+impl<T: Real> Row<T> for FloorRow<T> {
+    #[inline(always)]
+    fn ends(&self) -> [T; 3] {
+        let du = sub3(&self.next, &self.u);
+        [dot(&du, &self.force), dot(&du, &self.linear_force(&self.next)), dot(&du, &self.true_force(&self.u))]
+    }
+
+    #[inline(always)]
+    fn slope(&self, alpha: T) -> [T; 2] {
+        let du = sub3(&self.next, &self.u);
+        let u = [du[0].mul_add(alpha, self.u[0]), du[1].mul_add(alpha, self.u[1]), du[2].mul_add(alpha, self.u[2])];
+        let (e, de) = (self.edges(&u), self.edges(&du));
+        let (mut s1, mut s2) = (T::zero(), T::zero());
+        for k in 0..4 {
+            let pushing = T::masked(e[k].lt(T::zero()), de[k]);
+            s1 = pushing.mul_add(e[k], s1);
+            s2 = pushing.mul_add(de[k], s2);
+        }
+        [self.d * s1, self.d * s2]
+    }
+}

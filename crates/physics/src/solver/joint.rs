@@ -1,0 +1,208 @@
+//! Rows of single degrees of freedom: joint limits and dry friction. They add to the diagonal.
+
+use crate::lanes::Real;
+use crate::sim::Sim;
+use crate::solver::Row;
+use crate::solver::softness::{Softness, impedance};
+use crate::work::{Group, Work};
+
+/// A joint limit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LimitRow<T: Real> {
+    pub dof: usize,
+    /// +1 at the lower limit, -1 at the upper.
+    pub sign: T,
+    pub d: T,
+    pub u0: T,
+    pub u: T,
+    pub next: T,
+    pub force: T,
+    pub active: T::Mask,
+    pub on: T::Mask,
+}
+
+/// Dry friction of a joint: a force of bounded size.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DryRow<T: Real> {
+    pub dof: usize,
+    pub loss: T::Scalar,
+    pub d: T,
+    pub u0: T,
+    pub u: T,
+    pub next: T,
+    pub force: T,
+    /// The force is below its bound.
+    pub sticking: T::Mask,
+    /// Sign of `u`, where the force is at its bound.
+    pub positive: T::Mask,
+}
+
+impl<T: Real> LimitRow<T> {
+    /// Force at `u` with the present active set.
+    #[inline(always)]
+    fn linear(&self, u: T) -> T {
+        -(T::masked(self.active, self.d) * u)
+    }
+
+    /// Force at `u`.
+    #[inline(always)]
+    pub fn true_force(&self, u: T) -> T {
+        -(self.d * u.min(T::zero()))
+    }
+
+    /// Sets whether the limit pushes at `u`; returns the lanes where that is a change.
+    #[inline(always)]
+    pub fn activate(&mut self) -> T::Mask {
+        let active = T::and(self.u.lt(T::zero()), self.on);
+        let changed = T::xor(active, self.active);
+        self.active = active;
+        changed
+    }
+
+    #[inline(always)]
+    pub fn newton_point(&mut self, acc: T) -> T::Mask {
+        self.next = self.sign.mul_add(acc, self.u0);
+        T::xor(T::and(self.next.lt(T::zero()), self.on), self.active)
+    }
+
+    #[inline(always)]
+    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+        let linear = self.linear(self.next);
+        let moved = T::select(exact, self.next, alpha.mul_add(self.next - self.u, self.u));
+        self.u = T::select(done, self.u, moved);
+        let force = T::select(exact, linear, alpha.mul_add(linear - self.force, self.force));
+        self.force = T::select(done, self.force, force);
+        self.activate()
+    }
+}
+
+impl<T: Real> Row<T> for LimitRow<T> {
+    #[inline(always)]
+    fn ends(&self) -> [T; 3] {
+        let du = self.next - self.u;
+        [du * self.force, du * self.linear(self.next), du * self.true_force(self.u)]
+    }
+
+    #[inline(always)]
+    fn slope(&self, alpha: T) -> [T; 2] {
+        let du = self.next - self.u;
+        let u = du.mul_add(alpha, self.u);
+        let pushing = T::masked(u.lt(T::zero()), self.d * du);
+        [pushing * u, pushing * du]
+    }
+}
+
+impl<T: Real> DryRow<T> {
+    /// Zone at `u`: below the bound, and the sign of `u`.
+    #[inline(always)]
+    fn zone(&self, u: T) -> (T::Mask, T::Mask) {
+        ((self.d * u).abs().lt(T::splat(self.loss)), T::zero().lt(u))
+    }
+
+    /// Force at `u`.
+    #[inline(always)]
+    pub fn true_force(&self, u: T) -> T {
+        let bound = T::splat(self.loss);
+        -((self.d * u).max(-bound).min(bound))
+    }
+
+    /// Force at `u` in the linear model of the present zone.
+    #[inline(always)]
+    pub fn linear(&self, u: T) -> T {
+        let bound = T::splat(self.loss);
+        T::select(self.sticking, -(self.d * u), T::select(self.positive, -bound, bound))
+    }
+
+    /// Sets the zone at `u`; returns the lanes where that is a change.
+    #[inline(always)]
+    pub fn activate(&mut self) -> T::Mask {
+        let (sticking, positive) = self.zone(self.u);
+        let changed = T::or(T::xor(sticking, self.sticking), T::xor(positive, self.positive));
+        (self.sticking, self.positive) = (sticking, positive);
+        changed
+    }
+
+    #[inline(always)]
+    pub fn newton_point(&mut self, acc: T) -> T::Mask {
+        self.next = acc + self.u0;
+        let (sticking, positive) = self.zone(self.next);
+        let sliding_differs = T::and(T::not(sticking), T::xor(positive, self.positive));
+        T::or(T::xor(sticking, self.sticking), sliding_differs)
+    }
+
+    #[inline(always)]
+    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+        let linear = self.linear(self.next);
+        let moved = T::select(exact, self.next, alpha.mul_add(self.next - self.u, self.u));
+        self.u = T::select(done, self.u, moved);
+        let force = T::select(exact, linear, alpha.mul_add(linear - self.force, self.force));
+        self.force = T::select(done, self.force, force);
+        self.activate()
+    }
+}
+
+impl<T: Real> Row<T> for DryRow<T> {
+    #[inline(always)]
+    fn ends(&self) -> [T; 3] {
+        let du = self.next - self.u;
+        [du * self.force, du * self.linear(self.next), du * self.true_force(self.u)]
+    }
+
+    #[inline(always)]
+    fn slope(&self, alpha: T) -> [T; 2] {
+        let du = self.next - self.u;
+        let u = du.mul_add(alpha, self.u);
+        let (sticking, _) = self.zone(u);
+        [-(du * self.true_force(u)), T::masked(sticking, self.d * du) * du]
+    }
+}
+
+/// Writes the rows of violated joint limits and of dry friction.
+#[inline(always)]
+pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    let one = T::lit(1.0);
+    work.limits.clear();
+    for limit in &sim.limits {
+        let q = group.qpos[limit.qpos];
+        let low = (q - T::splat(limit.low[0])) - T::splat(limit.low[1]);
+        let high = (T::splat(limit.high[0]) - q) + T::splat(limit.high[1]);
+        if limit.two_sided {
+            push_limit(limit.dof, low, one, &limit.soft, group, work);
+            push_limit(limit.dof, high, -one, &limit.soft, group, work);
+        } else {
+            // at most one side is violated: one row serves both
+            let lower = low.lt(high);
+            let sign = T::select(lower, one, -one);
+            push_limit(limit.dof, T::select(lower, low, high), sign, &limit.soft, group, work);
+        }
+    }
+    work.dry.clear();
+    for dry in &sim.dry {
+        let (_, d) = impedance(&dry.soft, T::zero());
+        let u0 = T::splat(dry.soft.b) * group.qvel[dry.dof];
+        work.dry.push(DryRow {
+            dof: dry.dof,
+            loss: dry.loss,
+            d,
+            u0,
+            u: u0,
+            next: u0,
+            force: T::zero(),
+            sticking: T::none(),
+            positive: T::none(),
+        });
+    }
+}
+
+#[inline(always)]
+fn push_limit<T: Real>(dof: usize, dist: T, sign: T, soft: &Softness<T::Scalar>, group: &Group<T>, work: &mut Work<T>) {
+    let on = dist.lt(T::splat(soft.margin));
+    if !T::any(on) {
+        return;
+    }
+    let violation = dist - T::splat(soft.margin);
+    let (imp, d) = impedance(soft, violation);
+    let u0 = (sign * group.qvel[dof]).mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));
+    let d = T::masked(on, d);
+    work.limits.push(LimitRow { dof, sign, d, u0, u: u0, next: u0, force: T::zero(), active: T::none(), on });
+}

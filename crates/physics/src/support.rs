@@ -1,0 +1,104 @@
+//! What the kernels do not simulate is refused here by name, never ignored.
+
+use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, TendonKind, Transmission};
+use crate::sim::SimError;
+
+/// Refuses a model that would not be simulated as MuJoCo does. Contacts are checked where their list is made.
+pub(crate) fn check(model: &Model) -> Result<(), SimError> {
+    let refuse = |(what, remedy): (String, &str)| {
+        Err(SimError::Unsupported { model: model.name.clone(), what, remedy: remedy.into() })
+    };
+    let found = options(model)
+        .or_else(|| model.bodies.iter().find_map(|b| body(model, b)))
+        .or_else(|| model.tendons.iter().find_map(|t| tendon(model, t)))
+        .or_else(|| model.actuators.iter().find_map(|a| actuator(model, a)));
+    found.map_or(Ok(()), refuse)
+}
+
+type Refusal = Option<(String, &'static str)>;
+
+fn options(model: &Model) -> Refusal {
+    let in_medium = model.opt.density != 0.0 || model.opt.viscosity != 0.0;
+    match model.opt.integrator {
+        Integrator::Implicit => Some(("integrator Implicit".into(), "use Euler, RK4 or implicitfast")),
+        Integrator::ImplicitFast if in_medium => {
+            Some(("integrator ImplicitFast in a medium with density or viscosity".into(), "use Euler or RK4"))
+        }
+        _ => None,
+    }
+}
+
+fn body(model: &Model, body: &Body) -> Refusal {
+    let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
+    joints.iter().enumerate().find_map(|(i, j)| joint(model, body, joints, i, j))
+}
+
+fn joint(model: &Model, body: &Body, siblings: &[Joint], i: usize, joint: &Joint) -> Refusal {
+    let name = &joint.name;
+    match joint.kind {
+        JointType::Free if siblings.len() > 1 || body.parent != 0 => {
+            return Some((
+                format!("free joint '{name}' below another joint"),
+                "free joints belong on top-level bodies",
+            ));
+        }
+        JointType::Ball if i + 1 < siblings.len() => {
+            let what = format!("ball joint '{name}' followed by another joint of its body");
+            return Some((what, "list the ball joint last"));
+        }
+        _ => {}
+    }
+    if joint.stiffness_poly != [0.0; 2] || model.dofs[joint.dof_adr].damping_poly != [0.0; 2] {
+        return Some((format!("polynomial stiffness or damping of joint '{name}'"), "use the linear term"));
+    }
+    if joint.actuator_gravcomp && model.bodies.iter().any(|b| b.gravcomp != 0.0) {
+        return Some((format!("actuatorgravcomp of joint '{name}'"), "remove the attribute"));
+    }
+    None
+}
+
+fn tendon(model: &Model, tendon: &Tendon) -> Refusal {
+    let name = &tendon.name;
+    if tendon.stiffness_poly != [0.0; 2] || tendon.damping_poly != [0.0; 2] {
+        return Some((format!("polynomial stiffness or damping of tendon '{name}'"), "use the linear term"));
+    }
+    if tendon.armature != 0.0 {
+        return Some((format!("armature of tendon '{name}'"), "give the joints armature"));
+    }
+    if tendon.actuator_force_range.is_some() {
+        return Some((format!("actuatorfrcrange of tendon '{name}'"), "use the actuators' forcerange"));
+    }
+    if tendon.damping != 0.0 && model.opt.integrator == Integrator::ImplicitFast {
+        return Some((format!("damping of tendon '{name}' with integrator ImplicitFast"), "use Euler or RK4"));
+    }
+    None
+}
+
+fn actuator(model: &Model, a: &Actuator) -> Refusal {
+    let name = &a.name;
+    let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
+    match a.transmission {
+        Transmission::Tendon(t) => {
+            if model.tendons[t].kind == TendonKind::Spatial {
+                return Some((format!("the spatial tendon of actuator '{name}'"), "use a fixed tendon"));
+            }
+            let by_velocity = a.gain[2] != 0.0 || a.bias[2] != 0.0;
+            if by_velocity && model.opt.integrator == Integrator::ImplicitFast {
+                let what = format!("velocity feedback of actuator '{name}' on a tendon with integrator ImplicitFast");
+                return Some((what, "use Euler or RK4"));
+            }
+        }
+        Transmission::Joint(j) | Transmission::JointInParent(j) => {
+            let joint = &model.joints[j];
+            let scalar = matches!(joint.kind, JointType::Hinge | JointType::Slide);
+            if !scalar && matches!(a.transmission, Transmission::JointInParent(_)) {
+                return Some((format!("jointinparent of actuator '{name}'"), "use joint"));
+            }
+            if !scalar && affine {
+                let what = format!("actuator '{name}' with position or velocity feedback on joint '{}'", joint.name);
+                return Some((what, "only hinge and slide joints can be fed back"));
+            }
+        }
+    }
+    None
+}
