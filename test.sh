@@ -9,6 +9,7 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   fi
   .venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/oracle/requirements.txt
   .venv/bin/python tests/oracle/install_torch.py
+  .venv/bin/python tests/oracle/foreign_models.py --install
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
 cargo fmt --all --check

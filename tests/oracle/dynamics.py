@@ -1,11 +1,12 @@
 """Random states of MJCF models and what MuJoCo makes of them.
 
 Reads a JSON list of jobs from standard input, one per model:
-    {"xml": path, "states": n, "seed": s, "ground_only": bool, "near_floor": bool, "spread": x, "pushes": bool}
+    {"xml": path, "states": n, "seed": s, "ground_only": bool, "near_floor": bool, "spread": x, "pushes": bool, "vary": bool}
 and prints a JSON list with, per job, the states and MuJoCo's accelerations, forces, mass matrices, contact counts,
 sensor values and next states. States and controls are rounded to single precision so that both sides start alike.
 """
 
+import copy
 import json
 import sys
 
@@ -118,6 +119,34 @@ def pushed(model, data):
     return total
 
 
+def vary(model, rng, original):
+    """Edits masses, friction, strength and gravity in place and returns their factors."""
+    factor = lambda n, low, high: rng.uniform(low, high, n).astype(np.float32).astype(np.float64)
+    mass = factor(model.nbody, 0.5, 2.0)
+    for b in range(model.nbody):
+        mass[b] = mass[model.body_weldid[b]]
+    friction = float(factor(1, 0.3, 1.5)[0])
+    strength = factor(model.nu, 0.5, 1.5)
+    gravity = (original.opt.gravity + factor(3, -1.0, 1.0)).astype(np.float32).astype(np.float64)
+    # the shortcut for bodies without relatives uses numbers that were compiled
+    model.body_simple[:] = 0
+    model.dof_simplenum[:] = 0
+    model.body_mass[:] = original.body_mass * mass
+    model.body_inertia[:] = original.body_inertia * mass[:, None]
+    model.geom_friction[:] = original.geom_friction * friction
+    model.pair_friction[:] = original.pair_friction * friction
+    model.actuator_gainprm[:, :3] = original.actuator_gainprm[:, :3] * strength[:, None]
+    model.actuator_biasprm[:, :3] = original.actuator_biasprm[:, :3] * strength[:, None]
+    model.actuator_forcerange[:] = original.actuator_forcerange * strength[:, None]
+    model.opt.gravity[:] = gravity
+    return {
+        "mass": mass.tolist(),
+        "friction": friction,
+        "strength": strength.tolist(),
+        "gravity": gravity.tolist(),
+    }
+
+
 def deep_in_field(model, data):
     """Whether a shape reaches into a height field with more than its rounding.
 
@@ -144,6 +173,7 @@ def run(job):
     data = mujoco.MjData(model)
     rng = np.random.default_rng(job.get("seed", 0))
     states = []
+    original = copy.deepcopy(model)
     # penetrations of height fields are found by iteration
     model.opt.ccd_tolerance = 1e-12
     model.opt.ccd_iterations = 200
@@ -159,9 +189,11 @@ def run(job):
             data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = q, v, u, act
             data.xfrc_applied[:] = push
 
+        own = vary(model, rng, original) if job.get("vary") else None
         restart()
         mujoco.mj_forward(model, data)
         state = {
+            "own": own,
             "deep": deep_in_field(model, data),
             "act": act.tolist(),
             "xfrc": push.ravel().tolist(),

@@ -5,7 +5,7 @@ use crate::model::{EqualityKind, Model};
 use crate::readings::rot_to_quat;
 use crate::rigid::{self, BodyMount, quat_to_rot};
 use crate::sim::{Mount, Sim};
-use crate::solver::block::Cost;
+use crate::solver::block::{Cost, Source};
 use crate::solver::softness::{Softness, impedance_at, softness};
 use crate::spatial::*;
 use crate::tendon::TendonSpec;
@@ -14,6 +14,8 @@ use crate::work::{Group, Work};
 /// An equality constraint as the kernels see it.
 #[derive(Clone, Debug)]
 pub(crate) struct EqualitySpec<C> {
+    /// Index in the model.
+    index: usize,
     tie: Tie<C>,
     soft: Softness<C>,
     /// Approximate inverse inertia seen by the rows of positions and by those of orientations.
@@ -63,7 +65,7 @@ pub(crate) fn equalities<T: Real>(
     };
     let tendon = |t: usize| Length { terms: tendons[t].terms.clone(), zero: c(model.tendons[t].length0) };
     let mut out = Vec::new();
-    for e in model.equalities.iter().filter(|e| e.active) {
+    for (index, e) in model.equalities.iter().enumerate().filter(|(_, e)| e.active) {
         let dof_weight = |j: usize| model.dofs[model.joints[j].dof_adr].invweight0;
         let tendon_weight = |t: usize| model.tendons[t].invweight0;
         let (tie, diag) = match &e.kind {
@@ -84,7 +86,7 @@ pub(crate) fn equalities<T: Real>(
             ),
         };
         let soft = softness::<T>(model, &e.solref, &e.solimp, 0.0, diag[0]);
-        out.push(EqualitySpec { tie, soft, diag: diag.map(|x| c(x.max(1e-15))) });
+        out.push(EqualitySpec { index, tie, soft, diag: diag.map(|x| c(x.max(1e-15))) });
     }
     out
 }
@@ -131,7 +133,7 @@ impl<T: Real> Kernel<T> for EqualityBlocks<'_, T> {
         let EqualityBlocks { sim, group, work } = self;
         for spec in &sim.equalities {
             match &spec.tie {
-                Tie::Bodies { points, quats } => bodies_block(sim, work, spec, points, quats.as_ref()),
+                Tie::Bodies { points, quats } => bodies_block(sim, group, work, spec, points, quats.as_ref()),
                 Tie::Lengths { follower, leader, poly } => {
                     lengths_block(group, work, spec, follower, leader.as_ref(), poly);
                 }
@@ -144,6 +146,7 @@ impl<T: Real> Kernel<T> for EqualityBlocks<'_, T> {
 #[inline(always)]
 fn bodies_block<T: Real>(
     sim: &Sim<T>,
+    group: &Group<T>,
     work: &mut Work<T>,
     spec: &EqualitySpec<T::Scalar>,
     points: &[Mount<T::Scalar>; 2],
@@ -181,7 +184,7 @@ fn bodies_block<T: Real>(
             let a = &work.bias_acc[l];
             let at = cross_add(&w[i], &v[i], &cross_add(&ang(a), &r[i], &lin(a)));
             // the bias acceleration has gravity in it
-            here[i] = add3(&at, &splat3(&sim.gravity));
+            here[i] = add3(&at, &group.gravity(sim));
             spin[i] = ang(a);
         }
     }
@@ -232,7 +235,7 @@ fn bodies_block<T: Real>(
     let (k, b) = (imp * T::splat(spec.soft.k), T::splat(spec.soft.b));
     let index = work.blocks.add();
     let block = &mut work.blocks[index];
-    block.reset(Cost::Equal, dim);
+    block.reset(Source::Equality(spec.index), Cost::Equal, dim);
     block.on = T::not(T::none());
     block.coupled = links[0].is_some() && links[1].is_some();
     for i in 0..dim {
@@ -281,7 +284,7 @@ fn lengths_block<T: Real>(
     let imp = impedance_at(&spec.soft, error);
     let index = work.blocks.add();
     let block = &mut work.blocks[index];
-    block.reset(Cost::Equal, 1);
+    block.reset(Source::Equality(spec.index), Cost::Equal, 1);
     block.on = T::not(T::none());
     block.d[0] = imp.div((T::lit(1.0) - imp) * T::splat(spec.diag[0]));
     block.u0[0] = v.mul_add(T::splat(spec.soft.b), imp * T::splat(spec.soft.k) * error);

@@ -12,7 +12,8 @@ pub(crate) struct Lift<C> {
     link: usize,
     /// Where it acts, in the link's frame.
     at: [C; 3],
-    force: [C; 3],
+    /// Mass that it carries, kg.
+    mass: C,
 }
 
 /// A body in a medium: a box of the same mass and inertia (MuJoCo documentation, "Passive forces", inertia model).
@@ -53,11 +54,7 @@ pub(crate) fn lifts<T: Real>(
             }
         }
         if weight != 0.0 {
-            out.push(Lift {
-                link,
-                at: moment.map(|x| T::scalar(x / weight)),
-                force: model.opt.gravity.map(|g| T::scalar(-g * weight)),
-            });
+            out.push(Lift { link, at: moment.map(|x| T::scalar(x / weight)), mass: T::scalar(weight) });
         }
     }
     out
@@ -124,10 +121,21 @@ impl<T: Real> Kernel<T> for External<'_, T> {
     fn run(self) {
         let External { sim, group, work } = self;
         let z = T::zero();
+        let gravity = group.gravity(sim);
         work.external.fill([z; 6]);
         for lift in &sim.lifts {
             let r = rotate_add(&work.rot[lift.link], &splat3(&lift.at), &work.pos[lift.link]);
-            push(work, lift.link, &r, &splat3(&lift.force), &[z; 3]);
+            let mut weight = T::splat(lift.mass);
+            if let Some(varied) = &group.varied {
+                weight *= varied.mass[lift.link];
+            }
+            push(
+                work,
+                lift.link,
+                &r,
+                &[-(gravity[0] * weight), -(gravity[1] * weight), -(gravity[2] * weight)],
+                &[z; 3],
+            );
         }
         for drag in &sim.drags {
             let m = &sim.coms[drag.body];

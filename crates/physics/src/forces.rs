@@ -224,6 +224,10 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
             slope = T::masked(T::and(low.lt(force), force.lt(high)), slope);
             force = force.max(low).min(high);
         }
+        if let Some(varied) = &group.varied {
+            force *= varied.strength[i];
+            slope *= varied.strength[i];
+        }
         work.actuator_force[i] = force;
         match &motor.pull {
             Pull::Joint { dofs, gear, .. } => {

@@ -34,6 +34,13 @@ pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         work.pos[l] = pos;
         work.inertia[l] = spatial_inertia(link, &rot, &pos);
     }
+    if let Some(varied) = &group.varied {
+        for (inertia, factor) in work.inertia.iter_mut().zip(&varied.mass) {
+            for x in inertia {
+                *x *= *factor;
+            }
+        }
+    }
 }
 
 /// Frame of a link before its joints move it; in world coordinates for a root.
@@ -205,14 +212,12 @@ fn turned<T: Real>(t: &Rot<T>, r: &Rot<T>, a: usize, b: usize) -> T {
 pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let z = T::zero();
     let v = &group.qvel;
+    let gravity = group.gravity(sim);
     for l in 0..sim.links.len() {
         let link = &sim.links[l];
         let (mut vel, mut acc) = match link.parent {
             Some(p) => (work.vel[p], work.bias_acc[p]),
-            None => {
-                let g = &sim.gravity;
-                ([z; 6], [z, z, z, -T::splat(g[0]), -T::splat(g[1]), -T::splat(g[2])])
-            }
+            None => ([z; 6], [z, z, z, -gravity[0], -gravity[1], -gravity[2]]),
         };
         for j in link.joints.clone() {
             let joint = &sim.joints[j];

@@ -26,12 +26,14 @@ pub mod spatial;
 mod step;
 mod support;
 mod tendon;
+mod variation;
 mod work;
 pub mod workload;
 
-pub use batch::{Batch, BatchOptions, BodyReading, Snapshot};
+pub use batch::{AgentState, Batch, BatchOptions, Blowup, BodyReading, Replay, Snapshot};
 pub use lanes::{Isa, Real};
 pub use model::Model;
 pub use readings::{Readings, rot_to_quat};
 pub use sim::{Sim, SimError, SimOptions};
+pub use variation::Variation;
 pub use work::{Group, SolverStats, Work};

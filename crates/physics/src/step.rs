@@ -47,13 +47,13 @@ stage!(
     /// Contacts, limits, dry friction.
     constraint_stage, ConstraintStage, |sim, group, work| {
         work.blocks.clear();
-        collide_floor(sim, work);
+        collide_floor(sim, group, work);
         joint_rows(sim, group, work);
     }
 );
 stage!(
     /// Contacts that are not points above a level floor.
-    pair_stage, PairStage, |sim, _group, work| collide_pairs(sim, work)
+    pair_stage, PairStage, |sim, group, work| collide_pairs(sim, group, work)
 );
 stage!(
     /// Constrained acceleration.

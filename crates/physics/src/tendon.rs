@@ -4,7 +4,7 @@ use crate::equality::Term;
 use crate::lanes::{Kernel, Real};
 use crate::model::{JointType, Model, TendonKind};
 use crate::sim::{Sim, split};
-use crate::solver::block::Cost;
+use crate::solver::block::{Cost, Source};
 use crate::solver::softness::{Softness, impedance, softness};
 use crate::spatial::quat_to_rotvec;
 use crate::work::{Group, Work};
@@ -133,7 +133,7 @@ impl<T: Real> Kernel<T> for TendonBlocks<'_, T> {
                 let (_, d) = impedance(soft, T::zero());
                 let index = work.blocks.add();
                 let block = &mut work.blocks[index];
-                block.reset(Cost::Dry, 1);
+                block.reset(Source::TendonFriction, Cost::Dry, 1);
                 block.on = T::not(T::none());
                 block.d[0] = d;
                 block.mu[0] = T::splat(*loss);
@@ -145,7 +145,14 @@ impl<T: Real> Kernel<T> for TendonBlocks<'_, T> {
                 (one, (length - T::splat(low[0])) - T::splat(low[1])),
                 (-one, (T::splat(high[0]) - length) + T::splat(high[1])),
             ] {
-                push(work, soft, dist, sign * velocity, t.terms.iter().map(|t| (t.dof, sign * T::splat(t.coef))));
+                push(
+                    work,
+                    Source::TendonLimit(i),
+                    soft,
+                    dist,
+                    sign * velocity,
+                    t.terms.iter().map(|t| (t.dof, sign * T::splat(t.coef))),
+                );
             }
         }
         for limit in &sim.ball_limits {
@@ -160,7 +167,7 @@ impl<T: Real> Kernel<T> for TendonBlocks<'_, T> {
                 rate = axis[k].neg_mul_add(group.qvel[limit.dof + k], rate);
             }
             let terms = (0..3).map(|k| (limit.dof + k, -axis[k]));
-            push(work, &limit.soft, T::splat(limit.range) - angle, rate, terms);
+            push(work, Source::BallLimit(limit.dof), &limit.soft, T::splat(limit.range) - angle, rate, terms);
         }
     }
 }
@@ -169,6 +176,7 @@ impl<T: Real> Kernel<T> for TendonBlocks<'_, T> {
 #[inline(always)]
 fn push<T: Real>(
     work: &mut Work<T>,
+    source: Source,
     soft: &Softness<T::Scalar>,
     dist: T,
     rate: T,
@@ -182,7 +190,7 @@ fn push<T: Real>(
     let (imp, d) = impedance(soft, violation);
     let index = work.blocks.add();
     let block = &mut work.blocks[index];
-    block.reset(Cost::Push, 1);
+    block.reset(source, Cost::Push, 1);
     block.on = on;
     block.d[0] = T::masked(on, d);
     block.u0[0] = rate.mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));

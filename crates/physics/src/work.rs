@@ -1,5 +1,6 @@
 //! State of a lane group and the scratch memory of a step.
 
+use crate::collision::Field;
 use crate::lanes::Real;
 use crate::model::JointType;
 use crate::narrow::Touch;
@@ -9,6 +10,8 @@ use crate::solver::coupled::Coupling;
 use crate::solver::floor::FloorRow;
 use crate::solver::joint::{DryRow, LimitRow};
 use crate::spatial::{Inertia, Rot, Sym6, V3, V6};
+use crate::variation::Varied;
+use std::sync::Arc;
 
 /// State of `T::LANES` agents that share a model: everything their future depends on.
 #[derive(Clone, Debug)]
@@ -25,6 +28,10 @@ pub struct Group<T: Real> {
     pub warm: Vec<T>,
     /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
     pub external: Vec<V6<T>>,
+    /// Constants that differ from the model's.
+    pub(crate) varied: Option<Box<Varied<T>>>,
+    /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
+    pub(crate) grounds: Vec<Option<Arc<Field<T::Scalar>>>>,
 }
 
 impl<T: Real> Group<T> {
@@ -38,6 +45,8 @@ impl<T: Real> Group<T> {
             ctrl: vec![zero; m.nu],
             act: vec![zero; m.na],
             external: Vec::new(),
+            varied: None,
+            grounds: Vec::new(),
             warm: vec![zero; m.nv],
         }
     }

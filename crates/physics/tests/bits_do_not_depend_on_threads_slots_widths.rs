@@ -3,11 +3,12 @@
 //! An agent's trajectory is a function of its own state and controls. Whoever shares its vector register, however many
 //! others there are, wherever it sits among them, and however many threads and lanes the machine has: the same bits.
 //! The agents of this test start apart, so that a group always holds standing, falling and lying ones, and they run for
-//! long enough to meet every branch of the solver.
+//! long enough to meet every branch of the solver. It holds with everything on: contacts between moving bodies, elliptic
+//! cones, terrain, equality constraints, tendons, activations, pushes, and constants and ground of each agent's own.
 
 mod common;
 
-use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions};
+use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions, Variation};
 
 /// Starts and controls of agent number `id`, from a hash of the number alone.
 fn noise(id: usize, k: usize) -> f64 {
@@ -20,15 +21,30 @@ fn noise(id: usize, k: usize) -> f64 {
 
 /// Runs agents `ids` (in this order of slots) and returns each one's state after every ten steps, as bits.
 fn run(model: &Model, ids: &[usize], threads: usize, isa: Isa, decisions: usize) -> Vec<Vec<u64>> {
-    let sim = SimOptions { ground_contacts_only: true, ..Default::default() };
-    let mut batch = Batch::new(model, &BatchOptions { agents: ids.len(), threads, isa, sim }).expect("supported");
+    let options = BatchOptions { agents: ids.len(), threads, isa, ..Default::default() };
+    let mut batch = Batch::new(model, &options).expect("supported");
     for (slot, &id) in ids.iter().enumerate() {
         let mut qpos = model.qpos0.clone();
-        for (k, q) in qpos.iter_mut().enumerate().skip(model.nq - model.nu) {
+        for (k, q) in qpos.iter_mut().enumerate().skip(model.nq - model.nu.min(model.nv)) {
             *q += 0.2 * noise(id, k);
         }
         let qvel: Vec<f64> = (0..model.nv).map(|k| 0.5 * noise(id, 100 + k)).collect();
         batch.reset(slot, &qpos, &qvel);
+        if id % 3 == 0 {
+            batch.push(slot, model.bodies.len() - 1, [noise(id, 200), noise(id, 201), 1.0], [0.1, noise(id, 202), 0.0]);
+        }
+        if id % 5 < 2 {
+            let mut own = Variation::none(model);
+            own.mass.iter_mut().enumerate().for_each(|(k, x)| *x = 1.0 + 0.3 * noise(id, 300 + k));
+            own.strength.iter_mut().enumerate().for_each(|(k, x)| *x = 1.0 + 0.2 * noise(id, 400 + k));
+            own.friction = 1.0 + 0.5 * noise(id, 299);
+            own.gravity[2] -= noise(id, 298);
+            batch.vary(slot, &own);
+        }
+        for (field, h) in model.hfields.iter().enumerate().filter(|_| id % 2 == 0) {
+            let elevations: Vec<f32> = (0..h.data.len()).map(|k| 0.2 + 0.2 * noise(id, 500 + k) as f32).collect();
+            batch.set_ground(slot, field, &elevations);
+        }
     }
     let mut out = vec![Vec::new(); ids.len()];
     for t in 0..decisions {
@@ -45,7 +61,19 @@ fn run(model: &Model, ids: &[usize], threads: usize, isa: Isa, decisions: usize)
 fn models() -> Vec<Model> {
     let dir = common::workspace();
     let agents = ["hopper", "walker2d", "humanoid", "ant"].map(|n| dir.join(format!("assets/agents/{n}.xml")));
-    let others = ["tumbler", "arm"].map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
+    let others = [
+        "tumbler",
+        "arm",
+        "full/pile",
+        "full/elliptic",
+        "full/terrain",
+        "full/equality",
+        "full/tendons",
+        "full/actuators_implicitfast",
+        "full/actuators_rk4",
+        "full/medium",
+    ]
+    .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
     agents.iter().chain(&others).map(|p| Model::from_xml_file(p).unwrap_or_else(|e| panic!("{e}"))).collect()
 }
 

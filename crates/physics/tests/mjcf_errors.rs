@@ -66,7 +66,6 @@ fn references_must_exist() {
     check(&with_section("<contact><pair geom1='g' geom2='h'/></contact>"), &["'geom2': there is no geom 'h'"]);
     check(&with_section("<contact><exclude body1='b' body2='c'/></contact>"), &["'body2': there is no body 'c'"]);
     check(&in_body("<camera mode='targetbody' target='c'/>"), &["'target': there is no body 'c'"]);
-    check(&in_body("<light mode='targetbody'/>"), &["needs the attribute 'target'"]);
 }
 
 #[test]

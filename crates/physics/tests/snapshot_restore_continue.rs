@@ -2,18 +2,32 @@
 
 mod common;
 
-use marathon_physics::{Batch, BatchOptions, Model, SimOptions};
+use marathon_physics::{Batch, BatchOptions, Model, Variation};
 
 #[test]
 fn a_restored_batch_has_the_same_future() {
-    let path = common::workspace().join("assets/agents/humanoid.xml");
-    let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
-    let options = BatchOptions {
-        agents: 20,
-        sim: SimOptions { ground_contacts_only: true, ..Default::default() },
-        ..Default::default()
-    };
+    for file in ["assets/agents/humanoid.xml", "crates/physics/tests/models/full/pile.xml"] {
+        check(file);
+    }
+    for name in ["terrain", "equality", "tendons", "actuators", "medium", "elliptic"] {
+        check(&format!("crates/physics/tests/models/full/{name}.xml"));
+    }
+}
+
+fn check(file: &str) {
+    let model = Model::from_xml_file(common::workspace().join(file)).unwrap_or_else(|e| panic!("{e}"));
+    let options = BatchOptions { agents: 20, ..Default::default() };
     let mut batch = Batch::new(&model, &options).expect("supported");
+    // some agents have things of their own, which are part of their state
+    let mut own = Variation::none(&model);
+    own.mass.fill(1.2);
+    own.friction = 0.7;
+    batch.vary(3, &own);
+    batch.push(4, 1, [1.0, 0.5, 0.2], [0.0, 0.1, 0.0]);
+    for (field, h) in model.hfields.iter().enumerate() {
+        let elevations: Vec<f32> = (0..h.data.len()).map(|k| 0.01 * k as f32).collect();
+        batch.set_ground(5, field, &elevations);
+    }
     let controls = |t: usize| -> Vec<f64> {
         (0..20 * model.nu).map(|i| ((i * 7919 + t * 104729) % 200) as f64 / 100.0 - 1.0).collect()
     };
@@ -25,18 +39,18 @@ fn a_restored_batch_has_the_same_future() {
         batch.step(&controls(t), 5);
     }
     let end = batch.snapshot();
-    assert!(end != middle, "something happened");
+    assert!(end != middle, "{file}: something happened");
 
     batch.restore(&middle);
     for t in 30..60 {
         batch.step(&controls(t), 5);
     }
-    assert!(batch.snapshot() == end, "the same batch again");
+    assert!(batch.snapshot() == end, "{file}: the same batch again");
 
     let mut fresh = Batch::new(&model, &options).expect("supported");
     fresh.restore(&middle);
     for t in 30..60 {
         fresh.step(&controls(t), 5);
     }
-    assert!(fresh.snapshot() == end, "another batch");
+    assert!(fresh.snapshot() == end, "{file}: another batch");
 }

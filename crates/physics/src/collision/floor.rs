@@ -3,6 +3,7 @@
 //! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
 //! corners. Each is a [`Candidate`]; all lanes walk the same list, and a lane that does not touch gets stiffness zero.
 
+use super::pairs::pyramid_share;
 use super::params::ContactParams;
 use crate::lanes::Real;
 use crate::model::{Cone, GeomType, Model};
@@ -11,7 +12,7 @@ use crate::sim::Sim;
 use crate::solver::floor::FloorRow;
 use crate::solver::softness::{Softness, impedance, softness};
 use crate::spatial::*;
-use crate::work::Work;
+use crate::work::{Group, Work};
 
 /// A point of a moving geom that may touch a level plane.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub(crate) struct Candidate<C> {
     pub link: usize,
     /// Geom index in the model.
     pub geom: usize,
+    /// Geom of the plane.
+    pub plane: usize,
     /// Center of the sphere that touches (radius 0 for a box corner), in the link's frame.
     pub point: [C; 3],
     pub radius: C,
@@ -43,7 +46,7 @@ pub(super) fn add<T: Real>(
     params: &ContactParams,
     out: &mut Vec<Candidate<T::Scalar>>,
 ) -> bool {
-    let (fixed, moving) = (&model.geoms[fixed], &model.geoms[geom]);
+    let (plane_geom, fixed, moving) = (fixed, &model.geoms[fixed], &model.geoms[geom]);
     let Some(link) = link else { return false };
     let pyramid = params.condim == 1 || (params.condim == 3 && model.opt.cone == Cone::Pyramidal);
     let shape = matches!(moving.kind, GeomType::Sphere | GeomType::Capsule | GeomType::Box);
@@ -73,6 +76,7 @@ pub(super) fn add<T: Real>(
     let base = Candidate {
         link,
         geom,
+        plane: plane_geom,
         point: c3(frame.0),
         radius: T::scalar(moving.size[0]),
         axis: None,
@@ -112,7 +116,7 @@ pub(super) fn add<T: Real>(
 
 /// Finds the contacts with the floor and writes their rows.
 #[inline(always)]
-pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let zero = T::zero();
     work.contacts.clear();
     work.touching.fill(T::none());
@@ -149,7 +153,15 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
         let r = [x, y, dist.mul_add(T::lit(0.5), T::splat(c.height) - reference[2])];
         let (tx, ty) = tangent(c.axis.as_ref(), rot);
         let violation = dist - T::splat(c.soft.margin);
-        let (imp, d) = impedance(&c.soft, violation);
+        let (imp, mut d) = impedance(&c.soft, violation);
+        let mut mu = [T::splat(c.mu[0]), T::splat(c.mu[1])];
+        if let Some(factor) = group.friction() {
+            // a frictionless contact is a flat pyramid and has nothing to vary
+            if c.mu[0] > T::scalar(0.0) {
+                d = d * pyramid_share(mu[0], factor);
+            }
+            mu = [mu[0] * factor, mu[1] * factor];
+        }
         let vel = &work.vel[c.link];
         let v = cross_add(&ang(vel), &r, &lin(vel));
         let (v1, v2) = (v[0].mul_add(tx, v[1] * ty), v[1].mul_add(tx, -(v[0] * ty)));
@@ -158,10 +170,11 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
         work.contacts.push(FloorRow {
             link: c.link,
             geom: c.geom,
+            plane: c.plane,
             r,
             tx,
             ty,
-            mu: c.mu,
+            mu,
             d: T::masked(on, d),
             u0,
             u: u0,

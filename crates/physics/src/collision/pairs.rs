@@ -10,10 +10,10 @@ use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow::{self, Touch, Touches};
 use crate::rigid::BodyMount;
 use crate::sim::{Mount, Sim};
-use crate::solver::block::{Block, Cost, Jacobian};
+use crate::solver::block::{Block, Cost, Jacobian, Source};
 use crate::solver::softness::{Softness, impedance, softness};
 use crate::spatial::*;
-use crate::work::Work;
+use crate::work::{Group, Work};
 
 /// Function that finds the contacts of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,6 +157,20 @@ pub(crate) struct Field<C: Real> {
     pub grid: narrow::height::HeightField<C>,
 }
 
+impl<C: Real> Field<C> {
+    /// The same grid with other elevations, m.
+    ///
+    /// # Panics
+    /// If their number is not that of the grid.
+    pub fn with_elevations(&self, elevations: &[f32]) -> Self {
+        let grid = &self.grid;
+        assert_eq!(elevations.len(), grid.rows * grid.cols, "one elevation per point of the grid");
+        let top = elevations.iter().fold(0.0f64, |m, x| m.max(f64::from(*x)));
+        let heights = elevations.iter().map(|x| C::lit(f64::from(*x))).collect();
+        Field { grid: narrow::height::HeightField { heights, top: C::lit(top), ..grid.clone() } }
+    }
+}
+
 /// Height fields of a model.
 pub(crate) fn fields<C: Real>(model: &Model) -> Vec<Field<C>> {
     model
@@ -188,7 +202,7 @@ struct Slots<T: Real> {
 
 /// Finds the contacts of all pairs and writes their blocks.
 #[inline(always)]
-pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for touching in work.touching_bodies.iter_mut() {
         *touching = T::none();
     }
@@ -210,7 +224,7 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
         if !T::any(near) {
             continue;
         }
-        touch_pair(sim, work, i, base, [&a, &b], near, &mut slots);
+        touch_pair(sim, group, work, i, base, [&a, &b], near, &mut slots);
     }
 }
 
@@ -246,9 +260,11 @@ fn axis_of<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>) -> V3<T> {
 }
 
 /// Narrow phase of one pair.
+#[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn touch_pair<T: Real>(
     sim: &Sim<T>,
+    group: &Group<T>,
     work: &mut Work<T>,
     index: usize,
     base: usize,
@@ -270,59 +286,61 @@ fn touch_pair<T: Real>(
     match pair.test {
         Test::PlaneSphere => {
             let t = narrow::plane::plane_sphere(&plane(), &sphere(1), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::PlaneCapsule => {
             for t in narrow::plane::plane_capsule(&plane(), &capsule(1, axis_of(work, mb)), margin) {
-                add_touch(sim, work, index, base, &t, slots);
+                add_touch(sim, group, work, index, base, &t, slots);
             }
         }
         Test::PlaneBox => {
             for t in narrow::plane::plane_box(&plane(), &block(1, axes_of(work, mb)), margin) {
-                add_touch(sim, work, index, base, &t, slots);
+                add_touch(sim, group, work, index, base, &t, slots);
             }
         }
         Test::PlaneCylinder => {
             for t in narrow::plane::plane_cylinder(&plane(), &cylinder(1, axes_of(work, mb)), margin) {
-                add_touch(sim, work, index, base, &t, slots);
+                add_touch(sim, group, work, index, base, &t, slots);
             }
         }
         Test::PlaneEllipsoid => {
             let t = narrow::plane::plane_ellipsoid(&plane(), &block(1, axes_of(work, mb)), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::SphereSphere => {
             let t = narrow::round::sphere_sphere(&sphere(0), &sphere(1), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::SphereCapsule => {
             let t = narrow::round::sphere_capsule(&sphere(0), &capsule(1, axis_of(work, mb)), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::SphereBox => {
             let t = narrow::round::sphere_box(&sphere(0), &block(1, axes_of(work, mb)), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::SphereCylinder => {
             let t = narrow::round::sphere_cylinder(&sphere(0), &cylinder(1, axes_of(work, mb)), margin);
-            add_touch(sim, work, index, base, &t, slots);
+            add_touch(sim, group, work, index, base, &t, slots);
         }
         Test::CapsuleCapsule => {
             let (a, b) = (capsule(0, axis_of(work, ma)), capsule(1, axis_of(work, mb)));
             for t in narrow::round::capsule_capsule(&a, &b, margin) {
-                add_touch(sim, work, index, base, &t, slots);
+                add_touch(sim, group, work, index, base, &t, slots);
             }
         }
         Test::CapsuleBox | Test::BoxBox | Test::FieldCapsule | Test::FieldBox => {
-            one_by_one(sim, work, index, base, centers, near, slots);
+            one_by_one(sim, group, work, index, base, centers, near, slots);
         }
     }
 }
 
 /// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
+#[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn one_by_one<T: Real>(
     sim: &Sim<T>,
+    group: &Group<T>,
     work: &mut Work<T>,
     index: usize,
     base: usize,
@@ -358,7 +376,7 @@ fn one_by_one<T: Real>(
             }
             Test::BoxBox => narrow::box_box::box_box(&block(0), &block(1), pair.margin, &mut lane_touches),
             test => {
-                let field = &sim.fields[pair.field].grid;
+                let field = &group.ground(sim, lane, pair.field).grid;
                 let terrain = narrow::height::Terrain { field, center: center(0), axes: turned(0) };
                 if test == Test::FieldBox {
                     narrow::height::field_box(&terrain, &block(1), pair.margin, &mut lane_touches);
@@ -374,7 +392,7 @@ fn one_by_one<T: Real>(
         gather(&lane_touches, lane, &mut found, &mut count);
     }
     for t in found.iter().take(count) {
-        add_touch(sim, work, index, base, t, slots);
+        add_touch(sim, group, work, index, base, t, slots);
     }
     work.touches = found;
 }
@@ -405,6 +423,7 @@ fn gather<T: Real>(touches: &Touches<T::Scalar>, lane: usize, found: &mut Vec<To
 #[inline(always)]
 fn add_touch<T: Real>(
     sim: &Sim<T>,
+    group: &Group<T>,
     work: &mut Work<T>,
     index: usize,
     base: usize,
@@ -412,23 +431,25 @@ fn add_touch<T: Real>(
     slots: &mut Slots<T>,
 ) {
     if T::any(touch.on) {
-        write_slot(sim, work, index, base, touch, slots);
+        write_slot(sim, group, work, index, base, touch, slots);
     }
 }
 
 fn write_slot<T: Real>(
     sim: &Sim<T>,
+    group: &Group<T>,
     work: &mut Work<T>,
     index: usize,
     base: usize,
     touch: &Touch<T>,
     slots: &mut Slots<T>,
 ) {
-    T::enter(WriteSlot { sim, work, index, base, touch, slots });
+    T::enter(WriteSlot { sim, group, work, index, base, touch, slots });
 }
 
 struct WriteSlot<'a, T: Real> {
     sim: &'a Sim<T>,
+    group: &'a Group<T>,
     work: &'a mut Work<T>,
     index: usize,
     base: usize,
@@ -440,7 +461,7 @@ impl<T: Real> crate::lanes::Kernel<T> for WriteSlot<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let WriteSlot { sim, work, index, base, touch, slots } = self;
+        let WriteSlot { sim, group, work, index, base, touch, slots } = self;
         let pair = &sim.contacts.pairs[index];
         let (zero, one) = (T::zero(), T::lit(1.0));
         work.stats.contacts += T::bits(touch.on).count_ones() as u64;
@@ -475,7 +496,10 @@ impl<T: Real> crate::lanes::Kernel<T> for WriteSlot<'_, T> {
         let w = sub3(&spin[1], &spin[0]);
 
         let violation = touch.dist - T::splat(pair.soft.margin);
-        let (imp, d) = impedance(&pair.soft, violation);
+        let (imp, mut d) = impedance(&pair.soft, violation);
+        if let (Some(factor), Cost::Pyramid) = (group.friction(), pair.cost) {
+            d = d * pyramid_share(T::splat(pair.friction[0]), factor);
+        }
         let b = T::splat(pair.soft.b);
         let frame = [normal, t1, t2];
         let mut u0 = [zero; 6];
@@ -497,7 +521,7 @@ impl<T: Real> crate::lanes::Kernel<T> for WriteSlot<'_, T> {
                     open(&mut work.blocks[new], pair);
                 }
                 let block = &mut work.blocks[slot];
-                fill(block, here, pair, &points, &frame, d, &u0);
+                fill(block, here, pair, &points, &frame, d, &u0, group.friction());
                 for (s, link) in links.iter().enumerate() {
                     if let (Some(l), Jacobian::Points { sides, .. }) = (link, &mut block.jacobian) {
                         join::<T>(&mut sides[s].links, *l, here);
@@ -511,6 +535,16 @@ impl<T: Real> crate::lanes::Kernel<T> for WriteSlot<'_, T> {
         }
         slots.filled += T::masked(touch.on, one);
     }
+}
+
+/// Ratio of an edge's stiffness at `factor` times the friction to that at the model's: `R` is in proportion to
+/// `mu^2 (1 + mu0^2)`.
+#[inline(always)]
+pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
+    let one = T::lit(1.0);
+    let square = mu0 * mu0;
+    let varied = square * (factor * factor);
+    (one + square).div((factor * factor) * (one + varied))
 }
 
 /// Marks who touches what.
@@ -548,12 +582,13 @@ fn join<T: Real>(entries: &mut Vec<(usize, T::Mask)>, key: usize, lanes: T::Mask
 #[inline(always)]
 fn open<T: Real>(block: &mut Block<T>, pair: &PairSpec<T::Scalar>) {
     let z = [T::zero(); 3];
-    block.reset(pair.cost, pair.dim);
+    block.reset(Source::Contacts, pair.cost, pair.dim);
     block.coupled = pair.coupled();
     block.tie_points([z; 3], [z; 3], [(None, z); 2], T::none());
 }
 
 /// Writes a contact into the lanes `here` of a slot.
+#[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn fill<T: Real>(
     block: &mut Block<T>,
@@ -563,6 +598,7 @@ fn fill<T: Real>(
     frame: &[V3<T>; 3],
     d: T,
     u0: &[T; 6],
+    friction: Option<T>,
 ) {
     block.on = T::or(block.on, here);
     for k in 0..pair.dim {
@@ -570,9 +606,11 @@ fn fill<T: Real>(
         block.u0[k] = T::select(here, u0[k], block.u0[k]);
     }
     for k in 0..pair.dim - 1 {
-        block.mu[k] = T::select(here, T::splat(pair.friction[k]), block.mu[k]);
+        let mu = T::splat(pair.friction[k]);
+        block.mu[k] = T::select(here, friction.map_or(mu, |f| mu * f), block.mu[k]);
     }
-    block.slope = T::select(here, T::splat(pair.slope), block.slope);
+    let slope = T::splat(pair.slope);
+    block.slope = T::select(here, friction.map_or(slope, |f| slope * f), block.slope);
     if let Jacobian::Points { sides, lin, ang } = &mut block.jacobian {
         for k in 0..3 {
             for i in 0..3 {

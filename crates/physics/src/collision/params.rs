@@ -106,7 +106,10 @@ fn may_collide(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> bool 
 /// "'name'", or the number of a nameless geom.
 pub(super) fn label(model: &Model, geom: usize) -> String {
     match model.geoms[geom].name.as_str() {
-        "" => format!("#{geom} of body '{}'", model.bodies[model.geoms[geom].body].name),
+        "" => match model.bodies[model.geoms[geom].body].name.as_str() {
+            "" => format!("#{geom}"),
+            body => format!("#{geom} of body '{body}'"),
+        },
         name => format!("'{name}'"),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::document::Element;
 use super::error::MjcfError;
-use super::math::{EPS, quat_norm};
+use super::math::{EPS, IDENTITY, quat_norm};
 use super::names::Names;
 use super::settings::{entries, sections};
 use super::value::{Attrs, numbers};
@@ -89,10 +89,9 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
             };
             let quat: Quat = std::array::from_fn(|i| key.qpos[adr + i]);
             let length = quat_norm(quat);
-            if !(length >= EPS) {
-                return Err(element.invalid(format!("the quaternion of the joint '{}' is zero", joint.name)));
-            }
-            key.qpos[adr..adr + 4].iter_mut().zip(quat).for_each(|(out, x)| *out = x / length);
+            // a quaternion of zeros is no rotation, as in MuJoCo
+            let unit = if length >= EPS { quat.map(|x| x / length) } else { IDENTITY };
+            key.qpos[adr..adr + 4].copy_from_slice(&unit);
         }
         keys.push(key);
     }

@@ -1,6 +1,7 @@
 //! The XML document: elements with their places, `<include>` already expanded.
 
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
@@ -102,6 +103,20 @@ pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve) -> Result<Element
     Ok(root)
 }
 
+/// The text with spaces for the dashes inside comments: MuJoCo's parser takes "--" there, which XML forbids.
+fn without_dashes_in_comments(text: &str) -> Cow<'_, str> {
+    let mut out = Cow::Borrowed(text);
+    let mut at = 0;
+    while let Some(start) = text[at..].find("<!--").map(|i| at + i + 4) {
+        let end = text[start..].find("-->").map_or(text.len(), |i| start + i);
+        if text[start..end].contains("--") || text[start..end].ends_with('-') {
+            out.to_mut().replace_range(start..end, &text[start..end].replace('-', " "));
+        }
+        at = end;
+    }
+    out
+}
+
 struct Loader<'a> {
     resolve: &'a Resolve<'a>,
     included: BTreeSet<String>,
@@ -112,6 +127,7 @@ impl Loader<'_> {
     fn file(&mut self, text: &str, name: &str, dir: &str, depth: usize) -> Result<Element, MjcfError> {
         let file: Rc<str> = name.into();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let text = &*without_dashes_in_comments(text);
         // no DTD, hence no entity bombs; the parser itself does not recurse over elements
         let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
         let document = roxmltree::Document::parse_with_options(text, options).map_err(|error| {

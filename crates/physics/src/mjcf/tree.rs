@@ -302,11 +302,9 @@ impl LightSpec<'_> {
     }
 }
 
-/// Tracking mode; the target modes need a target.
+/// Tracking mode; the target modes stay where they are without a target.
 fn mode(attrs: &Attrs) -> Result<TrackMode, MjcfError> {
     let mode = attrs.keyword("mode", &MODES)?.unwrap_or(TrackMode::Fixed);
-    if matches!(mode, TrackMode::TargetBody | TrackMode::TargetBodyCom) && attrs.text("target").is_none() {
-        return Err(attrs.element.invalid("this mode needs the attribute 'target'"));
-    }
-    Ok(mode)
+    let aims = matches!(mode, TrackMode::TargetBody | TrackMode::TargetBodyCom);
+    Ok(if aims && attrs.text("target").is_none() { TrackMode::Fixed } else { mode })
 }

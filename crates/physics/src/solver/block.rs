@@ -6,7 +6,7 @@
 //! ground with different limbs share a block. Lanes that leave a slot empty have stiffness zero in it.
 
 use crate::lanes::Real;
-use crate::solver::Row;
+use crate::solver::{Move, Row, replace};
 use crate::spatial::*;
 
 /// Values of up to six rows.
@@ -25,6 +25,21 @@ pub(crate) enum Cost {
     Equal,
     /// One row whose force is bounded: dry friction.
     Dry,
+}
+
+/// What a block stands for: the readings look for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// Contacts, listed in [`Block::members`].
+    Contacts,
+    /// An equality constraint, by index in the model.
+    Equality(usize),
+    /// A limit of a tendon.
+    TendonLimit(usize),
+    /// The limit of the ball joint with this first degree of freedom.
+    BallLimit(usize),
+    /// Dry friction of a tendon.
+    TendonFriction,
 }
 
 /// What the rows measure.
@@ -51,6 +66,7 @@ pub(crate) struct Side<T: Real> {
 pub(crate) struct Block<T: Real> {
     pub jacobian: Jacobian<T>,
     pub cost: Cost,
+    pub source: Source,
     pub dim: usize,
     /// Some lane's rows tie two links or several joints together, so that the block does not fit the tree.
     pub coupled: bool,
@@ -91,6 +107,7 @@ impl<T: Real> Block<T> {
         Block {
             jacobian: Jacobian::Points { sides: [side(), side()], lin: [[z; 3]; 3], ang: [[z; 3]; 3] },
             cost: Cost::Push,
+            source: Source::Contacts,
             dim: 1,
             coupled: false,
             on: T::none(),
@@ -110,8 +127,9 @@ impl<T: Real> Block<T> {
 
     /// Starts the block anew: empty lanes, no members, everything zero; what it measures is still to be said.
     #[inline(always)]
-    pub fn reset(&mut self, cost: Cost, dim: usize) {
+    pub fn reset(&mut self, source: Source, cost: Cost, dim: usize) {
         let z = T::zero();
+        self.source = source;
         self.cost = cost;
         self.dim = dim;
         self.coupled = true;
@@ -287,14 +305,14 @@ impl<T: Real> Block<T> {
         f
     }
 
-    /// Sets zones and the linear model at the present point; returns the lanes where they changed.
+    /// Sets zones and the linear model at the present point in the lanes `live`; returns the lanes where they changed.
     #[inline(always)]
-    pub fn activate(&mut self) -> T::Mask {
+    pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let z = T::zero();
         let mut changed = T::none();
         match self.cost {
             Cost::Push => {
-                let active = T::and(self.u[0].lt(z), self.on);
+                let active = replace::<T>(live, T::and(self.u[0].lt(z), self.on), self.zones[0]);
                 changed = T::xor(active, self.zones[0]);
                 self.zones[0] = active;
                 self.stiffness[0] = T::masked(active, self.d[0]);
@@ -308,8 +326,8 @@ impl<T: Real> Block<T> {
                 }
             }
             Cost::Dry => {
-                let below = (self.d[0] * self.u[0]).abs().lt(self.mu[0]);
-                let positive = z.lt(self.u[0]);
+                let below = replace::<T>(live, (self.d[0] * self.u[0]).abs().lt(self.mu[0]), self.zones[0]);
+                let positive = replace::<T>(live, z.lt(self.u[0]), self.zones[1]);
                 changed = T::or(T::xor(below, self.zones[0]), T::xor(positive, self.zones[1]));
                 self.zones[0] = below;
                 self.zones[1] = positive;
@@ -322,7 +340,8 @@ impl<T: Real> Block<T> {
                     self.stiffness[k] = z;
                 }
                 for e in 0..self.edges() {
-                    let active = T::and(self.edge(&self.u, e).lt(z), self.on);
+                    let pushes = T::and(self.edge(&self.u, e).lt(z), self.on);
+                    let active = replace::<T>(live, pushes, self.zones[e]);
                     changed = T::or(changed, T::xor(active, self.zones[e]));
                     self.zones[e] = active;
                     let (s, j) = (T::masked(active, self.d[0]), e / 2 + 1);
@@ -335,11 +354,14 @@ impl<T: Real> Block<T> {
             }
             Cost::Elliptic => {
                 let cone = Cone::at(self, &self.u);
-                let (bottom, middle) = (T::and(cone.bottom, self.on), T::and(cone.middle, self.on));
-                changed = T::or(T::xor(bottom, self.zones[0]), T::or(middle, self.zones[1]));
+                let bottom = replace::<T>(live, T::and(cone.bottom, self.on), self.zones[0]);
+                let middle = replace::<T>(live, T::and(cone.middle, self.on), self.zones[1]);
+                // on the curved part every move changes the model
+                changed = T::or(T::xor(bottom, self.zones[0]), T::xor(middle, self.zones[1]));
+                changed = T::or(changed, T::and(live, middle));
                 self.zones[0] = bottom;
                 self.zones[1] = middle;
-                self.elliptic_stiffness(&cone, bottom, middle);
+                self.elliptic_stiffness(&cone, live);
             }
         }
         changed
@@ -347,8 +369,9 @@ impl<T: Real> Block<T> {
 
     /// Second derivative of the elliptic cone's cost.
     #[inline(always)]
-    fn elliptic_stiffness(&mut self, cone: &Cone<T>, bottom: T::Mask, middle: T::Mask) {
+    fn elliptic_stiffness(&mut self, cone: &Cone<T>, live: T::Mask) {
         let z = T::zero();
+        let [bottom, middle] = [self.zones[0], self.zones[1]];
         let (mu, inv) = (self.slope, cone.inv_sliding);
         let radial = mu * cone.normal * inv * inv * inv;
         let round = mu * mu - mu * cone.normal * inv;
@@ -370,7 +393,8 @@ impl<T: Real> Block<T> {
                     }
                 };
                 let flat = if i == j { self.d[i] } else { z };
-                self.stiffness[at(i, j)] = T::select(middle, curved, T::masked(bottom, flat));
+                let now = T::select(middle, curved, T::masked(bottom, flat));
+                self.stiffness[at(i, j)] = T::select(live, now, self.stiffness[at(i, j)]);
             }
         }
     }
@@ -408,18 +432,15 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// Moves lanes that are not `done`: `exact` lanes to the Newton point, the others by `alpha` of the way. Returns the
-    /// lanes whose linear model changed.
+    /// Moves; returns the lanes whose linear model changed.
     #[inline(always)]
-    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);
         for i in 0..self.dim {
-            let moved = T::select(exact, self.next[i], alpha.mul_add(self.next[i] - self.u[i], self.u[i]));
-            self.u[i] = T::select(done, self.u[i], moved);
-            let force = T::select(exact, linear[i], alpha.mul_add(linear[i] - self.force[i], self.force[i]));
-            self.force[i] = T::select(done, self.force[i], force);
+            self.u[i] = step.of(self.u[i], self.next[i]);
+            self.force[i] = step.of(self.force[i], linear[i]);
         }
-        self.activate()
+        self.activate(step.live())
     }
 
     /// Adds the block's force to the forces on links and joints.

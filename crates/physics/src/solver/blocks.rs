@@ -4,8 +4,8 @@
 
 use crate::lanes::{Kernel, Real};
 use crate::sim::Sim;
-use crate::solver::Row;
 use crate::solver::block::{Block, Jacobian, Side, at};
+use crate::solver::{Move, Row};
 use crate::spatial::*;
 use crate::work::Work;
 
@@ -48,7 +48,7 @@ out_of_line!(
                 b.u[k] = ja[k] + b.u0[k];
             }
             b.force = [T::zero(); 6];
-            b.activate();
+            b.activate(T::not(T::none()));
         }
     }
 );
@@ -125,11 +125,11 @@ out_of_line!(
 );
 
 out_of_line!(
-    /// Moves lanes that are not `done`; marks the links whose system changed.
+    /// Moves the lanes and marks the links whose system changed.
     advance, Advance,
-    (sim: &'a Sim<T>, work: &'a mut Work<T>, done: T::Mask, exact: T::Mask, alpha: T) -> (), {
+    (sim: &'a Sim<T>, work: &'a mut Work<T>, step: Move<T>) -> (), {
         for b in work.blocks.iter_mut() {
-            if !T::any(b.advance(done, exact, alpha)) {
+            if !T::any(b.advance(&step)) {
                 continue;
             }
             match &b.jacobian {

@@ -3,7 +3,7 @@
 //! The other side stands still, so the contact adds a symmetric 6x6 to its own link and nothing else.
 
 use crate::lanes::Real;
-use crate::solver::Row;
+use crate::solver::{Move, Row, replace};
 use crate::space::Space;
 use crate::spatial::*;
 
@@ -12,12 +12,14 @@ use crate::spatial::*;
 pub(crate) struct FloorRow<T: Real> {
     pub link: usize,
     pub geom: usize,
+    /// Geom of the plane.
+    pub plane: usize,
     /// Contact point relative to the tree's reference point.
     pub r: V3<T>,
     /// First tangent in the plane.
     pub tx: T,
     pub ty: T,
-    pub mu: [T::Scalar; 2],
+    pub mu: [T; 2],
     /// Stiffness of an edge, 0 in lanes without this contact.
     pub d: T,
     /// Minus the reference acceleration.
@@ -43,14 +45,14 @@ impl<T: Real> FloorRow<T> {
     /// Values along the four edges of the pyramid.
     #[inline(always)]
     pub fn edges(&self, u: &V3<T>) -> [T; 4] {
-        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        let (m1, m2) = (self.mu[0], self.mu[1]);
         [m1.mul_add(u[1], u[0]), m1.neg_mul_add(u[1], u[0]), m2.mul_add(u[2], u[0]), m2.neg_mul_add(u[2], u[0])]
     }
 
     /// Total of forces along the edges.
     #[inline(always)]
     fn total(&self, f: &[T; 4]) -> V3<T> {
-        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        let (m1, m2) = (self.mu[0], self.mu[1]);
         [(f[0] + f[1]) + (f[2] + f[3]), m1 * (f[0] - f[1]), m2 * (f[2] - f[3])]
     }
 
@@ -84,13 +86,13 @@ impl<T: Real> FloorRow<T> {
         [t[0], t[1], t[2], world[0], world[1], world[2]]
     }
 
-    /// Sets the edges that push at `u`; returns the lanes where that is a change.
+    /// Sets the edges that push at `u` in the lanes `live`; returns the lanes where that is a change.
     #[inline(always)]
-    pub fn activate(&mut self) -> T::Mask {
+    pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let e = self.edges(&self.u);
         let mut changed = T::none();
         for k in 0..4 {
-            let active = T::and(e[k].lt(T::zero()), self.on);
+            let active = replace::<T>(live, T::and(e[k].lt(T::zero()), self.on), self.active[k]);
             changed = T::or(changed, T::xor(active, self.active[k]));
             self.active[k] = active;
         }
@@ -111,24 +113,21 @@ impl<T: Real> FloorRow<T> {
         changed
     }
 
-    /// Moves lanes that are not `done`: `exact` lanes to the Newton point, the others by `alpha` of the way. Returns the
-    /// lanes whose active edges changed.
+    /// Moves; returns the lanes whose active edges changed.
     #[inline(always)]
-    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);
         for i in 0..3 {
-            let moved = T::select(exact, self.next[i], alpha.mul_add(self.next[i] - self.u[i], self.u[i]));
-            self.u[i] = T::select(done, self.u[i], moved);
-            let force = T::select(exact, linear[i], alpha.mul_add(linear[i] - self.force[i], self.force[i]));
-            self.force[i] = T::select(done, self.force[i], force);
+            self.u[i] = step.of(self.u[i], self.next[i]);
+            self.force[i] = step.of(self.force[i], linear[i]);
         }
-        self.activate()
+        self.activate(step.live())
     }
 
     /// Adds the active edges' stiffness to the link's 6x6 matrix.
     #[inline(always)]
     pub fn add_stiffness<S: Space>(&self, k: &mut Sym6<T>) {
-        let (m1, m2) = (T::splat(self.mu[0]), T::splat(self.mu[1]));
+        let (m1, m2) = (self.mu[0], self.mu[1]);
         let mut s = [T::zero(); 4];
         for e in 0..4 {
             s[e] = T::masked(self.active[e], self.d);

@@ -2,8 +2,8 @@
 
 use crate::lanes::Real;
 use crate::sim::Sim;
-use crate::solver::Row;
 use crate::solver::softness::{Softness, impedance};
+use crate::solver::{Move, Row, replace};
 use crate::work::{Group, Work};
 
 /// A joint limit.
@@ -50,10 +50,10 @@ impl<T: Real> LimitRow<T> {
         -(self.d * u.min(T::zero()))
     }
 
-    /// Sets whether the limit pushes at `u`; returns the lanes where that is a change.
+    /// Sets whether the limit pushes at `u` in the lanes `live`; returns the lanes where that is a change.
     #[inline(always)]
-    pub fn activate(&mut self) -> T::Mask {
-        let active = T::and(self.u.lt(T::zero()), self.on);
+    pub fn activate(&mut self, live: T::Mask) -> T::Mask {
+        let active = replace::<T>(live, T::and(self.u.lt(T::zero()), self.on), self.active);
         let changed = T::xor(active, self.active);
         self.active = active;
         changed
@@ -66,13 +66,11 @@ impl<T: Real> LimitRow<T> {
     }
 
     #[inline(always)]
-    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
         let linear = self.linear(self.next);
-        let moved = T::select(exact, self.next, alpha.mul_add(self.next - self.u, self.u));
-        self.u = T::select(done, self.u, moved);
-        let force = T::select(exact, linear, alpha.mul_add(linear - self.force, self.force));
-        self.force = T::select(done, self.force, force);
-        self.activate()
+        self.u = step.of(self.u, self.next);
+        self.force = step.of(self.force, linear);
+        self.activate(step.live())
     }
 }
 
@@ -113,10 +111,12 @@ impl<T: Real> DryRow<T> {
         T::select(self.sticking, -(self.d * u), T::select(self.positive, -bound, bound))
     }
 
-    /// Sets the zone at `u`; returns the lanes where that is a change.
+    /// Sets the zone at `u` in the lanes `live`; returns the lanes where that is a change.
     #[inline(always)]
-    pub fn activate(&mut self) -> T::Mask {
+    pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let (sticking, positive) = self.zone(self.u);
+        let sticking = replace::<T>(live, sticking, self.sticking);
+        let positive = replace::<T>(live, positive, self.positive);
         let changed = T::or(T::xor(sticking, self.sticking), T::xor(positive, self.positive));
         (self.sticking, self.positive) = (sticking, positive);
         changed
@@ -131,13 +131,11 @@ impl<T: Real> DryRow<T> {
     }
 
     #[inline(always)]
-    pub fn advance(&mut self, done: T::Mask, exact: T::Mask, alpha: T) -> T::Mask {
+    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
         let linear = self.linear(self.next);
-        let moved = T::select(exact, self.next, alpha.mul_add(self.next - self.u, self.u));
-        self.u = T::select(done, self.u, moved);
-        let force = T::select(exact, linear, alpha.mul_add(linear - self.force, self.force));
-        self.force = T::select(done, self.force, force);
-        self.activate()
+        self.u = step.of(self.u, self.next);
+        self.force = step.of(self.force, linear);
+        self.activate(step.live())
     }
 }
 

@@ -78,19 +78,20 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
         arrived = T::or(arrived, T::and(exact, T::not(done)));
         if T::all(T::or(done, exact)) {
             // every live lane arrived
-            advance(sim, work, done, exact, T::lit(1.0));
+            advance(sim, work, &Move { done, exact, alpha: T::lit(1.0), last: exact });
             done = T::or(done, exact);
         } else if iteration == 1 {
             // the warm start only chose the active set: its accelerations obey no identity, take the whole step
-            advance(sim, work, done, T::not(T::none()), T::lit(1.0));
+            advance(sim, work, &Move { done, exact: T::not(T::none()), alpha: T::lit(1.0), last: exact });
             done = exact;
         } else {
             let (alpha, small) = search::line_search(sim, work, T::or(done, exact), iteration);
             if sim.elliptic {
                 arrived = T::or(arrived, T::and(small, T::not(done)));
             }
-            advance(sim, work, done, exact, alpha);
-            done = T::or(done, T::or(exact, small));
+            let last = T::or(exact, small);
+            advance(sim, work, &Move { done, exact, alpha, last });
+            done = T::or(done, last);
         }
         if T::all(done) || iteration >= sim.max_newton {
             break;
@@ -114,21 +115,22 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) 
         work.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
     }
     link_accelerations::<T, S>(sim, work);
+    let all = T::not(T::none());
     work.stale.fill(true);
     work.in_contact.fill(false);
     for c in work.contacts.iter_mut() {
         work.in_contact[c.link] = true;
         let ja = c.of_motion(&work.link_acc[c.link]);
         c.u = add3(&ja, &c.u0);
-        c.activate();
+        c.activate(all);
     }
     for l in work.limits.iter_mut() {
         l.u = l.sign.mul_add(work.acc[l.dof], l.u0);
-        l.activate();
+        l.activate(all);
     }
     for f in work.dry.iter_mut() {
         f.u = work.acc[f.dof] + f.u0;
-        f.activate();
+        f.activate(all);
     }
     if !work.blocks.is_empty() {
         blocks::start(work);
@@ -200,25 +202,58 @@ fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     changed
 }
 
-/// Moves every lane that is not `done`: `exact` lanes to the Newton point, the others by `alpha` of the way. Marks the
-/// links whose system changed.
+/// How far the lanes go towards the Newton point.
+#[derive(Clone, Copy)]
+pub(crate) struct Move<T: Real> {
+    /// Lanes that stay where they are.
+    pub done: T::Mask,
+    /// Lanes that go all the way.
+    pub exact: T::Mask,
+    /// Fraction of the way of the others.
+    pub alpha: T,
+    /// Lanes that will be done after this: they keep the system that they were solved with, whatever other lanes go on
+    /// to do.
+    pub last: T::Mask,
+}
+
+impl<T: Real> Move<T> {
+    /// From `here` towards `there`.
+    #[inline(always)]
+    pub fn of(&self, here: T, there: T) -> T {
+        let moved = T::select(self.exact, there, self.alpha.mul_add(there - here, here));
+        T::select(self.done, here, moved)
+    }
+
+    /// Lanes whose zones follow them.
+    #[inline(always)]
+    pub fn live(&self) -> T::Mask {
+        T::not(T::or(self.done, self.last))
+    }
+}
+
+/// `new` in the lanes `live`, `old` in the others.
 #[inline(always)]
-fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, done: T::Mask, exact: T::Mask, alpha: T) {
+pub(crate) fn replace<T: Real>(live: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
+    T::or(T::and(live, new), T::and(T::not(live), old))
+}
+
+/// Moves the lanes and marks the links whose system changed.
+#[inline(always)]
+fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &Move<T>) {
     for (a, n) in work.acc.iter_mut().zip(&work.next) {
-        let moved = T::select(exact, *n, alpha.mul_add(*n - *a, *a));
-        *a = T::select(done, *a, moved);
+        *a = step.of(*a, *n);
     }
     for c in work.contacts.iter_mut() {
-        work.stale[c.link] |= T::any(c.advance(done, exact, alpha));
+        work.stale[c.link] |= T::any(c.advance(step));
     }
     for l in work.limits.iter_mut() {
-        work.stale[sim.dof_link[l.dof]] |= T::any(l.advance(done, exact, alpha));
+        work.stale[sim.dof_link[l.dof]] |= T::any(l.advance(step));
     }
     for f in work.dry.iter_mut() {
-        work.stale[sim.dof_link[f.dof]] |= T::any(f.advance(done, exact, alpha));
+        work.stale[sim.dof_link[f.dof]] |= T::any(f.advance(step));
     }
     if !work.blocks.is_empty() {
-        blocks::advance(sim, work, done, exact, alpha);
+        blocks::advance(sim, work, *step);
     }
 }
 

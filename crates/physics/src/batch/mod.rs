@@ -3,12 +3,20 @@
 //! [`Batch`] hides the lane width: states go in and out in MuJoCo's layout, agent by agent. The same agents give the same
 //! bits whatever the width, the number of threads, the number of other agents and the slots they sit in.
 
-use crate::lanes::{Isa, Real};
+mod blowup;
+mod lanes;
+mod state;
+
+pub use blowup::{Blowup, Replay};
+pub use state::AgentState;
+
+use crate::lanes::Isa;
 use crate::model::Model;
-use crate::readings::Readings;
 use crate::sim::{Sim, SimError, SimOptions};
+use crate::variation::Variation;
 use crate::with_lanes;
-use crate::work::{Group, SolverStats, Work};
+use crate::work::SolverStats;
+use lanes::{LaneBatch, Lanes};
 use std::sync::Arc;
 
 /// Number of agents, threads and lanes of a [`Batch`].
@@ -22,19 +30,21 @@ pub struct BatchOptions {
     pub isa: Isa,
     /// Simulation options.
     pub sim: SimOptions,
+    /// Number of past [`Batch::step`] calls whose states are kept, to find out how an agent broke: see
+    /// [`Batch::take_blowups`]. 0 keeps none and costs nothing.
+    pub guard: usize,
 }
 
 impl Default for BatchOptions {
     fn default() -> Self {
-        BatchOptions { agents: 1, threads: 1, isa: Isa::best(), sim: SimOptions::default() }
+        BatchOptions { agents: 1, threads: 1, isa: Isa::best(), sim: SimOptions::default(), guard: 0 }
     }
 }
 
 /// The complete state of some agents: an exact copy, to be restored into a batch of the same model and precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// Per agent: qpos, qvel, ctrl and the solver's warm start.
-    agents: Vec<Vec<f64>>,
+    agents: Vec<AgentState>,
 }
 
 /// Agents of one model, stepped together.
@@ -45,6 +55,8 @@ pub struct Batch {
     isa: Isa,
     home: Vec<f64>,
     quarantined: u64,
+    options: BatchOptions,
+    blowups: Vec<Blowup>,
 }
 
 impl Batch {
@@ -69,6 +81,8 @@ impl Batch {
             home: model.qpos0.clone(),
             model: Arc::new(model.clone()),
             quarantined: 0,
+            options: options.clone(),
+            blowups: Vec::new(),
         })
     }
 
@@ -109,9 +123,15 @@ impl Batch {
         for (agent, u) in ctrl.chunks(nu.max(1)).enumerate().take(self.agents) {
             self.inner.set_ctrl(agent, u);
         }
+        if self.options.guard > 0 {
+            self.inner.remember(self.options.guard);
+        }
         self.inner.step(substeps);
         let broken: Vec<usize> = self.inner.broken().into_iter().filter(|a| *a < self.agents).collect();
         for &agent in &broken {
+            if self.options.guard > 0 && self.blowups.len() < Blowup::MOST {
+                self.blowups.push(self.blowup(agent, substeps));
+            }
             self.inner.reset(agent, &self.home, &vec![0.0; self.model.nv]);
             self.quarantined += 1;
         }
@@ -170,6 +190,49 @@ impl Batch {
         }
     }
 
+    /// The complete state of one agent.
+    pub fn agent_state(&self, agent: usize) -> AgentState {
+        self.inner.save(agent)
+    }
+
+    /// Puts one agent into a complete state.
+    ///
+    /// # Panics
+    /// If the agent does not exist or the state belongs to another model.
+    pub fn set_agent_state(&mut self, agent: usize, state: &AgentState) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.load(agent, state);
+    }
+
+    /// Pushes a body of an agent until told otherwise or reset: force, N, and torque, N m, in world axes at the body's
+    /// center of mass.
+    ///
+    /// # Panics
+    /// If the agent or the body does not exist.
+    pub fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.push(agent, body, force, torque);
+    }
+
+    /// Gives an agent masses, friction, strength and gravity of its own; a reset keeps them.
+    ///
+    /// # Panics
+    /// If the agent does not exist or a length is not the model's.
+    pub fn vary(&mut self, agent: usize, variation: &Variation) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.vary(agent, variation);
+    }
+
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row. It
+    /// can be changed between steps; a reset keeps it.
+    ///
+    /// # Panics
+    /// If the agent or the field does not exist, or the number of elevations is not that of the field's grid.
+    pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.set_ground(agent, field, elevations);
+    }
+
     /// Counts of the constraint solver's work.
     pub fn stats(&self) -> SolverStats {
         self.inner.stats()
@@ -189,152 +252,4 @@ pub struct BodyReading {
     pub angular_velocity: [f64; 3],
     /// Number of contacts with the floor at the present state.
     pub contacts: usize,
-}
-
-/// What [`Batch`] needs of a lane width.
-trait Lanes: Send {
-    fn set_ctrl(&mut self, agent: usize, ctrl: &[f64]);
-    fn step(&mut self, substeps: usize);
-    fn broken(&self) -> Vec<usize>;
-    fn reset(&mut self, agent: usize, qpos: &[f64], qvel: &[f64]);
-    fn read(&self, agent: usize) -> (Vec<f64>, Vec<f64>);
-    fn bodies(&mut self, agent: usize) -> Vec<BodyReading>;
-    fn sensors(&mut self, agent: usize) -> Vec<f64>;
-    fn save(&self, agent: usize) -> Vec<f64>;
-    fn load(&mut self, agent: usize, state: &[f64]);
-    fn stats(&self) -> SolverStats;
-}
-
-struct LaneBatch<T: Real> {
-    sim: Arc<Sim<T>>,
-    groups: Vec<Group<T>>,
-    /// One per thread.
-    works: Vec<Work<T>>,
-}
-
-impl<T: Real> LaneBatch<T> {
-    fn new(sim: Sim<T>, agents: usize, threads: usize) -> Self {
-        let groups = vec![Group::new(&sim); agents.div_ceil(T::LANES)];
-        let works = vec![Work::new(&sim); threads.min(groups.len())];
-        LaneBatch { sim: Arc::new(sim), groups, works }
-    }
-
-    fn slot(agent: usize) -> (usize, usize) {
-        (agent / T::LANES, agent % T::LANES)
-    }
-}
-
-impl<T: Real> Lanes for LaneBatch<T> {
-    fn set_ctrl(&mut self, agent: usize, ctrl: &[f64]) {
-        let (g, lane) = Self::slot(agent);
-        for (u, x) in self.groups[g].ctrl.iter_mut().zip(ctrl) {
-            u.set(lane, T::scalar(*x));
-        }
-    }
-
-    fn step(&mut self, substeps: usize) {
-        let share = self.groups.len().div_ceil(self.works.len());
-        let sim = &self.sim;
-        if self.works.len() == 1 {
-            for group in &mut self.groups {
-                sim.step(&mut self.works[0], group, substeps);
-            }
-            return;
-        }
-        std::thread::scope(|scope| {
-            for (groups, work) in self.groups.chunks_mut(share).zip(&mut self.works) {
-                scope.spawn(move || {
-                    for group in groups {
-                        sim.step(work, group, substeps);
-                    }
-                });
-            }
-        });
-    }
-
-    fn broken(&self) -> Vec<usize> {
-        let mut out = Vec::new();
-        for (g, group) in self.groups.iter().enumerate() {
-            let bad = T::bits(T::not(group.finite()));
-            out.extend((0..T::LANES).filter(|i| bad >> i & 1 == 1).map(|i| g * T::LANES + i));
-        }
-        out
-    }
-
-    fn reset(&mut self, agent: usize, qpos: &[f64], qvel: &[f64]) {
-        let (g, lane) = Self::slot(agent);
-        self.groups[g].reset_lane(&self.sim, lane, qpos, qvel);
-    }
-
-    fn read(&self, agent: usize) -> (Vec<f64>, Vec<f64>) {
-        let (g, lane) = Self::slot(agent);
-        let get = |v: &[T]| v.iter().map(|x| T::widen(x.get(lane))).collect();
-        (get(&self.groups[g].qpos), get(&self.groups[g].qvel))
-    }
-
-    fn bodies(&mut self, agent: usize) -> Vec<BodyReading> {
-        let (g, lane) = Self::slot(agent);
-        let (group, work) = (&self.groups[g], &mut self.works[0]);
-        self.sim.forward(work, group);
-        let r = Readings::new(&self.sim, group, work);
-        let v3 = |v: &[T; 3]| [T::widen(v[0].get(lane)), T::widen(v[1].get(lane)), T::widen(v[2].get(lane))];
-        (0..self.sim.model().bodies.len())
-            .map(|b| BodyReading {
-                pos: v3(&r.body_pos(b)),
-                axes: r.body_axes(b).map(|c| v3(&c)),
-                velocity: v3(&r.body_velocity(b)),
-                angular_velocity: v3(&r.body_angular_velocity(b)),
-                contacts: T::widen(r.body_contacts(b).get(lane)) as usize,
-            })
-            .collect()
-    }
-
-    fn sensors(&mut self, agent: usize) -> Vec<f64> {
-        let (g, lane) = Self::slot(agent);
-        let (group, work) = (&self.groups[g], &mut self.works[0]);
-        self.sim.forward(work, group);
-        let r = Readings::new(&self.sim, group, work);
-        let mut out = Vec::new();
-        for (i, s) in self.sim.model().sensors.iter().enumerate() {
-            match r.sensor(i) {
-                Some(v) => out.extend(v.iter().map(|x| T::widen(x.get(lane)))),
-                None => out.resize(out.len() + s.dim, f64::NAN),
-            }
-        }
-        out
-    }
-
-    fn save(&self, agent: usize) -> Vec<f64> {
-        let (g, lane) = Self::slot(agent);
-        let group = &self.groups[g];
-        let parts = [&group.qpos, &group.qvel, &group.ctrl, &group.act, &group.warm];
-        let pushes = group.external.iter().flatten();
-        parts.into_iter().flatten().chain(pushes).map(|x| T::widen(x.get(lane))).collect()
-    }
-
-    fn load(&mut self, agent: usize, state: &[f64]) {
-        let (g, lane) = Self::slot(agent);
-        let group = &mut self.groups[g];
-        let plain = group.qpos.len() + group.qvel.len() + group.ctrl.len() + group.act.len() + group.warm.len();
-        let pushes = 6 * self.sim.model().bodies.len();
-        assert!(state.len() == plain || state.len() == plain + pushes, "a snapshot of the same model");
-        if state.len() > plain && group.external.is_empty() {
-            group.external = vec![[T::zero(); 6]; self.sim.model().bodies.len()];
-        }
-        let parts = [&mut group.qpos, &mut group.qvel, &mut group.ctrl, &mut group.act, &mut group.warm];
-        let pushes = group.external.iter_mut().flatten();
-        // an agent that was not pushed when it was saved is not pushed now
-        let state = state.iter().copied().chain(std::iter::repeat(0.0));
-        for (x, s) in parts.into_iter().flatten().chain(pushes).zip(state) {
-            x.set(lane, T::scalar(s));
-        }
-    }
-
-    fn stats(&self) -> SolverStats {
-        let mut sum = SolverStats::default();
-        for w in &self.works {
-            sum.add(&w.stats());
-        }
-        sum
-    }
 }

@@ -1,0 +1,151 @@
+//! Sums over bodies: centers of mass, momenta, energies.
+
+use super::Readings;
+use super::frames::{quat_conjugate, quat_mul};
+use crate::lanes::Real;
+use crate::model::{JointType, TendonKind};
+use crate::spatial::*;
+
+/// Mass properties and motion of a body together with all bodies below it.
+pub(super) struct Subtree<T> {
+    pub com: V3<T>,
+    /// Velocity of the center of mass.
+    pub velocity: V3<T>,
+    /// Angular momentum about the center of mass.
+    pub momentum: V3<T>,
+}
+
+impl<T: Real> Readings<'_, T> {
+    /// Sums over a subtree.
+    #[inline(always)]
+    pub(super) fn subtree(&self, body: usize) -> Subtree<T> {
+        let m = &self.sim.model;
+        let own = &self.sim.coms[body];
+        let inside = self.subtree_of(body);
+        let mut total = T::zero();
+        for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
+            total += self.own_mass(b);
+        }
+        // nothing is divided by a subtree without mass, as in MuJoCo
+        let inverse = total.max(T::lit(1e-15)).recip();
+        let (mut arm, mut velocity) = ([T::zero(); 3], [T::zero(); 3]);
+        for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
+            let (r, v, part) =
+                (self.separation(own, &self.sim.coms[b]), self.body_com_velocity(b), self.own_mass(b) * inverse);
+            for k in 0..3 {
+                arm[k] = r[k].mul_add(part, arm[k]);
+                velocity[k] = v[k].mul_add(part, velocity[k]);
+            }
+        }
+        let mut momentum = [T::zero(); 3];
+        for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
+            let mass = self.own_mass(b);
+            let r = sub3(&self.separation(own, &self.sim.coms[b]), &arm);
+            let v = sub3(&self.body_com_velocity(b), &velocity);
+            let p = [v[0] * mass, v[1] * mass, v[2] * mass];
+            momentum = cross_add(&r, &p, &add3(&momentum, &self.spin_momentum(b)));
+        }
+        Subtree { com: add3(&self.mount_pos(own), &arm), velocity, momentum }
+    }
+
+    /// Energy of gravity and springs. A spring whose stiffness is a polynomial of its displacement `x` holds
+    /// `k x^2 / 2 + p0 x^3 / 3 + p1 x^4 / 4`.
+    #[inline(always)]
+    pub(super) fn potential_energy(&self) -> T {
+        let m = &self.sim.model;
+        let mut sum = T::zero();
+        let g: V3<T> = self.group.gravity(self.sim);
+        for b in 1..m.bodies.len() {
+            sum = self.own_mass(b).neg_mul_add(dot(&g, &self.body_com(b)), sum);
+        }
+        if !m.opt.flags.spring {
+            return sum;
+        }
+        for joint in &m.joints {
+            let (q, rest) = (joint.qpos_adr, &m.qpos_spring[joint.qpos_adr..]);
+            let away = |i: usize| self.group.qpos[q + i] - T::lit(rest[i]);
+            let k = (joint.stiffness, &joint.stiffness_poly);
+            if *k.1 == [0.0; 2] && k.0 == 0.0 {
+                continue;
+            }
+            match joint.kind {
+                JointType::Hinge | JointType::Slide => sum += spring(away(0), k),
+                JointType::Ball => sum += spring(self.angle_from(q, &rest[..4]), k),
+                JointType::Free => {
+                    let r = [away(0), away(1), away(2)];
+                    sum += spring(dot(&r, &r).sqrt(), k) + spring(self.angle_from(q + 3, &rest[3..7]), k);
+                }
+            }
+        }
+        for (t, tendon) in m.tendons.iter().enumerate() {
+            if tendon.kind == TendonKind::Spatial {
+                continue;
+            }
+            // slack between the two lengths
+            let length = self.tendon_length(t);
+            let [low, high] = tendon.spring_length;
+            let stretch = (length - T::lit(high)).max(T::zero()) + (length - T::lit(low)).min(T::zero());
+            sum += spring(stretch, (tendon.stiffness, &tendon.stiffness_poly));
+        }
+        sum
+    }
+
+    /// Angle between the quaternion at an address of `qpos` and a constant one.
+    #[inline(always)]
+    fn angle_from(&self, at: usize, rest: &[f64]) -> T {
+        let r = [T::lit(rest[0]), T::lit(rest[1]), T::lit(rest[2]), T::lit(rest[3])];
+        let turn = quat_mul(&quat_conjugate(&r), &self.joint_quat(at));
+        let v = quat_to_rotvec(&turn);
+        dot(&v, &v).sqrt()
+    }
+
+    /// Energy of motion, that of armatures included.
+    #[inline(always)]
+    pub(super) fn kinetic_energy(&self) -> T {
+        let m = &self.sim.model;
+        let mut twice = T::zero();
+        for (inertia, v) in self.work.inertia.iter().zip(&self.work.vel) {
+            twice += dot6(v, &inertia_mul(inertia, v));
+        }
+        for (armature, v) in self.sim.armature.iter().zip(&self.group.qvel) {
+            twice = (T::splat(*armature) * *v).mul_add(*v, twice);
+        }
+        for tendon in m.tendons.iter().filter(|t| t.armature != 0.0) {
+            let TendonKind::Fixed(terms) = &tendon.kind else { continue };
+            for (i, (a, ca)) in terms.iter().enumerate() {
+                for (b, cb) in &terms[..=i] {
+                    let (a, b) = (m.joints[*a].dof_adr, m.joints[*b].dof_adr);
+                    // the mass matrix couples a degree of freedom with its ancestors only
+                    let weight = match a == b {
+                        true => 1.0,
+                        false if self.above(a, b) || self.above(b, a) => 2.0,
+                        false => continue,
+                    };
+                    let c = T::lit(weight * tendon.armature * ca * cb);
+                    twice = (c * self.group.qvel[a]).mul_add(self.group.qvel[b], twice);
+                }
+            }
+        }
+        T::lit(0.5) * twice
+    }
+
+    /// Whether degree of freedom `a` carries `b`.
+    #[inline(always)]
+    fn above(&self, a: usize, b: usize) -> bool {
+        let mut d = self.sim.model.dofs[b].parent;
+        while let Some(i) = d {
+            if i == a {
+                return true;
+            }
+            d = self.sim.model.dofs[i].parent;
+        }
+        false
+    }
+}
+
+/// Energy of a spring with a constant and a polynomial stiffness.
+#[inline(always)]
+fn spring<T: Real>(x: T, (stiffness, poly): (f64, &[f64; 2])) -> T {
+    let c = T::lit(poly[1] / 4.0).mul_add(x, T::lit(poly[0] / 3.0));
+    c.mul_add(x, T::lit(stiffness / 2.0)) * (x * x)
+}

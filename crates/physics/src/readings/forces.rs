@@ -1,0 +1,218 @@
+//! Forces between bodies at the last physics step: contacts, and what a body's parent exerts on it.
+
+use super::Readings;
+use super::frames::into_axes;
+use crate::lanes::Real;
+use crate::model::EqualityKind;
+use crate::sim::Mount;
+use crate::solver::block::{Jacobian, Source};
+use crate::spatial::*;
+
+/// A contact in some lanes.
+pub(super) struct ContactForce<T: Real> {
+    /// The force acts on the second geom, and its opposite on the first.
+    pub geoms: [usize; 2],
+    /// The order of the geoms is MuJoCo's.
+    pub natural: bool,
+    /// Lanes that have this contact.
+    pub on: T::Mask,
+    /// The contact point, relative to the reference point of a tree.
+    pub tree: usize,
+    pub point: V3<T>,
+    /// Direction towards the second geom.
+    pub normal: V3<T>,
+    /// Force along the normal, and all of it in world axes, and the torque about the contact point.
+    pub push: T,
+    pub force: V3<T>,
+    pub torque: V3<T>,
+}
+
+/// What a connect or weld constraint does.
+struct TieForce<T: Real> {
+    /// The force acts on the second body, and its opposite on the first, each at its own point.
+    bodies: [usize; 2],
+    points: [Mount<T::Scalar>; 2],
+    force: V3<T>,
+    torque: V3<T>,
+}
+
+/// A sum of forces, with their torque about one point.
+struct Wrench<T> {
+    force: V3<T>,
+    torque: V3<T>,
+}
+
+impl<T: Real> Wrench<T> {
+    /// Adds a force that acts at a distance `arm` from the point, and a torque, in the lanes `on`.
+    #[inline(always)]
+    fn add(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
+        let t = cross_add(arm, force, torque);
+        for k in 0..3 {
+            self.force[k] += T::masked(on, force[k]);
+            self.torque[k] += T::masked(on, t[k]);
+        }
+    }
+
+    /// Takes such a force away.
+    #[inline(always)]
+    fn subtract(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
+        let (f, t) = ([-force[0], -force[1], -force[2]], [-torque[0], -torque[1], -torque[2]]);
+        self.add(arm, &f, &t, on);
+    }
+}
+
+impl<T: Real> Readings<'_, T> {
+    /// All contacts of the last physics step.
+    #[inline(always)]
+    pub(super) fn contact_forces(&self) -> Vec<ContactForce<T>> {
+        let (z, one) = (T::zero(), T::lit(1.0));
+        let mut out = Vec::new();
+        for row in &self.work.contacts {
+            out.push(ContactForce {
+                geoms: [row.plane, row.geom],
+                natural: true,
+                on: row.on,
+                tree: self.sim.links[row.link].tree,
+                point: row.r,
+                normal: [z, z, one],
+                push: row.force[0],
+                force: lin(&row.wrench(&row.force)),
+                torque: [z; 3],
+            });
+        }
+        for block in self.work.blocks.iter().filter(|b| b.source == Source::Contacts) {
+            let Jacobian::Points { sides, lin: frame, .. } = &block.jacobian else { continue };
+            for (index, on) in &block.members {
+                let pair = &self.sim.contacts.pairs[*index];
+                // the second side of a block moves
+                let second = pair.moving();
+                let first = if pair.geoms[0] == second { pair.geoms[1] } else { pair.geoms[0] };
+                let Some(link) = self.sim.geoms[second].link else { continue };
+                let wrench = block.total_wrench(&block.force, &[z; 3]);
+                out.push(ContactForce {
+                    geoms: [first, second],
+                    natural: second == pair.geoms[1],
+                    on: *on,
+                    tree: self.sim.links[link].tree,
+                    point: sides[1].r,
+                    normal: frame[0],
+                    push: block.force[0],
+                    force: lin(&wrench),
+                    torque: ang(&wrench),
+                });
+            }
+        }
+        out
+    }
+
+    /// All connect and weld constraints of the last physics step.
+    #[inline(always)]
+    fn tie_forces(&self) -> Vec<TieForce<T>> {
+        let mut out = Vec::new();
+        for block in self.work.blocks.iter() {
+            let Source::Equality(index) = block.source else { continue };
+            let (EqualityKind::Connect { bodies, anchors, .. } | EqualityKind::Weld { bodies, anchors, .. }) =
+                &self.sim.model.equalities[index].kind
+            else {
+                continue;
+            };
+            let at = |i: usize| {
+                let body = &self.sim.bodies[bodies[i]];
+                let pos = rotate_add(&body.rot, &anchors[i].map(T::scalar), &body.pos);
+                Mount { link: body.link, pos, rot: body.rot }
+            };
+            let wrench = block.total_wrench(&block.force, &[T::zero(); 3]);
+            // the second side of a block moves
+            let second = usize::from(self.sim.bodies[bodies[0]].link.is_none());
+            let first = 1 - second;
+            out.push(TieForce {
+                bodies: [bodies[first], bodies[second]],
+                points: [at(first), at(second)],
+                force: lin(&wrench),
+                torque: ang(&wrench),
+            });
+        }
+        out
+    }
+
+    /// Force and torque that a site's body receives from its parent, about the site and in its axes: what the motion of
+    /// the body and of all bodies below it needs, less what contacts, connect and weld constraints and pushes from
+    /// outside provide (MuJoCo's `cfrc_int`). `None` for sites of the world, which has no parent.
+    #[inline(always)]
+    pub(super) fn interaction(&self, site: usize) -> Option<(V3<T>, V3<T>)> {
+        let m = &self.sim.model;
+        let (mount, body) = (&self.sim.sites[site], m.sites[site].body);
+        if body == 0 {
+            return None;
+        }
+        let inside = self.subtree_of(body);
+        let all = T::not(T::none());
+        let mut sum = Wrench { force: [T::zero(); 3], torque: [T::zero(); 3] };
+        for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
+            let (force, torque) = self.inertial_force(b);
+            let arm = self.separation(mount, &self.sim.coms[b]);
+            sum.add(&arm, &force, &torque, all);
+            if let Some(push) = self.group.external.get(b) {
+                sum.subtract(&arm, &lin(push), &ang(push), all);
+            }
+        }
+        for c in self.contact_forces() {
+            let arm = self.arm_from(mount, Some(c.tree), &c.point);
+            match c.geoms.map(|g| inside[m.geoms[g].body]) {
+                [true, false] => sum.add(&arm, &c.force, &c.torque, c.on),
+                [false, true] => sum.subtract(&arm, &c.force, &c.torque, c.on),
+                _ => {}
+            }
+        }
+        for t in self.tie_forces() {
+            let [first, second] = t.bodies.map(|b| inside[b]);
+            if first {
+                sum.add(&self.separation(mount, &t.points[0]), &t.force, &t.torque, all);
+            }
+            if second {
+                sum.subtract(&self.separation(mount, &t.points[1]), &t.force, &t.torque, all);
+            }
+        }
+        let axes = self.mount_axes(mount);
+        Some((into_axes(&axes, &sum.force), into_axes(&axes, &sum.torque)))
+    }
+
+    /// Force at the center of mass and torque about it that a body's motion and weight need.
+    #[inline(always)]
+    fn inertial_force(&self, body: usize) -> (V3<T>, V3<T>) {
+        let com = &self.sim.coms[body];
+        let (a, turn) = self.mount_acceleration(com);
+        let mass = self.own_mass(body);
+        // Euler's equations in the principal axes
+        let axes = self.mount_axes(com);
+        let (w, dw) = (into_axes(&axes, &self.mount_spin(com)), into_axes(&axes, &turn));
+        let i = self.own_inertia(body);
+        let torque = [
+            i[0].mul_add(dw[0], (i[2] - i[1]) * w[1] * w[2]),
+            i[1].mul_add(dw[1], (i[0] - i[2]) * w[2] * w[0]),
+            i[2].mul_add(dw[2], (i[1] - i[0]) * w[0] * w[1]),
+        ];
+        ([a[0] * mass, a[1] * mass, a[2] * mass], rotate(&axes, &torque))
+    }
+
+    /// Which bodies belong to a body's subtree.
+    #[inline(always)]
+    pub(super) fn subtree_of(&self, body: usize) -> Vec<bool> {
+        let bodies = &self.sim.model.bodies;
+        let mut inside = vec![false; bodies.len()];
+        for (b, one) in bodies.iter().enumerate() {
+            inside[b] = b == body || (b > 0 && inside[one.parent]);
+        }
+        inside
+    }
+
+    /// A body's angular momentum about its own center of mass.
+    #[inline(always)]
+    pub(super) fn spin_momentum(&self, body: usize) -> V3<T> {
+        let com: &Mount<T::Scalar> = &self.sim.coms[body];
+        let axes = self.mount_axes(com);
+        let w = into_axes(&axes, &self.mount_spin(com));
+        let i = self.own_inertia(body);
+        rotate(&axes, &[i[0] * w[0], i[1] * w[1], i[2] * w[2]])
+    }
+}

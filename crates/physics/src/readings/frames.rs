@@ -1,0 +1,170 @@
+//! Frames of bodies, geoms, sites and cameras: where they are relative to each other and how they move.
+
+use super::Readings;
+use crate::lanes::Real;
+use crate::model::{JointType, SensorObject, TrackMode};
+use crate::sim::Mount;
+use crate::spatial::*;
+
+impl<T: Real> Readings<'_, T> {
+    /// Where an object sits on its link. `None` for what has no frame, and for cameras that turn by themselves.
+    #[inline(always)]
+    pub(super) fn mount_of(&self, object: SensorObject) -> Option<Mount<T::Scalar>> {
+        match object {
+            SensorObject::Body(b) => Some(self.sim.coms[b].clone()),
+            SensorObject::XBody(b) => Some(self.sim.bodies[b].clone()),
+            SensorObject::Geom(g) => Some(self.sim.geoms[g].clone()),
+            SensorObject::Site(s) => Some(self.sim.sites[s].clone()),
+            SensorObject::Camera(c) => {
+                let camera = &self.sim.model.cameras[c];
+                let body = &self.sim.bodies[camera.body];
+                if camera.mode != TrackMode::Fixed {
+                    return None;
+                }
+                let pos = camera.pos.map(T::scalar);
+                let rot = quat_to_rot(&camera.quat.map(T::scalar));
+                Some(Mount {
+                    link: body.link,
+                    pos: rotate_add(&body.rot, &pos, &body.pos),
+                    rot: [rotate(&body.rot, &rot[0]), rotate(&body.rot, &rot[1]), rotate(&body.rot, &rot[2])],
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// From one frame's origin to another's, world axes. Within a tree it does not lose precision far from the origin.
+    #[inline(always)]
+    pub(super) fn separation(&self, from: &Mount<T::Scalar>, to: &Mount<T::Scalar>) -> V3<T> {
+        match to.link {
+            None => self.arm_from(from, None, &splat3(&to.pos)),
+            Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.arm_of(to, l)),
+        }
+    }
+
+    /// From a frame's origin to a point that is given relative to the reference point of a tree, or in the world.
+    #[inline(always)]
+    pub(super) fn arm_from(&self, from: &Mount<T::Scalar>, tree: Option<usize>, point: &V3<T>) -> V3<T> {
+        let (start, start_tree) = match from.link {
+            None => (splat3(&from.pos), None),
+            Some(l) => (self.arm_of(from, l), Some(self.sim.links[l].tree)),
+        };
+        let arm = sub3(point, &start);
+        if tree == start_tree {
+            return arm;
+        }
+        let origin = [T::zero(); 3];
+        let to = tree.map_or(origin, |t| self.work.reference[t]);
+        let back = start_tree.map_or(origin, |t| self.work.reference[t]);
+        add3(&arm, &sub3(&to, &back))
+    }
+
+    /// A vector in a frame's own axes.
+    #[inline(always)]
+    pub(super) fn in_axes(&self, m: &Mount<T::Scalar>, v: &V3<T>) -> V3<T> {
+        into_axes(&self.mount_axes(m), v)
+    }
+
+    /// Orientation of an object as the product of the quaternions from the root outward, as MuJoCo has it: its sign is
+    /// that of the state's quaternions, not a choice of its own.
+    #[inline(always)]
+    pub(super) fn quat_of(&self, object: SensorObject) -> Option<[T; 4]> {
+        let m = &self.sim.model;
+        let (body, local) = match object {
+            SensorObject::Body(b) => (b, m.bodies[b].iquat),
+            SensorObject::XBody(b) => (b, [1.0, 0.0, 0.0, 0.0]),
+            SensorObject::Geom(g) => (m.geoms[g].body, m.geoms[g].quat),
+            SensorObject::Site(s) => (m.sites[s].body, m.sites[s].quat),
+            SensorObject::Camera(c) if m.cameras[c].mode == TrackMode::Fixed => (m.cameras[c].body, m.cameras[c].quat),
+            _ => return None,
+        };
+        Some(quat_mul(&self.body_quat(body), &literal(&local)))
+    }
+
+    /// Orientation of a body's frame.
+    #[inline(always)]
+    fn body_quat(&self, body: usize) -> [T; 4] {
+        let m = &self.sim.model;
+        let mut path = Vec::new();
+        let mut b = body;
+        while b != 0 {
+            path.push(b);
+            b = m.bodies[b].parent;
+        }
+        let mut q = literal(&[1.0, 0.0, 0.0, 0.0]);
+        for &b in path.iter().rev() {
+            let body = &m.bodies[b];
+            q = quat_mul(&q, &literal(&body.quat));
+            for j in body.joint_start..body.joint_start + body.joint_count {
+                let joint = &m.joints[j];
+                match joint.kind {
+                    JointType::Free => q = self.joint_quat(joint.qpos_adr + 3),
+                    JointType::Ball => q = quat_mul(&q, &self.joint_quat(joint.qpos_adr)),
+                    JointType::Hinge => {
+                        let turn = self.group.qpos[joint.qpos_adr] - T::splat(self.sim.joints[j].q0);
+                        let (s, c) = (turn * T::lit(0.5)).sin_cos();
+                        let a = joint.axis;
+                        q = quat_mul(&q, &[c, s * T::lit(a[0]), s * T::lit(a[1]), s * T::lit(a[2])]);
+                    }
+                    JointType::Slide => {}
+                }
+            }
+        }
+        normalized(&q)
+    }
+
+    /// The quaternion at an address of `qpos`, normalized.
+    #[inline(always)]
+    pub(super) fn joint_quat(&self, at: usize) -> [T; 4] {
+        let q = &self.group.qpos;
+        normalized(&[q[at], q[at + 1], q[at + 2], q[at + 3]])
+    }
+
+    /// Velocity of a frame's origin and its angular velocity, as seen from another frame (which may move and turn).
+    #[inline(always)]
+    pub(super) fn relative_velocity(&self, m: &Mount<T::Scalar>, from: &Mount<T::Scalar>) -> (V3<T>, V3<T>) {
+        let turning = self.mount_spin(from);
+        let v = sub3(&self.mount_velocity(m), &self.mount_velocity(from));
+        // what the turning of the reference frame makes of a point at rest
+        let v = cross_add(&self.separation(from, m), &turning, &v);
+        let w = sub3(&self.mount_spin(m), &turning);
+        let axes = self.mount_axes(from);
+        (into_axes(&axes, &v), into_axes(&axes, &w))
+    }
+}
+
+/// Components of a vector along the axes of a rotation.
+#[inline(always)]
+pub(super) fn into_axes<T: Real>(axes: &Rot<T>, v: &V3<T>) -> V3<T> {
+    [dot(&axes[0], v), dot(&axes[1], v), dot(&axes[2], v)]
+}
+
+/// Constant quaternion.
+#[inline(always)]
+fn literal<T: Real>(q: &[f64; 4]) -> [T; 4] {
+    [T::lit(q[0]), T::lit(q[1]), T::lit(q[2]), T::lit(q[3])]
+}
+
+#[inline(always)]
+fn normalized<T: Real>(q: &[T; 4]) -> [T; 4] {
+    let inv = q[0].mul_add(q[0], q[1].mul_add(q[1], q[2].mul_add(q[2], q[3] * q[3]))).sqrt().recip();
+    [q[0] * inv, q[1] * inv, q[2] * inv, q[3] * inv]
+}
+
+/// The inverse of a unit quaternion.
+#[inline(always)]
+pub(super) fn quat_conjugate<T: Real>(q: &[T; 4]) -> [T; 4] {
+    [q[0], -q[1], -q[2], -q[3]]
+}
+
+/// Product of quaternions.
+#[inline(always)]
+pub(super) fn quat_mul<T: Real>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
+    let [w, x, y, z] = *b;
+    [
+        a[3].neg_mul_add(z, a[2].neg_mul_add(y, a[1].neg_mul_add(x, a[0] * w))),
+        a[3].neg_mul_add(y, a[2].mul_add(z, a[1].mul_add(w, a[0] * x))),
+        a[1].neg_mul_add(z, a[3].mul_add(x, a[2].mul_add(w, a[0] * y))),
+        a[2].neg_mul_add(x, a[1].mul_add(y, a[3].mul_add(w, a[0] * z))),
+    ]
+}

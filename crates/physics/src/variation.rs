@@ -1,0 +1,138 @@
+//! What one agent has of its own: masses, friction, strength, gravity, ground.
+//!
+//! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
+//! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
+
+use crate::collision::Field;
+use crate::lanes::Real;
+use crate::model::{Model, Vec3};
+use crate::sim::Sim;
+use crate::spatial::V3;
+use crate::work::Group;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// One agent's deviations from the model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variation {
+    /// Factor of every body's mass and inertia, one per body. Bodies without joints weigh as the body that they are
+    /// welded to says.
+    pub mass: Vec<f64>,
+    /// Factor of all friction coefficients of contacts.
+    pub friction: f64,
+    /// Factor of every actuator's force, one per actuator.
+    pub strength: Vec<f64>,
+    /// Gravity, m/s^2.
+    pub gravity: Vec3,
+}
+
+impl Variation {
+    /// No deviation.
+    pub fn none(model: &Model) -> Self {
+        Variation {
+            mass: vec![1.0; model.bodies.len()],
+            friction: 1.0,
+            strength: vec![1.0; model.nu],
+            gravity: if model.opt.flags.gravity { model.opt.gravity } else { [0.0; 3] },
+        }
+    }
+}
+
+/// The deviations of a lane group.
+#[derive(Clone, Debug)]
+pub(crate) struct Varied<T: Real> {
+    /// Per link.
+    pub mass: Vec<T>,
+    pub friction: T,
+    /// Per actuator.
+    pub strength: Vec<T>,
+    pub gravity: V3<T>,
+}
+
+impl<T: Real> Group<T> {
+    /// Gives an agent constants of its own, until changed; a reset keeps them.
+    ///
+    /// # Panics
+    /// If the number of masses or strengths is not the model's number of bodies or actuators.
+    pub fn vary(&mut self, sim: &Sim<T>, lane: usize, variation: &Variation) {
+        let model = &sim.model;
+        assert_eq!(variation.mass.len(), model.bodies.len(), "one mass factor per body");
+        assert_eq!(variation.strength.len(), model.nu, "one strength per actuator");
+        let varied = self.varied.get_or_insert_with(|| {
+            let one = T::lit(1.0);
+            Box::new(Varied {
+                mass: vec![one; sim.links.len()],
+                friction: one,
+                strength: vec![one; model.nu],
+                gravity: sim.gravity.map(T::splat),
+            })
+        });
+        for (body, b) in model.bodies.iter().enumerate() {
+            if b.weld_id == body
+                && let Some(link) = sim.bodies[body].link
+            {
+                varied.mass[link].set(lane, T::scalar(variation.mass[body]));
+            }
+        }
+        varied.friction.set(lane, T::scalar(variation.friction));
+        for (s, x) in varied.strength.iter_mut().zip(&variation.strength) {
+            s.set(lane, T::scalar(*x));
+        }
+        for (g, x) in varied.gravity.iter_mut().zip(variation.gravity) {
+            g.set(lane, T::scalar(x));
+        }
+    }
+
+    /// The constants of an agent.
+    pub fn variation(&self, sim: &Sim<T>, lane: usize) -> Variation {
+        let mut out = Variation::none(&sim.model);
+        let Some(varied) = &self.varied else { return out };
+        let get = |x: &T| T::widen(x.get(lane));
+        for (body, factor) in out.mass.iter_mut().enumerate() {
+            if let Some(link) = sim.bodies[body].link {
+                *factor = get(&varied.mass[link]);
+            }
+        }
+        out.friction = get(&varied.friction);
+        out.strength = varied.strength.iter().map(get).collect();
+        out.gravity = [get(&varied.gravity[0]), get(&varied.gravity[1]), get(&varied.gravity[2])];
+        out
+    }
+
+    /// Gravity of every agent.
+    #[inline(always)]
+    pub(crate) fn gravity(&self, sim: &Sim<T>) -> V3<T> {
+        match &self.varied {
+            Some(v) => v.gravity,
+            None => [T::splat(sim.gravity[0]), T::splat(sim.gravity[1]), T::splat(sim.gravity[2])],
+        }
+    }
+
+    /// Factor of the friction coefficients.
+    #[inline(always)]
+    pub(crate) fn friction(&self) -> Option<T> {
+        self.varied.as_ref().map(|v| v.friction)
+    }
+
+    /// Gives an agent ground of its own: the elevations (m, from the height field's zero) of height field `field`, row by
+    /// row as the model has them. It stays until changed.
+    ///
+    /// # Panics
+    /// If there is no such field, or the number of elevations is not that of its grid.
+    pub fn set_ground(&mut self, sim: &Sim<T>, lane: usize, field: usize, elevations: &[f32]) {
+        let own = sim.fields[field].with_elevations(elevations);
+        if self.grounds.is_empty() {
+            self.grounds = vec![None; sim.fields.len() * T::LANES];
+        }
+        self.grounds[field * T::LANES + lane] = Some(Arc::new(own));
+    }
+
+    /// Height field `field` of an agent.
+    #[inline(always)]
+    pub(crate) fn ground<'a>(&'a self, sim: &'a Sim<T>, lane: usize, field: usize) -> &'a Field<T::Scalar> {
+        match self.grounds.get(field * T::LANES + lane) {
+            Some(Some(own)) => own,
+            _ => &sim.fields[field],
+        }
+    }
+}

@@ -1,0 +1,383 @@
+//! Contract: a model that was not written here either loads and agrees with MuJoCo, or is refused by name.
+//!
+//! Tried are all model files of the Python packages of `tests/oracle` (dm_control, Gymnasium, MuJoCo, MJX, MuJoCo Warp,
+//! Brax and others). None may panic, and none may load and move differently: on random states, contacts of all kinds
+//! included, the acceleration, the constraint forces, the number of contacts, the sensors and the next state equal
+//! MuJoCo's to 1e-8 in double precision. A refusal names the file or the model, and the element or the feature.
+//!
+//! `docs/models.md` lists what became of each file. The test fails if the list is out of date; run it with
+//! `MARATHON_BLESS=1` to write it anew.
+
+mod common;
+
+use marathon_physics::mjcf::{MjcfError, MjcfErrorKind};
+use marathon_physics::{Group, Model, Readings, Sim, SimError, SimOptions, Work};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// States per model.
+const STATES: usize = 20;
+/// Largest relative error.
+const BOUND: f64 = 1e-8;
+/// Models that MuJoCo loads and that move: the promise.
+const AT_LEAST: usize = 100;
+
+/// A file, as `foreign_models.py` lists it.
+#[derive(Deserialize)]
+struct File {
+    id: String,
+    path: PathBuf,
+    /// Another file with the same text.
+    same_as: Option<String>,
+    /// Why MuJoCo does not load it.
+    error: Option<String>,
+    /// MuJoCo warns about its reference configuration.
+    warns: bool,
+    /// It has neither bodies nor geoms: a part for inclusion.
+    empty: bool,
+    #[serde(default)]
+    nv: usize,
+    #[serde(default)]
+    nu: usize,
+}
+
+/// A state and what MuJoCo makes of it.
+#[derive(Deserialize)]
+struct State {
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+    ctrl: Vec<f64>,
+    act: Vec<f64>,
+    qacc: Vec<f64>,
+    qfrc_constraint: Vec<f64>,
+    ncon: usize,
+    /// Nothing where rounding decides.
+    sensordata: Vec<Option<f64>>,
+    next_qpos: Vec<f64>,
+    next_qvel: Vec<f64>,
+    next_act: Vec<f64>,
+}
+
+/// What `foreign_models.py` says about a model.
+#[derive(Deserialize)]
+struct Answer {
+    states: Vec<State>,
+    /// States that were drawn and left out.
+    skipped: usize,
+}
+
+/// What became of a file.
+enum Outcome {
+    Loads(Box<Sim<f64>>),
+    Refused(Refusal),
+}
+
+/// Why a model was refused.
+struct Refusal {
+    /// In the table's words.
+    why: String,
+    /// What is missing in the error for a user to find the place.
+    vague: Option<&'static str>,
+    /// The model is said to be faulty, not to need what Marathon does not have.
+    faulty: bool,
+}
+
+/// How far a loaded model is from MuJoCo.
+#[derive(Default)]
+struct Agreement {
+    /// Largest error of each quantity.
+    errors: BTreeMap<String, f64>,
+    /// States with another number of contacts.
+    contacts: usize,
+}
+
+impl Agreement {
+    fn add(&mut self, what: &str, got: &[f64], want: &[f64], floor: f64) {
+        let error = self.errors.entry(what.to_owned()).or_default();
+        // NaN is an error too
+        let d = distance(got, want, floor);
+        *error = if d.is_nan() { f64::INFINITY } else { error.max(d) };
+    }
+
+    fn worst(&self) -> f64 {
+        self.errors.values().copied().fold(0.0, f64::max)
+    }
+}
+
+/// Distance of two vectors, relative to the second or to `floor` if that is larger.
+fn distance(a: &[f64], b: &[f64], floor: f64) -> f64 {
+    assert_eq!(a.len(), b.len(), "both sides have the same layout");
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied()).max(floor)
+}
+
+/// Loads a file and prepares its simulation.
+fn load(path: &Path) -> Outcome {
+    let mut model = match Model::from_xml_file(path) {
+        Ok(model) => model,
+        Err(e) => return Outcome::Refused(mjcf_refusal(path, &e)),
+    };
+    // solved to the end, as the oracle does
+    model.opt.tolerance = 1e-14;
+    model.opt.ls_iterations = 100;
+    match Sim::<f64>::new(&model, SimOptions { max_newton: Some(200), ..Default::default() }) {
+        Ok(sim) => Outcome::Loads(Box::new(sim)),
+        Err(e) => {
+            let text = e.to_string();
+            let SimError::Unsupported { what, .. } = e;
+            let vague = if !text.contains(&format!("'{}'", model.name)) {
+                Some("the error does not name the model")
+            } else if what.contains("''") {
+                Some("the error names an element by an empty name")
+            } else {
+                None
+            };
+            Outcome::Refused(Refusal { why: what, vague, faulty: false })
+        }
+    }
+}
+
+fn mjcf_refusal(path: &Path, e: &MjcfError) -> Refusal {
+    let folder = format!("{}/", path.parent().expect("a file is in a folder").display());
+    let text = e.to_string().replace(&folder, "");
+    let own = format!("{}:", path.file_name().expect("a file has a name").display());
+    // lines of the file itself need no name, those of included files do
+    let why = text.strip_prefix(&own).map_or(text.clone(), |rest| match e.line {
+        0 => rest.trim_start().to_owned(),
+        _ => format!("line {rest}"),
+    });
+    let vague = if e.file.is_empty() || !text.contains(".xml") {
+        Some("the error names no file")
+    } else if e.line == 0 {
+        Some("the error names no line")
+    } else {
+        None
+    };
+    Refusal { why, vague, faulty: !matches!(e.kind, MjcfErrorKind::Unsupported { .. }) }
+}
+
+/// Compares a model with MuJoCo on the states.
+fn compare(sim: &Sim<f64>, states: &[State]) -> Agreement {
+    let mut out = Agreement::default();
+    let model = sim.model();
+    let mut work = Work::new(sim);
+    for state in states {
+        let mut group = Group::new(sim);
+        group.reset_lane(sim, 0, &state.qpos, &state.qvel);
+        group.ctrl.copy_from_slice(&state.ctrl);
+        group.act.copy_from_slice(&state.act);
+        sim.forward(&mut work, &group);
+        let r = Readings::new(sim, &group, &work);
+        let acc: Vec<f64> = (0..model.nv).map(|d| r.qacc(d)).collect();
+        out.add("acceleration", &acc, &state.qacc, 1.0);
+        out.add("constraint force", &r.constraint_forces(), &state.qfrc_constraint, 1.0);
+        out.contacts += usize::from(r.contact_count() as usize != state.ncon);
+        for (i, sensor) in model.sensors.iter().enumerate() {
+            let Some(values) = r.sensor(i) else { continue };
+            let want = &state.sensordata[sensor.adr..sensor.adr + values.len()];
+            if let Some(want) = want.iter().copied().collect::<Option<Vec<f64>>>() {
+                out.add(&format!("sensor '{}'", sensor.name), &values, &want, 1.0);
+            }
+        }
+        sim.step(&mut work, &mut group, 1);
+        out.add("next position", &group.qpos, &state.next_qpos, 1.0);
+        out.add("next velocity", &group.qvel, &state.next_qvel, 1.0);
+        out.add("next activation", &group.act, &state.next_act, 1.0);
+    }
+    out
+}
+
+/// A line of the table: what is the same everywhere, and what was measured.
+struct Row {
+    package: String,
+    /// Counted under this heading.
+    verdict: &'static str,
+    fixed: String,
+    measured: String,
+}
+
+const AGREES: &str = "agree with MuJoCo";
+const STILL: &str = "load, nothing to compare";
+const REFUSED: &str = "refused by name";
+const BROKEN: &str = "MuJoCo refuses them too";
+
+/// An error bound in steps that do not depend on the processor's rounding.
+fn bucket(error: f64) -> &'static str {
+    match error {
+        e if e <= 1e-12 => "1e-12",
+        e if e <= 1e-10 => "1e-10",
+        e if e <= 1e-9 => "1e-9",
+        _ => "1e-8",
+    }
+}
+
+fn table(rows: &[Row], same: usize, empty: usize) -> String {
+    let mut text = String::from(INTRODUCTION);
+    let tally = |verdict: &str, rows: &[&Row]| rows.iter().filter(|r| r.verdict == verdict).count();
+    let mut packages: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        packages.entry(&row.package).or_default().push(row);
+    }
+    let verdicts = [AGREES, STILL, REFUSED, BROKEN];
+    writeln!(text, "| package | files | {} |", verdicts.join(" | ")).expect("text");
+    writeln!(text, "|---|---|---|---|---|---|").expect("text");
+    let everything: Vec<&Row> = rows.iter().collect();
+    for (name, rows) in packages.iter().map(|(n, r)| (*n, r)).chain([("**all**", &everything)]) {
+        let counts: Vec<String> = verdicts.iter().map(|v| tally(v, rows).to_string()).collect();
+        writeln!(text, "| {name} | {} | {} |", rows.len(), counts.join(" | ")).expect("text");
+    }
+    writeln!(text, "\nLeft out: {same} files with the text of another one and {empty} without a body or a geom.")
+        .expect("text");
+    for (name, rows) in packages {
+        writeln!(text, "\n## {name}\n\n| file | outcome | error | states left out |\n|---|---|---|---|").expect("text");
+        for row in rows {
+            writeln!(text, "{}{}", row.fixed, row.measured).expect("text");
+        }
+    }
+    text
+}
+
+const INTRODUCTION: &str = "\
+# Models that were tried
+
+Every model file of the Python packages that the tests install, and what became of it. This page is written by
+[`foreign_models_agree_or_are_refused.rs`](../crates/physics/tests/foreign_models_agree_or_are_refused.rs), which fails
+when it is out of date:
+
+```sh
+MARATHON_BLESS=1 cargo test --release -p marathon-physics --test foreign_models_agree_or_are_refused
+```
+
+*Agrees* means: in 20 random states (poses within the joints' limits and a little beyond, any orientation, random
+velocities and controls; parts may be deep inside each other), acceleration, constraint forces, number of contacts,
+sensors and the next state equal those of MuJoCo, both in double precision and solved to the end. The column *error* is a
+bound on the largest relative error of all of these. Left out, and drawn again, are states in which MuJoCo itself has no
+definite answer: accelerations above 1e8, or a change of position by 1e-9 that changes the contacts or moves the
+acceleration by more than 1e-4.
+
+What is refused is refused with the message shown, before anything is simulated.
+
+";
+
+/// The table without what was measured.
+fn without_measurements(text: &str) -> Vec<String> {
+    let cut = |line: &str| {
+        let cells: Vec<&str> = line.split(" | ").collect();
+        if cells.len() == 4 { cells[..2].join(" | ") } else { line.to_owned() }
+    };
+    text.lines().map(cut).collect()
+}
+
+#[test]
+fn foreign_models_agree_or_are_refused() {
+    let answer = common::oracle("foreign_models.py", &Value::Null);
+    let found: Vec<File> = serde_json::from_value(answer).expect("a list of files");
+    let (same, files): (Vec<File>, Vec<File>) = found.into_iter().partition(|f| f.same_as.is_some());
+    let (empty, files): (Vec<File>, Vec<File>) = files.into_iter().partition(|f| f.empty);
+    let tried = files.iter().filter(|f| f.error.is_none() && f.nv > 0).count();
+    assert!(tried >= AT_LEAST, "only {tried} foreign models were found: run ./test.sh, which installs them");
+
+    // whatever is read, nothing panics
+    let mut failures = Vec::new();
+    let mut load = |file: &File| {
+        let outcome = catch_unwind(AssertUnwindSafe(|| load(&file.path)));
+        outcome.map_err(|_| failures.push(format!("{}: panicked while loading", file.id))).ok()
+    };
+    for file in same.iter().chain(&empty) {
+        load(file);
+    }
+    let outcomes: Vec<(File, Outcome)> = files.into_iter().filter_map(|f| load(&f).map(|o| (f, o))).collect();
+
+    // MuJoCo's part of the comparison
+    let compared: Vec<&File> = outcomes
+        .iter()
+        .filter(|(f, o)| f.error.is_none() && f.nv > 0 && matches!(o, Outcome::Loads(_)))
+        .map(|(f, _)| f)
+        .collect();
+    let job = |f: &&File| json!({"xml": f.path, "states": STATES, "seed": seed(&f.id)});
+    let answers = common::oracle("foreign_models.py", &Value::Array(compared.iter().map(job).collect()));
+    let answers = compared.iter().map(|f| f.id.clone()).zip(answers.as_array().expect("a list").iter().cloned());
+    let mut answers: BTreeMap<String, Value> = answers.collect();
+
+    let mut rows = Vec::new();
+    for (file, outcome) in &outcomes {
+        let mut measured = " |  |  |".to_owned();
+        let (verdict, words) = match (outcome, &file.error) {
+            (Outcome::Refused(refusal), error) => {
+                if let Some(vague) = refusal.vague {
+                    failures.push(format!("{}: {vague}: {}", file.id, refusal.why));
+                }
+                if refusal.faulty && error.is_none() && !file.warns {
+                    failures.push(format!("{}: MuJoCo loads it, but: {}", file.id, refusal.why));
+                }
+                let verdict = if error.is_some() { BROKEN } else { REFUSED };
+                (verdict, format!("refused: {}", refusal.why.replace('|', "\\|")))
+            }
+            (Outcome::Loads(_), Some(error)) => {
+                failures.push(format!("{}: loads, but MuJoCo refuses it: {error}", file.id));
+                continue;
+            }
+            (Outcome::Loads(_), None) if file.nv == 0 => (STILL, "loads; nothing moves".into()),
+            (Outcome::Loads(sim), None) => {
+                let m = sim.model();
+                if (m.nv, m.nu) != (file.nv, file.nu) {
+                    failures.push(format!("{}: nv, nu are {}, {}, not {}, {}", file.id, m.nv, m.nu, file.nv, file.nu));
+                    continue;
+                }
+                let answer: Answer = serde_json::from_value(answers.remove(&file.id).expect("an answer per job"))
+                    .expect("states of a model");
+                if answer.states.is_empty() {
+                    (STILL, "loads; rounding decides what it touches".into())
+                } else if let Ok(agreement) = catch_unwind(AssertUnwindSafe(|| compare(sim, &answer.states))) {
+                    failures.extend(disagreement(&file.id, &agreement));
+                    measured = format!(" | {} | {} |", bucket(agreement.worst()), answer.skipped);
+                    (AGREES, "agrees".into())
+                } else {
+                    failures.push(format!("{}: panicked while stepping", file.id));
+                    continue;
+                }
+            }
+        };
+        let package = if file.id.starts_with("mujoco/mjx/") { "mujoco_mjx" } else { &file.id };
+        let package = package.split('/').next().expect("a first part").to_owned();
+        rows.push(Row { package, verdict, fixed: format!("| `{}` | {words}", file.id), measured });
+    }
+    check_document(&table(&rows, same.len(), empty.len()), &mut failures);
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// A seed that belongs to a file, whichever others there are (FNV-1a).
+fn seed(id: &str) -> u32 {
+    id.bytes().fold(0x811c_9dc5, |h, b| (h ^ u32::from(b)).wrapping_mul(0x0100_0193))
+}
+
+/// What is wrong with a loaded model, if anything is.
+fn disagreement(id: &str, a: &Agreement) -> Option<String> {
+    let mut wrong = Vec::new();
+    if a.contacts > 0 {
+        wrong.push(format!("contacts differ in {} states", a.contacts));
+    }
+    wrong.extend(a.errors.iter().filter(|(_, e)| **e > BOUND).map(|(what, e)| format!("{what} {e:.0e}")));
+    (!wrong.is_empty()).then(|| format!("{id}: disagrees with MuJoCo: {}", wrong.join(", ")))
+}
+
+/// Compares `docs/models.md` with what it should be, or writes it.
+fn check_document(text: &str, failures: &mut Vec<String>) {
+    let path = common::workspace().join("docs/models.md");
+    if std::env::var_os("MARATHON_BLESS").is_some_and(|v| v == "1") {
+        std::fs::write(&path, text).expect("docs/models.md can be written");
+        return;
+    }
+    let committed = std::fs::read_to_string(&path).unwrap_or_default();
+    let (want, have) = (without_measurements(text), without_measurements(&committed));
+    let different = want.iter().zip(&have).find(|(a, b)| a != b);
+    if let Some((want, have)) = different {
+        failures.push(format!("docs/models.md is out of date (MARATHON_BLESS=1 writes it):\n- {have}\n+ {want}"));
+    } else if want.len() != have.len() {
+        failures.push("docs/models.md is out of date (MARATHON_BLESS=1 writes it): its length differs".into());
+    }
+}
