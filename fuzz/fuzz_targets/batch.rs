@@ -63,16 +63,34 @@ impl Number {
 
 #[derive(Arbitrary, Debug)]
 enum Operation {
-    Step { ctrl: Vec<Number>, substeps: u8 },
-    Reset { agent: u8, qpos: Vec<Number>, qvel: Vec<Number> },
-    ResetHome { agent: u8 },
-    SetHome { qpos: Vec<i16> },
+    Step {
+        ctrl: Vec<Number>,
+        substeps: u8,
+    },
+    Reset {
+        agent: u8,
+        qpos: Vec<Number>,
+        qvel: Vec<Number>,
+    },
+    ResetHome {
+        agent: u8,
+    },
+    SetHome {
+        qpos: Vec<i16>,
+    },
     Save,
     Restore,
     /// Step, go back, step again.
-    Replay { ctrl: Vec<Number>, substeps: u8 },
-    Bodies { agent: u8 },
-    Sensors { agent: u8 },
+    Replay {
+        ctrl: Vec<Number>,
+        substeps: u8,
+    },
+    Bodies {
+        agent: u8,
+    },
+    Sensors {
+        agent: u8,
+    },
 }
 
 #[derive(Arbitrary, Debug)]

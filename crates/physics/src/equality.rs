@@ -24,15 +24,19 @@ pub(crate) struct EqualitySpec<C> {
 
 #[derive(Clone, Debug)]
 enum Tie<C> {
-    /// Points (and with `quats` orientations) of two bodies.
-    Bodies {
-        points: [Mount<C>; 2],
-        /// Orientations of the frames on their links (in the world for static bodies), and the weight of the angular
-        /// error.
-        quats: Option<([[C; 4]; 2], C)>,
-    },
+    /// Points (and with `frames` orientations) of two bodies.
+    Bodies { points: [Mount<C>; 2], frames: Option<Frames<C>> },
     /// A length, and one that it follows by a polynomial.
     Lengths { follower: Length<C>, leader: Option<Length<C>>, poly: [C; 5] },
+}
+
+/// What a weld holds besides points.
+#[derive(Clone, Copy, Debug)]
+struct Frames<C> {
+    /// Orientations of the frames on their links (in the world for static bodies).
+    quats: [[C; 4]; 2],
+    /// Weight of the angular error.
+    scale: C,
 }
 
 /// A joint's position or a tendon's length, measured from the reference configuration.
@@ -108,11 +112,11 @@ fn tie_bodies<T: Real>(
         let (pos, _) = rigid::compose(&(m.pos, m.rot), &(anchors[i], quat_to_rot(&[1.0, 0.0, 0.0, 0.0])));
         Mount { link: link_of[m.body], pos: pos.map(c), rot: m.rot.map(|r| r.map(c)) }
     };
-    let quats = frames.map(|(quats, scale)| {
+    let frames = frames.map(|(quats, scale)| {
         let on_link = |i: usize| quat_mul(&rot_to_quat(&mounts[bodies[i]].rot), &quats[i]).map(c);
-        ([on_link(0), on_link(1)], c(scale))
+        Frames { quats: [on_link(0), on_link(1)], scale: c(scale) }
     });
-    Tie::Bodies { points: [point(0), point(1)], quats }
+    Tie::Bodies { points: [point(0), point(1)], frames }
 }
 
 /// Writes the blocks of all equality constraints.
@@ -133,7 +137,7 @@ impl<T: Real> Kernel<T> for EqualityBlocks<'_, T> {
         let EqualityBlocks { sim, group, work } = self;
         for spec in &sim.equalities {
             match &spec.tie {
-                Tie::Bodies { points, quats } => bodies_block(sim, group, work, spec, points, quats.as_ref()),
+                Tie::Bodies { points, frames } => bodies_block(sim, group, work, spec, points, frames.as_ref()),
                 Tie::Lengths { follower, leader, poly } => {
                     lengths_block(group, work, spec, follower, leader.as_ref(), poly);
                 }
@@ -150,7 +154,7 @@ fn bodies_block<T: Real>(
     work: &mut Work<T>,
     spec: &EqualitySpec<T::Scalar>,
     points: &[Mount<T::Scalar>; 2],
-    quats: Option<&([[T::Scalar; 4]; 2], T::Scalar)>,
+    frames: Option<&Frames<T::Scalar>>,
 ) {
     let (z, one) = (T::zero(), T::lit(1.0));
     let links = [points[0].link, points[1].link];
@@ -195,8 +199,8 @@ fn bodies_block<T: Real>(
     error[..3].copy_from_slice(&gap);
     rate[..3].copy_from_slice(&speed);
     let mut turns = [[z; 3]; 3];
-    let dim = if quats.is_some() { 6 } else { 3 };
-    if let Some((quats, scale)) = quats {
+    let dim = if frames.is_some() { 6 } else { 3 };
+    if let Some(Frames { quats, scale }) = frames {
         let frame = |i: usize| {
             let q = quats[i].map(T::splat);
             links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.rot[l]), &q))
@@ -251,7 +255,7 @@ fn bodies_block<T: Real>(
     for i in 0..3 {
         lin[i][i] = sign;
         for x in &mut turns[i] {
-            *x = *x * sign;
+            *x *= sign;
         }
     }
     block.tie_points(lin, turns, [(links[first], r[first]), (links[second], r[second])], all);

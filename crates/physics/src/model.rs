@@ -274,7 +274,7 @@ pub struct Joint {
     /// Spring stiffness, N/m or N m/rad.
     pub stiffness: f64,
     /// Higher orders of the stiffness (MuJoCo `jnt_stiffnesspoly`): at the displacement `x` from rest the spring's
-    /// stiffness is `stiffness + poly[0] |x| + poly[1] x^2`.
+    /// stiffness is `stiffness + poly[0] x + poly[1] x^2`.
     pub stiffness_poly: [f64; 2],
     /// `solreflimit`.
     pub solref_limit: SolRef,

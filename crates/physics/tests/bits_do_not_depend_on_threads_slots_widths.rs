@@ -8,7 +8,7 @@
 
 mod common;
 
-use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions, Variation};
+use marathon_physics::{Batch, BatchOptions, Isa, Model, Variation};
 
 /// Starts and controls of agent number `id`, from a hash of the number alone.
 fn noise(id: usize, k: usize) -> f64 {

@@ -143,3 +143,36 @@ fn random_states_excite_the_sensors() {
         }
     }
 }
+
+/// A range finder sees the ground of its own agent: that of a model with other elevations.
+#[test]
+fn range_finders_see_the_agents_own_ground() {
+    let path = common::workspace().join("crates/physics/tests/models/sensors/rays.xml");
+    let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+    let mut other = model.clone();
+    let top = other.hfields[0].size[2];
+    other.hfields[0].data.iter_mut().rev().enumerate().for_each(|(i, x)| *x = (i % 3) as f32 / 2.0);
+    let elevations: Vec<f32> = other.hfields[0].data.iter().map(|x| (f64::from(*x) * top) as f32).collect();
+
+    let read = |model: &Model, ground: Option<&[f32]>| {
+        let sim = Sim::<f64>::new(model, SimOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let (mut work, mut group) = (Work::new(&sim), Group::new(&sim));
+        if let Some(ground) = ground {
+            group.set_ground(&sim, 0, 0, ground);
+        }
+        let mut seen = Vec::new();
+        for turn in 0..12 {
+            let mut qpos = model.qpos0.clone();
+            let (s, c) = (0.25 * f64::from(turn)).sin_cos();
+            qpos[3..7].copy_from_slice(&[c, 0.8 * s, 0.6 * s, 0.0]);
+            group.reset_lane(&sim, 0, &qpos, &vec![0.0; model.nv]);
+            sim.forward(&mut work, &group);
+            let r = Readings::new(&sim, &group, &work);
+            seen.extend((0..model.sensors.len()).flat_map(|k| r.sensor(k).expect("it is evaluated")));
+        }
+        seen
+    };
+    let (shared, own, wanted) = (read(&model, None), read(&model, Some(&elevations)), read(&other, None));
+    assert!(shared != wanted, "some ray meets the field");
+    assert!(own == wanted, "the agent's rays meet its own ground");
+}

@@ -158,7 +158,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         if let Some(factor) = group.friction() {
             // a frictionless contact is a flat pyramid and has nothing to vary
             if c.mu[0] > T::scalar(0.0) {
-                d = d * pyramid_share(mu[0], factor);
+                d *= pyramid_share(mu[0], factor);
             }
             mu = [mu[0] * factor, mu[1] * factor];
         }

@@ -498,7 +498,7 @@ impl<T: Real> crate::lanes::Kernel<T> for WriteSlot<'_, T> {
         let violation = touch.dist - T::splat(pair.soft.margin);
         let (imp, mut d) = impedance(&pair.soft, violation);
         if let (Some(factor), Cost::Pyramid) = (group.friction(), pair.cost) {
-            d = d * pyramid_share(T::splat(pair.friction[0]), factor);
+            d *= pyramid_share(T::splat(pair.friction[0]), factor);
         }
         let b = T::splat(pair.soft.b);
         let frame = [normal, t1, t2];

@@ -247,10 +247,13 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     fn ray_field(&self, index: usize, p: &V3<T>, d: &V3<T>) -> Hit<T> {
         let field = &self.sim.model.hfields[index];
-        let size = field.size.map(T::scalar);
-        let grid = Grid { rows: field.nrow, cols: field.ncol, size, heights: &self.sim.fields[index].grid.heights };
         let mut out = Hit::<T>::none();
         for lane in 0..T::LANES {
+            // an agent may have ground of its own, with higher hills
+            let own = &self.group.ground(self.sim, lane, index).grid;
+            let mut size = field.size.map(T::scalar);
+            size[2] = size[2].max(own.top);
+            let grid = Grid { rows: own.rows, cols: own.cols, size, heights: &own.heights };
             let pick = |v: &V3<T>| [v[0].get(lane), v[1].get(lane), v[2].get(lane)];
             let hit = ray_hfield(&grid, &pick(p), &pick(d));
             out.dist.set(lane, hit.dist);

@@ -238,7 +238,7 @@ impl<T: Real> Block<T> {
     #[inline(always)]
     fn edge(&self, u: &Rows<T>, e: usize) -> T {
         let j = e / 2;
-        if e % 2 == 0 { self.mu[j].mul_add(u[j + 1], u[0]) } else { self.mu[j].neg_mul_add(u[j + 1], u[0]) }
+        if e.is_multiple_of(2) { self.mu[j].mul_add(u[j + 1], u[0]) } else { self.mu[j].neg_mul_add(u[j + 1], u[0]) }
     }
 
     fn edges(&self) -> usize {
@@ -250,7 +250,8 @@ impl<T: Real> Block<T> {
     fn add_edge(&self, f: &mut Rows<T>, e: usize, x: T) {
         let j = e / 2;
         f[0] += x;
-        f[j + 1] = if e % 2 == 0 { self.mu[j].mul_add(x, f[j + 1]) } else { self.mu[j].neg_mul_add(x, f[j + 1]) };
+        f[j + 1] =
+            if e.is_multiple_of(2) { self.mu[j].mul_add(x, f[j + 1]) } else { self.mu[j].neg_mul_add(x, f[j + 1]) };
     }
 
     /// The force that the block exerts at `u`.
@@ -345,7 +346,7 @@ impl<T: Real> Block<T> {
                     changed = T::or(changed, T::xor(active, self.zones[e]));
                     self.zones[e] = active;
                     let (s, j) = (T::masked(active, self.d[0]), e / 2 + 1);
-                    let m = if e % 2 == 0 { self.mu[j - 1] } else { -self.mu[j - 1] };
+                    let m = if e.is_multiple_of(2) { self.mu[j - 1] } else { -self.mu[j - 1] };
                     let sm = s * m;
                     self.stiffness[0] += s;
                     self.stiffness[at(j, 0)] += sm;

@@ -12,8 +12,9 @@
 //! least the identity: its Cholesky factors always exist. In lanes without a block the column is zero and the
 //! factor's row that of the identity, so nothing changes there, to the bit.
 //!
-//! Measured against the alternatives: splitting `|j2 - j1|^2 <= 2 |j1|^2 + 2 |j2|^2` keeps the tree but needs three
-//! times as many iterations; a dense factorization of H costs twice the recursion for every iteration and agent.
+//! The alternatives: splitting `|j2 - j1|^2 <= 2 |j1|^2 + 2 |j2|^2` keeps the tree and needs no small matrix, but costs
+//! several times as many iterations; a dense factorization of H costs about twice the recursion before the first contact
+//! (`docs/physics.md` has the numbers).
 
 use crate::articulated::reduce_free_root;
 use crate::lanes::{Kernel, Real};
