@@ -33,8 +33,8 @@ pub enum SimError {
 /// Choices a user makes when building a [`Sim`].
 #[derive(Clone, Debug, Default)]
 pub struct SimOptions {
-    /// Simulate contacts with the static floor alone even if the model's moving geoms could collide with each other
-    /// (by their contype and conaffinity). Without it such a model is refused.
+    /// Simulate contacts with the static world alone even if the model's moving geoms could collide with each other (by
+    /// their contype and conaffinity).
     pub ground_contacts_only: bool,
     /// Overrides the model's cap on Newton iterations.
     pub max_newton: Option<usize>,
