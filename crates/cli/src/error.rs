@@ -2,6 +2,7 @@
 
 use crate::config::ConfigError;
 use marathon_envs::EnvError;
+use marathon_learn::Error;
 use marathon_physics::mjcf::MjcfError;
 use marathon_render::RenderError;
 use std::path::{Path, PathBuf};
@@ -12,9 +13,9 @@ pub enum CliError {
     /// Of the environments: an unknown agent, most likely.
     #[error(transparent)]
     Env(#[from] EnvError),
-    /// Of the trainer.
+    /// Of the trainer; or of a file, whose errors are worded there.
     #[error(transparent)]
-    Learn(#[from] marathon_learn::Error),
+    Learn(#[from] Error),
     /// Of a configuration file.
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -24,28 +25,6 @@ pub enum CliError {
     /// Of the pictures.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A file or folder cannot be read or written.
-    #[error("{}: {action}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// Why it failed.
-        source: std::io::Error,
-    },
-    /// A file is not what it should be.
-    #[error("{}: {place}: found {found}, expected {expected}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Where in the file.
-        place: String,
-        /// What is there.
-        found: String,
-        /// What should be there.
-        expected: String,
-    },
     /// A picture of the results cannot be drawn.
     #[error("{}: {reason}", path.display())]
     Draw {
@@ -62,6 +41,9 @@ pub enum CliError {
         /// What is left and how to go on.
         advice: String,
     },
+    /// MuJoCo cannot be asked.
+    #[error("{0}")]
+    Mujoco(String),
     /// The command line makes no sense.
     #[error("{0}")]
     Usage(String),
@@ -73,13 +55,13 @@ pub enum CliError {
 impl CliError {
     /// For `map_err` after something was tried on a file.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
-        move |source| CliError::Io { path: path.into(), action, source }
+        move |source| Error::Io { path: path.into(), action, source }.into()
     }
 
     /// A file with wrong contents.
     pub fn file(path: &Path, place: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
         let (place, found, expected) = (place.to_string(), found.to_string(), expected.to_string());
-        CliError::File { path: path.into(), place, found, expected }
+        Error::File { path: path.into(), place, found, expected }.into()
     }
 
     /// Exit code of the program.

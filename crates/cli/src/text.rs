@@ -42,6 +42,16 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
+/// What to say of agents whose state was no longer finite; nothing if there were none.
+pub fn broken(agents: u64) -> Option<String> {
+    let times = match agents {
+        0 => return None,
+        1 => "once".into(),
+        n => format!("{} times", thousands(n)),
+    };
+    Some(format!("note: {times} the simulation of an agent broke down (its state was not finite)"))
+}
+
 /// Zero for a number that would be written as `-0.0` with so many decimals.
 pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
@@ -73,6 +83,12 @@ mod tests {
         assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
         assert_eq!([12.0, 1500.0, 512_345.0, 1.25e6].map(short), ["12", "1.5 k", "512 k", "1.25 M"]);
         assert_eq!([8.31, 59.96, 125.0, 3725.0].map(duration), ["8.3 s", "1 min 00 s", "2 min 05 s", "1 h 02 min"]);
+    }
+
+    #[test]
+    fn breakdowns_are_told() {
+        assert_eq!(broken(0), None);
+        assert!(broken(1).unwrap().contains("once") && broken(1234).unwrap().contains("1,234 times"));
     }
 
     #[test]

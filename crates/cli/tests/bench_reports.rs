@@ -1,6 +1,10 @@
 //! `marathon bench` measures what it says, for people and for programs.
 
+mod common;
+
+use common::python;
 use serde_json::Value;
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn bench(args: &[&str]) -> Output {
@@ -70,6 +74,133 @@ fn train_includes_everything() {
     assert_eq!(rows[0]["repetitions"], 3);
 }
 
+fn against_mujoco(python: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_marathon"));
+    command.args(["bench", "physics", "--against", "mujoco", "--seconds", "0.05"]).args(args);
+    command.env("MARATHON_PYTHON", python).output().expect("the program starts")
+}
+
+#[test]
+fn both_engines_run_the_same_workload() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/agents/ant.xml");
+    let args = ["--agent", "hopper", "--model", file, "--isa", "f64", "--isa", "f32", "--threads", "2", "--json"];
+    let out = against_mujoco(&python(), &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    assert_eq!((&document["bench"], &document["against"]), (&"physics".into(), &"mujoco".into()));
+    assert!(document["mujoco_version"].as_str().unwrap().starts_with(|c: char| c.is_ascii_digit()), "{document}");
+    let rows = document["rows"].as_array().unwrap();
+    let got: Vec<_> = rows.iter().map(|row| (row["agent"].as_str().unwrap(), row["isa"].as_str().unwrap())).collect();
+    assert_eq!(got, [("Hopper-v0", "f64"), ("Hopper-v0", "f32"), ("ant", "f64"), ("ant", "f32")]);
+    for row in rows {
+        let side = |side: &str, key: &str| row[side][key].as_f64().unwrap_or_else(|| panic!("{side} {key}: {row}"));
+        for (ratio, key) in [("ratio", "ns_per_agent_step"), ("wall_ratio", "wall_ns_per_agent_step")] {
+            let got = row[ratio].as_f64().unwrap();
+            assert!(got.is_finite() && got > 0.0, "{row}");
+            assert!((got * side("marathon", key) / side("mujoco", key) - 1.0).abs() < 1e-9, "{row}");
+        }
+        // the same physics under the same kind of torques: as often on the ground
+        let [theirs, ours] = ["mujoco", "marathon"].map(|engine| side(engine, "contacts"));
+        assert!(ours > 0.5 && (ours / theirs - 1.0).abs() < 0.2, "contacts: {ours} and MuJoCo's {theirs}");
+        assert_eq!((&row["mujoco"]["broken"], &row["marathon"]["broken"]), (&0.into(), &0.into()));
+    }
+}
+
+#[test]
+fn contacts_between_bodies_count_on_both_sides() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pair.xml");
+    // two balls that touch each other and no ground
+    let model = r#"<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/><geom size="0.1"/></body>
+        <body pos="0.15 0 0"><joint type="hinge" axis="0 0 1" pos="0.3 0 0" stiffness="200" damping="5"/><geom size="0.1"/>
+        </body><body pos="-0.15 0 0"><joint type="hinge" axis="0 0 1" pos="-0.3 0 0" stiffness="200" damping="5"/>
+        <geom size="0.1"/></body></worldbody></mujoco>"#;
+    std::fs::write(&file, model).unwrap();
+    for (which, low, high) in [("ground", 0.0, 0.0), ("all", 0.1, 3.0)] {
+        let args = ["--model", file.to_str().unwrap(), "--isa", "f64", "--json", "--contacts", which];
+        let out = against_mujoco(&python(), &args);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+        let side = |engine: &str| document["rows"][0][engine]["contacts"].as_f64().unwrap();
+        let (theirs, ours) = (side("mujoco"), side("marathon"));
+        assert!((low..=high).contains(&ours) && (low..=high).contains(&theirs), "{which}: {ours}, MuJoCo's {theirs}");
+        assert!((ours - theirs).abs() <= 0.2 * theirs, "{which}: {ours}, MuJoCo's {theirs}");
+    }
+}
+
+#[test]
+fn people_get_the_ratio() {
+    let out = against_mujoco(&python(), &["--agent", "hopper", "--isa", "f32"]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    let row = text.lines().find(|line| line.starts_with("Hopper-v0")).unwrap_or_else(|| panic!("{text}"));
+    let header = text.lines().find(|line| line.starts_with("agent")).unwrap();
+    assert_eq!((header.len(), row.matches("x ").count()), (row.len(), 2), "{text}");
+    for part in ["MuJoCo 4", "contacts with the ground only", "processor time", "time passed", "contacts per agent"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_python_without_mujoco_is_told_what_to_install() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let script = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        path
+    };
+    // a Python without packages, something that is no Python, nothing
+    let bare = script("bare", &format!("exec '{}' -S -I \"$@\"", python().display()));
+    let broken = script("broken", "echo out of order >&2; exit 3");
+    let missing = folder.path().join("missing");
+    for (python, messages) in [
+        (&bare, &["No module named 'mujoco'", "bare -m pip install mujoco", "MARATHON_PYTHON"][..]),
+        (&broken, &["ended early (exit status: 3)", "out of order", "MARATHON_PYTHON"]),
+        (&missing, &["cannot be started", "python3 -m pip install mujoco", "MARATHON_PYTHON"]),
+    ] {
+        let out = against_mujoco(python, &["--agent", "hopper"]);
+        let text = String::from_utf8_lossy(&out.stderr);
+        assert_eq!((out.status.code(), &out.stdout[..]), (Some(1), &b""[..]), "{text}");
+        for message in messages {
+            assert!(text.contains(message), "{message}: {text}");
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_mujoco_refuses_is_passed_on() {
+    // a model that says something else when it is read again
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("model.xml");
+    let ball = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    std::fs::write(&file, ball).unwrap();
+    let late = folder.path().join("python");
+    let text = format!("#!/bin/sh\necho '<mujoco' > '{}'\nexec '{}' \"$@\"\n", file.display(), python().display());
+    std::fs::write(&late, text).unwrap();
+    std::fs::set_permissions(&late, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let out = against_mujoco(&late, &["--model", file.to_str().unwrap(), "--isa", "f32"]);
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{text}");
+    assert!(text.contains("model 'model'") && text.contains("XML"), "{text}");
+}
+
+#[test]
+fn gait_trains_until_the_bar_is_met() {
+    let args =
+        ["gait", "--agent", "hopper", "--seeds", "1", "--every", "100000", "--speed=-9", "--falls", "100", "--json"];
+    let out = bench(&args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    assert_eq!((&document["bench"], &document["threads"]), (&"gait".into(), &1.into()));
+    let runs = document["runs"].as_array().unwrap();
+    assert_eq!((runs.len(), &runs[0]["agent"], &runs[0]["seed"]), (1, &"Hopper-v0".into(), &1.into()));
+    assert_eq!((&runs[0]["reached"], &runs[0]["diverged"]), (&true.into(), &0.into()), "{runs:?}");
+    assert!((100_000..200_000).contains(&runs[0]["steps"].as_u64().unwrap()), "{runs:?}");
+}
+
 #[test]
 fn people_get_a_table() {
     let out = bench(&["physics", "--agent", "hopper", "--isa", "f32", "--seconds", "0.05"]);
@@ -87,12 +218,15 @@ fn people_get_a_table() {
 fn mistakes_are_named() {
     for (args, code, message) in [
         (&["physics", "--agent", "hoper"][..], 1, "did you mean 'Hopper-v0'?"),
-        (&["env", "--model", "x.xml"], 2, "--model goes with `bench physics`"),
+        (&["env", "--model", "x.xml"], 2, "unexpected argument '--model'"),
         (&["physics", "--model", "no-such.xml"], 1, "no-such.xml"),
         (&["train", "--isa", "f64"], 2, "single precision"),
         (&["physics", "--isa", "mmx"], 2, "unknown instruction set 'mmx'"),
         (&["physics", "--seconds", "0"], 2, "expected a positive number of seconds"),
-        (&["fly"], 2, "physics"),
+        (&["phisics"], 2, "physics"),
+        (&[], 2, "physics"),
+        (&["physics", "--against", "bullet"], 2, "mujoco"),
+        (&["physics", "--contacts", "none"], 2, "ground, all"),
     ] {
         let out = bench(args);
         let text = String::from_utf8_lossy(&out.stderr);

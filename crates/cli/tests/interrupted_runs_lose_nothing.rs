@@ -160,6 +160,31 @@ fn a_complete_run_goes_on_with_more_steps_only() {
     assert_eq!(read_json(&temp.path().join("runs/hopper-1/summary.json"))["steps"], 40_960);
 }
 
+/// Agents whose simulation broke down are told of at the end, those of the run's earlier parts among them.
+#[test]
+fn breakdowns_are_counted_over_all_parts() {
+    let temp = tempfile::tempdir().unwrap();
+    let run = temp.path().join("a");
+    let output = common::run(temp.path(), &[&SMALL[..], &["5", "--steps", "20k", "--out", "a"]].concat());
+    assert!(!stderr(&output).contains("broke down"), "{}", stderr(&output));
+    assert_eq!(read_json(&run.join("summary.json"))["diverged"], 0);
+
+    // nothing that a user can do makes these agents break down, so a row says that three did
+    let rows = std::fs::read_to_string(run.join("progress.csv")).unwrap();
+    let column = rows.lines().next().unwrap().split(',').position(|name| name == "diverged").unwrap();
+    let marked = |(i, row): (usize, &str)| {
+        let mut cells: Vec<&str> = row.split(',').collect();
+        if i == 2 {
+            cells[column] = "3";
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(run.join("progress.csv"), rows.lines().enumerate().map(marked).collect::<String>()).unwrap();
+    let output = common::run(temp.path(), &["train", "--resume", "a", "--steps", "30k"]);
+    assert!(stderr(&output).contains("note: 3 times the simulation of an agent broke down"), "{}", stderr(&output));
+    assert_eq!(read_json(&run.join("summary.json"))["diverged"], 3);
+}
+
 #[test]
 fn a_second_interruption_ends_at_once_and_breaks_nothing() {
     let temp = tempfile::tempdir().unwrap();

@@ -113,7 +113,7 @@ fn tensorboard_reads_the_events() {
     let temp = tempfile::tempdir().unwrap();
     train(temp.path(), &[]);
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let python = std::env::var_os("MARATHON_PYTHON").map_or(workspace.join(".venv/bin/python"), Into::into);
+    let python = common::python();
     let script = workspace.join("tests/oracle/tensorboard_events.py");
     let output = Command::new(&python).arg(script).arg(temp.path().join("runs/hopper-1")).output();
     let output = output.unwrap_or_else(|e| panic!("{}: {e}: run ./test.sh, which sets up .venv", python.display()));

@@ -35,5 +35,7 @@ pub use lanes::{Isa, Real};
 pub use model::Model;
 pub use readings::{Readings, rot_to_quat};
 pub use sim::{Sim, SimError, SimOptions};
+#[doc(hidden)]
+pub use step::Stage;
 pub use variation::Variation;
 pub use work::{Group, SolverStats, Work};

@@ -96,28 +96,64 @@ impl<T: Real> Kernel<T> for Integrate<'_, T> {
     }
 }
 
+/// A stage of [`Sim::forward`]; public for the benchmark of the stages alone.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub enum Stage {
+    /// Frames, velocities, applied forces.
+    Smooth,
+    /// Collision detection and the rows of all constraints.
+    Constraints,
+    /// Constrained acceleration.
+    Solver,
+}
+
 impl<T: Real> Sim<T> {
     /// Accelerations and constraint forces at the present state; the state does not change.
     pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
-        smooth_stage(self, group, work);
-        if !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty() {
-            external_forces(self, group, work);
+        for stage in [Stage::Smooth, Stage::Constraints, Stage::Solver] {
+            self.run_stage(stage, work, group);
         }
-        constraint_stage(self, group, work);
-        if !self.equalities.is_empty() {
-            equality_blocks(self, group, work);
+    }
+
+    /// One stage of [`Sim::forward`], after those before it.
+    #[doc(hidden)]
+    pub fn run_stage(&self, stage: Stage, work: &mut Work<T>, group: &Group<T>) {
+        match stage {
+            Stage::Smooth => {
+                smooth_stage(self, group, work);
+                if !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty() {
+                    external_forces(self, group, work);
+                }
+            }
+            Stage::Constraints => {
+                constraint_stage(self, group, work);
+                if !self.equalities.is_empty() {
+                    equality_blocks(self, group, work);
+                }
+                if !self.tendons.is_empty() || !self.ball_limits.is_empty() {
+                    tendon_blocks(self, group, work);
+                }
+                if !self.contacts.pairs.is_empty() {
+                    pair_stage(self, group, work);
+                }
+            }
+            Stage::Solver if self.planar => planar_solver_stage(self, group, work),
+            Stage::Solver => solver_stage(self, group, work),
         }
-        if !self.tendons.is_empty() || !self.ball_limits.is_empty() {
-            tendon_blocks(self, group, work);
+    }
+
+    /// The end of a step after [`Sim::forward`]: damping taken at the end of the step, integration.
+    #[doc(hidden)]
+    pub fn finish_step(&self, work: &mut Work<T>, group: &mut Group<T>) {
+        if self.implicit_damping {
+            if self.planar {
+                planar_damping_stage(self, group, work);
+            } else {
+                damping_stage(self, group, work);
+            }
         }
-        if !self.contacts.pairs.is_empty() {
-            pair_stage(self, group, work);
-        }
-        if self.planar {
-            planar_solver_stage(self, group, work);
-        } else {
-            solver_stage(self, group, work);
-        }
+        T::enter(Integrate(self, group, work));
     }
 
     /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
@@ -131,14 +167,7 @@ impl<T: Real> Sim<T> {
                 self.step_rk4(work, group);
             } else {
                 self.forward(work, group);
-                if self.implicit_damping {
-                    if self.planar {
-                        planar_damping_stage(self, group, work);
-                    } else {
-                        damping_stage(self, group, work);
-                    }
-                }
-                T::enter(Integrate(self, group, work));
+                self.finish_step(work, group);
             }
         }
         self.refresh(work, group);

@@ -127,6 +127,18 @@ impl<T: Real> Group<T> {
         self.grounds[field * T::LANES + lane] = Some(Arc::new(own));
     }
 
+    /// Highest elevation of a height field for every agent.
+    #[inline(always)]
+    pub(crate) fn ground_top(&self, sim: &Sim<T>, field: usize) -> T {
+        let mut top = T::splat(sim.fields[field].grid.top);
+        if !self.grounds.is_empty() {
+            for lane in 0..T::LANES {
+                top.set(lane, self.ground(sim, lane, field).grid.top);
+            }
+        }
+        top
+    }
+
     /// Height field `field` of an agent.
     #[inline(always)]
     pub(crate) fn ground<'a>(&'a self, sim: &'a Sim<T>, lane: usize, field: usize) -> &'a Field<T::Scalar> {

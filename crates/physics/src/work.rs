@@ -13,6 +13,9 @@ use crate::spatial::{Inertia, Rot, Sym6, V3, V6};
 use crate::variation::Varied;
 use std::sync::Arc;
 
+/// Largest sound position, velocity or acceleration.
+const LARGEST: f64 = 1e10;
+
 /// State of `T::LANES` agents that share a model: everything their future depends on.
 #[derive(Clone, Debug)]
 pub struct Group<T: Real> {
@@ -98,14 +101,19 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// Lanes whose state is finite.
+    /// Lanes whose state is sound: finite, and with positions, velocities and accelerations below 1e10, MuJoCo's bound
+    /// too. Far beyond it products overflow, and then even what a mask makes zero is not.
     pub fn finite(&self) -> T::Mask {
         let mut sum = T::zero();
-        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm).chain(&self.act) {
+        for x in &self.act {
             // 0 x is 0, or NaN where x is not finite
             sum += *x * T::zero();
         }
-        sum.is_finite()
+        let mut sound = sum.is_finite();
+        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
+            sound = T::and(sound, x.abs().lt(T::lit(LARGEST)));
+        }
+        sound
     }
 }
 

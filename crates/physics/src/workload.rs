@@ -1,6 +1,6 @@
 //! The benchmark's workload: agents under random torques, falling and thrashing on the floor.
 //!
-//! The protocol is the same for the `mujoco` package (`tests/oracle/bench_mujoco.py`): start in the reference
+//! The `mujoco` package runs the same protocol in `marathon bench physics --against mujoco`: start in the reference
 //! configuration with hinges off by up to 0.1 rad and velocities up to 0.1, warm up, then time steps under controls
 //! drawn uniformly from [-1, 1] and held for four steps. Nobody is reset: contacts are many and differ between agents,
 //! which is the hard case for lanes.

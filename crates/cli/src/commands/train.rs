@@ -5,6 +5,7 @@ use crate::config;
 use crate::console::{self, say};
 use crate::error::CliError;
 use crate::folder::{RunFile, RunFolder, write_json};
+use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary, evaluation_table};
 use crate::report::{Reporter, curve, print_json, save};
 use crate::{interrupt, text};
@@ -52,9 +53,16 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     }
     saved.map_err(|cause| stopped(&folder, cause, false, steps))?;
 
-    let drawn = curve::draw(&folder, &run);
+    let (history, drawn) = match History::read(&folder.progress()) {
+        Ok(history) => {
+            let drawn = curve::draw(&folder, &run, &history);
+            (history, drawn)
+        }
+        Err(error) => (History::default(), Err(error)),
+    };
     if steps < run.config.total_steps {
-        let summary = Summary::new(folder.path().into(), &policy, true, None);
+        let summary = Summary::new(folder.path().into(), &policy, &history, true, None);
+        note_broken(&summary);
         write_json(&folder.summary(), &summary)?;
         drawn?;
         if json {
@@ -72,7 +80,8 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
     policy.set_evaluation(eval);
     policy.save(&folder.policy())?;
-    let summary = Summary::new(folder.path().into(), &policy, false, Some(eval));
+    let summary = Summary::new(folder.path().into(), &policy, &history, false, Some(eval));
+    note_broken(&summary);
     write_json(&folder.summary(), &summary)?;
     drawn?;
     if json {
@@ -173,6 +182,13 @@ fn announce(folder: &RunFolder, run: &RunFile, done: u64) {
         config.seed,
         folder.path().display()
     ));
+}
+
+/// Says so if agents broke down on the way.
+fn note_broken(summary: &Summary) {
+    if let Some(line) = text::broken(summary.diverged) {
+        console::note(format!("{line}; see the column `diverged` of progress.csv"));
+    }
 }
 
 /// The error of a run whose files could no longer be written.

@@ -12,6 +12,8 @@ const ITERATION: &str = "iteration";
 pub struct CsvLog {
     path: PathBuf,
     writer: csv::Writer<File>,
+    /// Head and last row of what the file held when it was opened.
+    before: Option<(String, String)>,
 }
 
 /// Columns and values of an iteration; a value that there is none of (no episode ended) is an empty cell.
@@ -52,11 +54,16 @@ impl CsvLog {
     /// # Errors
     /// If the file cannot be read or written.
     pub fn open(path: &Path, iteration: u64) -> Result<Self, CliError> {
-        if path.exists() {
-            cut(path, iteration)?;
-        }
+        let before = if path.exists() { cut(path, iteration)? } else { None };
         let file = OpenOptions::new().create(true).append(true).open(path).map_err(CliError::io(path, "open"))?;
-        Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file) })
+        Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file), before })
+    }
+
+    /// A value of the last row that the file held when it was opened.
+    pub fn before(&self, name: &str) -> Option<f64> {
+        let (head, last) = self.before.as_ref()?;
+        let column = head.split(',').position(|n| n == name)?;
+        last.split(',').nth(column)?.parse().ok()
     }
 
     /// Appends a row, and the head before the first.
@@ -103,8 +110,9 @@ impl History {
     }
 }
 
-/// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too.
-fn cut(path: &Path, iteration: u64) -> Result<(), CliError> {
+/// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too. Returns
+/// the head and the last row.
+fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, CliError> {
     let text = std::fs::read_to_string(path).map_err(CliError::io(path, "read"))?;
     let mut kept = String::with_capacity(text.len());
     for (i, line) in text.split_inclusive('\n').enumerate() {
@@ -118,7 +126,9 @@ fn cut(path: &Path, iteration: u64) -> Result<(), CliError> {
     if kept.len() < text.len() {
         write_atomic(path, kept.as_bytes())?
     }
-    Ok(())
+    let mut lines = kept.lines();
+    let head = lines.next();
+    Ok(head.zip(lines.next_back()).map(|(head, last)| (head.into(), last.into())))
 }
 
 fn failed(path: &Path, action: &'static str, error: csv::Error) -> CliError {
@@ -141,10 +151,12 @@ mod tests {
         (1..=5).for_each(|i| log.push(&row(f64::from(i))).unwrap());
         drop(log);
         let mut log = CsvLog::open(&path, 3).unwrap();
+        assert_eq!((log.before("a"), log.before("b")), (Some(1.5), None));
         log.push(&row(4.0)).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n3,1.5\n4,2\n");
         std::fs::write(&path, "iteration,a\n1,\n2,").unwrap();
-        drop(CsvLog::open(&path, 9).unwrap());
+        let log = CsvLog::open(&path, 9).unwrap();
+        assert_eq!((log.before(ITERATION), log.before("a")), (Some(1.0), None));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n");
         assert_eq!(History::read(&path).unwrap().column("a"), [None]);
     }

@@ -37,11 +37,10 @@ struct Series {
 /// Draws the curve of a run from its rows; a run without an ended episode has an empty one.
 ///
 /// # Errors
-/// If the rows cannot be read or the picture cannot be written.
-pub fn draw(folder: &RunFolder, run: &RunFile) -> Result<(), CliError> {
-    let history = History::read(&folder.progress())?;
+/// If the picture cannot be written.
+pub fn draw(folder: &RunFolder, run: &RunFile, history: &History) -> Result<(), CliError> {
     let path = folder.curve();
-    let png = picture(&history, run).map_err(|e| CliError::Draw { path: path.clone(), reason: e.to_string() })?;
+    let png = picture(history, run).map_err(|e| CliError::Draw { path: path.clone(), reason: e.to_string() })?;
     write_png(&path, &png)
 }
 

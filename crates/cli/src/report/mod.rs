@@ -48,12 +48,7 @@ impl<'a> Reporter<'a> {
         let (iteration, steps) = resume.map_or((0, 0), |c| (c.iteration(), c.steps()));
         let csv = CsvLog::open(&folder.progress(), iteration)?;
         let events = EventLog::open(folder, steps)?;
-        let wall = match iteration {
-            0 => 0.0,
-            _ => {
-                csv::History::read(&folder.progress())?.column("wall_seconds").last().copied().flatten().unwrap_or(0.0)
-            }
-        };
+        let wall = csv.before("wall_seconds").unwrap_or(0.0);
         let mut reporter = Self {
             folder,
             run,

@@ -1,5 +1,6 @@
 //! A run in numbers: `summary.json`, and the same for a person.
 
+use super::csv::History;
 use crate::text::{duration, short, thousands, unsigned_zero};
 use marathon_learn::{Evaluation, Policy};
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,9 @@ pub struct Summary {
     pub cpu_seconds: f64,
     /// Agent-steps by processor seconds.
     pub steps_per_cpu_second: f64,
+    /// Times that the state of an agent was not finite while it learned; it was then made whole.
+    #[serde(default)]
+    pub diverged: u64,
     /// Whether the run was stopped before its last step.
     pub interrupted: bool,
     /// How the policy does; none for an interrupted run.
@@ -32,8 +36,14 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of a run with its policy.
-    pub fn new(folder: PathBuf, policy: &Policy, interrupted: bool, eval: Option<Evaluation>) -> Self {
+    /// Of a run with its policy and rows.
+    pub fn new(
+        folder: PathBuf,
+        policy: &Policy,
+        history: &History,
+        interrupted: bool,
+        eval: Option<Evaluation>,
+    ) -> Self {
         let meta = policy.meta();
         let (mut seed, mut steps, mut wall_seconds, mut cpu_seconds) = (0, 0, 0.0, 0.0);
         if let Some(training) = &meta.training {
@@ -42,7 +52,19 @@ impl Summary {
         }
         let steps_per_cpu_second = if cpu_seconds > 0.0 { steps as f64 / cpu_seconds } else { 0.0 };
         let agent = meta.agent.clone();
-        Self { agent, folder, seed, steps, wall_seconds, cpu_seconds, steps_per_cpu_second, interrupted, eval }
+        let diverged = history.column("diverged").into_iter().flatten().sum::<f64>() as u64;
+        Self {
+            agent,
+            folder,
+            seed,
+            steps,
+            wall_seconds,
+            cpu_seconds,
+            steps_per_cpu_second,
+            diverged,
+            interrupted,
+            eval,
+        }
     }
 
     /// One line about the training.

@@ -75,6 +75,14 @@ pub fn event_files(run: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// The Python that has the oracles: that of `MARATHON_PYTHON`, else that of `.venv` at the root of the workspace.
+pub fn python() -> PathBuf {
+    let venv = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.venv/bin/python");
+    let python = std::env::var_os("MARATHON_PYTHON").map_or(PathBuf::from(venv), PathBuf::from);
+    assert!(python.exists(), "{}: no such file; run ./test.sh, which sets up .venv", python.display());
+    python
+}
+
 /// All files under a folder.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all = Vec::new();

@@ -57,6 +57,17 @@ impl Test {
     }
 }
 
+/// What decides whether a pair can touch at all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cull {
+    /// Balls around both.
+    Balls,
+    /// The first is a plane.
+    Plane,
+    /// The first is a height field: nothing touches it above its highest point.
+    Field,
+}
+
 /// Two geoms that may touch.
 #[derive(Clone, Debug)]
 pub(crate) struct PairSpec<C> {
@@ -67,10 +78,9 @@ pub(crate) struct PairSpec<C> {
     test: Test,
     /// Height field of the first.
     field: usize,
-    /// Distance of the centers, or of the second's from the plane, beyond which they cannot touch.
+    cull: Cull,
+    /// Distance beyond which they cannot touch: of the centers, or of the second's center from the plane.
     reach: C,
-    /// The first is a plane.
-    flat: bool,
     margin: C,
     dim: usize,
     cost: Cost,
@@ -130,7 +140,11 @@ pub(super) fn add<T: Real>(
             (Cost::Elliptic, invweight)
         }
     };
-    let flat = a.kind == GeomType::Plane;
+    let cull = match a.kind {
+        GeomType::Plane => Cull::Plane,
+        GeomType::Hfield => Cull::Field,
+        _ => Cull::Balls,
+    };
     let radius = |g: &Geom| narrow::bounding_radius(g.kind, &g.size);
     out.push(PairSpec {
         geoms,
@@ -138,8 +152,8 @@ pub(super) fn add<T: Real>(
         sizes: [a.size.map(c), b.size.map(c)],
         test,
         field: a.hfield.unwrap_or(0),
-        reach: c((if flat { radius(b) } else { radius(a) + radius(b) } + params.margin).min(1e15)),
-        flat,
+        cull,
+        reach: c(if cull == Cull::Balls { radius(a) } else { 0.0 } + radius(b) + params.margin),
         margin: c(params.margin),
         dim: params.condim,
         cost,
@@ -215,11 +229,20 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let a = center_of(sim, work, &sim.geoms[pair.geoms[0]], base);
         let b = center_of(sim, work, &sim.geoms[pair.geoms[1]], base);
-        let near = if pair.flat {
-            let plane = narrow::Plane { point: a, normal: axis_of(work, &sim.geoms[pair.geoms[0]]) };
-            narrow::plane::near_plane(&plane, &b, T::splat(pair.reach))
-        } else {
-            narrow::near(&a, &b, T::splat(pair.reach))
+        let reach = T::splat(pair.reach);
+        let near = match pair.cull {
+            Cull::Balls => narrow::near(&a, &b, reach),
+            Cull::Plane | Cull::Field => {
+                let mut point = a;
+                let normal = axis_of(work, &sim.geoms[pair.geoms[0]]);
+                if pair.cull == Cull::Field {
+                    let top = group.ground_top(sim, pair.field);
+                    for i in 0..3 {
+                        point[i] = normal[i].mul_add(top, point[i]);
+                    }
+                }
+                narrow::plane::near_plane(&narrow::Plane { point, normal }, &b, reach)
+            }
         };
         if !T::any(near) {
             continue;

@@ -118,7 +118,11 @@ impl<S: Real> Prism<S> {
         if inside && !less(to, from) {
             return Some(self.exit(arm, &faces, (from + to) * S::lit(0.5)));
         }
-        self.over_face(&faces).or_else(|| self.beside_edge(arm, limit))
+        // no closure here: it would be compiled for the baseline processor
+        match self.over_face(&faces) {
+            None => self.beside_edge(arm, limit),
+            found => found,
+        }
     }
 
     /// An end of the segment whose closest point is within a face, which no other point of the segment can beat if the

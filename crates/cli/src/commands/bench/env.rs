@@ -1,10 +1,11 @@
 //! The environments under random actions, resets included.
 
-use super::Plan;
-use super::row::{More, Row, Sample, on_threads, thread_cpu};
+use super::options::{Common, Head, isas, seconds, supported};
+use super::row::{Figures, Row, Sample, Table, on_threads, thread_cpu};
 use crate::error::CliError;
 use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec, registry};
 use marathon_physics::lanes::Isa;
+use serde::Serialize;
 
 /// Blocks of each thread.
 const BLOCKS: usize = 4;
@@ -15,29 +16,67 @@ const REPETITIONS: usize = 5;
 /// Blocks of actions drawn beforehand, so that drawing them is not what is measured; a prime.
 const STOCK: usize = 257;
 
+/// Options of `bench env`.
+#[derive(Debug, clap::Args)]
+pub struct EnvArgs {
+    #[command(flatten)]
+    pub common: Common,
+    /// Instruction set: f64, f32, baseline, avx2 or avx512; may be repeated [default: all that the processor has].
+    #[arg(long, value_name = "ISA", value_parser = supported)]
+    pub isa: Vec<Isa>,
+    /// Processor seconds of each thread for every row, more or less.
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    pub seconds: f64,
+}
+
+/// Columns of this benchmark.
+#[derive(Serialize)]
+struct Env {
+    /// Physics steps per decision.
+    frame_skip: usize,
+    /// Decisions per ended episode.
+    episode_length: Option<f64>,
+    /// Agents whose simulation broke down.
+    diverged: u64,
+}
+
+impl Figures for Env {
+    const HEADER: &'static str = "  episode";
+    fn cells(&self) -> String {
+        format!("  {:>7}", self.episode_length.map_or("-".into(), |n| format!("{n:.0}")))
+    }
+    fn broken(&self) -> u64 {
+        self.diverged
+    }
+}
+
 /// Measures the agents for every instruction set.
 ///
 /// # Errors
 /// If an agent cannot be simulated.
-pub fn run(plan: &Plan, emit: &mut dyn FnMut(Row)) -> Result<(), CliError> {
-    for id in &plan.agents {
-        for isa in &plan.isas {
-            let factory = registry::factory(id, *isa)?;
-            emit(measure(plan, &*factory, *isa));
+pub fn run(args: &EnvArgs, json: bool) -> Result<(), CliError> {
+    let (agents, threads) = (args.common.agents(true)?, args.common.threads());
+    let step = "one decision of one agent: random actions, physics, observation, reward, resets";
+    let mut table = Table::new(json, Head::new("env", threads), args.seconds, step);
+    for id in &agents {
+        for isa in isas(&args.isa) {
+            let factory = registry::factory(id, isa)?;
+            table.push(measure(threads, args.seconds, &*factory, isa));
         }
     }
+    table.finish();
     Ok(())
 }
 
-fn measure(plan: &Plan, factory: &dyn ShardFactory, isa: Isa) -> Row {
+fn measure(threads: usize, seconds: f64, factory: &dyn ShardFactory, isa: Isa) -> Row<Env> {
     let spec = factory.spec();
     let actions = actions(spec.act);
     let player = |thread: usize| Player::new(factory.shard(thread * BLOCKS, BLOCKS, 1), spec, &actions);
-    let mut players: Vec<Player<'_>> = (0..plan.threads).map(player).collect();
+    let mut players: Vec<Player<'_>> = (0..threads).map(player).collect();
     players.iter_mut().for_each(Player::play);
-    players.iter_mut().for_each(|player| (player.steps, player.episodes) = (0, 0));
+    players.iter_mut().for_each(|player| (player.steps, player.episodes, player.diverged) = (0, 0, 0));
 
-    let each = plan.seconds / REPETITIONS as f64;
+    let each = seconds / REPETITIONS as f64;
     let samples: Vec<Sample> = (0..REPETITIONS)
         .map(|_| {
             let before: u64 = players.iter().map(|player| player.steps).sum();
@@ -55,10 +94,14 @@ fn measure(plan: &Plan, factory: &dyn ShardFactory, isa: Isa) -> Row {
             Sample { steps, cpu: cpu.iter().sum(), wall }
         })
         .collect();
-    let (steps, episodes) = players.iter().fold((0, 0), |(s, e), player| (s + player.steps, e + player.episodes));
-    let episode_length = (episodes > 0).then(|| steps as f64 / episodes as f64);
-    let more = More::Env { frame_skip: spec.frame_skip, episode_length };
-    Row::new(&spec.id, isa, (plan.threads, plan.threads * BLOCKS * BLOCK), &samples, more)
+    let total = |count: fn(&Player<'_>) -> u64| players.iter().map(count).sum::<u64>();
+    let (steps, episodes) = (total(|p| p.steps), total(|p| p.episodes));
+    let figures = Env {
+        frame_skip: spec.frame_skip,
+        episode_length: (episodes > 0).then(|| steps as f64 / episodes as f64),
+        diverged: total(|p| p.diverged),
+    };
+    Row::new(&spec.id, isa, (threads, threads * BLOCKS * BLOCK), &samples, figures)
 }
 
 /// A thread's agents.
@@ -70,6 +113,7 @@ struct Player<'a> {
     decision: usize,
     steps: u64,
     episodes: u64,
+    diverged: u64,
 }
 
 impl<'a> Player<'a> {
@@ -78,7 +122,7 @@ impl<'a> Player<'a> {
         for block in 0..BLOCKS {
             shard.reset(block, u16::MAX, &mut obs);
         }
-        Player { shard, actions, obs, out: BlockStep::default(), decision: 0, steps: 0, episodes: 0 }
+        Player { shard, actions, obs, out: BlockStep::default(), decision: 0, steps: 0, episodes: 0, diverged: 0 }
     }
 
     /// Some decisions of all agents.
@@ -93,6 +137,7 @@ impl<'a> Player<'a> {
                     self.shard.reset(block, ended, &mut self.obs);
                     self.episodes += u64::from(ended.count_ones());
                 }
+                self.diverged += u64::from(self.out.diverged.count_ones());
                 self.steps += BLOCK as u64;
             }
         }

@@ -1,17 +1,40 @@
 //! Processor seconds until a gait: training with the agent's own configuration, interrupted every so many steps by an
 //! evaluation that is off the clock, until all the episodes of one meet the demand.
 
-use super::{BenchArgs, Plan};
+use super::options::{Common, Head, for_networks};
 use crate::config;
-use crate::console::{print_json, say};
+use crate::console::{note, print_json, say};
 use crate::error::CliError;
-use crate::text::short;
+use crate::text::{broken, short};
 use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
+use marathon_physics::lanes::Isa;
 use serde::Serialize;
 
 /// Episodes of an evaluation.
 const EPISODES: usize = 100;
+
+/// Options of `bench gait`.
+#[derive(Debug, clap::Args)]
+pub struct GaitArgs {
+    #[command(flatten)]
+    pub common: Common,
+    /// Instruction set: f32, baseline, avx2 or avx512 [default: the best that the processor has].
+    #[arg(long, value_name = "ISA", value_parser = for_networks)]
+    pub isa: Option<Isa>,
+    /// Seeds: 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// Mean speed that is asked for, m/s.
+    #[arg(long, value_name = "M/S", default_value_t = 2.0)]
+    pub speed: f64,
+    /// Episodes of 100 that may end in a fall.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub falls: u64,
+    /// Steps between the evaluations, which do not count.
+    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub every: u64,
+}
 
 /// One seed.
 #[derive(Serialize)]
@@ -23,6 +46,8 @@ struct Run {
     steps: u64,
     cpu_seconds: f64,
     wall_seconds: f64,
+    /// Agents whose simulation broke down.
+    diverged: u64,
     /// The last evaluation.
     eval: Option<Evaluation>,
 }
@@ -30,8 +55,8 @@ struct Run {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Document<'a> {
-    bench: &'static str,
-    threads: usize,
+    #[serde(flatten)]
+    head: Head,
     speed: f64,
     falls: u64,
     episodes: usize,
@@ -42,20 +67,21 @@ struct Document<'a> {
 ///
 /// # Errors
 /// If an agent cannot be simulated or trained.
-pub fn run(plan: &Plan, args: &BenchArgs, json: bool) -> Result<(), CliError> {
+pub fn run(args: &GaitArgs, json: bool) -> Result<(), CliError> {
+    let (agents, threads) = (args.common.agents(false)?, args.common.threads());
+    let GaitArgs { speed, falls, every, .. } = *args;
     let mut runs = Vec::new();
     if !json {
-        let BenchArgs { speed, falls, every, .. } = args;
         say(format!("until {EPISODES} episodes run at {speed} m/s on average with at most {falls} falls, tried every"));
-        say(format!("{} steps off the clock; seconds are those of {} thread(s)\n", short(*every as f64), plan.threads));
+        say(format!("{} steps off the clock; seconds are those of {} thread(s)\n", short(every as f64), threads));
         say(format!(
             "{:14} {:>4} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6}",
             "agent", "seed", "steps", "cpu s", "wall s", "return", "m/s", "falls"
         ));
     }
-    for id in &plan.agents {
+    for id in &agents {
         for seed in 1..=args.seeds {
-            let run = one(plan, args, id, seed)?;
+            let run = one(args, threads, id, seed)?;
             if !json {
                 print(&run);
             }
@@ -76,23 +102,35 @@ pub fn run(plan: &Plan, args: &BenchArgs, json: bool) -> Result<(), CliError> {
         }
     }
     if json {
-        let BenchArgs { speed, falls, .. } = *args;
-        print_json(&Document { bench: "gait", threads: plan.threads, speed, falls, episodes: EPISODES, runs: &runs });
+        let head = Head::new("gait", threads);
+        print_json(&Document { head, speed, falls, episodes: EPISODES, runs: &runs });
+    }
+    if let Some(line) = broken(runs.iter().map(|run| run.diverged).sum()) {
+        note(line);
     }
     Ok(())
 }
 
-fn one(plan: &Plan, args: &BenchArgs, id: &str, seed: u64) -> Result<Run, CliError> {
-    let isa = plan.isas[0];
+fn one(args: &GaitArgs, threads: usize, id: &str, seed: u64) -> Result<Run, CliError> {
+    let isa = args.isa.unwrap_or_else(Isa::best);
     let factory = registry::factory(id, isa)?;
-    let config = PpoConfig { seed, threads: plan.threads, ..config::default_for(id).ppo };
+    let config = PpoConfig { seed, threads, ..config::default_for(id).ppo };
     let options = EvalOptions { episodes: EPISODES, ..Default::default() };
     let mut next = args.every;
     let mut failed = None;
-    let mut run =
-        Run { agent: id.into(), seed, reached: false, steps: 0, cpu_seconds: 0.0, wall_seconds: 0.0, eval: None };
+    let mut run = Run {
+        agent: id.into(),
+        seed,
+        reached: false,
+        steps: 0,
+        cpu_seconds: 0.0,
+        wall_seconds: 0.0,
+        diverged: 0,
+        eval: None,
+    };
     let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
         (run.steps, run.cpu_seconds, run.wall_seconds) = (stats.steps, stats.cpu_seconds, stats.wall_seconds);
+        run.diverged += stats.diverged;
         if stats.steps < next {
             return Control::Continue;
         }

@@ -1,7 +1,9 @@
-//! Repetitions and the row that they make.
+//! Repetitions, and the row of a table that they make.
 
-use super::What;
+use super::options::{Head, Machine};
+use crate::console::{note, print_json, say};
 use crate::text::short;
+use marathon_physics::lanes::Isa;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -17,14 +19,29 @@ pub struct Sample {
 }
 
 impl Sample {
-    fn cpu_per_step(&self) -> f64 {
+    /// Processor time of an agent-step, s.
+    pub fn cpu_per_step(&self) -> f64 {
         self.cpu / self.steps as f64
     }
+    /// Time that passed per agent-step, s.
+    pub fn wall_per_step(&self) -> f64 {
+        self.wall / self.steps as f64
+    }
+}
+
+/// Figures that only one benchmark has.
+pub trait Figures: Serialize {
+    /// Names of their columns.
+    const HEADER: &'static str;
+    /// The columns.
+    fn cells(&self) -> String;
+    /// Agents whose simulation broke down.
+    fn broken(&self) -> u64;
 }
 
 /// What was measured of an agent.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct Row<F> {
     pub agent: String,
     /// Agents per vector.
     pub lanes: usize,
@@ -40,51 +57,17 @@ pub struct Row {
     pub steps_per_wall_second: f64,
     /// Slowest repetition by fastest, less one.
     pub spread: f64,
-    /// Figures that only some benchmarks have.
     #[serde(flatten)]
-    pub more: More,
+    pub figures: F,
 }
 
-/// Figures that only some benchmarks have.
-#[derive(Clone, Debug, Serialize)]
-#[serde(untagged)]
-pub enum More {
-    Physics {
-        /// Contacts of an agent, on average.
-        contacts: f64,
-        /// Newton iterations of a lane group per step, on average.
-        newton: f64,
-        /// Agents whose state was not finite at the end.
-        non_finite: usize,
-    },
-    Env {
-        /// Physics steps per decision.
-        frame_skip: usize,
-        /// Decisions per ended episode.
-        episode_length: Option<f64>,
-    },
-    Train {
-        /// Part of the time spent in the environments, and on gradients.
-        env_share: f64,
-        update_share: f64,
-        physics_steps_per_wall_second: f64,
-    },
-}
-
-impl Row {
-    /// From its repetitions, of which there is at least one.
-    pub fn new(
-        agent: &str,
-        isa: marathon_physics::lanes::Isa,
-        size: (usize, usize),
-        samples: &[Sample],
-        more: More,
-    ) -> Row {
+impl<F: Figures> Row<F> {
+    /// From its repetitions, of which there is at least one; `size` is the number of threads and of agents.
+    pub fn new(agent: &str, isa: Isa, size: (usize, usize), samples: &[Sample], figures: F) -> Self {
         let (threads, agents) = size;
         let mut sorted = samples.to_vec();
         sorted.sort_by(|a, b| a.cpu_per_step().total_cmp(&b.cpu_per_step()));
         let median = sorted[sorted.len() / 2];
-        let [fast, slow] = [sorted[0], sorted[sorted.len() - 1]].map(|s| s.cpu_per_step());
         Row {
             agent: agent.into(),
             lanes: isa.lanes(),
@@ -95,54 +78,96 @@ impl Row {
             steps: samples.iter().map(|s| s.steps).sum(),
             ns_per_agent_step: median.cpu_per_step() * 1e9,
             steps_per_cpu_second: 1.0 / median.cpu_per_step(),
-            steps_per_wall_second: median.steps as f64 / median.wall,
-            spread: slow / fast - 1.0,
-            more,
+            steps_per_wall_second: 1.0 / median.wall_per_step(),
+            spread: spread(samples),
+            figures,
         }
     }
 
-    /// Names of the columns.
-    pub fn header(what: What) -> String {
-        let more = match what {
-            What::Physics => "  contacts  newton",
-            What::Env => "  episode",
-            What::Train | What::Gait => "   env  update  physics steps/s",
-        };
+    fn header() -> String {
         format!(
-            "{:14} {:>8} {:>5}  {:>12}  {:>11}  {:>11}  {:>6}{more}",
-            "agent", "isa", "lanes", "ns/step", "steps/cpu s", "steps/s", "spread"
+            "{:14} {:>8} {:>5}  {:>12}  {:>11}  {:>11}  {:>6}{}",
+            "agent",
+            "isa",
+            "lanes",
+            "ns/step",
+            "steps/cpu s",
+            "steps/s",
+            "spread",
+            F::HEADER
         )
     }
 
-    /// The row as a person reads it.
-    pub fn line(&self, what: What) -> String {
-        let more = match &self.more {
-            More::Physics { contacts, newton, non_finite } => {
-                let broken = if *non_finite > 0 { format!("  {non_finite} agents not finite") } else { String::new() };
-                format!("  {contacts:>8.2}  {newton:>6.2}{broken}")
-            }
-            More::Env { episode_length, .. } => {
-                format!("  {:>7}", episode_length.map_or("-".into(), |n| format!("{n:.0}")))
-            }
-            More::Train { env_share, update_share, physics_steps_per_wall_second } => {
-                let physics = short(*physics_steps_per_wall_second);
-                format!("  {:>3.0}%  {:>5.0}%  {physics:>15}", 100.0 * env_share, 100.0 * update_share)
-            }
-        };
-        debug_assert!(matches!(
-            (what, &self.more),
-            (What::Physics, More::Physics { .. }) | (What::Env, More::Env { .. }) | (What::Train, More::Train { .. })
-        ));
+    fn line(&self) -> String {
         format!(
-            "{:14} {:>8} {:>5}  {:>12.1}  {:>11}  {:>11}  {:>5.0}%{more}",
+            "{:14} {:>8} {:>5}  {:>12.1}  {:>11}  {:>11}  {:>5.0}%{}",
             self.agent,
             self.isa,
             self.lanes,
             self.ns_per_agent_step,
             short(self.steps_per_cpu_second),
             short(self.steps_per_wall_second),
-            100.0 * self.spread
+            100.0 * self.spread,
+            self.figures.cells()
         )
+    }
+}
+
+/// Processor time of the slowest repetition by that of the fastest, less one.
+pub fn spread(samples: &[Sample]) -> f64 {
+    let costs = samples.iter().map(Sample::cpu_per_step);
+    let (fast, slow) = costs.fold((f64::INFINITY, 0.0_f64), |(fast, slow), x| (fast.min(x), slow.max(x)));
+    slow / fast - 1.0
+}
+
+/// Rows that appear as they are measured, or all at once as JSON.
+pub struct Table<F> {
+    json: bool,
+    head: Head,
+    seconds: f64,
+    rows: Vec<Row<F>>,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Document<'a, F> {
+    #[serde(flatten)]
+    head: &'a Head,
+    seconds: f64,
+    rows: &'a [Row<F>],
+}
+
+impl<F: Figures> Table<F> {
+    /// Prints the head; `step` says what a step is, `seconds` those of a row.
+    pub fn new(json: bool, head: Head, seconds: f64, step: &str) -> Self {
+        if !json {
+            let Machine { arch, os, cores, isas, best_isa } = &head.machine;
+            say(format!("{arch} {os}, {cores} cores, instruction sets {} (best: {best_isa})", isas.join(", ")));
+            say(format!(
+                "a step is {step};\ntimes are processor time of {} thread(s); rows are medians\n",
+                head.threads
+            ));
+            say(Row::<F>::header());
+        }
+        Self { json, head, seconds, rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: Row<F>) {
+        if !self.json {
+            say(row.line());
+        }
+        self.rows.push(row);
+    }
+
+    /// Prints what is still to be said.
+    pub fn finish(self) {
+        if self.json {
+            print_json(&Document { head: &self.head, seconds: self.seconds, rows: &self.rows });
+        }
+        if let Some(line) = crate::text::broken(self.rows.iter().map(|row| row.figures.broken()).sum()) {
+            note(line);
+        }
     }
 }
 
@@ -170,18 +195,28 @@ pub fn on_threads<W: Send, R: Send>(workers: &mut [W], work: impl Fn(usize, &mut
 #[cfg(test)]
 mod tests {
     use super::*;
-    use marathon_physics::lanes::Isa;
+
+    #[derive(Serialize)]
+    struct Nothing;
+    impl Figures for Nothing {
+        const HEADER: &'static str = "  more";
+        fn cells(&self) -> String {
+            "     -".into()
+        }
+        fn broken(&self) -> u64 {
+            0
+        }
+    }
 
     #[test]
     fn a_row_is_the_median_by_processor_time() {
         let sample = |cpu: f64, wall: f64| Sample { steps: 1000, cpu, wall };
         let samples = [sample(3.0, 1.0), sample(1.0, 9.0), sample(2.0, 4.0)];
-        let more = More::Env { frame_skip: 4, episode_length: None };
-        let row = Row::new("Hopper-v0", Isa::F32, (2, 64), &samples, more);
+        let row = Row::new("Hopper-v0", Isa::F32, (2, 64), &samples, Nothing);
         assert_eq!((row.ns_per_agent_step, row.steps_per_cpu_second), (2e6, 500.0));
         assert_eq!((row.steps_per_wall_second, row.spread), (250.0, 2.0));
         assert_eq!((row.steps, row.repetitions, row.lanes, row.agents), (3000, 3, 1, 64));
-        assert_eq!(row.line(What::Env).len(), Row::header(What::Env).len());
+        assert_eq!(row.line().len(), Row::<Nothing>::header().len());
     }
 
     #[test]

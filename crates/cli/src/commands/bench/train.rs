@@ -1,45 +1,91 @@
 //! Training with the agent's own configuration, everything included.
 
-use super::Plan;
-use super::row::{More, Row, Sample};
+use super::options::{Common, Head, for_networks, seconds};
+use super::row::{Figures, Row, Sample, Table};
 use crate::config;
 use crate::error::CliError;
+use crate::text::short;
 use marathon_envs::registry;
 use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
+use serde::Serialize;
 
 /// Repetitions of a row, each with a seed of its own.
 const REPETITIONS: usize = 3;
 /// Iterations with an update that a repetition has at least.
 const ITERATIONS: u64 = 2;
 
+/// Options of `bench train`.
+#[derive(Debug, clap::Args)]
+pub struct TrainArgs {
+    #[command(flatten)]
+    pub common: Common,
+    /// Instruction set: f32, baseline, avx2 or avx512; may be repeated [default: the best that the processor has].
+    #[arg(long, value_name = "ISA", value_parser = for_networks)]
+    pub isa: Vec<Isa>,
+    /// Processor seconds of each thread for every row, more or less.
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    pub seconds: f64,
+    /// Widths of both hidden layers, instead of the configuration's.
+    #[arg(long, value_name = "WIDTH", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub hidden: Option<u32>,
+}
+
+/// Columns of this benchmark.
+#[derive(Serialize)]
+struct Train {
+    /// Part of the time spent in the environments, and on gradients.
+    env_share: f64,
+    update_share: f64,
+    physics_steps_per_wall_second: f64,
+    /// Agents whose simulation broke down.
+    diverged: u64,
+}
+
+impl Figures for Train {
+    const HEADER: &'static str = "   env  update  physics steps/s";
+    fn cells(&self) -> String {
+        let physics = short(self.physics_steps_per_wall_second);
+        format!("  {:>3.0}%  {:>5.0}%  {physics:>15}", 100.0 * self.env_share, 100.0 * self.update_share)
+    }
+    fn broken(&self) -> u64 {
+        self.diverged
+    }
+}
+
 /// Measures the agents.
 ///
 /// # Errors
 /// If an agent cannot be simulated or trained.
-pub fn run(plan: &Plan, emit: &mut dyn FnMut(Row)) -> Result<(), CliError> {
-    for id in &plan.agents {
-        for isa in &plan.isas {
-            emit(measure(plan, id, *isa)?);
+pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
+    let (agents, threads) = (args.common.agents(false)?, args.common.threads());
+    let isas = if args.isa.is_empty() { vec![Isa::best()] } else { args.isa.clone() };
+    let step = "one decision of one agent, with all that learning from it takes";
+    let mut table = Table::new(json, Head::new("train", threads), args.seconds, step);
+    for id in &agents {
+        for isa in &isas {
+            table.push(measure(args, threads, id, *isa)?);
         }
     }
+    table.finish();
     Ok(())
 }
 
-fn measure(plan: &Plan, id: &str, isa: Isa) -> Result<Row, CliError> {
+fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<Train>, CliError> {
     let factory = registry::factory(id, isa)?;
     let mut base = config::default_for(id).ppo;
-    if let Some(width) = plan.hidden {
+    if let Some(width) = args.hidden.map(|width| width as usize) {
         (base.actor_hidden, base.critic_hidden) = (vec![width; 2], vec![width; 2]);
     }
     let mut samples = Vec::new();
-    let (mut shares, mut weight) = ([0.0; 2], 0.0);
+    let (mut shares, mut weight, mut diverged) = ([0.0; 2], 0.0, 0);
     for seed in 0..REPETITIONS as u64 {
         // it ends by the clock; agents fall at first and run later, so the cost of a step moves with learning
-        let config = PpoConfig { seed, threads: plan.threads, total_steps: u64::MAX >> 16, ..base.clone() };
-        let each = plan.seconds * config.worker_count() as f64 / REPETITIONS as f64;
+        let config = PpoConfig { seed, threads, total_steps: u64::MAX >> 16, ..base.clone() };
+        let each = args.seconds * config.worker_count() as f64 / REPETITIONS as f64;
         let mut first: Option<IterationStats> = None;
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+            diverged += stats.diverged;
             // the first iteration has no update
             let Some(first) = &first else {
                 first = Some(stats.clone());
@@ -50,7 +96,7 @@ fn measure(plan: &Plan, id: &str, isa: Isa) -> Result<Row, CliError> {
             shares[1] += stats.update_share;
             weight += 1.0;
             let enough = stats.iteration > ITERATIONS && stats.cpu_seconds - first.cpu_seconds >= each;
-            if enough || seconds > 10.0 * plan.seconds.max(1.0) { Control::Stop } else { Control::Continue }
+            if enough || seconds > 10.0 * args.seconds.max(1.0) { Control::Stop } else { Control::Continue }
         };
         let last = train(&*factory, isa, &config, None, &mut observer)?.last;
         if let (Some(first), Some(last)) = (first, last) {
@@ -62,17 +108,8 @@ fn measure(plan: &Plan, id: &str, isa: Isa) -> Result<Row, CliError> {
         }
     }
     let [env_share, update_share] = shares.map(|share| share / weight);
-    let mut row = Row::new(
-        id,
-        isa,
-        (plan.threads, base.agents),
-        &samples,
-        More::Train { env_share, update_share, physics_steps_per_wall_second: 0.0 },
-    );
-    row.more = More::Train {
-        env_share,
-        update_share,
-        physics_steps_per_wall_second: row.steps_per_wall_second * factory.spec().frame_skip as f64,
-    };
+    let figures = Train { env_share, update_share, physics_steps_per_wall_second: 0.0, diverged };
+    let mut row = Row::new(id, isa, (threads, base.agents), &samples, figures);
+    row.figures.physics_steps_per_wall_second = row.steps_per_wall_second * factory.spec().frame_skip as f64;
     Ok(row)
 }

@@ -1,0 +1,194 @@
+//! MuJoCo in a Python process of its own: finding one, and talking to it.
+
+use super::physics::{AGENTS, Plan, STEPS, Source, Subject, WARMUP};
+use super::row::Sample;
+use crate::error::CliError;
+use marathon_physics::workload::HOLD;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::env;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::thread::JoinHandle;
+
+/// What the process runs; its requests and answers are described there.
+const SCRIPT: &str = include_str!("mujoco_side.py");
+/// Names the Python to use.
+const VARIABLE: &str = "MARATHON_PYTHON";
+/// Last characters of the process's complaints that are worth showing.
+const COMPLAINT: usize = 2000;
+
+/// A Python process with MuJoCo.
+pub struct Mujoco {
+    python: PathBuf,
+    /// Version of MuJoCo.
+    pub version: String,
+    child: Child,
+    requests: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+    /// Collects what the process complains about.
+    complaints: Option<JoinHandle<String>>,
+}
+
+/// What MuJoCo did in a turn.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub struct Turn {
+    steps: u64,
+    cpu: f64,
+    wall: f64,
+    /// Contacts of an agent, on average.
+    pub contacts: f64,
+    /// Agents that MuJoCo gave up on.
+    pub broken: u64,
+}
+
+impl Turn {
+    /// Its times.
+    pub fn sample(&self) -> Sample {
+        Sample { steps: self.steps, cpu: self.cpu, wall: self.wall }
+    }
+}
+
+impl Mujoco {
+    /// Starts Python.
+    ///
+    /// # Errors
+    /// If there is no Python or it has no MuJoCo.
+    pub fn start() -> Result<Self, CliError> {
+        let python = find_python();
+        let mut command = Command::new(&python);
+        // a folder called mujoco in the working directory is not the package
+        command.args(["-c", SCRIPT]).env("PYTHONSAFEPATH", "1");
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|e| {
+            CliError::Mujoco(format!(
+                "{}: cannot be started: {e}; expected a Python with MuJoCo: install Python 3 and the package by \
+                 `python3 -m pip install mujoco`, or let the variable {VARIABLE} name the Python that has it",
+                python.display()
+            ))
+        })?;
+        let (Some(requests), Some(answers), Some(mut errors)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            unreachable!("all three are piped")
+        };
+        let complaints = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            let _ = errors.read_to_end(&mut bytes);
+            String::from_utf8_lossy(&bytes).into_owned()
+        });
+        let mut side = Self {
+            python,
+            version: String::new(),
+            child,
+            requests: Some(requests),
+            answers: BufReader::new(answers),
+            complaints: Some(complaints),
+        };
+        let hello = side.answer()?;
+        if let Some(version) = hello["mujoco"].as_str() {
+            side.version = version.into();
+            return Ok(side);
+        }
+        let found = hello["missing"].as_str().unwrap_or("no MuJoCo");
+        let python = crate::text::path_word(&side.python);
+        Err(CliError::Mujoco(format!(
+            "{python}: found {found}, expected the package mujoco (tests run with 4.0); install it by `{python} -m pip \
+             install mujoco`, or let the variable {VARIABLE} name a Python that has it"
+        )))
+    }
+
+    /// Gives it a model.
+    ///
+    /// # Errors
+    /// If MuJoCo cannot read the model, or the process has ended.
+    pub fn load(&mut self, plan: &Plan, subject: &Subject) -> Result<(), CliError> {
+        let mut job = json!({
+            "agents": AGENTS * plan.threads,
+            "threads": plan.threads,
+            "warmup": WARMUP,
+            "steps": STEPS,
+            "hold": HOLD,
+            "contacts": plan.contacts,
+        });
+        match &subject.source {
+            Source::Text(text) => job["xml"] = json!(text),
+            Source::File(file) => {
+                let path = std::path::absolute(file).map_err(CliError::io(file, "find"))?;
+                job["path"] = json!(path);
+            }
+        }
+        self.ask(&subject.name, &job)?;
+        Ok(())
+    }
+
+    /// Lets it run the model that it was given last for so many processor seconds of each thread, more or less.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn turn(&mut self, subject: &Subject, seconds: f64) -> Result<Turn, CliError> {
+        let answer = self.ask(&subject.name, &json!({ "seconds": seconds }))?;
+        serde_json::from_value(answer).map_err(|e| self.nonsense(&e.to_string()))
+    }
+
+    fn ask(&mut self, model: &str, request: &Value) -> Result<Value, CliError> {
+        let sent = self.requests.as_mut().map(|pipe| writeln!(pipe, "{request}").and_then(|()| pipe.flush()));
+        if !matches!(sent, Some(Ok(()))) {
+            return Err(self.ended());
+        }
+        let answer = self.answer()?;
+        match answer["error"].as_str() {
+            Some(error) => Err(CliError::Mujoco(format!("MuJoCo {}: model '{model}': {error}", self.version))),
+            None => Ok(answer),
+        }
+    }
+
+    fn answer(&mut self) -> Result<Value, CliError> {
+        let mut line = String::new();
+        match self.answers.read_line(&mut line) {
+            Ok(n) if n > 0 => serde_json::from_str(&line).map_err(|_| self.nonsense(&format!("'{}'", line.trim_end()))),
+            _ => Err(self.ended()),
+        }
+    }
+
+    fn nonsense(&self, found: &str) -> CliError {
+        CliError::Mujoco(format!("{}: found {found}, expected an answer of Python's", self.python.display()))
+    }
+
+    /// The error of a process that has ended early.
+    fn ended(&mut self) -> CliError {
+        self.requests = None;
+        let status = self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string());
+        let text = self.complaints.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let text = text.trim();
+        let from = text.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);
+        let complaint = if text.is_empty() { String::new() } else { format!(":\n{}", &text[from..]) };
+        CliError::Mujoco(format!(
+            "{}: ended early ({status}), expected a Python 3 with the package mujoco; let the variable {VARIABLE} name \
+             one{complaint}",
+            self.python.display()
+        ))
+    }
+}
+
+impl Drop for Mujoco {
+    fn drop(&mut self) {
+        // the process ends with its input
+        self.requests = None;
+        let _ = self.child.wait();
+    }
+}
+
+/// The Python that the user names, else that of the virtual environment at hand, else the system's.
+fn find_python() -> PathBuf {
+    if let Some(named) = env::var_os(VARIABLE).filter(|name| !name.is_empty()) {
+        return named.into();
+    }
+    let inside = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
+    let here = env::current_dir().unwrap_or_default();
+    let root = here.ancestors().find(|folder| folder.join(".git").exists());
+    let venv = [Some(here.as_path()), root].into_iter().flatten().map(|folder: &Path| folder.join(inside));
+    let found = venv.into_iter().find(|python| python.exists());
+    found.unwrap_or_else(|| if cfg!(windows) { "python".into() } else { "python3".into() })
+}

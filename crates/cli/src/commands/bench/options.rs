@@ -1,0 +1,118 @@
+//! What the benchmarks have in common: whom to measure, on what.
+
+use crate::error::CliError;
+use marathon_envs::registry;
+use marathon_physics::lanes::Isa;
+use serde::Serialize;
+
+/// Agents and threads.
+#[derive(Debug, clap::Args)]
+pub struct Common {
+    /// Agent to measure; may be repeated [default: all; one of those with the same model, where only the model counts].
+    #[arg(long, value_name = "AGENT")]
+    pub agent: Vec<String>,
+    /// Threads; 0 means one per processor.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=4096))]
+    pub threads: u64,
+}
+
+impl Common {
+    /// Ids of the agents that the user names, or of all; of those with the same model one, unless their tasks count.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn agents(&self, tasks_count: bool) -> Result<Vec<String>, CliError> {
+        if !self.agent.is_empty() {
+            let id = |name: &String| Ok(registry::agent(name)?.facts().id.to_string());
+            return self.agent.iter().map(id).collect();
+        }
+        let mut ids: Vec<String> = Vec::new();
+        let mut models = Vec::new();
+        for id in registry::ids() {
+            let model = registry::agent(&id)?.facts().model;
+            if tasks_count || !models.contains(&model) {
+                models.push(model);
+                ids.push(id);
+            }
+        }
+        Ok(ids)
+    }
+
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        if self.threads == 0 { cores() } else { self.threads as usize }
+    }
+}
+
+/// The computer.
+#[derive(Serialize)]
+pub struct Machine {
+    pub arch: &'static str,
+    pub os: &'static str,
+    /// Processors that this program may use.
+    pub cores: usize,
+    /// Instruction sets that the processor has, narrowest first.
+    pub isas: Vec<&'static str>,
+    /// The one that everything else uses.
+    pub best_isa: &'static str,
+}
+
+/// How every `--json` document begins.
+#[derive(Serialize)]
+pub struct Head {
+    pub bench: &'static str,
+    pub version: &'static str,
+    pub machine: Machine,
+    pub threads: usize,
+}
+
+impl Head {
+    /// Of a benchmark on this computer.
+    pub fn new(bench: &'static str, threads: usize) -> Self {
+        let machine = Machine {
+            arch: std::env::consts::ARCH,
+            os: std::env::consts::OS,
+            cores: cores(),
+            isas: isas(&[]).into_iter().map(Isa::name).collect(),
+            best_isa: Isa::best().name(),
+        };
+        Self { bench, version: env!("CARGO_PKG_VERSION"), machine, threads }
+    }
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}
+
+/// The chosen instruction sets, or all that the processor has.
+pub fn isas(chosen: &[Isa]) -> Vec<Isa> {
+    match chosen {
+        [] => Isa::ALL.into_iter().filter(|isa| isa.supported()).collect(),
+        chosen => chosen.to_vec(),
+    }
+}
+
+/// Reads an instruction set that this processor has.
+pub fn supported(text: &str) -> Result<Isa, String> {
+    let isa: Isa = text.parse()?;
+    if isa.supported() {
+        Ok(isa)
+    } else {
+        let (isa, best) = (isa.name(), Isa::best().name());
+        Err(format!("this processor cannot run '{isa}'; the best it has is '{best}'"))
+    }
+}
+
+/// Reads an instruction set that networks train on.
+pub fn for_networks(text: &str) -> Result<Isa, String> {
+    match supported(text)? {
+        Isa::F64 => Err("networks train in single precision; expected f32, baseline, avx2 or avx512".into()),
+        isa => Ok(isa),
+    }
+}
+
+/// Reads a duration.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let x: f64 = text.parse().map_err(|_| "expected a number of seconds".to_string())?;
+    if x > 0.0 && x <= 86_400.0 { Ok(x) } else { Err("expected a positive number of seconds, at most a day".into()) }
+}
