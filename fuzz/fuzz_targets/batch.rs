@@ -143,10 +143,11 @@ fuzz_target!(|script: Script| {
     let isa = if script.double { Isa::F64 } else { Isa::best() };
     let twin_isa = if script.double { Isa::F64 } else { Isa::F32 };
     let threads = usize::from(script.threads % 3) + 1;
-    let options = BatchOptions { agents, threads, isa, sim: sim.clone() };
+    let options = BatchOptions { agents, threads, isa, sim: sim.clone(), ..Default::default() };
     let mut batch = Batch::new(model, &options).expect("supported");
     // the same agents, one per group, on one thread
-    let mut twin = Batch::new(model, &BatchOptions { agents, threads: 1, isa: twin_isa, sim }).expect("supported");
+    let mut twin = Batch::new(model, &BatchOptions { agents, threads: 1, isa: twin_isa, sim, ..Default::default() })
+        .expect("supported");
     let mut saved = batch.snapshot();
 
     for operation in script.operations.iter().take(MOST_OPERATIONS) {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use marathon_physics::{Batch, BatchOptions, Model, SimOptions};
+use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions};
 
 #[test]
 fn a_broken_agent_is_reset_and_its_neighbors_are_untouched() {
@@ -36,5 +36,20 @@ fn a_broken_agent_is_reset_and_its_neighbors_are_untouched() {
         }
         assert_eq!(reported, [5], "{name}: reported once");
         assert_eq!(sick.quarantined(), before + 1, "{name}: counted");
+    }
+}
+
+#[test]
+fn an_agent_too_far_away_is_broken_in_every_lane_width() {
+    let path = common::workspace().join("assets/agents/hopper.xml");
+    let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+    for isa in Isa::ALL.into_iter().filter(|i| i.supported()) {
+        let sim = SimOptions { ground_contacts_only: true, ..Default::default() };
+        let mut batch = Batch::new(&model, &BatchOptions { agents: 16, isa, sim, ..Default::default() }).unwrap();
+        let mut qpos = model.qpos0.clone();
+        // finite, but its square is not: alone it would hover there, beside others that touch the ground it would not
+        qpos[1] = 3e38;
+        batch.reset(3, &qpos, &vec![0.0; model.nv]);
+        assert_eq!(batch.step(&vec![0.0; 16 * model.nu], 1), [3], "{}", isa.name());
     }
 }
