@@ -159,29 +159,30 @@ fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work
 /// Inward half of the six degrees of freedom of a free root: the pivots are on the factor's diagonal.
 #[inline(always)]
 fn drive_free_root<T: Real>(d: usize, tree: usize, f: &V6<T>, work: &mut Work<T>) {
-    // torques are given along the body's axes, forces along the world's
-    let (x, r) = (&work.rhs, &work.axis);
-    let mut y = [T::zero(); 6];
-    for i in 0..3 {
-        let torque = r[d + 3][i].mul_add(x[d + 3], r[d + 4][i].mul_add(x[d + 4], r[d + 5][i] * x[d + 5]));
-        y[i] = torque - f[i];
-        y[3 + i] = x[d + i] - f[3 + i];
-    }
-    reduce_free_root(&work.root_factor[tree], &mut y);
+    let y = reduce_free_root(d, &work.root_factor[tree], &work.axis, &work.rhs, f);
     for p in 0..6 {
         work.pivot[d + p] = work.root_factor[tree][p][p];
         work.drive[d + p] = y[p] * work.pivot[d + p];
     }
 }
 
-/// Forward substitution with a free root's factor.
+/// Joint forces `rhs` and the force `f` that the motion needs, brought inward through a free root's factor `a`.
 #[inline(always)]
-pub(crate) fn reduce_free_root<T: Real>(a: &[[T; 6]; 6], y: &mut V6<T>) {
+pub(crate) fn reduce_free_root<T: Real>(d: usize, a: &[[T; 6]; 6], axis: &[V6<T>], rhs: &[T], f: &V6<T>) -> V6<T> {
+    // torques are given along the body's axes, forces along the world's
+    let mut y = [T::zero(); 6];
+    for i in 0..3 {
+        let torque =
+            axis[d + 3][i].mul_add(rhs[d + 3], axis[d + 4][i].mul_add(rhs[d + 4], axis[d + 5][i] * rhs[d + 5]));
+        y[i] = torque - f[i];
+        y[3 + i] = rhs[d + i] - f[3 + i];
+    }
     for p in (0..6).rev() {
         for i in (0..p).rev() {
             y[i] = a[p][i].neg_mul_add(y[p], y[i]);
         }
     }
+    y
 }
 
 /// Outward half of a free root.

@@ -1,6 +1,6 @@
 //! Equality constraints: bodies, joints and tendons tied together.
 
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Real, kernel_fn};
 use crate::model::{EqualityKind, Model};
 use crate::readings::rot_to_quat;
 use crate::rigid::{self, BodyMount, quat_to_rot};
@@ -119,22 +119,9 @@ fn tie_bodies<T: Real>(
     Tie::Bodies { points: [point(0), point(1)], frames }
 }
 
-/// Writes the blocks of all equality constraints.
-pub(crate) fn equality_blocks<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    T::enter(EqualityBlocks { sim, group, work });
-}
-
-struct EqualityBlocks<'a, T: Real> {
-    sim: &'a Sim<T>,
-    group: &'a Group<T>,
-    work: &'a mut Work<T>,
-}
-
-impl<T: Real> Kernel<T> for EqualityBlocks<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let EqualityBlocks { sim, group, work } = self;
+kernel_fn! {
+    /// Writes the blocks of all equality constraints.
+    pub(crate) fn equality_blocks<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         for spec in &sim.equalities {
             match &spec.tie {
                 Tie::Bodies { points, frames } => bodies_block(sim, group, work, spec, points, frames.as_ref()),
@@ -172,7 +159,7 @@ fn bodies_block<T: Real>(
         match links[i] {
             None => place[i] = splat3(&points[i].pos),
             Some(l) => {
-                r[i] = rotate_add(&work.rot[l], &splat3(&points[i].pos), &work.pos[l]);
+                r[i] = work.arm(&points[i], l);
                 // within a tree the common reference would only cost digits
                 place[i] = if same_tree { r[i] } else { add3(&r[i], &work.reference[sim.links[l].tree]) };
                 v[i] = cross_add(&ang(&work.vel[l]), &r[i], &lin(&work.vel[l]));
@@ -206,7 +193,7 @@ fn bodies_block<T: Real>(
             links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.rot[l]), &q))
         };
         let (q0, q1) = (frame(0), frame(1));
-        let back = [q1[0], -q1[1], -q1[2], -q1[3]];
+        let back = quat_conjugate(&q1);
         let scale = T::splat(*scale);
         let relative = quat_mul(&back, &q0);
         for i in 0..3 {
@@ -306,15 +293,4 @@ fn measure<T: Real>(group: &Group<T>, length: &Length<T::Scalar>) -> (T, T) {
         v = T::splat(t.coef).mul_add(group.qvel[t.dof], v);
     }
     (q, v)
-}
-
-/// Product of quaternions.
-#[inline(always)]
-fn quat_mul<T: Real>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
-    [
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    ]
 }

@@ -1,6 +1,6 @@
 //! Forces on links that do not come from joints: compensation of gravity, a medium, and pushes from outside.
 
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Real, kernel_fn};
 use crate::model::Model;
 use crate::sim::{Link, Sim};
 use crate::spatial::*;
@@ -104,25 +104,12 @@ pub(crate) fn drags<T: Real>(
     out
 }
 
-/// Wrenches on links from outside, into `external`, and off the bias forces.
-pub(crate) fn external_forces<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    T::enter(External { sim, group, work });
-}
-
-struct External<'a, T: Real> {
-    sim: &'a Sim<T>,
-    group: &'a Group<T>,
-    work: &'a mut Work<T>,
-}
-
-impl<T: Real> Kernel<T> for External<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let External { sim, group, work } = self;
+kernel_fn! {
+    /// Wrenches on links from outside, into `external`, and off the bias forces.
+    pub(crate) fn external_forces<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         let z = T::zero();
         let gravity = group.gravity(sim);
-        work.external.fill([z; 6]);
+        work.external.resize(sim.links.len(), [z; 6]);
         for lift in &sim.lifts {
             let r = rotate_add(&work.rot[lift.link], &splat3(&lift.at), &work.pos[lift.link]);
             let mut weight = T::splat(lift.mass);
@@ -139,8 +126,8 @@ impl<T: Real> Kernel<T> for External<'_, T> {
         }
         for drag in &sim.drags {
             let m = &sim.coms[drag.body];
-            let axes = compose(&work.rot[drag.link], &m.rot);
-            let r = rotate_add(&work.rot[drag.link], &splat3(&m.pos), &work.pos[drag.link]);
+            let axes = work.axes(m);
+            let r = work.arm(m, drag.link);
             let v = &work.vel[drag.link];
             let through = sub3(&cross_add(&ang(v), &r, &lin(v)), &splat3(&sim.wind));
             let (mut force, mut torque) = ([z; 3], [z; 3]);
@@ -158,7 +145,7 @@ impl<T: Real> Kernel<T> for External<'_, T> {
         for (body, x) in group.external.iter().enumerate() {
             let m = &sim.coms[body];
             let Some(link) = m.link else { continue };
-            let r = rotate_add(&work.rot[link], &splat3(&m.pos), &work.pos[link]);
+            let r = work.arm(m, link);
             push(work, link, &r, &lin(x), &ang(x));
         }
         for l in 0..sim.links.len() {

@@ -3,7 +3,7 @@
 use crate::lanes::Real;
 use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
 use crate::sim::{LinkJoint, Sim};
-use crate::spatial::quat_to_rotvec;
+use crate::spatial::{quat_conjugate, quat_mul, quat_to_rotvec};
 use crate::tendon::{measure_tendons, tendon_springs};
 use crate::work::{Group, Work};
 
@@ -57,16 +57,9 @@ fn add_ball_spring<T: Real>(
     k: T,
 ) {
     let s = joint.spring;
-    // conj(rest) * q
-    let [a, b, c, e] = [T::splat(s[0]), -T::splat(s[1]), -T::splat(s[2]), -T::splat(s[3])];
-    let [w, x, y, z] = [group.qpos[q], group.qpos[q + 1], group.qpos[q + 2], group.qpos[q + 3]];
-    let turn = [
-        a * w - b * x - c * y - e * z,
-        a * x + b * w + c * z - e * y,
-        a * y - b * z + c * w + e * x,
-        a * z + b * y - c * x + e * w,
-    ];
-    let r = quat_to_rotvec(&turn);
+    let rest = [T::splat(s[0]), T::splat(s[1]), T::splat(s[2]), T::splat(s[3])];
+    let now = [group.qpos[q], group.qpos[q + 1], group.qpos[q + 2], group.qpos[q + 3]];
+    let r = quat_to_rotvec(&quat_mul(&quat_conjugate(&rest), &now));
     for i in 0..3 {
         work.tau[d + i] = r[i].neg_mul_add(k, work.tau[d + i]);
     }

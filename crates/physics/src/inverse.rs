@@ -10,9 +10,11 @@ impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
     pub fn bias_forces(&self) -> Vec<T> {
         let mut forces = self.work.bias_force.clone();
-        for (f, x) in forces.iter_mut().zip(&self.work.external) {
-            for i in 0..6 {
-                f[i] += x[i];
+        if self.work.bias_is_net {
+            for (f, x) in forces.iter_mut().zip(&self.work.external) {
+                for i in 0..6 {
+                    f[i] += x[i];
+                }
             }
         }
         self.joint_space(forces)
@@ -20,7 +22,9 @@ impl<T: Real> Readings<'_, T> {
 
     /// Springs, dampers, actuators, the medium and pushes together (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
     pub fn applied_forces(&self) -> Vec<T> {
-        let mut sum = self.joint_space(self.work.external.clone());
+        let mut external = self.work.external.clone();
+        external.resize(self.sim.links.len(), [T::zero(); 6]);
+        let mut sum = self.joint_space(external);
         for (s, t) in sum.iter_mut().zip(&self.work.tau) {
             *s += *t;
         }
@@ -103,5 +107,31 @@ impl<T: Real> Readings<'_, T> {
             n += T::masked(b.on, T::lit(1.0));
         }
         n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Group, Model, Readings, Sim, SimOptions, Work};
+
+    const BALL: &str = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+
+    #[test]
+    fn pushes_stay_with_their_group() {
+        let model = Model::from_xml_str(BALL, "ball").expect("a model");
+        let sim = Sim::<f64>::new(&model, SimOptions::default()).expect("a simulation");
+        let mut work = Work::new(&sim);
+        let (mut pushed, calm) = (Group::new(&sim), Group::new(&sim));
+        pushed.push(&sim, 0, 1, [3.0, 0.0, 0.0], [0.0; 3]);
+        for (group, force) in [(&pushed, 3.0), (&calm, 0.0)] {
+            sim.forward(&mut work, group);
+            let readings = Readings::new(&sim, group, &work);
+            let bias = readings.bias_forces();
+            assert_eq!(readings.applied_forces()[0], force);
+            assert_eq!(bias[0], 0.0);
+            // positions and velocities alone know nothing of pushes, and the bias is what it was
+            sim.refresh(&mut work, group);
+            assert_eq!(Readings::new(&sim, group, &work).bias_forces(), bias);
+        }
     }
 }

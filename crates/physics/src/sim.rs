@@ -3,12 +3,13 @@
 //! Bodies without joints are merged into the body they are welded to, so the kernels only meet bodies that move
 //! ("links"). What this engine does not simulate is refused here by name, never ignored.
 
-use crate::collision::{Contacts, Field, contacts, fields};
+use crate::collision::{Contacts, contacts};
 use crate::equality::{EqualitySpec, equalities};
 use crate::fluid::{Drag, Lift, drags, lifts};
 use crate::forces::{Motor, motors};
 use crate::lanes::Real;
 use crate::model::{Cone, Integrator, JointType, Model};
+use crate::narrow::height::HeightField;
 use crate::rigid;
 use crate::solver::softness::{Softness, softness};
 use crate::support;
@@ -138,7 +139,7 @@ pub struct Sim<T: Real> {
     pub(crate) drags: Vec<Drag<T::Scalar>>,
     pub(crate) wind: [T::Scalar; 3],
     pub(crate) contacts: Contacts<T::Scalar>,
-    pub(crate) fields: Vec<Field<T::Scalar>>,
+    pub(crate) fields: Vec<HeightField<T::Scalar>>,
     /// Frames, centers of mass (inertial frames), geoms and sites as seen from the links they move with.
     pub(crate) bodies: Vec<Mount<T::Scalar>>,
     pub(crate) coms: Vec<Mount<T::Scalar>>,
@@ -333,7 +334,7 @@ impl<T: Real> Sim<T> {
             drags: drags::<T>(model, &mounts, &link_of),
             wind: c3(&model.opt.wind),
             contacts,
-            fields: fields(model),
+            fields: model.hfields.iter().map(HeightField::new).collect(),
             bodies,
             coms,
             geoms,

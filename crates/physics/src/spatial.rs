@@ -51,6 +51,12 @@ pub fn sub3<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// The opposite.
+#[inline(always)]
+pub fn neg3<T: Real>(a: &V3<T>) -> V3<T> {
+    [-a[0], -a[1], -a[2]]
+}
+
 /// A constant vector in every lane.
 #[inline(always)]
 pub fn splat3<T: Real>(a: &[T::Scalar; 3]) -> V3<T> {
@@ -77,10 +83,33 @@ pub fn rotate_add<T: Real>(r: &Rot<T>, x: &V3<T>, c: &V3<T>) -> V3<T> {
     ]
 }
 
+/// Components of a vector along the axes of a rotation: the inverse rotation.
+#[inline(always)]
+pub fn into_axes<T: Real>(axes: &Rot<T>, v: &V3<T>) -> V3<T> {
+    [dot(&axes[0], v), dot(&axes[1], v), dot(&axes[2], v)]
+}
+
 /// Composition with a constant rotation.
 #[inline(always)]
 pub fn compose<T: Real>(r: &Rot<T>, c: &[[T::Scalar; 3]; 3]) -> Rot<T> {
     [rotate(r, &splat3(&c[0])), rotate(r, &splat3(&c[1])), rotate(r, &splat3(&c[2]))]
+}
+
+/// Product of quaternions.
+#[inline(always)]
+pub fn quat_mul<T: Real>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+/// The inverse of a unit quaternion.
+#[inline(always)]
+pub fn quat_conjugate<T: Real>(q: &[T; 4]) -> [T; 4] {
+    [q[0], -q[1], -q[2], -q[3]]
 }
 
 /// Rotation of a unit quaternion; normalized on the fly.

@@ -6,7 +6,7 @@ use crate::equality::equality_blocks;
 use crate::fluid::external_forces;
 use crate::forces::{advance_activations, applied_forces};
 use crate::kinematics::{kinematics, velocities};
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Kernel, Real, kernel_fn};
 use crate::model::JointType;
 use crate::sim::Sim;
 use crate::solver::joint::joint_rows;
@@ -16,83 +16,71 @@ use crate::spatial::*;
 use crate::tendon::tendon_blocks;
 use crate::work::{Group, Work};
 
-/// A stage of the step, compiled as a function of its own for each instruction set.
-macro_rules! stage {
-    ($(#[$doc:meta])* $name:ident, $kernel:ident, |$sim:ident, $group:ident, $work:ident| $body:expr) => {
-        struct $kernel<'a, T: Real>(&'a Sim<T>, &'a Group<T>, &'a mut Work<T>);
-        impl<T: Real> Kernel<T> for $kernel<'_, T> {
-            type Output = ();
-            #[inline(always)]
-            fn run(self) {
-                let ($sim, $group, $work) = (self.0, self.1, self.2);
-                $body
-            }
-        }
-        $(#[$doc])*
-        fn $name<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-            T::enter($kernel(sim, group, work));
-        }
-    };
-}
-
-stage!(
+kernel_fn! {
     /// Frames, axes, inertias, velocities, and applied forces.
-    smooth_stage, SmoothStage, |sim, group, work| {
+    fn smooth_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         kinematics(sim, group, work);
         velocities(sim, group, work);
         applied_forces(sim, group, work);
     }
-);
-stage!(
+}
+kernel_fn! {
     /// Contacts, limits, dry friction.
-    constraint_stage, ConstraintStage, |sim, group, work| {
+    fn constraint_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         work.blocks.clear();
         collide_floor(sim, group, work);
         joint_rows(sim, group, work);
     }
-);
-stage!(
+}
+kernel_fn! {
     /// Contacts that are not points above a level floor.
-    pair_stage, PairStage, |sim, group, work| collide_pairs(sim, group, work)
-);
-stage!(
+    fn pair_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        collide_pairs(sim, group, work);
+    }
+}
+kernel_fn! {
     /// Constrained acceleration.
-    solver_stage, SolverStage, |sim, group, work| solve::<T, Full>(sim, group, work)
-);
-stage!(
+    fn solver_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve::<T, Full>(sim, group, work);
+    }
+}
+kernel_fn! {
     /// The same for a planar model.
-    planar_solver_stage, PlanarSolverStage, |sim, group, work| solve::<T, Planar>(sim, group, work)
-);
-stage!(
+    fn planar_solver_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve::<T, Planar>(sim, group, work);
+    }
+}
+kernel_fn! {
     /// Acceleration with the joint damping taken at the end of the step.
-    damping_stage, DampingStage, |sim, _group, work| implicit_damping::<T, Full>(sim, work)
-);
-stage!(
+    fn damping_stage<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
+        implicit_damping::<T, Full>(sim, work);
+    }
+}
+kernel_fn! {
     /// The same for a planar model.
-    planar_damping_stage, PlanarDampingStage, |sim, _group, work| implicit_damping::<T, Planar>(sim, work)
-);
-stage!(
+    fn planar_damping_stage<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
+        implicit_damping::<T, Planar>(sim, work);
+    }
+}
+kernel_fn! {
     /// Positions and velocities only.
-    refresh_stage, RefreshStage, |sim, group, work| {
+    fn refresh_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         kinematics(sim, group, work);
         velocities(sim, group, work);
     }
-);
+}
 
-struct Integrate<'a, T: Real>(&'a Sim<T>, &'a mut Group<T>, &'a mut Work<T>);
-impl<T: Real> Kernel<T> for Integrate<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let dt = T::splat(self.0.dt);
-        let acc = if self.0.implicit_damping { &self.2.next } else { &self.2.acc };
-        self.1.warm.copy_from_slice(&self.2.acc);
-        for (v, a) in self.1.qvel.iter_mut().zip(acc) {
+kernel_fn! {
+    /// Velocities, activations and positions at the end of the step.
+    fn integrate<'a, T>(sim: &'a Sim<T>, group: &'a mut Group<T>, work: &'a mut Work<T>) {
+        let dt = T::splat(sim.dt);
+        let acc = if sim.implicit_damping { &work.next } else { &work.acc };
+        group.warm.copy_from_slice(&work.acc);
+        for (v, a) in group.qvel.iter_mut().zip(acc) {
             *v = a.mul_add(dt, *v);
         }
-        let Group { qpos, qvel, act, .. } = self.1;
-        advance_activations(self.0, act, &self.2.act_dot);
-        integrate_positions(self.0, qpos, qvel, dt);
+        advance_activations(sim, &mut group.act, &work.act_dot);
+        integrate_positions(sim, &mut group.qpos, &group.qvel, dt);
     }
 }
 
@@ -122,7 +110,9 @@ impl<T: Real> Sim<T> {
         match stage {
             Stage::Smooth => {
                 smooth_stage(self, group, work);
-                if !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty() {
+                work.external.clear();
+                work.bias_is_net = !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty();
+                if work.bias_is_net {
                     external_forces(self, group, work);
                 }
             }
@@ -148,12 +138,12 @@ impl<T: Real> Sim<T> {
     pub fn finish_step(&self, work: &mut Work<T>, group: &mut Group<T>) {
         if self.implicit_damping {
             if self.planar {
-                planar_damping_stage(self, group, work);
+                planar_damping_stage(self, work);
             } else {
-                damping_stage(self, group, work);
+                damping_stage(self, work);
             }
         }
-        T::enter(Integrate(self, group, work));
+        integrate(self, group, work);
     }
 
     /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
@@ -176,6 +166,7 @@ impl<T: Real> Sim<T> {
     /// Recomputes positions and velocities of bodies at the present state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
         refresh_stage(self, group, work);
+        work.bias_is_net = false;
     }
 
     /// Classical Runge-Kutta over the whole dynamics.

@@ -1,7 +1,7 @@
 //! Fixed tendons and ball-joint limits: rows over several degrees of freedom.
 
 use crate::equality::Term;
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Real, kernel_fn};
 use crate::model::{JointType, Model, TendonKind};
 use crate::sim::{Sim, split};
 use crate::solver::block::{Cost, Source};
@@ -110,22 +110,9 @@ pub(crate) fn tendon_springs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     }
 }
 
-/// Writes the blocks of tendons' dry friction and limits, and of ball joints' limits.
-pub(crate) fn tendon_blocks<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    T::enter(TendonBlocks { sim, group, work });
-}
-
-struct TendonBlocks<'a, T: Real> {
-    sim: &'a Sim<T>,
-    group: &'a Group<T>,
-    work: &'a mut Work<T>,
-}
-
-impl<T: Real> Kernel<T> for TendonBlocks<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let TendonBlocks { sim, group, work } = self;
+kernel_fn! {
+    /// Writes the blocks of tendons' dry friction and limits, and of ball joints' limits.
+    pub(crate) fn tendon_blocks<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         let one = T::lit(1.0);
         for (i, t) in sim.tendons.iter().enumerate() {
             let (length, velocity) = (work.tendon_length[i], work.tendon_velocity[i]);

@@ -3,9 +3,9 @@
 //! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
 //! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
 
-use crate::collision::Field;
 use crate::lanes::Real;
 use crate::model::{Model, Vec3};
+use crate::narrow::height::HeightField;
 use crate::sim::Sim;
 use crate::spatial::V3;
 use crate::work::Group;
@@ -130,10 +130,10 @@ impl<T: Real> Group<T> {
     /// Highest elevation of a height field for every agent.
     #[inline(always)]
     pub(crate) fn ground_top(&self, sim: &Sim<T>, field: usize) -> T {
-        let mut top = T::splat(sim.fields[field].grid.top);
+        let mut top = T::splat(sim.fields[field].top);
         if !self.grounds.is_empty() {
             for lane in 0..T::LANES {
-                top.set(lane, self.ground(sim, lane, field).grid.top);
+                top.set(lane, self.ground(sim, lane, field).top);
             }
         }
         top
@@ -141,7 +141,7 @@ impl<T: Real> Group<T> {
 
     /// Height field `field` of an agent.
     #[inline(always)]
-    pub(crate) fn ground<'a>(&'a self, sim: &'a Sim<T>, lane: usize, field: usize) -> &'a Field<T::Scalar> {
+    pub(crate) fn ground<'a>(&'a self, sim: &'a Sim<T>, lane: usize, field: usize) -> &'a HeightField<T::Scalar> {
         match self.grounds.get(field * T::LANES + lane) {
             Some(Some(own)) => own,
             _ => &sim.fields[field],

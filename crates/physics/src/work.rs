@@ -1,15 +1,15 @@
 //! State of a lane group and the scratch memory of a step.
 
-use crate::collision::Field;
 use crate::lanes::Real;
 use crate::model::JointType;
-use crate::narrow::Touch;
-use crate::sim::Sim;
+use crate::narrow::height::HeightField;
+use crate::narrow::{Touch, Touches};
+use crate::sim::{Mount, Sim};
 use crate::solver::block::Block;
 use crate::solver::coupled::Coupling;
 use crate::solver::floor::FloorRow;
 use crate::solver::joint::{DryRow, LimitRow};
-use crate::spatial::{Inertia, Rot, Sym6, V3, V6};
+use crate::spatial::*;
 use crate::variation::Varied;
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ pub struct Group<T: Real> {
     /// Constants that differ from the model's.
     pub(crate) varied: Option<Box<Varied<T>>>,
     /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
-    pub(crate) grounds: Vec<Option<Arc<Field<T::Scalar>>>>,
+    pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
 }
 
 impl<T: Real> Group<T> {
@@ -144,8 +144,10 @@ pub struct Work<T: Real> {
     pub(crate) act_dot: Vec<T>,
     pub(crate) tendon_length: Vec<T>,
     pub(crate) tendon_velocity: Vec<T>,
-    /// Forces on links from outside; already in `bias_force`.
+    /// Forces on links from outside; empty: none.
     pub(crate) external: Vec<V6<T>>,
+    /// They have been taken off `bias_force`.
+    pub(crate) bias_is_net: bool,
     /// Force of each actuator.
     pub(crate) actuator_force: Vec<T>,
     /// Joint accelerations, after a solve.
@@ -191,8 +193,11 @@ pub struct Work<T: Real> {
     pub(crate) normal_force: Vec<T>,
     /// Per geom: lanes that touch another moving geom at the last physics step.
     pub(crate) touching_bodies: Vec<T::Mask>,
-    /// Contacts of one pair of geoms.
+    /// Centers of the geoms that meet others, relative to their trees' reference points; of static ones, in the world.
+    pub(crate) centers: Vec<V3<T>>,
+    /// Contacts of one pair of geoms, and of one lane of them.
     pub(crate) touches: Vec<Touch<T>>,
+    pub(crate) lane_touches: Touches<T::Scalar>,
     /// States of the Runge-Kutta stages.
     pub(crate) stages: Vec<Group<T>>,
     pub(crate) stats: SolverStats,
@@ -275,7 +280,8 @@ impl<T: Real> Work<T> {
             act_dot: vec![z; sim.model.na],
             tendon_length: vec![z; sim.tendons.len()],
             tendon_velocity: vec![z; sim.tendons.len()],
-            external: vec![[z; 6]; nl],
+            external: Vec::with_capacity(nl),
+            bias_is_net: false,
             actuator_force: vec![z; sim.model.nu],
             acc: vec![z; nv],
             next: vec![z; nv],
@@ -304,9 +310,26 @@ impl<T: Real> Work<T> {
             ground_contacts: vec![z; sim.geoms.len()],
             normal_force: vec![z; sim.geoms.len()],
             touching_bodies: vec![T::none(); sim.geoms.len()],
+            centers: vec![[z; 3]; sim.geoms.len()],
             touches: Vec::new(),
+            lane_touches: Touches::new(),
             stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
             stats: SolverStats::default(),
+        }
+    }
+
+    /// Origin of a frame on a link, relative to the tree's reference point.
+    #[inline(always)]
+    pub(crate) fn arm(&self, m: &Mount<T::Scalar>, link: usize) -> V3<T> {
+        rotate_add(&self.rot[link], &splat3(&m.pos), &self.pos[link])
+    }
+
+    /// Axes of a frame in the world.
+    #[inline(always)]
+    pub(crate) fn axes(&self, m: &Mount<T::Scalar>) -> Rot<T> {
+        match m.link {
+            None => [splat3(&m.rot[0]), splat3(&m.rot[1]), splat3(&m.rot[2])],
+            Some(l) => compose(&self.rot[l], &m.rot),
         }
     }
 

@@ -49,7 +49,7 @@ impl<T: Real> Group<T> {
         let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.warm];
         let grounds = self.grounds.chunks(T::LANES).map(|lanes| {
             let elevation = |x: &T::Scalar| T::widen(*x) as f32;
-            lanes[lane].as_ref().map(|field| field.grid.heights.iter().map(elevation).collect())
+            lanes[lane].as_ref().map(|field| field.heights.iter().map(elevation).collect())
         });
         AgentState {
             numbers: parts.into_iter().flatten().map(get).collect(),

@@ -3,8 +3,8 @@
 //! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
 //! corners. Each is a [`Candidate`]; all lanes walk the same list, and a lane that does not touch gets stiffness zero.
 
-use super::pairs::pyramid_share;
 use super::params::ContactParams;
+use super::slots::pyramid_share;
 use crate::lanes::Real;
 use crate::model::{Cone, GeomType, Model};
 use crate::rigid::{self, BodyMount, quat_to_rot};

@@ -1,15 +1,17 @@
 //! Contacts: which geoms may touch, where they do, and the rows that follow.
 //!
 //! The list of pairs is made once per model ([`Contacts`]). Points of spheres, capsules and boxes above a level plane
-//! are the common case and have their own list ([`floor`]); everything else goes through [`pairs`] and
-//! [`crate::narrow`].
+//! are the common case and have their own list ([`floor`]); everything else is listed by [`pairs`] and
+//! found by [`meet`].
 
 mod floor;
+mod meet;
 mod pairs;
 mod params;
+mod slots;
 
 pub(crate) use floor::collide_floor;
-pub(crate) use pairs::{Field, collide_pairs, fields};
+pub(crate) use meet::collide_pairs;
 
 use crate::lanes::Real;
 use crate::model::{GeomType, Model};
@@ -26,12 +28,14 @@ pub(crate) struct Contacts<C> {
     pub floor: Vec<Candidate<C>>,
     /// Other pairs of geoms, those of a kind next to each other.
     pub pairs: Vec<PairSpec<C>>,
+    /// Geoms of those pairs.
+    pub paired: Vec<usize>,
 }
 
 impl<C> Contacts<C> {
     /// No contacts.
     pub fn none() -> Self {
-        Contacts { floor: Vec::new(), pairs: Vec::new() }
+        Contacts { floor: Vec::new(), pairs: Vec::new(), paired: Vec::new() }
     }
 }
 
@@ -73,6 +77,9 @@ pub(crate) fn contacts<T: Real>(
     out.floor.sort_by_key(|c| c.geom);
     // slots of one class are filled together
     out.pairs.sort_by_key(|p| p.class());
+    out.paired = out.pairs.iter().flat_map(|p| p.geoms).collect();
+    out.paired.sort_unstable();
+    out.paired.dedup();
     Ok(out)
 }
 

@@ -309,6 +309,35 @@ macro_rules! with_lanes {
     };
 }
 
+/// A function over lanes that is compiled on its own for each instruction set: its body is the [`Kernel`] that it enters.
+macro_rules! kernel_fn {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime, $T:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+        $crate::lanes::kernel_fn! { $(#[$meta])* $vis fn $name<$life, $T>($($arg: $type),*) -> () $body }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis fn $name:ident<$life:lifetime, $T:ident>($($arg:ident: $type:ty),* $(,)?) -> $out:ty $body:block
+    ) => {
+        $(#[$meta])*
+        $vis fn $name<$life, $T: $crate::lanes::Real>($($arg: $type),*) -> $out {
+            struct Body<$life, $T: $crate::lanes::Real> {
+                $($arg: $type,)*
+                lifetime: std::marker::PhantomData<&$life $T>,
+            }
+            impl<$life, $T: $crate::lanes::Real> $crate::lanes::Kernel<$T> for Body<$life, $T> {
+                type Output = $out;
+                #[inline(always)]
+                fn run(self) -> $out {
+                    let Body { $($arg,)* .. } = self;
+                    $body
+                }
+            }
+            $T::enter(Body { $($arg,)* lifetime: std::marker::PhantomData })
+        }
+    };
+}
+pub(crate) use kernel_fn;
+
 macro_rules! assign_ops {
     ($t:ty) => {
         impl AddAssign for $t {

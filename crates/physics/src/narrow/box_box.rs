@@ -6,7 +6,7 @@
 //! margin are the contacts. If it is that of two edges, their closest points are the contact.
 
 use super::*;
-use crate::lanes::Kernel;
+use crate::lanes::kernel_fn;
 
 /// An edge direction wins only if it separates more than the best face by this share.
 const EDGE_BIAS: f64 = 1e-6;
@@ -57,31 +57,17 @@ struct Relative<S: Real> {
     first: V3<S>,
 }
 
-/// Finds the contacts and appends them.
-pub(crate) fn box_box<S: Real>(a: &Block<S>, b: &Block<S>, margin: S, out: &mut Touches<S>) {
-    S::enter(BoxBox { a, b, margin, out });
-}
-
-struct BoxBox<'a, S: Real> {
-    a: &'a Block<S>,
-    b: &'a Block<S>,
-    margin: S,
-    out: &'a mut Touches<S>,
-}
-
-impl<S: Real> Kernel<S> for BoxBox<'_, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let BoxBox { a, b, margin, out } = self;
+kernel_fn! {
+    /// Finds the contacts and appends them.
+    pub(crate) fn box_box<'a, S>(a: &'a Block<S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
         let slack = Slack::new();
         let d = sub3(&b.center, &a.center);
         let back = [-d[0], -d[1], -d[2]];
         let mut cos = [[S::zero(); 3]; 3];
         for i in 0..3 {
-            cos[i] = into_frame(&b.axes, &a.axes[i]);
+            cos[i] = into_axes(&b.axes, &a.axes[i]);
         }
-        let relative = Relative { cos, second: into_frame(&a.axes, &d), first: into_frame(&b.axes, &back) };
+        let relative = Relative { cos, second: into_axes(&a.axes, &d), first: into_axes(&b.axes, &back) };
         match separate(a, b, &relative, margin, &slack) {
             None => {}
             Some(Direction::Face { first: true, axis }) => {

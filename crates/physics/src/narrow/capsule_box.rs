@@ -6,7 +6,7 @@
 
 use super::round::sphere_box;
 use super::*;
-use crate::lanes::Kernel;
+use crate::lanes::kernel_fn;
 
 /// Where on the box the segment's closest point lies.
 #[derive(Clone, Copy)]
@@ -29,25 +29,11 @@ struct Closest<S> {
     distance2: S,
 }
 
-/// Finds the contacts and appends them.
-pub(crate) fn capsule_box<S: Real>(a: &Capsule<S>, b: &Block<S>, margin: S, out: &mut Touches<S>) {
-    S::enter(CapsuleBox { a, b, margin, out });
-}
-
-struct CapsuleBox<'a, S: Real> {
-    a: &'a Capsule<S>,
-    b: &'a Block<S>,
-    margin: S,
-    out: &'a mut Touches<S>,
-}
-
-impl<S: Real> Kernel<S> for CapsuleBox<'_, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let CapsuleBox { a, b, margin, out } = self;
-        let center = into_frame(&b.axes, &sub3(&a.center, &b.center));
-        let axis = into_frame(&b.axes, &a.axis);
+kernel_fn! {
+    /// Finds the contacts and appends them.
+    pub(crate) fn capsule_box<'a, S>(a: &'a Capsule<S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+        let center = into_axes(&b.axes, &sub3(&a.center, &b.center));
+        let axis = into_axes(&b.axes, &a.axis);
         let arm = scale3(&axis, a.half);
         let first = closest(&center, &arm, a.half, &b.half);
         out.push(ball_at(a, b, first.along, margin));

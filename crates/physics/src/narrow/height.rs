@@ -8,7 +8,8 @@
 
 use super::prism::Prism;
 use super::*;
-use crate::lanes::Kernel;
+use crate::lanes::kernel_fn;
+use crate::model::HField;
 
 /// Heights over a grid, in the field's frame: columns along x, rows along y, centered at the origin.
 #[derive(Clone, Debug)]
@@ -33,30 +34,11 @@ pub(crate) struct Terrain<'a, S: Real> {
     pub axes: Rot<S>,
 }
 
-/// Finds the contacts of a height field and a capsule, or a sphere (a capsule with `half` zero), and appends them.
-pub(crate) fn field_capsule<S: Real>(a: &Terrain<S>, b: &Capsule<S>, margin: S, out: &mut Touches<S>) {
-    S::enter(FieldCapsule { a, b, margin, out });
-}
-
-/// Finds the contacts of a height field and a box and appends them.
-pub(crate) fn field_box<S: Real>(a: &Terrain<S>, b: &Block<S>, margin: S, out: &mut Touches<S>) {
-    S::enter(FieldBox { a, b, margin, out });
-}
-
-struct FieldCapsule<'a, S: Real> {
-    a: &'a Terrain<'a, S>,
-    b: &'a Capsule<S>,
-    margin: S,
-    out: &'a mut Touches<S>,
-}
-
-impl<S: Real> Kernel<S> for FieldCapsule<'_, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let FieldCapsule { a, b, margin, out } = self;
-        let center = into_frame(&a.axes, &sub3(&b.center, &a.center));
-        let arm = scale3(&into_frame(&a.axes, &b.axis), b.half);
+kernel_fn! {
+    /// Finds the contacts of a height field and a capsule, or a sphere (a capsule with `half` zero), and appends them.
+    pub(crate) fn field_capsule<'a, S>(a: &'a Terrain<'a, S>, b: &'a Capsule<S>, margin: S, out: &'a mut Touches<S>) {
+        let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
+        let arm = scale3(&into_axes(&a.axes, &b.axis), b.half);
         let reach = b.radius + margin;
         let extent = [arm[0].abs() + reach, arm[1].abs() + reach, arm[2].abs() + reach];
         let Some(window) = a.field.window(&center, &extent) else { return };
@@ -85,23 +67,14 @@ impl<S: Real> Kernel<S> for FieldCapsule<'_, S> {
     }
 }
 
-struct FieldBox<'a, S: Real> {
-    a: &'a Terrain<'a, S>,
-    b: &'a Block<S>,
-    margin: S,
-    out: &'a mut Touches<S>,
-}
-
-impl<S: Real> Kernel<S> for FieldBox<'_, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let FieldBox { a, b, margin, out } = self;
-        let center = into_frame(&a.axes, &sub3(&b.center, &a.center));
+kernel_fn! {
+    /// Finds the contacts of a height field and a box and appends them.
+    pub(crate) fn field_box<'a, S>(a: &'a Terrain<'a, S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+        let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
         let mut arms = [[S::zero(); 3]; 3];
         let mut extent = [margin; 3];
         for k in 0..3 {
-            arms[k] = scale3(&into_frame(&a.axes, &b.axes[k]), b.half[k]);
+            arms[k] = scale3(&into_axes(&a.axes, &b.axes[k]), b.half[k]);
             for i in 0..3 {
                 extent[i] += arms[k][i].abs();
             }
@@ -133,6 +106,34 @@ struct Window {
 }
 
 impl<S: Real> HeightField<S> {
+    /// A model's field.
+    pub(crate) fn new(field: &HField) -> Self {
+        let [x, y, scale, base] = field.size;
+        let elevations = field.data.iter().map(|z| f64::from(*z) * scale);
+        HeightField {
+            rows: field.nrow,
+            cols: field.ncol,
+            half: [S::lit(x), S::lit(y)],
+            base: S::lit(base),
+            top: S::lit(elevations.clone().fold(0.0, f64::max)),
+            heights: elevations.map(S::lit).collect(),
+        }
+    }
+
+    /// The same grid with other elevations, m.
+    ///
+    /// # Panics
+    /// If their number is not that of the grid.
+    pub(crate) fn with_elevations(&self, elevations: &[f32]) -> Self {
+        assert_eq!(elevations.len(), self.rows * self.cols, "one elevation per point of the grid");
+        let elevations = elevations.iter().map(|z| f64::from(*z));
+        HeightField {
+            top: S::lit(elevations.clone().fold(0.0, f64::max)),
+            heights: elevations.map(S::lit).collect(),
+            ..self.clone()
+        }
+    }
+
     /// The cells that come within `extent` of `center` along each axis, if there are any.
     #[inline(always)]
     fn window(&self, center: &V3<S>, extent: &V3<S>) -> Option<Window> {

@@ -59,10 +59,9 @@ impl<T: Real> Touch<T> {
 }
 
 /// Contacts of one pair of shapes of one agent.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Touches<S: Real> {
-    items: [Touch<S>; Touches::<f64>::CAPACITY],
-    len: usize,
+    items: Vec<Touch<S>>,
 }
 
 impl<S: Real> Touches<S> {
@@ -70,26 +69,25 @@ impl<S: Real> Touches<S> {
     pub(crate) const CAPACITY: usize = 50;
 
     pub(crate) fn new() -> Self {
-        Touches { items: [Touch::none(); Touches::<f64>::CAPACITY], len: 0 }
+        Touches { items: Vec::with_capacity(Self::CAPACITY) }
     }
     pub(crate) fn as_slice(&self) -> &[Touch<S>] {
-        &self.items[..self.len]
+        &self.items
     }
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
-        self.len = 0;
+        self.items.clear();
     }
     /// Whether there is no room left.
     #[inline(always)]
     fn is_full(&self) -> bool {
-        self.len == self.items.len()
+        self.items.len() == Self::CAPACITY
     }
     /// Adds a contact if it is one and there is room.
     #[inline(always)]
     fn push(&mut self, touch: Touch<S>) {
         if S::any(touch.on) && !self.is_full() {
-            self.items[self.len] = touch;
-            self.len += 1;
+            self.items.push(touch);
         }
     }
 }
@@ -193,12 +191,6 @@ fn axpy3<T: Real>(a: &V3<T>, s: T, c: &V3<T>) -> V3<T> {
 #[inline(always)]
 fn scale3<T: Real>(a: &V3<T>, s: T) -> V3<T> {
     [a[0] * s, a[1] * s, a[2] * s]
-}
-
-/// `x` in a rotated frame.
-#[inline(always)]
-fn into_frame<T: Real>(axes: &Rot<T>, x: &V3<T>) -> V3<T> {
-    [dot(&axes[0], x), dot(&axes[1], x), dot(&axes[2], x)]
 }
 
 /// `x` limited to [-`limit`, `limit`].

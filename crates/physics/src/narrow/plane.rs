@@ -130,7 +130,7 @@ pub(crate) fn plane_cylinder<T: Real>(plane: &Plane<T>, b: &Cylinder<T>, margin:
 /// One contact, at the lowest point.
 #[inline(always)]
 pub(crate) fn plane_ellipsoid<T: Real>(plane: &Plane<T>, b: &Block<T>, margin: T) -> Touch<T> {
-    let n = into_frame(&b.axes, &plane.normal);
+    let n = into_axes(&b.axes, &plane.normal);
     let s = [n[0] * b.half[0], n[1] * b.half[1], n[2] * b.half[2]];
     let reach = dot(&s, &s).sqrt();
     let k = -reach.recip();

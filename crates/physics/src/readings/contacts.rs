@@ -2,7 +2,6 @@
 
 use super::Readings;
 use super::forces::ContactForce;
-use super::frames::into_axes;
 use super::rays::inside_shape;
 use crate::lanes::Real;
 use crate::model::{Sensor, SensorObject};
@@ -96,7 +95,7 @@ impl<T: Real> Readings<'_, T> {
         let mut on = c.on;
         if let SensorObject::Site(site) = a {
             let (zone, mount) = (&self.sim.model.sites[site], &self.sim.sites[site]);
-            let p = into_axes(&self.mount_axes(mount), &self.arm_from(mount, Some(c.tree), &c.point));
+            let p = into_axes(&self.work.axes(mount), &self.arm_from(mount, Some(c.tree), &c.point));
             on = T::and(on, inside_shape(zone.kind, &zone.size, &p));
         }
         (on, reversed == c.natural)

@@ -1,7 +1,6 @@
 //! Sums over bodies: centers of mass, momenta, energies.
 
 use super::Readings;
-use super::frames::{quat_conjugate, quat_mul};
 use crate::lanes::Real;
 use crate::model::{JointType, TendonKind};
 use crate::spatial::*;

@@ -1,7 +1,6 @@
 //! Forces between bodies at the last physics step: contacts, and what a body's parent exerts on it.
 
 use super::Readings;
-use super::frames::into_axes;
 use crate::lanes::Real;
 use crate::model::EqualityKind;
 use crate::sim::Mount;
@@ -173,7 +172,7 @@ impl<T: Real> Readings<'_, T> {
                 sum.subtract(&self.separation(mount, &t.points[1]), &t.force, &t.torque, all);
             }
         }
-        let axes = self.mount_axes(mount);
+        let axes = self.work.axes(mount);
         Some((into_axes(&axes, &sum.force), into_axes(&axes, &sum.torque)))
     }
 
@@ -184,7 +183,7 @@ impl<T: Real> Readings<'_, T> {
         let (a, turn) = self.mount_acceleration(com);
         let mass = self.own_mass(body);
         // Euler's equations in the principal axes
-        let axes = self.mount_axes(com);
+        let axes = self.work.axes(com);
         let (w, dw) = (into_axes(&axes, &self.mount_spin(com)), into_axes(&axes, &turn));
         let i = self.own_inertia(body);
         let torque = [
@@ -210,7 +209,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn spin_momentum(&self, body: usize) -> V3<T> {
         let com: &Mount<T::Scalar> = &self.sim.coms[body];
-        let axes = self.mount_axes(com);
+        let axes = self.work.axes(com);
         let w = into_axes(&axes, &self.mount_spin(com));
         let i = self.own_inertia(body);
         rotate(&axes, &[i[0] * w[0], i[1] * w[1], i[2] * w[2]])

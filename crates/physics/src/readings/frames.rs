@@ -38,7 +38,7 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn separation(&self, from: &Mount<T::Scalar>, to: &Mount<T::Scalar>) -> V3<T> {
         match to.link {
             None => self.arm_from(from, None, &splat3(&to.pos)),
-            Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.arm_of(to, l)),
+            Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.work.arm(to, l)),
         }
     }
 
@@ -47,7 +47,7 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn arm_from(&self, from: &Mount<T::Scalar>, tree: Option<usize>, point: &V3<T>) -> V3<T> {
         let (start, start_tree) = match from.link {
             None => (splat3(&from.pos), None),
-            Some(l) => (self.arm_of(from, l), Some(self.sim.links[l].tree)),
+            Some(l) => (self.work.arm(from, l), Some(self.sim.links[l].tree)),
         };
         let arm = sub3(point, &start);
         if tree == start_tree {
@@ -62,7 +62,7 @@ impl<T: Real> Readings<'_, T> {
     /// A vector in a frame's own axes.
     #[inline(always)]
     pub(super) fn in_axes(&self, m: &Mount<T::Scalar>, v: &V3<T>) -> V3<T> {
-        into_axes(&self.mount_axes(m), v)
+        into_axes(&self.work.axes(m), v)
     }
 
     /// Orientation of an object as the product of the quaternions from the root outward, as MuJoCo has it: its sign is
@@ -128,15 +128,9 @@ impl<T: Real> Readings<'_, T> {
         // what the turning of the reference frame makes of a point at rest
         let v = cross_add(&self.separation(from, m), &turning, &v);
         let w = sub3(&self.mount_spin(m), &turning);
-        let axes = self.mount_axes(from);
+        let axes = self.work.axes(from);
         (into_axes(&axes, &v), into_axes(&axes, &w))
     }
-}
-
-/// Components of a vector along the axes of a rotation.
-#[inline(always)]
-pub(super) fn into_axes<T: Real>(axes: &Rot<T>, v: &V3<T>) -> V3<T> {
-    [dot(&axes[0], v), dot(&axes[1], v), dot(&axes[2], v)]
 }
 
 /// Constant quaternion.
@@ -149,22 +143,4 @@ fn literal<T: Real>(q: &[f64; 4]) -> [T; 4] {
 fn normalized<T: Real>(q: &[T; 4]) -> [T; 4] {
     let inv = q[0].mul_add(q[0], q[1].mul_add(q[1], q[2].mul_add(q[2], q[3] * q[3]))).sqrt().recip();
     [q[0] * inv, q[1] * inv, q[2] * inv, q[3] * inv]
-}
-
-/// The inverse of a unit quaternion.
-#[inline(always)]
-pub(super) fn quat_conjugate<T: Real>(q: &[T; 4]) -> [T; 4] {
-    [q[0], -q[1], -q[2], -q[3]]
-}
-
-/// Product of quaternions.
-#[inline(always)]
-pub(super) fn quat_mul<T: Real>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
-    let [w, x, y, z] = *b;
-    [
-        a[3].neg_mul_add(z, a[2].neg_mul_add(y, a[1].neg_mul_add(x, a[0] * w))),
-        a[3].neg_mul_add(y, a[2].mul_add(z, a[1].mul_add(w, a[0] * x))),
-        a[1].neg_mul_add(z, a[3].mul_add(x, a[2].mul_add(w, a[0] * y))),
-        a[2].neg_mul_add(x, a[1].mul_add(y, a[3].mul_add(w, a[0] * z))),
-    ]
 }

@@ -71,7 +71,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a body's frame (columns x, y, z).
     #[inline(always)]
     pub fn body_axes(&self, body: usize) -> Rot<T> {
-        self.mount_axes(&self.sim.bodies[body])
+        self.work.axes(&self.sim.bodies[body])
     }
 
     /// Center of mass of a body, m.
@@ -107,7 +107,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a geom's frame (columns).
     #[inline(always)]
     pub fn geom_axes(&self, geom: usize) -> Rot<T> {
-        self.mount_axes(&self.sim.geoms[geom])
+        self.work.axes(&self.sim.geoms[geom])
     }
 
     /// Velocity of a geom's center, m/s.
@@ -125,7 +125,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a site's frame (columns).
     #[inline(always)]
     pub fn site_axes(&self, site: usize) -> Rot<T> {
-        self.mount_axes(&self.sim.sites[site])
+        self.work.axes(&self.sim.sites[site])
     }
 
     /// Lanes in which a geom touches the static world, at the last physics step.
@@ -166,21 +166,7 @@ impl<'a, T: Real> Readings<'a, T> {
     fn mount_pos(&self, m: &Mount<T::Scalar>) -> V3<T> {
         match m.link {
             None => splat3(&m.pos),
-            Some(l) => add3(&self.arm_of(m, l), &self.work.reference[self.sim.links[l].tree]),
-        }
-    }
-
-    /// Position relative to the tree's reference point.
-    #[inline(always)]
-    fn arm_of(&self, m: &Mount<T::Scalar>, link: usize) -> V3<T> {
-        rotate_add(&self.work.rot[link], &splat3(&m.pos), &self.work.pos[link])
-    }
-
-    #[inline(always)]
-    fn mount_axes(&self, m: &Mount<T::Scalar>) -> Rot<T> {
-        match m.link {
-            None => [splat3(&m.rot[0]), splat3(&m.rot[1]), splat3(&m.rot[2])],
-            Some(l) => compose(&self.work.rot[l], &m.rot),
+            Some(l) => add3(&self.work.arm(m, l), &self.work.reference[self.sim.links[l].tree]),
         }
     }
 
@@ -190,7 +176,7 @@ impl<'a, T: Real> Readings<'a, T> {
             None => [T::zero(); 3],
             Some(l) => {
                 let v = &self.work.vel[l];
-                cross_add(&ang(v), &self.arm_of(m, l), &lin(v))
+                cross_add(&ang(v), &self.work.arm(m, l), &lin(v))
             }
         }
     }
@@ -237,7 +223,7 @@ impl<'a, T: Real> Readings<'a, T> {
             }
             l = self.sim.links[i].parent;
         }
-        let r = self.arm_of(m, link);
+        let r = self.work.arm(m, link);
         let v = self.mount_velocity(m);
         let spin = ang(&self.work.vel[link]);
         let at_point = cross_add(&ang(&a), &r, &lin(&a));

@@ -3,7 +3,6 @@
 //! Planes are hit on their front alone, other shapes from inside as well. Distances are in units of the ray's direction.
 
 use super::Readings;
-use super::frames::into_axes;
 use super::hfield::{Grid, ray_hfield};
 use crate::lanes::Real;
 use crate::model::GeomType;
@@ -204,7 +203,7 @@ impl<T: Real> Readings<'_, T> {
         let m = &self.sim.model;
         let body = m.sites[site].body;
         let mount = &self.sim.sites[site];
-        let direction = self.mount_axes(mount)[2];
+        let direction = self.work.axes(mount)[2];
         let mut nearest = Hit::none();
         for (g, geom) in m.geoms.iter().enumerate() {
             // what cannot be seen is not hit
@@ -212,7 +211,7 @@ impl<T: Real> Readings<'_, T> {
                 continue;
             }
             let frame = &self.sim.geoms[g];
-            let axes = self.mount_axes(frame);
+            let axes = self.work.axes(frame);
             let p = into_axes(&axes, &self.separation(frame, mount));
             let d = into_axes(&axes, &direction);
             let size = [T::lit(geom.size[0]), T::lit(geom.size[1]), T::lit(geom.size[2])];
@@ -250,7 +249,7 @@ impl<T: Real> Readings<'_, T> {
         let mut out = Hit::<T>::none();
         for lane in 0..T::LANES {
             // an agent may have ground of its own, with higher hills
-            let own = &self.group.ground(self.sim, lane, index).grid;
+            let own = &self.group.ground(self.sim, lane, index);
             let mut size = field.size.map(T::scalar);
             size[2] = size[2].max(own.top);
             let grid = Grid { rows: own.rows, cols: own.cols, size, heights: &own.heights };

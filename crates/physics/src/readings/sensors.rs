@@ -1,7 +1,6 @@
 //! Values of sensors, equal to MuJoCo's `sensordata`.
 
 use super::Readings;
-use super::frames::{into_axes, quat_conjugate, quat_mul};
 use super::joints::LimitReading;
 use super::rays::inside_shape;
 use crate::lanes::{Kernel, Real};
@@ -100,9 +99,9 @@ impl<T: Real> Readings<'_, T> {
                 None => self.mount_pos(m),
                 Some(f) => self.in_axes(f, &self.separation(f, m)),
             },
-            S::FrameXAxis => seen(self.mount_axes(m)[0]),
-            S::FrameYAxis => seen(self.mount_axes(m)[1]),
-            S::FrameZAxis => seen(self.mount_axes(m)[2]),
+            S::FrameXAxis => seen(self.work.axes(m)[0]),
+            S::FrameYAxis => seen(self.work.axes(m)[1]),
+            S::FrameZAxis => seen(self.work.axes(m)[2]),
             S::FrameLinVel => match &from {
                 None => self.mount_velocity(m),
                 Some(f) => self.relative_velocity(m, f).0,
@@ -118,7 +117,7 @@ impl<T: Real> Readings<'_, T> {
             S::Accelerometer => self.in_axes(m, &self.mount_acceleration(m).0),
             S::Magnetometer => {
                 let flux = self.sim.model.opt.magnetic;
-                into_axes(&self.mount_axes(m), &[T::lit(flux[0]), T::lit(flux[1]), T::lit(flux[2])])
+                into_axes(&self.work.axes(m), &[T::lit(flux[0]), T::lit(flux[1]), T::lit(flux[2])])
             }
             _ => return None,
         })

@@ -1,9 +1,9 @@
 //! Touch sensors.
 
 use super::Readings;
-use super::frames::into_axes;
 use super::rays::ray_shape;
 use crate::lanes::Real;
+use crate::spatial::into_axes;
 
 impl<T: Real> Readings<'_, T> {
     /// Normal forces of all contacts of a geom, with whatever it touches.
@@ -24,7 +24,7 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn site_touch(&self, site: usize) -> T {
         let s = &self.sim.model.sites[site];
         let mount = &self.sim.sites[site];
-        let axes = self.mount_axes(mount);
+        let axes = self.work.axes(mount);
         let size = [T::lit(s.size[0]), T::lit(s.size[1]), T::lit(s.size[2])];
         let mut total = T::zero();
         for c in self.contact_forces() {

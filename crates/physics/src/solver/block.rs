@@ -6,6 +6,7 @@
 //! ground with different limbs share a block. Lanes that leave a slot empty have stiffness zero in it.
 
 use crate::lanes::Real;
+use crate::solver::cone::Cone;
 use crate::solver::{Move, Row, replace};
 use crate::spatial::*;
 
@@ -368,38 +369,6 @@ impl<T: Real> Block<T> {
         changed
     }
 
-    /// Second derivative of the elliptic cone's cost.
-    #[inline(always)]
-    fn elliptic_stiffness(&mut self, cone: &Cone<T>, live: T::Mask) {
-        let z = T::zero();
-        let [bottom, middle] = [self.zones[0], self.zones[1]];
-        let (mu, inv) = (self.slope, cone.inv_sliding);
-        let radial = mu * cone.normal * inv * inv * inv;
-        let round = mu * mu - mu * cone.normal * inv;
-        for i in 0..self.dim {
-            for j in 0..=i {
-                let curved = match (i, j) {
-                    (0, 0) => cone.weight * mu * mu,
-                    (_, 0) => {
-                        let m = self.mu[i - 1];
-                        -(cone.weight * mu * mu * (m * self.u[i]) * inv * m)
-                    }
-                    _ => {
-                        let (mi, mj) = (self.mu[i - 1], self.mu[j - 1]);
-                        let mut h = radial * (mi * self.u[i]) * (mj * self.u[j]);
-                        if i == j {
-                            h += round;
-                        }
-                        cone.weight * h * mi * mj
-                    }
-                };
-                let flat = if i == j { self.d[i] } else { z };
-                let now = T::select(middle, curved, T::masked(bottom, flat));
-                self.stiffness[at(i, j)] = T::select(live, now, self.stiffness[at(i, j)]);
-            }
-        }
-    }
-
     /// Moves to the Newton point; returns the lanes where the linear model does not hold there.
     #[inline(always)]
     pub fn newton_point(&mut self, link_acc: &[V6<T>], joint_acc: &[T]) -> T::Mask {
@@ -520,73 +489,7 @@ impl<T: Real> Row<T> for Block<T> {
                 }
                 [self.d[0] * s1, self.d[0] * s2]
             }
-            Cost::Elliptic => {
-                let cone = Cone::at(self, &u);
-                let (mut b1, mut b2) = (z, z);
-                let (mut cross, mut square) = (z, z);
-                for k in 0..self.dim {
-                    let w = self.d[k] * du[k];
-                    b1 = w.mul_add(u[k], b1);
-                    b2 = w.mul_add(du[k], b2);
-                    if k > 0 {
-                        let (x, dx) = (self.mu[k - 1] * u[k], self.mu[k - 1] * du[k]);
-                        cross = x.mul_add(dx, cross);
-                        square = dx.mul_add(dx, square);
-                    }
-                }
-                // derivatives of the sliding speed along the segment
-                let inv = cone.inv_sliding;
-                let rate = cross * inv;
-                let bend = (square - rate * rate) * inv;
-                let towards = self.slope * (du[0] - rate);
-                let m1 = cone.weight * cone.excess * towards;
-                let m2 = cone.weight * (towards * towards - cone.excess * self.slope * bend);
-                [
-                    T::select(cone.middle, m1, T::masked(cone.bottom, b1)),
-                    T::select(cone.middle, m2, T::masked(cone.bottom, b2)),
-                ]
-            }
-        }
-    }
-}
-
-/// Where a point lies with respect to an elliptic cone.
-struct Cone<T: Real> {
-    bottom: T::Mask,
-    middle: T::Mask,
-    /// Scaled normal value, `excess = normal - slope * sliding`, inverse of the sliding speed.
-    normal: T,
-    excess: T,
-    inv_sliding: T,
-    /// Stiffness of the curved part.
-    weight: T,
-}
-
-impl<T: Real> Cone<T> {
-    #[inline(always)]
-    fn at(block: &Block<T>, u: &Rows<T>) -> Self {
-        let (z, one) = (T::zero(), T::lit(1.0));
-        let mu = block.slope;
-        let mut square = z;
-        for k in 1..block.dim {
-            let x = block.mu[k - 1] * u[k];
-            square = x.mul_add(x, square);
-        }
-        let sliding = square.sqrt();
-        let normal = mu * u[0];
-        let excess = mu.neg_mul_add(sliding, normal);
-        let inside = excess.lt(z);
-        // a value on the far side of the polar cone pushes in full
-        let full = T::not(z.lt(mu.mul_add(normal, sliding)));
-        let square_mu = mu * mu;
-        let safe = T::select(block.on, square_mu * (one + square_mu), one);
-        Cone {
-            bottom: T::and(inside, full),
-            middle: T::and(inside, T::not(full)),
-            normal,
-            excess,
-            inv_sliding: one.div(sliding.max(T::lit(1e-30))),
-            weight: block.d[0].div(safe),
+            Cost::Elliptic => self.elliptic_slope(&u, &du),
         }
     }
 }

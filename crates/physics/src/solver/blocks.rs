@@ -2,41 +2,21 @@
 //!
 //! Many models have none, so these are functions of their own: the solver's inner loop stays small.
 
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
 use crate::solver::block::{Block, Jacobian, Side, at};
 use crate::solver::{Move, Row};
 use crate::spatial::*;
 use crate::work::Work;
 
-/// A function compiled on its own for each instruction set.
-macro_rules! out_of_line {
-    ($(#[$doc:meta])* $name:ident, $kernel:ident, ($($arg:ident: $type:ty),*) -> $out:ty, $body:block) => {
-        struct $kernel<'a, T: Real> { $($arg: $type),*, _life: std::marker::PhantomData<&'a T> }
-        impl<'a, T: Real> Kernel<T> for $kernel<'a, T> {
-            type Output = $out;
-            #[inline(always)]
-            fn run(self) -> $out {
-                let $kernel { $($arg),*, .. } = self;
-                $body
-            }
-        }
-        $(#[$doc])*
-        pub(crate) fn $name<'a, T: Real>($($arg: $type),*) -> $out {
-            T::enter($kernel { $($arg),*, _life: std::marker::PhantomData })
-        }
-    };
-}
-pub(super) use out_of_line;
-
 /// Whether some block does not fit the tree.
 pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
     work.blocks.iter().any(|b| b.coupled)
 }
 
-out_of_line!(
+kernel_fn! {
     /// Values and zones at the warm start; marks the links that are touched.
-    start, Start, (work: &'a mut Work<T>) -> (), {
+    pub(crate) fn start<'a, T>(work: &'a mut Work<T>) {
         for b in work.blocks.iter_mut() {
             if let Jacobian::Points { sides, .. } = &b.jacobian {
                 for (link, _) in sides.iter().flat_map(|s| &s.links) {
@@ -51,11 +31,11 @@ out_of_line!(
             b.activate(T::not(T::none()));
         }
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// The blocks' share of the system: everything if they fit the tree, only constant forces if they are coupled.
-    assemble, Assemble, (sim: &'a Sim<T>, work: &'a mut Work<T>) -> (), {
+    pub(crate) fn assemble<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
         for b in work.blocks.iter() {
             match &b.jacobian {
                 Jacobian::Joints(terms) => {
@@ -74,7 +54,7 @@ out_of_line!(
             }
         }
     }
-);
+}
 
 /// Adds a block's stiffness and right-hand side to the links that carry its second side.
 #[inline(always)]
@@ -113,21 +93,20 @@ fn add_to_links<T: Real>(
     }
 }
 
-out_of_line!(
+kernel_fn! {
     /// Moves to the Newton point; lanes where some block's linear model does not hold there.
-    newton_point, NewtonPoint, (work: &'a mut Work<T>) -> T::Mask, {
+    pub(crate) fn newton_point<'a, T>(work: &'a mut Work<T>) -> T::Mask {
         let mut changed = T::none();
         for b in work.blocks.iter_mut() {
             changed = T::or(changed, b.newton_point(&work.link_acc, &work.next));
         }
         changed
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Moves the lanes and marks the links whose system changed.
-    advance, Advance,
-    (sim: &'a Sim<T>, work: &'a mut Work<T>, step: Move<T>) -> (), {
+    pub(crate) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, step: Move<T>) {
         for b in work.blocks.iter_mut() {
             if !T::any(b.advance(&step)) {
                 continue;
@@ -147,11 +126,11 @@ out_of_line!(
             }
         }
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Sums of [`Row::ends`].
-    ends, Ends, (work: &'a Work<T>) -> [T; 3], {
+    pub(crate) fn ends<'a, T>(work: &'a Work<T>) -> [T; 3] {
         let mut sums = [T::zero(); 3];
         for b in work.blocks.iter() {
             let e = b.ends();
@@ -161,11 +140,11 @@ out_of_line!(
         }
         sums
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Sums of [`Row::slope`].
-    slope, Slope, (work: &'a Work<T>, alpha: T) -> [T; 2], {
+    pub(crate) fn slope<'a, T>(work: &'a Work<T>, alpha: T) -> [T; 2] {
         let mut sums = [T::zero(); 2];
         for b in work.blocks.iter() {
             let s = b.slope(alpha);
@@ -174,20 +153,20 @@ out_of_line!(
         }
         sums
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// True forces at the present point.
-    true_forces, TrueForces, (work: &'a mut Work<T>) -> (), {
+    pub(crate) fn true_forces<'a, T>(work: &'a mut Work<T>) {
         for b in work.blocks.iter_mut() {
             b.force = b.true_force(&b.u);
         }
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Adds the refinement's accelerations to the row values of the lanes in `arrived`.
-    add_refinement, AddRefinement, (work: &'a mut Work<T>, arrived: T::Mask) -> (), {
+    pub(crate) fn add_refinement<'a, T>(work: &'a mut Work<T>, arrived: T::Mask) {
         for b in work.blocks.iter_mut() {
             let du = b.of_motion(&work.link_acc, &work.next);
             for k in 0..b.dim {
@@ -195,20 +174,20 @@ out_of_line!(
             }
         }
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Puts the blocks' forces on links and joints.
-    apply_forces, ApplyForces, (work: &'a mut Work<T>) -> (), {
+    pub(crate) fn apply_forces<'a, T>(work: &'a mut Work<T>) {
         for b in work.blocks.iter() {
             b.exert(&mut work.wrench, &mut work.rhs);
         }
     }
-);
+}
 
-out_of_line!(
+kernel_fn! {
     /// Adds the normal forces of contacts with the static world to their geoms.
-    report_forces, ReportForces, (sim: &'a Sim<T>, work: &'a mut Work<T>) -> (), {
+    pub(crate) fn report_forces<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
         for b in work.blocks.iter().filter(|b| !b.coupled) {
             for (pair, lanes) in &b.members {
                 let geom = sim.contacts.pairs[*pair].moving();
@@ -216,4 +195,4 @@ out_of_line!(
             }
         }
     }
-);
+}

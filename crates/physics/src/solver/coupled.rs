@@ -17,10 +17,9 @@
 //! (`docs/physics.md` has the numbers).
 
 use crate::articulated::reduce_free_root;
-use crate::lanes::{Kernel, Real};
+use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
 use crate::solver::block::{Block, Jacobian, at};
-use crate::solver::blocks::out_of_line;
 use crate::space::{Full, Planar, Space};
 use crate::work::Work;
 
@@ -58,16 +57,16 @@ impl<T: Real> Coupling<T> {
     }
 }
 
-out_of_line!(
+kernel_fn! {
     /// Computes the columns of all coupled blocks (`fresh`: the factors of the tree changed) and factorizes.
-    factorize, Factorize, (sim: &'a Sim<T>, work: &'a mut Work<T>, fresh: bool) -> (), {
+    pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, fresh: bool) {
         if sim.planar {
             factorize_in::<T, Planar>(sim, work, fresh);
         } else {
             factorize_in::<T, Full>(sim, work, fresh);
         }
     }
-);
+}
 
 #[inline(always)]
 fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool) {
@@ -125,17 +124,17 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
     work.coupling = c;
 }
 
-out_of_line!(
-        /// Corrects `drive` for the coupled blocks; `with_offset` at a Newton point, without for a residual.
-        correct, Correct, (sim: &'a Sim<T>, work: &'a mut Work<T>, with_offset: bool) -> (), {
+kernel_fn! {
+    /// Corrects `drive` for the coupled blocks; `with_offset` at a Newton point, without for a residual.
+    pub(crate) fn correct<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, with_offset: bool) {
         let nv = sim.model.nv;
-        let mut c = std::mem::replace(&mut work.coupling, Coupling::new(0, 0));
+        let Work { coupling: c, drive, pivot, .. } = work;
         let n = c.rows;
         for i in 0..n {
             let column = &c.scaled[i * nv..(i + 1) * nv];
             let mut sum = if with_offset { c.offset[i] } else { T::zero() };
             for d in 0..nv {
-                sum = column[d].mul_add(work.drive[d], sum);
+                sum = column[d].mul_add(drive[d], sum);
             }
             for k in 0..i {
                 sum = c.factor[at(i, k)].neg_mul_add(c.y[k], sum);
@@ -152,12 +151,11 @@ out_of_line!(
         for i in 0..n {
             let column = &c.scaled[i * nv..(i + 1) * nv];
             for d in 0..nv {
-                work.drive[d] = (column[d] * work.pivot[d]).neg_mul_add(c.y[i], work.drive[d]);
+                drive[d] = (column[d] * pivot[d]).neg_mul_add(c.y[i], drive[d]);
             }
         }
-        work.coupling = c;
     }
-);
+}
 
 /// Marks the links whose joints a block can move, up to the roots.
 fn mark_path<T: Real>(sim: &Sim<T>, block: &Block<T>, on_path: &mut [bool]) {
@@ -228,15 +226,8 @@ fn inward<T: Real, S: Space>(
         let mut f = work.link_force[l];
         let dofs = link.dofs.clone();
         if link.free_block {
-            let (d, r) = (dofs.start, &work.axis);
-            let mut y = [z; 6];
-            for i in 0..3 {
-                let t = r[d + 3][i].mul_add(rhs[d + 3], r[d + 4][i].mul_add(rhs[d + 4], r[d + 5][i] * rhs[d + 5]));
-                y[i] = t - f[i];
-                y[3 + i] = rhs[d + i] - f[3 + i];
-            }
-            reduce_free_root(&work.root_factor[link.tree], &mut y);
-            out[d..d + 6].copy_from_slice(&y);
+            let reduced = reduce_free_root(dofs.start, &work.root_factor[link.tree], &work.axis, rhs, &f);
+            out[dofs].copy_from_slice(&reduced);
             continue;
         }
         for d in dofs.rev() {

@@ -20,6 +20,7 @@
 
 pub(crate) mod block;
 mod blocks;
+mod cone;
 pub(crate) mod coupled;
 pub(crate) mod floor;
 pub(crate) mod joint;

@@ -1,0 +1,232 @@
+//! Contacts of pairs of geoms.
+//!
+//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::narrow`].
+
+use super::pairs::{Cull, PairSpec, Test};
+use super::slots::{Place, Slots, write_contact};
+use crate::lanes::Real;
+use crate::narrow::{self, Block, Capsule, Cylinder, Plane, Sphere, Touch, Touches};
+use crate::sim::{Mount, Sim};
+use crate::spatial::*;
+use crate::work::{Group, Work};
+
+/// A pair that comes near in some lanes.
+struct Meeting<T: Real> {
+    place: Place,
+    /// Centers of the geoms, relative to the place's reference point.
+    centers: [V3<T>; 2],
+    near: T::Mask,
+}
+
+/// Finds the contacts of all pairs and writes their blocks.
+#[inline(always)]
+pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    work.touching_bodies.fill(T::none());
+    for &g in &sim.contacts.paired {
+        let mount = &sim.geoms[g];
+        work.centers[g] = mount.link.map_or(splat3(&mount.pos), |l| work.arm(mount, l));
+    }
+    let mut slots = Slots::new();
+    for (index, pair) in sim.contacts.pairs.iter().enumerate() {
+        slots.turn_to(pair.class(), work.blocks.len());
+        // everything relative to the reference point of one of the moving geoms' trees
+        let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
+        let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
+        let near = near(sim, group, work, pair, &centers);
+        if T::any(near) {
+            let meeting = Meeting { place: Place { index, base }, centers, near };
+            touch_pair(sim, group, work, &mut slots, &meeting);
+        }
+    }
+}
+
+/// Lanes in which a pair may touch.
+#[inline(always)]
+fn near<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    work: &Work<T>,
+    pair: &PairSpec<T::Scalar>,
+    centers: &[V3<T>; 2],
+) -> T::Mask {
+    let reach = T::splat(pair.reach);
+    let mut point = centers[0];
+    let first = &sim.geoms[pair.geoms[0]];
+    match pair.cull {
+        Cull::Balls => narrow::near(&point, &centers[1], reach),
+        Cull::Plane => narrow::plane::near_plane(&Plane { point, normal: axis(work, first) }, &centers[1], reach),
+        Cull::Field => {
+            let normal = axis(work, first);
+            let top = group.ground_top(sim, pair.field);
+            for i in 0..3 {
+                point[i] = normal[i].mul_add(top, point[i]);
+            }
+            narrow::plane::near_plane(&Plane { point, normal }, &centers[1], reach)
+        }
+    }
+}
+
+/// Center of a geom relative to the reference point of tree `base`.
+#[inline(always)]
+fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3<T> {
+    let own = &work.centers[geom];
+    match sim.geoms[geom].link.map(|l| sim.links[l].tree) {
+        None => sub3(own, &work.reference[base]),
+        Some(t) if t == base => *own,
+        Some(t) => add3(own, &sub3(&work.reference[t], &work.reference[base])),
+    }
+}
+
+/// Third axis of a geom: of a plane its normal, of a capsule its direction.
+#[inline(always)]
+fn axis<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>) -> V3<T> {
+    match m.link {
+        None => splat3(&m.rot[2]),
+        Some(l) => rotate(&work.rot[l], &splat3(&m.rot[2])),
+    }
+}
+
+/// Narrow phase of one pair.
+#[inline(always)]
+fn touch_pair<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
+    let pair = &sim.contacts.pairs[meeting.place.index];
+    let [ma, mb] = pair.geoms.map(|g| &sim.geoms[g]);
+    let margin = T::splat(pair.margin);
+    let [a, b] = meeting.centers;
+    let [size_a, size_b]: [V3<T>; 2] = [splat3(&pair.sizes[0]), splat3(&pair.sizes[1])];
+    let first_sphere = Sphere { center: a, radius: size_a[0] };
+    let sphere = Sphere { center: b, radius: size_b[0] };
+    let found: &[Touch<T>] = match pair.test {
+        Test::PlaneSphere => &[narrow::plane::plane_sphere(&plane(work, ma, a), &sphere, margin)],
+        Test::PlaneCapsule => &narrow::plane::plane_capsule(&plane(work, ma, a), &capsule(work, mb, b, size_b), margin),
+        Test::PlaneBox => &narrow::plane::plane_box(&plane(work, ma, a), &block(work, mb, b, size_b), margin),
+        Test::PlaneCylinder => {
+            &narrow::plane::plane_cylinder(&plane(work, ma, a), &cylinder(work, mb, b, size_b), margin)
+        }
+        Test::PlaneEllipsoid => {
+            &[narrow::plane::plane_ellipsoid(&plane(work, ma, a), &block(work, mb, b, size_b), margin)]
+        }
+        Test::SphereSphere => &[narrow::round::sphere_sphere(&first_sphere, &sphere, margin)],
+        Test::SphereCapsule => &[narrow::round::sphere_capsule(&first_sphere, &capsule(work, mb, b, size_b), margin)],
+        Test::SphereBox => &[narrow::round::sphere_box(&first_sphere, &block(work, mb, b, size_b), margin)],
+        Test::SphereCylinder => {
+            &[narrow::round::sphere_cylinder(&first_sphere, &cylinder(work, mb, b, size_b), margin)]
+        }
+        Test::CapsuleCapsule => {
+            &narrow::round::capsule_capsule(&capsule(work, ma, a, size_a), &capsule(work, mb, b, size_b), margin)
+        }
+        Test::CapsuleBox | Test::BoxBox | Test::FieldCapsule | Test::FieldBox => {
+            return one_by_one(sim, group, work, slots, meeting);
+        }
+    };
+    add_all(sim, group, work, slots, meeting.place, found);
+}
+
+#[inline(always)]
+fn plane<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, point: V3<T>) -> Plane<T> {
+    Plane { point, normal: axis(work, m) }
+}
+
+#[inline(always)]
+fn capsule<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: V3<T>) -> Capsule<T> {
+    Capsule { center, axis: axis(work, m), radius: size[0], half: size[1] }
+}
+
+#[inline(always)]
+fn cylinder<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: V3<T>) -> Cylinder<T> {
+    Cylinder { center, axes: work.axes(m), radius: size[0], half: size[1] }
+}
+
+#[inline(always)]
+fn block<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3<T>) -> Block<T> {
+    Block { center, axes: work.axes(m), half }
+}
+
+/// Writes the contacts of a pair that some lanes have.
+#[inline(always)]
+fn add_all<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    slots: &mut Slots<T>,
+    place: Place,
+    found: &[Touch<T>],
+) {
+    for touch in found {
+        if T::any(touch.on) {
+            write_contact(sim, group, work, slots, place, touch);
+        }
+    }
+}
+
+/// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
+#[inline(always)]
+fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
+    let pair = &sim.contacts.pairs[meeting.place.index];
+    let axes = pair.geoms.map(|g| work.axes(&sim.geoms[g]));
+    let mut found = std::mem::take(&mut work.touches);
+    let mut own = std::mem::take(&mut work.lane_touches);
+    found.clear();
+    let bits = T::bits(meeting.near);
+    for lane in (0..T::LANES).filter(|l| bits >> l & 1 == 1) {
+        let [a, b] = [pick(&meeting.centers[0], lane), pick(&meeting.centers[1], lane)];
+        let [turned_a, turned_b] = [pick_axes(&axes[0], lane), pick_axes(&axes[1], lane)];
+        let [size_a, size_b] = pair.sizes;
+        let block = Block { center: b, axes: turned_b, half: size_b };
+        own.clear();
+        match pair.test {
+            Test::CapsuleBox => {
+                let capsule = Capsule { center: a, axis: turned_a[2], radius: size_a[0], half: size_a[1] };
+                narrow::capsule_box::capsule_box(&capsule, &block, pair.margin, &mut own);
+            }
+            Test::BoxBox => {
+                let first = Block { center: a, axes: turned_a, half: size_a };
+                narrow::box_box::box_box(&first, &block, pair.margin, &mut own);
+            }
+            test => {
+                let field = group.ground(sim, lane, pair.field);
+                let terrain = narrow::height::Terrain { field, center: a, axes: turned_a };
+                if test == Test::FieldBox {
+                    narrow::height::field_box(&terrain, &block, pair.margin, &mut own);
+                } else {
+                    let capsule = Capsule { center: b, axis: turned_b[2], radius: size_b[0], half: size_b[1] };
+                    narrow::height::field_capsule(&terrain, &capsule, pair.margin, &mut own);
+                }
+            }
+        }
+        gather(&own, lane, &mut found);
+    }
+    add_all(sim, group, work, slots, meeting.place, &found);
+    work.touches = found;
+    work.lane_touches = own;
+}
+
+/// Puts one lane's contacts into that lane of `found`.
+#[inline(always)]
+fn gather<T: Real>(touches: &Touches<T::Scalar>, lane: usize, found: &mut Vec<Touch<T>>) {
+    for (k, t) in touches.as_slice().iter().enumerate() {
+        if k == found.len() {
+            found.push(Touch::none());
+        }
+        let touch = &mut found[k];
+        touch.on = T::or(touch.on, T::from_bits(1 << lane));
+        touch.dist.set(lane, t.dist);
+        for i in 0..3 {
+            touch.pos[i].set(lane, t.pos[i]);
+            touch.normal[i].set(lane, t.normal[i]);
+            touch.tangent[i].set(lane, t.tangent[i]);
+        }
+    }
+}
+
+/// One lane's vector.
+#[inline(always)]
+fn pick<T: Real>(v: &V3<T>, lane: usize) -> V3<T::Scalar> {
+    [v[0].get(lane), v[1].get(lane), v[2].get(lane)]
+}
+
+/// One lane's axes.
+#[inline(always)]
+fn pick_axes<T: Real>(axes: &Rot<T>, lane: usize) -> Rot<T::Scalar> {
+    [pick(&axes[0], lane), pick(&axes[1], lane), pick(&axes[2], lane)]
+}
