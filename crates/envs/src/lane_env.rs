@@ -31,6 +31,9 @@ pub struct AgentState {
 pub trait AgentShard: Shard {
     /// State of an agent, numbered within this shard.
     fn state(&self, agent: usize) -> AgentState;
+    /// Position of an agent's root along x, m: what [`BlockStep::forward`] is a difference of. `None` if the root cannot
+    /// move along x.
+    fn x_position(&self, agent: usize) -> Option<f64>;
     /// Puts an agent into a state, as if an episode had begun there.
     ///
     /// # Errors
@@ -38,6 +41,13 @@ pub trait AgentShard: Shard {
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
     /// Starts all random streams anew from a seed; the next reset begins every agent's first episode under it.
     fn reseed(&mut self, seed: u64);
+    /// The same for one agent, numbered within this shard, which gets the streams of agent `number`.
+    fn reseed_agent(&mut self, agent: usize, seed: u64, number: u64);
+    /// Writes the observations of the agents in `mask` as if their episodes began in their present states into `obs`
+    /// (`[obs][16]`; lanes outside the mask are left alone).
+    fn observe(&mut self, block: usize, mask: u16, obs: &mut [f32]);
+    /// Sets the number of decisions after which an episode is truncated, in place of the task's own.
+    fn limit_episodes(&mut self, max_episode_steps: usize);
 }
 
 /// A [`ShardFactory`] that can also make [`AgentShard`]s.
@@ -142,6 +152,8 @@ struct LaneShard<T: Real, A> {
     task: Arc<Task<T, A>>,
     work: Work<T>,
     blocks: Vec<Block<T>>,
+    /// Decisions after which an episode is truncated.
+    max_episode_steps: u64,
     // scratch of resets
     qpos: Vec<f64>,
     qvel: Vec<f64>,
@@ -155,7 +167,8 @@ impl<T: Real, A: Agent> LaneShard<T, A> {
             .map(|b| Block { groups: groups(&task), lives: std::array::from_fn(|i| life(b * BLOCK + i)) })
             .collect();
         let work = Work::new(&task.sim);
-        LaneShard { task, work, blocks, qpos: Vec::new(), qvel: Vec::new() }
+        let max_episode_steps = task.spec.max_episode_steps as u64;
+        LaneShard { task, work, blocks, max_episode_steps, qpos: Vec::new(), qvel: Vec::new() }
     }
 
     /// Begins an episode of one agent: the spawn pose with noise of the agent's own.
@@ -201,14 +214,7 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
         for agent in (0..BLOCK).filter(|i| mask >> i & 1 == 1) {
             self.begin_episode(block, agent);
         }
-        let task = &*self.task;
-        for (i, group) in self.blocks[block].groups.iter_mut().enumerate() {
-            let first = i * T::LANES;
-            let lanes = lanes_of::<T>(mask, first);
-            if lanes != 0 {
-                group.observe_start(task, &mut self.work, lanes, first, obs);
-            }
-        }
+        self.observe(block, mask, obs);
     }
 
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep) {
@@ -231,7 +237,7 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
         }
         for (i, life) in lives.iter_mut().enumerate() {
             life.steps += 1;
-            if life.steps >= task.spec.max_episode_steps as u64 {
+            if life.steps >= self.max_episode_steps {
                 out.truncated |= 1 << i;
             }
         }
@@ -277,6 +283,12 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
         AgentState { qpos, qvel }
     }
 
+    fn x_position(&self, agent: usize) -> Option<f64> {
+        let along_x = &self.task.anatomy.along_x;
+        let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        (!along_x.is_empty()).then(|| group.x_position(along_x, agent % T::LANES))
+    }
+
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
         let model = &self.task.blueprint.model;
         for (what, given, expected) in [("qpos", &state.qpos, model.nq), ("qvel", &state.qvel, model.nv)] {
@@ -297,5 +309,24 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
         for life in self.blocks.iter_mut().flat_map(|b| &mut b.lives) {
             (life.seed, life.episode, life.steps) = (seed, 0, 0);
         }
+    }
+
+    fn reseed_agent(&mut self, agent: usize, seed: u64, number: u64) {
+        self.blocks[agent / BLOCK].lives[agent % BLOCK] = Life { seed, agent: number, episode: 0, steps: 0 };
+    }
+
+    fn observe(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
+        let task = &*self.task;
+        for (i, group) in self.blocks[block].groups.iter_mut().enumerate() {
+            let first = i * T::LANES;
+            let lanes = lanes_of::<T>(mask, first);
+            if lanes != 0 {
+                group.observe_start(task, &mut self.work, lanes, first, obs);
+            }
+        }
+    }
+
+    fn limit_episodes(&mut self, max_episode_steps: usize) {
+        self.max_episode_steps = max_episode_steps as u64;
     }
 }

@@ -61,6 +61,11 @@ impl<T: Real> LaneGroup<T> {
         (read(&self.physics.qpos), read(&self.physics.qvel))
     }
 
+    /// Position of an agent along the axes that lead to +x.
+    pub fn x_position(&self, along_x: &[(usize, T::Scalar)], lane: usize) -> f64 {
+        along_x.iter().map(|(i, axis)| T::widen(self.physics.qpos[*i].get(lane)) * T::widen(*axis)).sum()
+    }
+
     /// Everything that the future depends on. Controls do not belong to it: every decision sets them.
     pub fn future(&self) -> impl Iterator<Item = &T> {
         let p = &self.physics;

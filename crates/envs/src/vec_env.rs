@@ -18,6 +18,9 @@ pub enum Autoreset {
     /// It starts a new episode within the same step: `obs` is the first of the new, `final_obs` the last of the old.
     #[default]
     SameStep,
+    /// It starts a new episode at the next step, which ignores its action and gives the first observation, reward 0 and
+    /// neither end.
+    NextStep,
     /// Nothing: the caller resets it with [`VecEnv::reset_agents`].
     Disabled,
 }
@@ -35,11 +38,20 @@ pub struct VecEnvOptions {
     pub isa: Option<Isa>,
     /// What happens at the end of an episode.
     pub autoreset: Autoreset,
+    /// Decisions after which an episode is truncated; `None` means the task's own number.
+    pub max_episode_steps: Option<usize>,
 }
 
 impl Default for VecEnvOptions {
     fn default() -> Self {
-        VecEnvOptions { agents: 1, seed: 0, threads: 1, isa: None, autoreset: Autoreset::SameStep }
+        VecEnvOptions {
+            agents: 1,
+            seed: 0,
+            threads: 1,
+            isa: None,
+            autoreset: Autoreset::SameStep,
+            max_episode_steps: None,
+        }
     }
 }
 
@@ -119,9 +131,11 @@ struct Worker {
     action: Vec<f32>,
     obs: Vec<f32>,
     out: BlockStep,
+    /// A mask per block: agents that start a new episode at the next step instead of acting.
+    pending: Vec<u16>,
 }
 
-const MAGIC: &[u8; 8] = b"MRTHNv01";
+const MAGIC: &[u8; 8] = b"MRTHNv02";
 
 impl VecEnv {
     /// Makes an environment of an agent of the global registry. Agents must be [reset](VecEnv::reset) before their
@@ -142,19 +156,29 @@ impl VecEnv {
         if options.agents == 0 {
             return wrong("agents", "0".into(), "at least 1");
         }
+        if options.max_episode_steps == Some(0) {
+            return wrong("max_episode_steps", "0".into(), "at least 1");
+        }
         let factory = registry.shards(agent, options.isa.unwrap_or_else(Isa::best))?;
-        let spec = factory.spec().clone();
+        let mut spec = factory.spec().clone();
+        spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);
         let blocks = options.agents.div_ceil(BLOCK);
         let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
         let threads = if options.threads == 0 { cores() } else { options.threads }.min(blocks);
         let share = blocks.div_ceil(threads);
         let workers: Vec<_> = (0..blocks)
             .step_by(share)
-            .map(|first| Worker {
-                shard: factory.agent_shard(first, share.min(blocks - first), options.seed),
-                action: vec![0.0; spec.act * BLOCK],
-                obs: vec![0.0; spec.obs * BLOCK],
-                out: BlockStep { terms: vec![0.0; spec.reward_terms.len() * BLOCK], ..Default::default() },
+            .map(|first| {
+                let own = share.min(blocks - first);
+                let mut shard = factory.agent_shard(first, own, options.seed);
+                shard.limit_episodes(spec.max_episode_steps);
+                Worker {
+                    shard,
+                    action: vec![0.0; spec.act * BLOCK],
+                    obs: vec![0.0; spec.obs * BLOCK],
+                    out: BlockStep { terms: vec![0.0; spec.reward_terms.len() * BLOCK], ..Default::default() },
+                    pending: vec![0; own],
+                }
             })
             .collect();
         let pool = if workers.len() > 1 {
@@ -212,7 +236,7 @@ impl VecEnv {
                 worker.shard.reseed(seed);
             }
         }
-        self.reset_where(|_| true, obs);
+        self.each_block(&|_| true, obs, Worker::reset);
         Ok(())
     }
 
@@ -223,7 +247,30 @@ impl VecEnv {
     pub fn reset_agents(&mut self, mask: &[bool], obs: &mut [f32]) -> Result<(), EnvError> {
         self.check("mask [agents]", mask.len(), 1)?;
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
-        self.reset_where(|i| mask[i], obs);
+        self.each_block(&|i| mask[i], obs, Worker::reset);
+        Ok(())
+    }
+
+    /// Starts the random streams of one agent anew, as those of agent `number` of an environment with this seed; its next
+    /// reset begins the first episode under it.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn reseed_agent(&mut self, agent: usize, seed: u64, number: usize) -> Result<(), EnvError> {
+        self.check_agent(agent)?;
+        self.workers[agent / self.stride].shard.reseed_agent(agent % self.stride, seed, number as u64);
+        Ok(())
+    }
+
+    /// Writes the observations of the agents in `mask` at their present states, which begin an episode there; for use
+    /// after [`VecEnv::set_state`]. Other rows are left alone.
+    ///
+    /// # Errors
+    /// If an array's length is wrong.
+    pub fn observe(&mut self, mask: &[bool], obs: &mut [f32]) -> Result<(), EnvError> {
+        self.check("mask [agents]", mask.len(), 1)?;
+        self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
+        self.each_block(&|i| mask[i], obs, Worker::observe);
         Ok(())
     }
 
@@ -285,13 +332,24 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.state(agent % self.stride))
     }
 
+    /// Position of every agent's root along x, m, as the distances `forward` of [`Step`] add up to. `None` if the root
+    /// cannot move along x.
+    pub fn x_positions(&self) -> Option<Vec<f64>> {
+        let agents = |i| (0..self.stride).map(move |k| (i, k));
+        let all = (0..self.workers.len()).flat_map(agents).take(self.agents);
+        all.map(|(i, k)| self.workers[i].shard.x_position(k)).collect()
+    }
+
     /// Puts an agent into a state, as if an episode had begun there.
     ///
     /// # Errors
     /// If there is no such agent, or the state does not fit it.
     pub fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
         self.check_agent(agent)?;
-        self.workers[agent / self.stride].shard.set_state(agent % self.stride, state)
+        let (worker, local) = (&mut self.workers[agent / self.stride], agent % self.stride);
+        worker.shard.set_state(local, state)?;
+        worker.pending[local / BLOCK] &= !(1 << (local % BLOCK));
+        Ok(())
     }
 
     /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
@@ -304,6 +362,7 @@ impl VecEnv {
         for worker in &self.workers {
             for block in 0..worker.shard.blocks() {
                 worker.shard.save(block, &mut bytes);
+                bytes.extend(worker.pending[block].to_le_bytes());
             }
         }
         bytes
@@ -329,10 +388,12 @@ impl VecEnv {
         let mut rest = &bytes[header..];
         for worker in &mut self.workers {
             for block in 0..worker.shard.blocks() {
-                let Some(r) = worker.shard.load(block, rest) else {
+                let after = worker.shard.load(block, rest).and_then(<[u8]>::split_first_chunk);
+                let Some((pending, after)) = after else {
                     return Err(EnvError::Snapshot("it ends too early".into()));
                 };
-                rest = r;
+                worker.pending[block] = u16::from_le_bytes(*pending);
+                rest = after;
             }
         }
         Ok(())
@@ -354,38 +415,46 @@ impl VecEnv {
         Err(EnvError::Option { option: "agent", found: agent.to_string(), expected: "less than the number of agents" })
     }
 
-    fn reset_where(&mut self, chosen: impl Fn(usize) -> bool + Sync, obs: &mut [f32]) {
-        let (rows, n) = (self.spec.obs, self.stride);
+    /// Hands the blocks with chosen agents, and the rows of each, to a function.
+    fn each_block(&mut self, chosen: Chosen, obs: &mut [f32], act: fn(&mut Worker, usize, u16)) {
+        let (columns, n) = (self.spec.obs, self.stride);
         let run = |(i, (worker, obs)): (usize, (&mut Worker, &mut [f32]))| {
-            worker.reset(|agent| chosen(i * n + agent), rows, obs);
+            for (block, rows) in obs.chunks_mut(BLOCK * columns).enumerate() {
+                let first = i * n + block * BLOCK;
+                let mask = (0..rows.len() / columns).fold(0, |mask, k| mask | u16::from(chosen(first + k)) << k);
+                if mask != 0 {
+                    act(worker, block, mask);
+                    to_rows(&worker.obs, columns, mask, rows);
+                }
+            }
         };
         match &self.pool {
             None => run((0, (&mut self.workers[0], obs))),
             Some(pool) => pool.install(|| {
-                self.workers.par_iter_mut().zip(obs.par_chunks_mut(n * rows)).enumerate().for_each(run);
+                self.workers.par_iter_mut().zip(obs.par_chunks_mut(n * columns)).enumerate().for_each(run);
             }),
         }
     }
 }
 
+/// Which agents of an environment are meant.
+type Chosen<'a> = &'a (dyn Fn(usize) -> bool + Sync);
+
 impl Worker {
-    /// Resets the chosen agents, numbered within this worker; `obs` has a row for each of its real agents.
-    fn reset(&mut self, chosen: impl Fn(usize) -> bool, columns: usize, obs: &mut [f32]) {
-        for (block, rows) in obs.chunks_mut(BLOCK * columns).enumerate() {
-            let mut mask = 0;
-            for i in 0..rows.len() / columns {
-                mask |= u16::from(chosen(block * BLOCK + i)) << i;
-            }
-            if mask != 0 {
-                self.shard.reset(block, mask, &mut self.obs);
-                to_rows(&self.obs, columns, mask, rows);
-            }
-        }
+    /// Starts new episodes in a block; their observations are left in `self.obs`.
+    fn reset(&mut self, block: usize, mask: u16) {
+        self.shard.reset(block, mask, &mut self.obs);
+        self.pending[block] &= !mask;
+    }
+
+    /// Leaves the observations of a block in `self.obs`.
+    fn observe(&mut self, block: usize, mask: u16) {
+        self.shard.observe(block, mask, &mut self.obs);
     }
 
     /// Steps all agents of this worker.
     fn step(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut) {
-        let Worker { shard, action, obs, out: o } = self;
+        let Worker { shard, action, obs, out: o, pending } = self;
         let spec = shard.spec();
         let (n_obs, n_act, n_terms) = (spec.obs, spec.act, spec.reward_terms.len());
         for block in 0..shard.blocks() {
@@ -401,6 +470,11 @@ impl Worker {
                 }
             }
             shard.step(block, action, obs, o);
+            let due = std::mem::take(&mut pending[block]);
+            if due != 0 {
+                shard.reset(block, due, obs);
+                clear(o, due);
+            }
 
             out.reward[agents.clone()].copy_from_slice(&o.reward[..count]);
             out.forward[agents.clone()].copy_from_slice(&o.forward[..count]);
@@ -412,16 +486,29 @@ impl Worker {
             }
             let rows = first * n_obs..(first + count) * n_obs;
             to_rows(obs, n_obs, real, &mut out.final_obs[rows.clone()]);
-            if autoreset == Autoreset::SameStep {
-                // lanes without an agent live on unseen
-                let ended = o.terminated | o.truncated;
-                if ended != 0 {
-                    shard.reset(block, ended, obs);
-                }
+            // lanes without an agent live on unseen
+            let ended = o.terminated | o.truncated;
+            match autoreset {
+                Autoreset::SameStep if ended != 0 => shard.reset(block, ended, obs),
+                Autoreset::NextStep => pending[block] = ended,
+                Autoreset::SameStep | Autoreset::Disabled => {}
             }
             to_rows(obs, n_obs, real, &mut out.obs[rows]);
         }
     }
+}
+
+/// Takes back what a step said of the agents in `mask`.
+fn clear(out: &mut BlockStep, mask: u16) {
+    let terms = out.terms.chunks_exact_mut(BLOCK);
+    for row in terms.chain([&mut out.reward[..], &mut out.forward[..]]) {
+        for lane in (0..BLOCK).filter(|i| mask >> i & 1 == 1) {
+            row[lane] = 0.0;
+        }
+    }
+    out.terminated &= !mask;
+    out.truncated &= !mask;
+    out.diverged &= !mask;
 }
 
 /// Copies the agents in `mask` from a block's `[column][16]` into rows.

@@ -64,7 +64,7 @@ pub fn action(agent: usize, decision: usize, scale: f32, row: &mut [f32]) {
 
 /// An environment of its own options.
 pub fn make(id: &str, agents: usize, threads: usize, isa: Option<Isa>, autoreset: Autoreset) -> VecEnv {
-    let options = VecEnvOptions { agents, seed: 11, threads, isa, autoreset };
+    let options = VecEnvOptions { agents, seed: 11, threads, isa, autoreset, ..Default::default() };
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
