@@ -1,6 +1,10 @@
 //! Numbers and commands as people read them.
 
+use std::ffi::OsString;
 use std::path::Path;
+use std::sync::OnceLock;
+
+static PROGRAM: OnceLock<String> = OnceLock::new();
 
 /// `12345678` as `12,345,678`.
 pub fn thousands(n: u64) -> String {
@@ -57,11 +61,16 @@ pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
 }
 
+/// Notes the name that the program was called by.
+pub fn set_program(called: Option<&OsString>) {
+    let called = called.map(|name| name.to_string_lossy()).unwrap_or_default();
+    // a bare name was found by the shell and will be found again
+    PROGRAM.get_or_init(|| if called.is_empty() { "marathon".into() } else { word(&called) });
+}
+
 /// The program as the user called it, so that a printed command can be pasted into the same shell.
 pub fn program() -> String {
-    let called = std::env::args().next().unwrap_or_default();
-    // a bare name was found by the shell and will be found again
-    if called.is_empty() { "marathon".into() } else { word(&called) }
+    PROGRAM.get().cloned().unwrap_or_else(|| "marathon".into())
 }
 
 /// A path as a word of a shell command.

@@ -1,0 +1,57 @@
+//! The `marathon` command: trains, evaluates, benchmarks and shows agents.
+//!
+//! What a person reads goes to stdout, progress and errors to stderr. With `--json`, stdout carries exactly one JSON
+//! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C.
+
+mod args;
+mod commands;
+mod config;
+mod console;
+mod error;
+mod folder;
+mod interrupt;
+mod report;
+mod text;
+
+use args::{Args, Command};
+use clap::Parser;
+use error::CliError;
+use std::ffi::OsString;
+
+/// Runs the command with the words of a command line, the first being the program's own name, and returns its exit code.
+///
+/// It is a function so that other programs can bring the command along, as the Python package does. It belongs at the
+/// end of a process: commands that take long replace the handler of Ctrl-C.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().collect();
+    text::set_program(words.first());
+    let args = match Args::try_parse_from(words) {
+        Ok(args) => args,
+        // help goes to stdout with code 0, a wrong command line to stderr with code 2
+        Err(answer) => {
+            let _ = answer.print();
+            return answer.exit_code() as u8;
+        }
+    };
+    match dispatch(&args) {
+        Ok(()) => 0,
+        Err(error) => {
+            console::note(format!("error: {error}"));
+            // an interrupted run has printed its summary already
+            if args.json && !matches!(error, CliError::Interrupted(_)) {
+                console::print_json(&serde_json::json!({ "error": error.to_string() }));
+            }
+            error.exit_code()
+        }
+    }
+}
+
+fn dispatch(args: &Args) -> Result<(), CliError> {
+    match &args.command {
+        Command::Train(train) => commands::train::run(train, args.json),
+        Command::Eval(eval) => commands::eval::run(eval, args.json),
+        Command::Render(render) => commands::render::run(render, args.json),
+        Command::List => commands::list::run(args.json),
+        Command::Bench(bench) => commands::bench::run(bench, args.json),
+    }
+}
