@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
 # Runs every test. Sets up what they need by itself: a Python environment in .venv with the oracles (MuJoCo, Gymnasium,
-# dm_control, PyTorch). Needs a Rust toolchain, Python 3.11 with venv, and a C compiler.
+# dm_control, PyTorch) and what tests the Python package. Needs a Rust toolchain, Python 3.11 with venv, and a C compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  .venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement tests/oracle/requirements.txt
+  for requirements in tests/oracle python/tests; do
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement $requirements/requirements.txt
+  done
   .venv/bin/python tests/oracle/install_torch.py
   .venv/bin/python tests/oracle/foreign_models.py --install
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
@@ -16,3 +18,4 @@ cargo fmt --all --check
 cargo clippy --release --workspace --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 cargo test --release --workspace
+python/tests/run.sh

@@ -1,0 +1,88 @@
+//! The NumPy arrays that a step writes to.
+
+use crate::error;
+use marathon_envs::{Spec, StepMut};
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray, ndarray::Dimension};
+use pyo3::prelude::*;
+
+/// Results of a step, the fields of [`marathon_envs::Step`].
+pub struct Arrays {
+    pub obs: Py<PyArray2<f32>>,
+    pub final_obs: Py<PyArray2<f32>>,
+    pub reward: Py<PyArray1<f32>>,
+    pub terms: Py<PyArray2<f32>>,
+    pub forward: Py<PyArray1<f32>>,
+    pub terminated: Py<PyArray1<bool>>,
+    pub truncated: Py<PyArray1<bool>>,
+    pub diverged: Py<PyArray1<bool>>,
+}
+
+impl Arrays {
+    /// For a number of agents.
+    pub fn new(py: Python<'_>, agents: usize, spec: &Spec) -> Self {
+        Arrays {
+            obs: PyArray2::zeros(py, [agents, spec.obs], false).unbind(),
+            final_obs: PyArray2::zeros(py, [agents, spec.obs], false).unbind(),
+            reward: list(py, agents),
+            terms: PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind(),
+            forward: list(py, agents),
+            terminated: list(py, agents),
+            truncated: list(py, agents),
+            diverged: list(py, agents),
+        }
+    }
+
+    /// Puts new arrays in the place of all but `final_obs`, so that those of the last step can be kept.
+    pub fn renew(&mut self, py: Python<'_>, agents: usize, spec: &Spec) {
+        self.obs = PyArray2::zeros(py, [agents, spec.obs], false).unbind();
+        self.terms = PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind();
+        self.reward = list(py, agents);
+        self.forward = list(py, agents);
+        self.terminated = list(py, agents);
+        self.truncated = list(py, agents);
+        self.diverged = list(py, agents);
+    }
+
+    /// Lets `f` write to all arrays without the GIL.
+    pub fn write<R: Send>(&self, py: Python<'_>, f: impl FnOnce(&mut StepMut<'_>) -> R + Send) -> PyResult<R> {
+        let mut obs = writer(py, "obs", &self.obs)?;
+        let mut final_obs = writer(py, "final_obs", &self.final_obs)?;
+        let mut reward = writer(py, "reward", &self.reward)?;
+        let mut terms = writer(py, "reward_terms", &self.terms)?;
+        let mut forward = writer(py, "forward", &self.forward)?;
+        let mut terminated = writer(py, "terminated", &self.terminated)?;
+        let mut truncated = writer(py, "truncated", &self.truncated)?;
+        let mut diverged = writer(py, "diverged", &self.diverged)?;
+        let mut out = StepMut {
+            obs: obs.as_slice_mut()?,
+            final_obs: final_obs.as_slice_mut()?,
+            reward: reward.as_slice_mut()?,
+            terms: terms.as_slice_mut()?,
+            forward: forward.as_slice_mut()?,
+            terminated: terminated.as_slice_mut()?,
+            truncated: truncated.as_slice_mut()?,
+            diverged: diverged.as_slice_mut()?,
+        };
+        Ok(py.detach(|| f(&mut out)))
+    }
+
+    /// Lets `f` write to the observations without the GIL.
+    pub fn write_obs<R: Send>(&self, py: Python<'_>, f: impl FnOnce(&mut [f32]) -> R + Send) -> PyResult<R> {
+        let mut obs = writer(py, "obs", &self.obs)?;
+        let obs = obs.as_slice_mut()?;
+        Ok(py.detach(|| f(obs)))
+    }
+}
+
+fn list<T: Element>(py: Python<'_>, n: usize) -> Py<PyArray1<T>> {
+    PyArray1::zeros(py, n, false).unbind()
+}
+
+/// Exclusive access to an array. It fails if the array is being written to by another thread, or was made read-only.
+fn writer<'py, T: Element, D: Dimension>(
+    py: Python<'py>,
+    name: &str,
+    array: &Py<PyArray<T, D>>,
+) -> PyResult<PyReadwriteArray<'py, T, D>> {
+    array.bind(py).try_readwrite().map_err(|e| error::array(name, e))
+}

@@ -1,0 +1,33 @@
+//! The native module `marathon_envs._native` of the Python package: environments stepped without the GIL on NumPy arrays
+//! that are not copied, and the `marathon` command.
+//!
+//! What Python programmers see is documented in `python/marathon_envs`, this module's classes in its `_native.pyi` too.
+//! Nothing here knows of Gymnasium or another framework.
+
+mod arrays;
+mod error;
+mod spec;
+mod vec_env;
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+
+/// Native part of marathon_envs.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::{main, spec::Spec, spec::ids, spec::spec, vec_env::VecEnv};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
+
+/// Runs the `marathon` command with the words of a command line, the first being the program's name; returns its exit
+/// code. It belongs at the end of a process: some commands replace the handler of Ctrl-C.
+#[pyfunction]
+fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| marathon_cli::main(words))
+}

@@ -1,0 +1,320 @@
+//! Many agents of one kind as a Python object.
+
+use crate::arrays::Arrays;
+use crate::error;
+use crate::spec::Spec;
+use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
+use marathon_physics::lanes::Isa;
+use numpy::{
+    AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyReadonlyArray2,
+    PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::borrow::Cow;
+use std::sync::Mutex;
+
+/// Names of the autoreset modes; those of Gymnasium's `AutoresetMode` work too.
+const AUTORESET: [(&str, Autoreset); 3] =
+    [("next_step", Autoreset::NextStep), ("same_step", Autoreset::SameStep), ("disabled", Autoreset::Disabled)];
+
+type State<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+type StepResult = (Py<PyArray2<f32>>, Py<PyArray1<f32>>, Py<PyArray1<bool>>, Py<PyArray1<bool>>);
+
+/// Agents of one kind that are stepped together on the threads of a pool, without the GIL.
+///
+/// Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
+/// overwrites them at the next step; with `copy`, every step returns new ones.
+#[pyclass(module = "marathon_envs")]
+pub struct VecEnv {
+    /// Behind a lock because a Python object may be dropped on any thread; never contended.
+    env: Mutex<marathon_envs::VecEnv>,
+    arrays: Arrays,
+    spec: Py<Spec>,
+    num_envs: usize,
+    autoreset: Autoreset,
+    copy: bool,
+    ready: bool,
+}
+
+/// Seeds of a reset.
+#[derive(FromPyObject)]
+enum Seeds {
+    #[pyo3(transparent)]
+    One(u64),
+    #[pyo3(transparent)]
+    Each(Vec<Option<u64>>),
+}
+
+#[pymethods]
+impl VecEnv {
+    #[new]
+    #[pyo3(signature = (
+        id, num_envs = 1, *, seed = 0, threads = 0, isa = None, autoreset = "same_step", max_episode_steps = None,
+        copy = false
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
+    fn new(
+        py: Python<'_>,
+        id: &str,
+        num_envs: usize,
+        seed: u64,
+        threads: usize,
+        isa: Option<&str>,
+        autoreset: &str,
+        max_episode_steps: Option<usize>,
+        copy: bool,
+    ) -> PyResult<Self> {
+        let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
+        let autoreset = parse_autoreset(autoreset)?;
+        let options = VecEnvOptions { agents: num_envs, seed, threads, isa, autoreset, max_episode_steps };
+        let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
+        let arrays = Arrays::new(py, num_envs, env.spec());
+        let spec = Py::new(py, Spec::of(env.spec())?)?;
+        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false })
+    }
+
+    /// Facts of the task, with this environment's `max_episode_steps`.
+    #[getter]
+    fn spec(&self, py: Python<'_>) -> Py<Spec> {
+        self.spec.clone_ref(py)
+    }
+
+    /// Number of agents.
+    #[getter]
+    fn num_envs(&self) -> usize {
+        self.num_envs
+    }
+
+    /// Number of threads.
+    #[getter]
+    fn threads(&mut self) -> usize {
+        self.env().threads()
+    }
+
+    /// What happens to an agent whose episode ended: "next_step", "same_step" or "disabled".
+    #[getter]
+    fn autoreset(&self) -> &'static str {
+        AUTORESET.iter().find(|(_, mode)| *mode == self.autoreset).map_or("", |(name, _)| name)
+    }
+
+    /// Whether every step returns new arrays.
+    #[getter]
+    fn copy(&self) -> bool {
+        self.copy
+    }
+
+    /// Observations to act upon next, `(num_envs, obs_size)`: what the last `reset` or `step` returned.
+    #[getter]
+    fn obs(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
+        self.arrays.obs.clone_ref(py)
+    }
+
+    /// Observations of the states that the last step reached, `(num_envs, obs_size)`. With "same_step", they differ from
+    /// `obs` where an episode ended. Overwritten by the next step, also with `copy`.
+    #[getter]
+    fn final_obs(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
+        self.arrays.final_obs.clone_ref(py)
+    }
+
+    /// Terms of the last step's rewards, `(num_envs, len(spec.reward_terms))`; they add up to the rewards.
+    #[getter]
+    fn reward_terms(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
+        self.arrays.terms.clone_ref(py)
+    }
+
+    /// Distance that each agent moved along +x in the last step, m, `(num_envs,)`.
+    #[getter]
+    fn forward(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
+        self.arrays.forward.clone_ref(py)
+    }
+
+    /// Agents whose simulation broke down in the last step, `(num_envs,)`; they count as terminated, with reward 0.
+    #[getter]
+    fn diverged(&self, py: Python<'_>) -> Py<PyArray1<bool>> {
+        self.arrays.diverged.clone_ref(py)
+    }
+
+    /// Position of each agent's root along x, m, `(num_envs,)`, a new array; `None` if the task has no such thing.
+    #[getter]
+    fn x_position<'py>(&mut self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.env().x_positions().map(|x| PyArray1::from_vec(py, x))
+    }
+
+    /// Starts new episodes and returns the observations, `(num_envs, obs_size)`.
+    ///
+    /// A seed starts the random streams anew: the same seed, the same lives. A sequence has a seed, or `None`, for each
+    /// agent, which then lives as the only agent of an environment with that seed. With a mask, `(num_envs,)`, all of this
+    /// is about the chosen agents alone.
+    #[pyo3(signature = (seed = None, mask = None))]
+    fn reset(
+        &mut self,
+        py: Python<'_>,
+        seed: Option<Seeds>,
+        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+    ) -> PyResult<Py<PyArray2<f32>>> {
+        let mask = self.mask(mask)?;
+        if !self.ready && mask.contains(&false) {
+            return Err(error::value("the first reset must be of all agents; mask has some that are False"));
+        }
+        // seeds and the numbers of the streams that they mean
+        let streams: Vec<Option<(u64, usize)>> = match seed {
+            None => vec![None; self.num_envs],
+            Some(Seeds::One(seed)) => (0..self.num_envs).map(|i| Some((seed, i))).collect(),
+            Some(Seeds::Each(each)) if each.len() == self.num_envs => {
+                each.iter().map(|seed| seed.map(|seed| (seed, 0))).collect()
+            }
+            Some(Seeds::Each(each)) => {
+                return Err(error::value(format!("seed has {} numbers, expected {}", each.len(), self.num_envs)));
+            }
+        };
+        self.begin(py, move |env, obs| {
+            for (i, stream) in streams.iter().enumerate().filter(|(i, _)| mask[*i]) {
+                if let Some((seed, number)) = stream {
+                    env.reseed_agent(i, *seed, *number)?;
+                }
+            }
+            env.reset_agents(&mask, obs)
+        })
+    }
+
+    /// Advances every agent by one decision. `actions` is `(num_envs, act_size)`, clipped to [-1, 1].
+    ///
+    /// Returns `(obs, reward, terminated, truncated)`, of shapes `(num_envs, obs_size)` and three times `(num_envs,)`;
+    /// more is in `final_obs`, `reward_terms`, `forward` and `diverged`. A C-contiguous float32 array is read in place.
+    fn step(&mut self, py: Python<'_>, actions: PyArrayLike2<'_, f32, AllowTypeChange>) -> PyResult<StepResult> {
+        if !self.ready {
+            return Err(error::value("reset must be called before the first step"));
+        }
+        let expected = [self.num_envs, self.spec.get().act_size];
+        if actions.shape() != expected {
+            return Err(error::value(format!("actions have the shape {:?}, expected {expected:?}", actions.shape())));
+        }
+        if self.copy {
+            let env = self.env.get_mut().expect("no thread panics with the lock");
+            self.arrays.renew(py, self.num_envs, env.spec());
+        }
+        let actions = rows(&actions);
+        let env = self.env.get_mut().expect("no thread panics with the lock");
+        self.arrays.write(py, |out| env.step(&actions, out))?.map_err(error::env)?;
+        let a = &self.arrays;
+        Ok((a.obs.clone_ref(py), a.reward.clone_ref(py), a.terminated.clone_ref(py), a.truncated.clone_ref(py)))
+    }
+
+    /// State of every agent in MuJoCo's layout: `qpos`, `(num_envs, nq)`, and `qvel`, `(num_envs, nv)`, m, rad, m/s and
+    /// rad/s, quaternions w x y z.
+    fn get_state<'py>(&mut self, py: Python<'py>) -> PyResult<State<'py>> {
+        let (n, spec) = (self.num_envs, self.spec.clone_ref(py));
+        let (mut qpos, mut qvel) = (Vec::new(), Vec::new());
+        for i in 0..n {
+            let state = self.env().state(i).map_err(error::env)?;
+            qpos.extend(state.qpos);
+            qvel.extend(state.qvel);
+        }
+        let array = |data, columns| PyArray1::from_vec(py, data).reshape([n, columns]);
+        Ok((array(qpos, spec.get().nq)?, array(qvel, spec.get().nv)?))
+    }
+
+    /// Puts agents, all or those of a mask, into states as [`get_state`](VecEnv::get_state) returns them, as if their
+    /// episodes had begun there. Returns the observations, `(num_envs, obs_size)`.
+    #[pyo3(signature = (qpos, qvel, mask = None))]
+    fn set_state(
+        &mut self,
+        py: Python<'_>,
+        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
+        qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
+        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+    ) -> PyResult<Py<PyArray2<f32>>> {
+        let mask = self.mask(mask)?;
+        let spec = self.spec.get();
+        for (name, array, columns) in [("qpos", &qpos, spec.nq), ("qvel", &qvel, spec.nv)] {
+            if array.shape() != [self.num_envs, columns] {
+                let expected = [self.num_envs, columns];
+                return Err(error::value(format!("{name} has the shape {:?}, expected {expected:?}", array.shape())));
+            }
+        }
+        let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
+        if let Some(i) = (0..self.num_envs).find(|i| mask[*i] && !all_finite([qpos.row(*i), qvel.row(*i)])) {
+            return Err(error::value(format!("the state of agent {i} is not finite")));
+        }
+        let env = self.env.get_mut().expect("no thread panics with the lock");
+        for i in (0..self.num_envs).filter(|i| mask[*i]) {
+            let state = AgentState { qpos: qpos.row(i).to_vec(), qvel: qvel.row(i).to_vec() };
+            env.set_state(i, &state).map_err(error::env)?;
+        }
+        self.begin(py, move |env, obs| env.observe(&mask, obs))
+    }
+
+    /// Everything that the future depends on. Loaded, the environment continues with the same bits, whatever the number
+    /// of threads and the instruction set.
+    fn save<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.env().save())
+    }
+
+    /// Restores what [`save`](VecEnv::save) returned for the same task and number of agents. Observations are those of
+    /// the next step.
+    fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
+        self.env().load(snapshot).map_err(error::env)?;
+        self.ready = true;
+        Ok(())
+    }
+
+    fn __len__(&self) -> usize {
+        self.num_envs
+    }
+
+    fn __repr__(&self) -> String {
+        format!("VecEnv({:?}, num_envs={}, autoreset={:?})", self.spec.get().id, self.num_envs, self.autoreset())
+    }
+}
+
+impl VecEnv {
+    fn env(&mut self) -> &mut marathon_envs::VecEnv {
+        self.env.get_mut().expect("no thread panics with the lock")
+    }
+
+    /// Lets `f` begin episodes and write their observations.
+    fn begin<F>(&mut self, py: Python<'_>, f: F) -> PyResult<Py<PyArray2<f32>>>
+    where
+        F: FnOnce(&mut marathon_envs::VecEnv, &mut [f32]) -> Result<(), marathon_envs::EnvError> + Send,
+    {
+        if self.copy {
+            // rows of agents that go on are carried over
+            self.arrays.obs = self.arrays.obs.bind(py).call_method0("copy")?.cast_into()?.unbind();
+        }
+        let env = self.env.get_mut().expect("no thread panics with the lock");
+        self.arrays.write_obs(py, |obs| f(env, obs))?.map_err(error::env)?;
+        self.ready = true;
+        Ok(self.arrays.obs.clone_ref(py))
+    }
+
+    /// The mask as a list; all agents without one.
+    fn mask(&self, mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>) -> PyResult<Vec<bool>> {
+        let Some(mask) = mask else { return Ok(vec![true; self.num_envs]) };
+        if mask.len() != self.num_envs {
+            return Err(error::value(format!("mask has {} values, expected {}", mask.len(), self.num_envs)));
+        }
+        Ok(mask.as_array().to_vec())
+    }
+}
+
+fn parse_autoreset(name: &str) -> PyResult<Autoreset> {
+    let squeezed = |name: &str| name.replace('_', "").to_lowercase();
+    let found = AUTORESET.iter().find(|(known, _)| squeezed(known) == squeezed(name));
+    found.map(|(_, mode)| *mode).ok_or_else(|| {
+        error::value(format!("autoreset is '{name}', expected one of 'next_step', 'same_step', 'disabled'"))
+    })
+}
+
+/// The numbers of an array, row by row, without a copy if they lie so.
+fn rows<'a>(array: &'a PyReadonlyArray2<'_, f32>) -> Cow<'a, [f32]> {
+    match array.as_slice() {
+        // a slice may lie column by column too
+        Ok(slice) if array.is_c_contiguous() => slice.into(),
+        _ => array.as_array().iter().copied().collect(),
+    }
+}
+
+fn all_finite<'a, const N: usize>(rows: [numpy::ndarray::ArrayView1<'a, f64>; N]) -> bool {
+    rows.iter().all(|row| row.iter().all(|x| x.is_finite()))
+}

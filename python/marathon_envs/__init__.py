@@ -1,0 +1,14 @@
+"""Locomotion environments with active ragdolls, stepped by the thousands on an ordinary CPU.
+
+`VecEnv` is the native vector environment: NumPy arrays in, NumPy arrays out, nothing copied, no GIL while it steps.
+`ids` lists the tasks, `spec` tells the facts of one.
+
+    >>> import numpy as np, marathon_envs
+    >>> env = marathon_envs.VecEnv("Hopper-v0", num_envs=1024)
+    >>> obs = env.reset(seed=1)
+    >>> obs, reward, terminated, truncated = env.step(np.zeros((1024, 4), np.float32))
+"""
+
+from marathon_envs._native import Spec, VecEnv, __version__, ids, spec
+
+__all__ = ["Spec", "VecEnv", "__version__", "ids", "spec"]

@@ -1,0 +1,171 @@
+"""Native part of marathon_envs."""
+
+from collections.abc import Sequence
+from typing import Literal, final
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Spec", "VecEnv", "__version__", "ids", "main", "spec"]
+
+__version__: str
+
+@final
+class Spec:
+    """Constant facts of a task."""
+
+    @property
+    def id(self) -> str:
+        """Name in the registry, such as ``Hopper-v0``."""
+    @property
+    def summary(self) -> str:
+        """One line about the task."""
+    @property
+    def obs_size(self) -> int:
+        """Length of an observation."""
+    @property
+    def act_size(self) -> int:
+        """Length of an action."""
+    @property
+    def action_names(self) -> list[str]:
+        """Names of the actuators, in the order of the action."""
+    @property
+    def dt(self) -> float:
+        """Seconds between two steps."""
+    @property
+    def frame_skip(self) -> int:
+        """Physics steps per step."""
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps after which an episode is truncated."""
+    @property
+    def reward_terms(self) -> list[str]:
+        """Names of the reward's terms, which add up to the reward."""
+    @property
+    def nq(self) -> int:
+        """Length of ``qpos``."""
+    @property
+    def nv(self) -> int:
+        """Length of ``qvel``."""
+
+@final
+class VecEnv:
+    """Agents of one kind that are stepped together on the threads of a pool, without the GIL.
+
+    Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
+    overwrites them at the next step; with `copy`, every step returns new ones.
+    """
+
+    def __new__(
+        cls,
+        id: str,
+        num_envs: int = 1,
+        *,
+        seed: int = 0,
+        threads: int = 0,
+        isa: Literal["f64", "f32", "baseline", "avx2", "avx512"] | None = None,
+        autoreset: Literal["next_step", "same_step", "disabled"] | str = "same_step",
+        max_episode_steps: int | None = None,
+        copy: bool = False,
+    ) -> VecEnv:
+        """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
+
+        Args:
+            id: name of the task, as in `marathon_envs.ids()`; case does not matter, and without a version it means v0.
+            num_envs: number of agents.
+            seed: seed until `reset` gives another.
+            threads: number of threads; 0 means one per processor core, but not more than there are blocks of 16 agents.
+            isa: instruction set; None means the widest that the processor has.
+            autoreset: what happens to an agent whose episode ended. "same_step": `obs` is the first observation of the
+                next episode already, `final_obs` the last one of the old. "next_step": the next step ignores its action
+                and returns the first observation with reward 0. "disabled": nothing; use `reset(mask=...)`.
+            max_episode_steps: steps after which an episode is truncated; None means the task's own number.
+            copy: whether every step returns new arrays.
+        """
+    @property
+    def spec(self) -> Spec:
+        """Facts of the task, with this environment's ``max_episode_steps``."""
+    @property
+    def num_envs(self) -> int:
+        """Number of agents."""
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+    @property
+    def autoreset(self) -> Literal["next_step", "same_step", "disabled"]:
+        """What happens to an agent whose episode ended."""
+    @property
+    def copy(self) -> bool:
+        """Whether every step returns new arrays."""
+    @property
+    def obs(self) -> npt.NDArray[np.float32]:
+        """Observations to act upon next, ``(num_envs, obs_size)``: what the last `reset` or `step` returned."""
+    @property
+    def final_obs(self) -> npt.NDArray[np.float32]:
+        """Observations of the states that the last step reached, ``(num_envs, obs_size)``.
+
+        With "same_step", they differ from `obs` where an episode ended. Overwritten by the next step, also with `copy`.
+        """
+    @property
+    def reward_terms(self) -> npt.NDArray[np.float32]:
+        """Terms of the last step's rewards, ``(num_envs, len(spec.reward_terms))``; they add up to the rewards."""
+    @property
+    def forward(self) -> npt.NDArray[np.float32]:
+        """Distance that each agent moved along +x in the last step, m, ``(num_envs,)``."""
+    @property
+    def diverged(self) -> npt.NDArray[np.bool_]:
+        """Agents whose simulation broke down in the last step, ``(num_envs,)``; they are terminated, with reward 0."""
+    @property
+    def x_position(self) -> npt.NDArray[np.float64] | None:
+        """Position of each agent's root along x, m, ``(num_envs,)``, a new array; None if it cannot move along x."""
+    def reset(
+        self, seed: int | Sequence[int | None] | None = None, mask: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Start new episodes and return the observations, ``(num_envs, obs_size)``.
+
+        A seed starts the random streams anew: the same seed, the same lives. A sequence has a seed, or None, for each
+        agent, which then lives as the only agent of an environment with that seed. With a mask, ``(num_envs,)``, all of
+        this is about the chosen agents alone.
+        """
+    def step(
+        self, actions: npt.ArrayLike
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``, clipped to [-1, 1].
+
+        Returns ``(obs, reward, terminated, truncated)``, of shapes ``(num_envs, obs_size)`` and three times
+        ``(num_envs,)``; more is in `final_obs`, `reward_terms`, `forward` and `diverged`. A C-contiguous float32 array
+        is read in place.
+        """
+    def get_state(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """State of every agent in MuJoCo's layout: ``qpos``, ``(num_envs, nq)``, and ``qvel``, ``(num_envs, nv)``.
+
+        Units are m, rad, m/s and rad/s; quaternions are w x y z.
+        """
+    def set_state(
+        self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Put agents, all or those of a mask, into states as if their episodes had begun there.
+
+        Shapes are those of `get_state`. Returns the observations, ``(num_envs, obs_size)``.
+        """
+    def save(self) -> bytes:
+        """Everything that the future depends on.
+
+        Loaded, the environment continues with the same bits, whatever the number of threads and the instruction set.
+        """
+    def load(self, snapshot: bytes) -> None:
+        """Restore what `save` returned for the same task and number of agents."""
+    def __len__(self) -> int: ...
+
+def ids() -> list[str]:
+    """Names of all registered tasks."""
+
+def spec(id: str, /) -> Spec:
+    """Facts of a task, by any of its names."""
+
+def main(words: Sequence[str]) -> int:
+    """Run the ``marathon`` command with the words of a command line and return its exit code.
+
+    The first word is the program's name. It belongs at the end of a process: some commands replace the handler of
+    Ctrl-C.
+    """

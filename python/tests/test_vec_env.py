@@ -1,0 +1,194 @@
+"""The native vector environment: the same bits as Rust's, arrays that are not copied, no GIL while it steps."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import marathon_envs
+from marathon_envs import VecEnv
+
+IDS = marathon_envs.ids()
+
+
+def actions(env: VecEnv, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1, 1, (env.num_envs, env.spec.act_size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_shapes_types_and_rewards(id: str) -> None:
+    env = VecEnv(id, 37, threads=2)
+    spec = env.spec
+    assert (spec.id, env.num_envs, len(env), env.threads) == (id, 37, 37, 2)
+    assert spec.id == marathon_envs.spec(id).id and len(spec.action_names) == spec.act_size
+    assert env.reset(seed=3).shape == (37, spec.obs_size)
+    for step in range(30):
+        obs, reward, terminated, truncated = env.step(actions(env, step))
+        assert obs.shape == (37, spec.obs_size) and obs.dtype == np.float32 and np.isfinite(obs).all()
+        assert reward.shape == terminated.shape == truncated.shape == (37,)
+        assert reward.dtype == np.float32 and terminated.dtype == truncated.dtype == np.bool_
+        assert env.reward_terms.shape == (37, len(spec.reward_terms))
+        np.testing.assert_allclose(env.reward_terms.sum(1), reward, atol=1e-4)
+        assert env.forward.shape == env.diverged.shape == (37,) and not env.diverged.any()
+
+
+def test_arrays_are_the_environments_own_unless_copies_are_asked_for() -> None:
+    env = VecEnv("hopper", 5)
+    first = env.reset(seed=1)
+    before = first.copy()
+    again, reward, *_ = env.step(actions(env))
+    assert again is first and again is env.obs and not np.array_equal(first, before)
+    assert env.step(actions(env))[1] is reward
+
+    env = VecEnv("hopper", 5, copy=True)
+    first = env.reset(seed=1)
+    kept = [(x, x.copy()) for x in (*env.step(actions(env)), first, env.reward_terms, env.forward)]
+    for _ in range(3):
+        env.step(actions(env))
+        env.reset(mask=[True, False, False, False, True])
+    assert all(np.array_equal(x, old) for x, old in kept)
+
+
+def test_results_do_not_depend_on_threads_copies_layout_or_type_of_the_actions() -> None:
+    a, b = VecEnv("ant", 50, seed=5, threads=1), VecEnv("ant", 50, seed=5, threads=2, copy=True)
+    a.reset()
+    b.reset()
+    for step in range(40):
+        given = actions(a, step)
+        x = a.step(given)
+        y = b.step([given.astype(np.float64), given.T.copy().T, given.tolist()][step % 3])
+        assert all(np.array_equal(p, q) for p, q in zip(x, y, strict=True))
+
+
+def test_the_same_seed_gives_the_same_lives() -> None:
+    env = VecEnv("walker", 20)
+    first = env.reset(seed=9).copy()
+    assert not np.array_equal(env.reset(), first)
+    assert np.array_equal(env.reset(seed=9), first)
+    assert not np.array_equal(env.reset(seed=10), first)
+    alone = VecEnv("walker", 1)
+    each = env.reset(seed=list(range(100, 120)))
+    assert all(np.array_equal(each[i], alone.reset(seed=100 + i)[0]) for i in range(20))
+    # with a mask, the seed is for the chosen agents alone
+    mask = np.arange(20) % 3 == 0
+    before = each.copy()
+    after = env.reset(seed=9, mask=mask)
+    assert np.array_equal(after[mask], first[mask]) and np.array_equal(after[~mask], before[~mask])
+
+
+def test_autoreset_modes() -> None:
+    envs = {mode: VecEnv("hopper", 16, seed=1, autoreset=mode, max_episode_steps=7) for mode in MODES}
+    assert [env.autoreset for env in envs.values()] == list(MODES)
+    for env in envs.values():
+        env.reset()
+        for step in range(6):
+            _, _, terminated, truncated = env.step(actions(env, step) * 0.1)
+            assert not truncated.any() and not terminated.any()
+        _, _, _, truncated = env.step(actions(env, 6) * 0.1)
+        assert truncated.all() and env.spec.max_episode_steps == 7
+    same, following, disabled = envs.values()
+    assert np.array_equal(same.final_obs, disabled.obs) and np.array_equal(following.obs, disabled.obs)
+    # the step after the end starts the next episode, or goes on with the old one
+    obs, reward, terminated, truncated = following.step(actions(following, 7))
+    assert np.array_equal(obs, same.obs) and not reward.any() and not truncated.any() and not terminated.any()
+    assert disabled.step(actions(disabled, 7) * 0.1)[3].all()
+    assert np.array_equal(disabled.reset(mask=np.ones(16, bool)), same.obs)
+
+
+MODES = ("same_step", "next_step", "disabled")
+
+
+def test_a_snapshot_continues_with_the_same_bits() -> None:
+    env = VecEnv("humanoid", 18, seed=2, autoreset="next_step", max_episode_steps=9)
+    env.reset()
+    for step in range(9):
+        env.step(actions(env, step))
+    snapshot = env.save()
+    assert isinstance(snapshot, bytes)
+    story = [[x.copy() for x in env.step(actions(env, step))] for step in range(9, 20)]
+    other = VecEnv("humanoid", 18, seed=77, autoreset="next_step", max_episode_steps=9, threads=2)
+    other.load(snapshot)
+    for step, expected in enumerate(story, 9):
+        assert all(np.array_equal(x, y) for x, y in zip(other.step(actions(env, step)), expected, strict=True))
+    with pytest.raises(ValueError, match="snapshot"):
+        VecEnv("humanoid", 17).load(snapshot)
+    with pytest.raises(ValueError, match="snapshot"):
+        other.load(snapshot[:-1])
+
+
+def test_states_can_be_read_and_written() -> None:
+    env = VecEnv("ant", 17, seed=4)
+    first = env.reset().copy()
+    qpos, qvel = env.get_state()
+    assert qpos.shape == (17, env.spec.nq) and qvel.shape == (17, env.spec.nv) and qpos.dtype == np.float64
+    np.testing.assert_array_equal(env.x_position, qpos[:, 0])
+    story = [env.step(actions(env, step))[0].copy() for step in range(5)]
+    np.testing.assert_allclose(env.x_position, env.get_state()[0][:, 0])
+    assert np.array_equal(env.set_state(qpos, qvel), first)
+    assert all(np.array_equal(env.step(actions(env, step))[0], obs) for step, obs in enumerate(story))
+    # a mask chooses agents
+    mask = np.zeros(17, bool)
+    mask[16] = True
+    obs = env.set_state(qpos, qvel, mask)
+    assert np.array_equal(obs[16], first[16]) and np.array_equal(obs[:16], story[-1][:16])
+
+
+def test_other_threads_run_while_it_steps() -> None:
+    env = VecEnv("humanoid", 512, threads=1)
+    env.reset()
+    given, turns, done = actions(env), 0, threading.Event()
+
+    def play() -> None:
+        for _ in range(10):
+            env.step(given)
+        done.set()
+
+    thread = threading.Thread(target=play)
+    thread.start()
+    while not done.is_set():
+        turns += 1
+        time.sleep(1e-4)
+    thread.join()
+    # with the GIL held, there would be one turn per step
+    assert turns > 50
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: VecEnv("hoper"), "agent 'hoper' does not exist; did you mean 'Hopper-v0'"),
+        (lambda: VecEnv("hopper", 0), "agents is 0, expected at least 1"),
+        (lambda: VecEnv("hopper", isa="mmx"), "unknown instruction set 'mmx'; expected one of"),
+        (lambda: VecEnv("hopper", autoreset="never"), "autoreset is 'never', expected one of"),
+        (lambda: VecEnv("hopper", max_episode_steps=0), "max_episode_steps is 0, expected at least 1"),
+        (lambda: VecEnv("hopper").step(np.zeros((1, 4))), "reset must be called before the first step"),
+        (lambda: ready().step(np.zeros((3, 4))), r"actions have the shape \[3, 4\], expected \[2, 4\]"),
+        (lambda: ready().reset(mask=[True]), "mask has 1 values, expected 2"),
+        (lambda: ready().reset(seed=[1]), "seed has 1 numbers, expected 2"),
+        (
+            lambda: ready().set_state(np.zeros((2, 7)), np.zeros((2, 1))),
+            r"qvel has the shape \[2, 1\], expected \[2, 7\]",
+        ),
+        (lambda: ready().set_state(np.full((2, 7), np.nan), np.zeros((2, 7))), "the state of agent 0 is not finite"),
+        (lambda: VecEnv("hopper", 2).reset(mask=[True, False]), "the first reset must be of all agents"),
+    ],
+)
+def test_errors_say_what_was_found_and_what_was_expected(wrong, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        wrong()
+
+
+def ready() -> VecEnv:
+    env = VecEnv("hopper", 2)
+    env.reset()
+    return env
+
+
+def test_an_action_that_is_not_finite_ends_its_own_agent_only() -> None:
+    env = ready()
+    given = actions(env)
+    given[1, 2] = np.nan
+    _, reward, terminated, _ = env.step(given)
+    assert terminated.tolist() == [False, True] and env.diverged.tolist() == [False, True] and reward[1] == 0
