@@ -3,7 +3,7 @@
 //! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
 //! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
 
-use crate::lanes::Real;
+use crate::lanes::{MAX_LANES, Real};
 use crate::model::{Model, Vec3};
 use crate::narrow::height::HeightField;
 use crate::sim::Sim;
@@ -137,6 +137,18 @@ impl<T: Real> Group<T> {
             }
         }
         top
+    }
+
+    /// Height field `field` of every agent.
+    #[inline(always)]
+    pub(crate) fn all_grounds<'a>(&'a self, sim: &'a Sim<T>, field: usize) -> [&'a HeightField<T::Scalar>; MAX_LANES] {
+        let mut fields = [&sim.fields[field]; MAX_LANES];
+        if !self.grounds.is_empty() {
+            for (lane, own) in fields[..T::LANES].iter_mut().enumerate() {
+                *own = self.ground(sim, lane, field);
+            }
+        }
+        fields
     }
 
     /// Height field `field` of an agent.

@@ -2,6 +2,7 @@
 
 use crate::lanes::Real;
 use crate::model::JointType;
+use crate::narrow::field_capsule::Gaps;
 use crate::narrow::height::HeightField;
 use crate::narrow::{Touch, Touches};
 use crate::sim::{Mount, Sim};
@@ -198,6 +199,8 @@ pub struct Work<T: Real> {
     /// Contacts of one pair of geoms, and of one lane of them.
     pub(crate) touches: Vec<Touch<T>>,
     pub(crate) lane_touches: Touches<T::Scalar>,
+    /// Gaps between one pair of a height field and another geom.
+    pub(crate) gaps: Gaps<T>,
     /// States of the Runge-Kutta stages.
     pub(crate) stages: Vec<Group<T>>,
     pub(crate) stats: SolverStats,
@@ -313,6 +316,7 @@ impl<T: Real> Work<T> {
             centers: vec![[z; 3]; sim.geoms.len()],
             touches: Vec::new(),
             lane_touches: Touches::new(),
+            gaps: Gaps::new(),
             stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
             stats: SolverStats::default(),
         }

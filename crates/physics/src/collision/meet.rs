@@ -4,8 +4,9 @@
 
 use super::pairs::{Cull, PairSpec, Test};
 use super::slots::{Place, Slots, write_contact};
-use crate::lanes::Real;
-use crate::narrow::{self, Block, Capsule, Cylinder, Plane, Sphere, Touch, Touches};
+use crate::lanes::{MAX_LANES, Real};
+use crate::narrow::height::Terrain;
+use crate::narrow::{self, Block, Capsule, Cylinder, Plane, Sphere, Touch, Touches, pick, pick_axes};
 use crate::sim::{Mount, Sim};
 use crate::spatial::*;
 use crate::work::{Group, Work};
@@ -115,9 +116,8 @@ fn touch_pair<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
         Test::CapsuleCapsule => {
             &narrow::round::capsule_capsule(&capsule(work, ma, a, size_a), &capsule(work, mb, b, size_b), margin)
         }
-        Test::CapsuleBox | Test::BoxBox | Test::FieldCapsule | Test::FieldBox => {
-            return one_by_one(sim, group, work, slots, meeting);
-        }
+        Test::FieldCapsule => return touch_field(sim, group, work, slots, meeting),
+        Test::CapsuleBox | Test::BoxBox | Test::FieldBox => return one_by_one(sim, group, work, slots, meeting),
     };
     add_all(sim, group, work, slots, meeting.place, found);
 }
@@ -159,6 +159,28 @@ fn add_all<T: Real>(
     }
 }
 
+/// Narrow phase of a height field and a capsule or sphere.
+#[inline(always)]
+fn touch_field<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    slots: &mut Slots<T>,
+    meeting: &Meeting<T>,
+) {
+    let pair = &sim.contacts.pairs[meeting.place.index];
+    let [ma, mb] = pair.geoms.map(|g| &sim.geoms[g]);
+    let fields = group.all_grounds(sim, pair.field);
+    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.axes(ma) };
+    let capsule = capsule(work, mb, meeting.centers[1], splat3(&pair.sizes[1]));
+    let mut found = std::mem::take(&mut work.touches);
+    found.clear();
+    let margin = T::splat(pair.margin);
+    narrow::field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.gaps, &mut found);
+    add_all(sim, group, work, slots, meeting.place, &found);
+    work.touches = found;
+}
+
 /// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
 #[inline(always)]
 fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
@@ -183,15 +205,10 @@ fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
                 let first = Block { center: a, axes: turned_a, half: size_a };
                 narrow::box_box::box_box(&first, &block, pair.margin, &mut own);
             }
-            test => {
+            _ => {
                 let field = group.ground(sim, lane, pair.field);
-                let terrain = narrow::height::Terrain { field, center: a, axes: turned_a };
-                if test == Test::FieldBox {
-                    narrow::height::field_box(&terrain, &block, pair.margin, &mut own);
-                } else {
-                    let capsule = Capsule { center: b, axis: turned_b[2], radius: size_b[0], half: size_b[1] };
-                    narrow::height::field_capsule(&terrain, &capsule, pair.margin, &mut own);
-                }
+                let terrain = Terrain { fields: [field; MAX_LANES], center: a, axes: turned_a };
+                narrow::height::field_box(&terrain, &block, pair.margin, &mut own);
             }
         }
         gather(&own, lane, &mut found);
@@ -217,16 +234,4 @@ fn gather<T: Real>(touches: &Touches<T::Scalar>, lane: usize, found: &mut Vec<To
             touch.tangent[i].set(lane, t.tangent[i]);
         }
     }
-}
-
-/// One lane's vector.
-#[inline(always)]
-fn pick<T: Real>(v: &V3<T>, lane: usize) -> V3<T::Scalar> {
-    [v[0].get(lane), v[1].get(lane), v[2].get(lane)]
-}
-
-/// One lane's axes.
-#[inline(always)]
-fn pick_axes<T: Real>(axes: &Rot<T>, lane: usize) -> Rot<T::Scalar> {
-    [pick(&axes[0], lane), pick(&axes[1], lane), pick(&axes[2], lane)]
 }

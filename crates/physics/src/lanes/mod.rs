@@ -22,6 +22,9 @@ pub use portable::F32x4;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{F32x8, F32x16};
 
+/// Lanes of the widest backend.
+pub const MAX_LANES: usize = 16;
+
 /// A piece of work over lanes of type `T`, run by [`Real::enter`].
 ///
 /// Implementations mark `run` `#[inline(always)]`.

@@ -1,4 +1,4 @@
-//! A height field and a sphere, capsule or box.
+//! Height fields, and where a height field meets a box.
 //!
 //! Each cell of the grid is two prisms down to the base, and each prism that comes closer than the margin makes one
 //! contact. MuJoCo finds it by iteration. For a sphere or capsule that is exact while the center (the capsule's axis) is
@@ -8,7 +8,7 @@
 
 use super::prism::Prism;
 use super::*;
-use crate::lanes::kernel_fn;
+use crate::lanes::{MAX_LANES, kernel_fn};
 use crate::model::HField;
 
 /// Heights over a grid, in the field's frame: columns along x, rows along y, centered at the origin.
@@ -17,92 +17,18 @@ pub(crate) struct HeightField<S: Real> {
     pub rows: usize,
     pub cols: usize,
     /// Half the extent along x and y.
-    pub half: [S; 2],
+    half: [S; 2],
+    /// Size of a cell, and its inverse.
+    cell: [S; 2],
+    per_cell: [S; 2],
     /// Depth of the base below the origin.
     pub base: S,
     /// Heights, row by row.
     pub heights: Vec<S>,
     /// The largest of the heights.
     pub top: S,
-}
-
-/// A height field in its place.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Terrain<'a, S: Real> {
-    pub field: &'a HeightField<S>,
-    pub center: V3<S>,
-    pub axes: Rot<S>,
-}
-
-kernel_fn! {
-    /// Finds the contacts of a height field and a capsule, or a sphere (a capsule with `half` zero), and appends them.
-    pub(crate) fn field_capsule<'a, S>(a: &'a Terrain<'a, S>, b: &'a Capsule<S>, margin: S, out: &'a mut Touches<S>) {
-        let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
-        let arm = scale3(&into_axes(&a.axes, &b.axis), b.half);
-        let reach = b.radius + margin;
-        let extent = [arm[0].abs() + reach, arm[1].abs() + reach, arm[2].abs() + reach];
-        let Some(window) = a.field.window(&center, &extent) else { return };
-        // level and across the segment; zero if that is upright
-        let flat2 = arm[0].mul_add(arm[0], arm[1] * arm[1]);
-        let inv = if less(S::zero(), flat2) { flat2.sqrt().recip() } else { S::zero() };
-        let across = [-arm[1] * inv, arm[0] * inv];
-        let base = -a.field.base - center[2];
-        for r in window.rows[0]..window.rows[1] {
-            for c in window.cols[0]..window.cols[1] {
-                for top in a.field.cell(r, c, &center) {
-                    if is_below(&top, -extent[2]) || is_beside(&top, &across, reach) {
-                        continue;
-                    }
-                    let Some(gap) = (Prism { top, base }).gap(&arm, reach) else { continue };
-                    let dist = gap.dist - b.radius;
-                    let local = axpy3(&gap.normal, dist.mul_add(S::lit(-0.5), -b.radius), &scale3(&arm, gap.along));
-                    let pos = rotate_add(&a.axes, &local, &b.center);
-                    out.push(Touch::new(dist, pos, rotate(&a.axes, &gap.normal), margin));
-                }
-                if out.is_full() {
-                    return;
-                }
-            }
-        }
-    }
-}
-
-kernel_fn! {
-    /// Finds the contacts of a height field and a box and appends them.
-    pub(crate) fn field_box<'a, S>(a: &'a Terrain<'a, S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
-        let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
-        let mut arms = [[S::zero(); 3]; 3];
-        let mut extent = [margin; 3];
-        for k in 0..3 {
-            arms[k] = scale3(&into_axes(&a.axes, &b.axes[k]), b.half[k]);
-            for i in 0..3 {
-                extent[i] += arms[k][i].abs();
-            }
-        }
-        let Some(window) = a.field.window(&center, &extent) else { return };
-        let base = -a.field.base - center[2];
-        for r in window.rows[0]..window.rows[1] {
-            for c in window.cols[0]..window.cols[1] {
-                for top in a.field.cell(r, c, &center) {
-                    if is_below(&top, -extent[2]) {
-                        continue;
-                    }
-                    let Some(gap) = (Prism { top, base }).gap_to_box(&arms, &b.half, margin) else { continue };
-                    let pos = rotate_add(&a.axes, &gap.pos, &b.center);
-                    out.push(Touch::new(gap.dist, pos, rotate(&a.axes, &gap.normal), margin));
-                }
-                if out.is_full() {
-                    return;
-                }
-            }
-        }
-    }
-}
-
-/// Cells of the grid, first and past the last.
-struct Window {
-    rows: [usize; 2],
-    cols: [usize; 2],
+    /// Normals of the walls of a cell's two prisms.
+    walls: [[[S; 2]; 3]; 2],
 }
 
 impl<S: Real> HeightField<S> {
@@ -110,13 +36,23 @@ impl<S: Real> HeightField<S> {
     pub(crate) fn new(field: &HField) -> Self {
         let [x, y, scale, base] = field.size;
         let elevations = field.data.iter().map(|z| f64::from(*z) * scale);
+        let lines = [field.ncol, field.nrow].map(|n| (n - 1) as f64);
+        let cell = [2.0 * x / lines[0], 2.0 * y / lines[1]];
+        // the diagonal goes from the lower left to the upper right
+        let slant = (cell[0] * cell[0] + cell[1] * cell[1]).sqrt();
+        let diagonal = [cell[1] / slant, -cell[0] / slant];
+        let upper_left = [[-1.0, 0.0], diagonal, [0.0, 1.0]];
+        let lower_right = [[0.0, -1.0], [1.0, 0.0], [-diagonal[0], -diagonal[1]]];
         HeightField {
             rows: field.nrow,
             cols: field.ncol,
-            half: [S::lit(x), S::lit(y)],
+            half: [x, y].map(S::lit),
+            cell: cell.map(S::lit),
+            per_cell: cell.map(|c| S::lit(1.0 / c)),
             base: S::lit(base),
             top: S::lit(elevations.clone().fold(0.0, f64::max)),
             heights: elevations.map(S::lit).collect(),
+            walls: [upper_left, lower_right].map(|prism| prism.map(|wall| wall.map(S::lit))),
         }
     }
 
@@ -133,69 +69,146 @@ impl<S: Real> HeightField<S> {
             ..self.clone()
         }
     }
+}
 
-    /// The cells that come within `extent` of `center` along each axis, if there are any.
+/// A height field in its place: the same grid in every lane, with heights of each lane's own.
+#[derive(Clone, Copy)]
+pub(crate) struct Terrain<'a, T: Real> {
+    /// One per lane.
+    pub fields: [&'a HeightField<T::Scalar>; MAX_LANES],
+    pub center: V3<T>,
+    pub axes: Rot<T>,
+}
+
+/// Cells of the grid, lane by lane: the first along x and along y, and how many from there on.
+pub(super) struct Window<T: Real> {
+    pub first: [T; 2],
+    pub count: [T; 2],
+    /// Where the lower left corner of the first cell is among the heights.
+    start: [usize; MAX_LANES],
+}
+
+/// A cell of every lane's window, counted from its first along x and along y.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Step {
+    pub col: usize,
+    pub row: usize,
+}
+
+impl<T: Real> Window<T> {
+    /// Lanes whose window has this row.
     #[inline(always)]
-    fn window(&self, center: &V3<S>, extent: &V3<S>) -> Option<Window> {
-        if less(self.top, center[2] - extent[2]) || less(center[2] + extent[2], -self.base) {
-            return None;
+    pub(super) fn has_row(&self, step: Step) -> T::Mask {
+        T::lit(step.row as f64).lt(self.count[1])
+    }
+
+    /// Lanes whose window has this column.
+    #[inline(always)]
+    pub(super) fn has_col(&self, step: Step) -> T::Mask {
+        T::lit(step.col as f64).lt(self.count[0])
+    }
+}
+
+impl<'a, T: Real> Terrain<'a, T> {
+    /// Cells that come within `extent` of `center` (in the field's frame) along each axis, in the lanes `near`.
+    #[inline(always)]
+    pub(super) fn window(&self, center: &V3<T>, extent: &V3<T>, near: T::Mask) -> Window<T> {
+        let zero = T::zero();
+        let field = self.fields[0];
+        let mut window = Window { first: [zero; 2], count: [zero; 2], start: [0; MAX_LANES] };
+        for (i, lines) in [field.cols, field.rows].into_iter().enumerate() {
+            let last = T::lit((lines - 1) as f64);
+            let (half, scale) = (T::splat(field.half[i]), T::splat(field.per_cell[i]));
+            let from = ((center[i] - extent[i] + half) * scale).floor();
+            let to = -((-(center[i] + extent[i] + half)) * scale).floor();
+            // written so that NaN finds no cell
+            let on = T::and(near, T::and(from.lt(last), zero.lt(to)));
+            window.first[i] = T::masked(on, from.max(zero));
+            window.count[i] = T::masked(on, to.min(last) - window.first[i]);
         }
-        let cols = cells(center[0], extent[0], self.half[0], self.cols)?;
-        let rows = cells(center[1], extent[1], self.half[1], self.rows)?;
-        Some(Window { rows, cols })
+        for (lane, start) in window.start[..T::LANES].iter_mut().enumerate() {
+            let [col, row] = [window.first[0].get(lane), window.first[1].get(lane)];
+            *start = T::widen(row) as usize * field.cols + T::widen(col) as usize;
+        }
+        window
     }
 
-    /// The tops of a cell's two prisms, relative to `center`: the upper left half, then the lower right.
+    /// The two prisms of each lane's cell in the lanes `on`, relative to `center`: the upper left half, then the lower
+    /// right.
     #[inline(always)]
-    fn cell(&self, r: usize, c: usize, center: &V3<S>) -> [[V3<S>; 3]; 2] {
-        let (upper_left, lower_left) = (self.vertex(r + 1, c, center), self.vertex(r, c, center));
-        let (upper_right, lower_right) = (self.vertex(r + 1, c + 1, center), self.vertex(r, c + 1, center));
-        [[upper_left, lower_left, upper_right], [lower_left, lower_right, upper_right]]
-    }
-
-    /// A grid point relative to `center`.
-    #[inline(always)]
-    fn vertex(&self, row: usize, col: usize, center: &V3<S>) -> V3<S> {
+    pub(super) fn cell(&self, window: &Window<T>, step: Step, center: &V3<T>, on: T::Mask) -> [Prism<'a, T>; 2] {
+        let field = self.fields[0];
+        let mut heights = [[T::Scalar::default(); MAX_LANES]; 4];
+        let here = step.row * field.cols + step.col;
+        let mut left = T::bits(on);
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let at = window.start[lane] + here;
+            let own = &self.fields[lane].heights[at..at + field.cols + 2];
+            heights[0][lane] = own[0];
+            heights[1][lane] = own[1];
+            heights[2][lane] = own[field.cols];
+            heights[3][lane] = own[field.cols + 1];
+        }
+        let one = T::lit(1.0);
+        let col = window.first[0] + T::lit(step.col as f64);
+        let row = window.first[1] + T::lit(step.row as f64);
+        let (x, y) = (
+            [self.line(0, col, center), self.line(0, col + one, center)],
+            [self.line(1, row, center), self.line(1, row + one, center)],
+        );
+        let mut corners = [[T::zero(); 3]; 4];
+        for (i, z) in heights.iter().enumerate() {
+            corners[i] = [x[i % 2], y[i / 2], T::load(&z[..T::LANES]) - center[2]];
+        }
+        let [lower_left, lower_right, upper_left, upper_right] = corners;
+        let base = -T::splat(field.base) - center[2];
         [
-            grid_line(self.half[0], self.cols, col) - center[0],
-            grid_line(self.half[1], self.rows, row) - center[1],
-            self.heights[row * self.cols + col] - center[2],
+            Prism { top: [upper_left, lower_left, upper_right], walls: &field.walls[0], base },
+            Prism { top: [lower_left, lower_right, upper_right], walls: &field.walls[1], base },
         ]
     }
+
+    /// Coordinate of a grid line along an axis, relative to `center`.
+    #[inline(always)]
+    fn line(&self, axis: usize, number: T, center: &V3<T>) -> T {
+        let field = self.fields[0];
+        T::splat(field.cell[axis]).mul_add(number, -T::splat(field.half[axis])) - center[axis]
+    }
 }
 
-/// Whether a prism with these upper corners is all below a height.
-#[inline(always)]
-fn is_below<S: Real>(top: &[V3<S>; 3], height: S) -> bool {
-    less(top[0][2].max(top[1][2]).max(top[2][2]), height)
-}
-
-/// Whether a prism with these upper corners is farther than `reach` from the vertical plane through the origin.
-#[inline(always)]
-fn is_beside<S: Real>(top: &[V3<S>; 3], normal: &[S; 2], reach: S) -> bool {
-    let (a, b, c) = (offset(&top[0], normal), offset(&top[1], normal), offset(&top[2], normal));
-    less(reach, a.min(b).min(c)) || less(a.max(b).max(c), -reach)
-}
-
-/// Distance of a point from the vertical plane through the origin with this normal.
-#[inline(always)]
-fn offset<S: Real>(point: &V3<S>, normal: &[S; 2]) -> S {
-    point[0].mul_add(normal[0], point[1] * normal[1])
-}
-
-/// Coordinate of line `i` of `n`.
-#[inline(always)]
-fn grid_line<S: Real>(half: S, n: usize, i: usize) -> S {
-    (half + half).div(S::lit((n - 1) as f64)).mul_add(S::lit(i as f64), -half)
-}
-
-/// The cells between `lines` lines that come within `reach` of `center`, if there are any.
-#[inline(always)]
-fn cells<S: Real>(center: S, reach: S, half: S, lines: usize) -> Option<[usize; 2]> {
-    let last = (lines - 1) as f64;
-    let scale = S::lit(last).div(half + half);
-    let from = S::widen(((center - reach + half) * scale).floor().get(0));
-    let to = S::widen((-((-(center + reach + half)) * scale).floor()).get(0));
-    // written so that NaN finds no cell
-    if from < last && to > 0.0 { Some([from.max(0.0) as usize, to.min(last) as usize]) } else { None }
+kernel_fn! {
+    /// Finds the contacts of a height field and a box and appends them.
+    pub(crate) fn field_box<'a, S>(a: &'a Terrain<'a, S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+        let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
+        let mut arms = [[S::zero(); 3]; 3];
+        let mut extent = [margin; 3];
+        for k in 0..3 {
+            arms[k] = scale3(&into_axes(&a.axes, &b.axes[k]), b.half[k]);
+            for i in 0..3 {
+                extent[i] += arms[k][i].abs();
+            }
+        }
+        let all = S::not(S::none());
+        let window = a.window(&center, &extent, all);
+        let mut step = Step::default();
+        while S::any(window.has_row(step)) {
+            while S::any(window.has_col(step)) {
+                for prism in a.cell(&window, step, &center, all) {
+                    if S::any(prism.highest().lt(-extent[2])) {
+                        continue;
+                    }
+                    let Some(gap) = prism.gap_to_box(&arms, &b.half, margin) else { continue };
+                    let pos = rotate_add(&a.axes, &gap.pos, &b.center);
+                    out.push(Touch::new(gap.dist, pos, rotate(&a.axes, &gap.normal), margin));
+                }
+                if out.is_full() {
+                    return;
+                }
+                step.col += 1;
+            }
+            step = Step { col: 0, row: step.row + 1 };
+        }
+    }
 }

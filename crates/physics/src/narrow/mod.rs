@@ -7,10 +7,11 @@
 //!
 //! Pairs whose contacts have fixed places ([`round`], [`plane`], and spheres on boxes) work on all lanes at once. The
 //! others ([`capsule_box`], [`box_box`], [`height`]) choose among many features, so they are written for one agent at a
-//! time, with branches, and fill a [`Touches`].
+//! time, with branches, and fill a [`Touches`]. [`field_capsule`] does what it can on all lanes, and the rest so.
 
 pub(crate) mod box_box;
 pub(crate) mod capsule_box;
+pub(crate) mod field_capsule;
 pub(crate) mod height;
 pub(crate) mod plane;
 mod prism;
@@ -58,6 +59,9 @@ impl<T: Real> Touch<T> {
     }
 }
 
+/// MuJoCo's limit of contacts per pair; further ones are left out.
+const CAPACITY: usize = 50;
+
 /// Contacts of one pair of shapes of one agent.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Touches<S: Real> {
@@ -65,11 +69,8 @@ pub(crate) struct Touches<S: Real> {
 }
 
 impl<S: Real> Touches<S> {
-    /// MuJoCo's limit per pair; further contacts are left out.
-    pub(crate) const CAPACITY: usize = 50;
-
     pub(crate) fn new() -> Self {
-        Touches { items: Vec::with_capacity(Self::CAPACITY) }
+        Touches { items: Vec::with_capacity(CAPACITY) }
     }
     pub(crate) fn as_slice(&self) -> &[Touch<S>] {
         &self.items
@@ -81,7 +82,7 @@ impl<S: Real> Touches<S> {
     /// Whether there is no room left.
     #[inline(always)]
     fn is_full(&self) -> bool {
-        self.items.len() == Self::CAPACITY
+        self.items.len() == CAPACITY
     }
     /// Adds a contact if it is one and there is room.
     #[inline(always)]
@@ -203,6 +204,18 @@ fn clamp<T: Real>(x: T, limit: T) -> T {
 #[inline(always)]
 fn negate_where<T: Real>(mask: T::Mask, x: T) -> T {
     T::select(mask, -x, x)
+}
+
+/// One lane's vector.
+#[inline(always)]
+pub(crate) fn pick<T: Real>(v: &V3<T>, lane: usize) -> V3<T::Scalar> {
+    [v[0].get(lane), v[1].get(lane), v[2].get(lane)]
+}
+
+/// One lane's axes.
+#[inline(always)]
+pub(crate) fn pick_axes<T: Real>(axes: &Rot<T>, lane: usize) -> Rot<T::Scalar> {
+    [pick(&axes[0], lane), pick(&axes[1], lane), pick(&axes[2], lane)]
 }
 
 /// Comparison of two numbers of one lane.

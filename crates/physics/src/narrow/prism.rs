@@ -4,16 +4,20 @@
 //! radius, so this is all that they need to meet a height field.
 
 use super::*;
+use crate::lanes::kernel_fn;
 
 /// The solid between a slanted triangle and a level base below it.
-pub(super) struct Prism<S: Real> {
+pub(super) struct Prism<'a, S: Real> {
     /// Upper corners, counterclockwise seen from above.
     pub top: [V3<S>; 3],
+    /// Outward unit normals of the walls: from the first corner to the second, and so on.
+    pub walls: &'a [[S::Scalar; 2]; 3],
     /// Height of the base.
     pub base: S,
 }
 
 /// Signed distance of a segment from a prism, negative by the length of the shortest way out.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Gap<S: Real> {
     pub dist: S,
     /// Unit vector from the prism to the segment.
@@ -46,7 +50,67 @@ impl<S: Real> Face<S> {
     }
 }
 
-impl<S: Real> Prism<S> {
+/// What the faces alone tell.
+pub(super) struct Glance<T: Real> {
+    /// Lanes where an end of the segment is closest, to a point within the prism's top.
+    pub over: T::Mask,
+    /// The distance in those.
+    pub gap: Gap<T>,
+    /// Lanes that may be nearer than the limit in some other way.
+    pub unclear: T::Mask,
+}
+
+impl<'a, T: Real> Prism<'a, T> {
+    /// Looks at the segment from `-arm` to `arm` from above, in the lanes `on`.
+    #[inline(always)]
+    pub(super) fn glance(&self, arm: &V3<T>, limit: T, on: T::Mask) -> Glance<T> {
+        let (zero, one) = (T::zero(), T::lit(1.0));
+        let slope = self.slope(arm);
+        let along = T::select(zero.lt(slope.slope), -one, one);
+        let dist = slope.at(along);
+        let gap = Gap { dist, normal: slope.normal, along };
+        let mut unclear = T::and(on, T::not(limit.lt(dist)));
+        let mut over = T::and(unclear, zero.lt(dist));
+        if T::any(unclear) {
+            for face in &self.faces(slope, arm)[1..] {
+                let beside = face.nearest();
+                let cos = dot(&slope.normal, &face.normal);
+                // the point of the top below the end
+                let other = cos.neg_mul_add(dist, face.at(along));
+                over = T::and(over, T::not(zero.lt(other)));
+                // beyond both faces: the edge between them is nearer than everything behind it
+                let (up, out) = (cos.neg_mul_add(beside, dist), cos.neg_mul_add(dist, beside));
+                let edge2 = up.mul_add(dist, out * beside);
+                let far2 = (limit * limit) * cos.neg_mul_add(cos, one);
+                let past_edge = T::and(T::and(zero.lt(up), zero.lt(out)), far2.lt(edge2));
+                unclear = T::and(unclear, T::not(T::or(limit.lt(beside), past_edge)));
+            }
+        }
+        Glance { over, gap, unclear: T::and(unclear, T::not(over)) }
+    }
+
+    /// Height of the highest corner.
+    #[inline(always)]
+    pub(super) fn highest(&self) -> T {
+        self.top[0][2].max(self.top[1][2]).max(self.top[2][2])
+    }
+
+    /// One lane's prism.
+    #[inline(always)]
+    pub(super) fn lane(&self, lane: usize) -> Prism<'a, T::Scalar> {
+        let top = [pick(&self.top[0], lane), pick(&self.top[1], lane), pick(&self.top[2], lane)];
+        Prism { top, walls: self.walls, base: self.base.get(lane) }
+    }
+}
+
+kernel_fn! {
+    /// Distance of the segment from `-arm` to `arm`; none if it is above `limit`.
+    pub(super) fn gap<'a, S>(prism: &'a Prism<'a, S>, arm: &'a V3<S>, limit: S) -> Option<Gap<S>> {
+        prism.gap(arm, limit)
+    }
+}
+
+impl<S: Real> Prism<'_, S> {
     /// Lower corner below upper corner `i`.
     #[inline(always)]
     pub(super) fn foot(&self, i: usize) -> V3<S> {
@@ -68,10 +132,8 @@ impl<S: Real> Prism<S> {
         let t = &self.top;
         let mut faces = [slope; 5];
         for i in 0..3 {
-            let (p, q) = (&t[i], &t[(i + 1) % 3]);
-            let (x, y) = (q[1] - p[1], p[0] - q[0]);
-            let inv = x.mul_add(x, y * y).sqrt().recip();
-            faces[1 + i] = Face::new([x * inv, y * inv, zero], p, arm);
+            let [x, y] = self.walls[i];
+            faces[1 + i] = Face::new([S::splat(x), S::splat(y), zero], &t[i], arm);
         }
         faces[4] = Face::new([zero, zero, -one], &self.foot(0), arm);
         faces
@@ -88,7 +150,7 @@ impl<S: Real> Prism<S> {
         }
     }
 
-    /// Distance of the segment from `-arm` to `arm`; none if it is above `limit`.
+    /// See [`gap`].
     #[inline(always)]
     pub(super) fn gap(&self, arm: &V3<S>, limit: S) -> Option<Gap<S>> {
         let one = S::lit(1.0);

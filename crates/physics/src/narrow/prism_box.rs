@@ -29,7 +29,7 @@ enum Feature {
     Edges(usize, usize),
 }
 
-impl<S: Real> Prism<S> {
+impl<S: Real> Prism<'_, S> {
     /// Distance of a box; none if it is above `limit`.
     #[inline(always)]
     pub(super) fn gap_to_box(&self, arms: &Rot<S>, half: &V3<S>, limit: S) -> Option<BoxGap<S>> {
@@ -137,7 +137,7 @@ impl<S: Real> Prism<S> {
             for (middle, sign) in [(sum, true), (sum, false), (difference, true), (difference, false)] {
                 let m = if sign { middle } else { [-middle[0], -middle[1], -middle[2]] };
                 let top = [sub3(&self.top[0], &m), sub3(&self.top[1], &m), sub3(&self.top[2], &m)];
-                let moved = Prism { top, base: self.base - m[2] };
+                let moved = Prism { top, walls: self.walls, base: self.base - m[2] };
                 if let Some(gap) = moved.gap(&arms[k], nearest)
                     && less(gap.dist, nearest)
                 {

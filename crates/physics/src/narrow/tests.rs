@@ -10,11 +10,13 @@ mod common;
 
 use super::box_box::box_box;
 use super::capsule_box::capsule_box;
-use super::height::{HeightField, Terrain, field_box, field_capsule};
+use super::field_capsule::{Gaps, field_capsule};
+use super::height::{HeightField, Terrain, field_box};
 use super::plane::*;
 use super::round::*;
 use super::*;
-use crate::lanes::{Isa, Kernel};
+use crate::lanes::{Isa, Kernel, MAX_LANES};
+use crate::model::HField;
 use crate::with_lanes;
 use serde_json::{Value, json};
 
@@ -128,39 +130,42 @@ impl<T: Real> Kernel<T> for Lanes<T> {
             [Sphere(q), Capsule(r, h)] => vec![sphere_capsule(&a.sphere(q), &b.capsule(r, h), margin)],
             [Sphere(q), Cylinder(r, h)] => vec![sphere_cylinder(&a.sphere(q), &b.cylinder(r, h), margin)],
             [Sphere(q), Box(s)] => vec![sphere_box(&a.sphere(q), &b.block(s), margin)],
+            [Field, Sphere(r)] => on_field(&a, &b.capsule(r, 0.0)),
+            [Field, Capsule(r, h)] => on_field(&a, &b.capsule(r, h)),
             [Capsule(q, g), Capsule(r, h)] => capsule_capsule(&a.capsule(q, g), &b.capsule(r, h), margin).to_vec(),
             _ => return None,
         })
     }
 }
 
+/// The height field of the tests.
+fn field<S: Real>() -> HeightField<S> {
+    let rows = heights();
+    let data = rows.concat();
+    HeightField::new(&HField { name: "field".into(), nrow: rows.len(), ncol: rows[0].len(), size: FIELD, data })
+}
+
+/// Contacts of the height field and a capsule.
+#[inline(always)]
+fn on_field<T: Real>(place: &Pose<T>, capsule: &super::Capsule<T>) -> Vec<Touch<T>> {
+    let field = field();
+    let terrain = Terrain { fields: [&field; MAX_LANES], center: place.center, axes: place.axes };
+    let mut out = Vec::new();
+    field_capsule(&terrain, capsule, T::lit(MARGIN), T::not(T::none()), &mut Gaps::new(), &mut out);
+    out
+}
+
 /// Contacts of the pairs that are treated agent by agent.
 fn branching<S: Real>(shapes: [Shape; 2], [a, b]: [Pose<S>; 2]) -> Vec<Touch<S>> {
     let margin = S::lit(MARGIN);
     let mut out = Touches::new();
-    let field = || {
-        let rows = heights();
-        let flat: Vec<f64> = rows.concat().iter().map(|&h| f64::from(h) * FIELD[2]).collect();
-        HeightField::<S> {
-            rows: rows.len(),
-            cols: rows[0].len(),
-            half: [S::lit(FIELD[0]), S::lit(FIELD[1])],
-            base: S::lit(FIELD[3]),
-            top: S::lit(flat.iter().copied().fold(f64::MIN, f64::max)),
-            heights: flat.into_iter().map(S::lit).collect(),
-        }
-    };
     match shapes {
         [Capsule(r, h), Box(s)] => capsule_box(&a.capsule(r, h), &b.block(s), margin, &mut out),
         [Box(s), Box(t)] => box_box(&a.block(s), &b.block(t), margin, &mut out),
-        [Field, other] => {
-            let terrain = Terrain { field: &field(), center: a.center, axes: a.axes };
-            match other {
-                Sphere(r) => field_capsule(&terrain, &b.capsule(r, 0.0), margin, &mut out),
-                Capsule(r, h) => field_capsule(&terrain, &b.capsule(r, h), margin, &mut out),
-                Box(s) => field_box(&terrain, &b.block(s), margin, &mut out),
-                _ => panic!("no such pair"),
-            }
+        [Field, Box(s)] => {
+            let field = field();
+            let terrain = Terrain { fields: [&field; MAX_LANES], center: a.center, axes: a.axes };
+            field_box(&terrain, &b.block(s), margin, &mut out);
         }
         _ => panic!("no such pair"),
     }

@@ -108,13 +108,14 @@ kernel_fn! {
     /// Moves the lanes and marks the links whose system changed.
     pub(crate) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, step: Move<T>) {
         for b in work.blocks.iter_mut() {
-            if !T::any(b.advance(&step)) {
+            let changed = b.advance(&step);
+            if !T::any(changed) {
                 continue;
             }
             match &b.jacobian {
                 Jacobian::Points { sides, .. } if !b.coupled => {
-                    for (link, _) in &sides[1].links {
-                        work.stale[*link] = true;
+                    for (link, lanes) in &sides[1].links {
+                        work.stale[*link] |= T::any(T::and(*lanes, changed));
                     }
                 }
                 Jacobian::Joints(terms) => {
