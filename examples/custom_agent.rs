@@ -15,7 +15,7 @@
 //! cargo run --release -p marathon-examples --bin custom_agent
 //! ```
 
-use marathon_envs::{Agent, Facts, Motors, Obs, Part, ResetNoise, Senses, Terms, VecEnv, VecEnvOptions, register};
+use marathon_envs::{Agent, Facts, Motors, Obs, Part, Senses, Terms, VecEnv, VecEnvOptions, names, register};
 use marathon_physics::lanes::Real;
 use std::error::Error;
 use std::sync::Arc;
@@ -35,21 +35,19 @@ struct Inchworm;
 impl Agent for Inchworm {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Inchworm-v0",
-            summary: "two motors, no legs: creep forward",
+            id: "Inchworm-v0".into(),
+            summary: "two motors, no legs: creep forward".into(),
             model: include_str!("inchworm.xml").into(),
             frame_skip: 4,
             max_episode_steps: 500,
-            observation: 3 + 3 + 2 + 8 + 2 + 1,
-            actions: &ACTIONS,
-            reward_terms: &["velocity", "effort"],
-            parts: &PARTS,
+            observation: Some(3 + 3 + 2 + 8 + 2 + 1),
+            actions: names(ACTIONS),
+            reward_terms: names(["velocity", "effort"]),
+            parts: names(PARTS),
             // a worm lies on the ground
-            feet: &PARTS,
-            touch: &["head", "tail"],
-            memory: 0,
-            reset: ResetNoise::MARATHON,
-            termination_reward: -1.0,
+            feet: names(PARTS),
+            touch: names(["head", "tail"]),
+            ..Facts::default()
         }
     }
 

@@ -119,6 +119,11 @@ def vary(model, rng, original):
     model.body_simple[:] = 0
     model.dof_simplenum[:] = 0
     model.body_mass[:] = original.body_mass * mass
+    model.body_subtreemass[:] = 0
+    for b in range(model.nbody - 1, -1, -1):
+        model.body_subtreemass[b] += model.body_mass[b]
+        if b:
+            model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
     model.body_inertia[:] = original.body_inertia * mass[:, None]
     model.geom_friction[:] = original.geom_friction * friction
     model.pair_friction[:] = original.pair_friction * friction
@@ -179,6 +184,7 @@ def run(job):
         own = vary(model, rng, original) if job.get("vary") else None
         restart()
         mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
         state = {
             "own": own,
             "deep": deep_in_field(model, data),
@@ -191,6 +197,10 @@ def run(job):
             "qfrc_constraint": data.qfrc_constraint.tolist(),
             "qfrc_bias": data.qfrc_bias.tolist(),
             "qfrc_applied": (data.qfrc_passive + data.qfrc_actuator + pushed(model, data)).tolist(),
+            "qfrc_actuator": data.qfrc_actuator.tolist(),
+            "cinert": data.cinert[1:].ravel().tolist(),
+            "cvel": data.cvel[1:].ravel().tolist(),
+            "cfrc_ext": data.cfrc_ext[1:].ravel().tolist(),
             "qM": full_mass_matrix(model, data).ravel().tolist(),
             # contacts in the gap exert no force and are not constraints
             "ncon": int(np.sum(data.contact.exclude == 0)),

@@ -9,49 +9,140 @@
 //! [`Registry`](crate::Registry) holds agents of any crate.
 
 use std::borrow::Cow;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use marathon_physics::Model;
 use marathon_physics::lanes::{Isa, Real};
 
 use crate::anatomy::Blueprint;
-use crate::error::EnvError;
+use crate::error::{EnvError, nearest};
 use crate::lane_env::{AgentFactory, AgentShards};
+use crate::options::{OptionInfo, Options};
 use crate::senses::Senses;
+use crate::start::Start;
 use crate::write::{Obs, Terms};
 
-/// Constant facts of an agent.
+/// Constant facts of an agent. What is left to [`Facts::default`] is as the suite's own agents have it.
 #[derive(Clone, Debug)]
 pub struct Facts {
     /// Registry name with a version, such as `Hopper-v0`.
-    pub id: &'static str,
+    pub id: String,
     /// One line for listings.
-    pub summary: &'static str,
-    /// The model, as MJCF text. A keyframe named `spawn`, if there is one, is the pose and the
-    /// velocity with which episodes start.
-    pub model: Cow<'static, str>,
+    pub summary: String,
+    /// The model. A keyframe named `spawn`, if there is one, is the pose and the velocity with which episodes start.
+    pub model: ModelSource,
     /// Physics steps per decision.
     pub frame_skip: usize,
     /// Decisions after which an episode is truncated.
     pub max_episode_steps: usize,
-    /// Length of the observation.
-    pub observation: usize,
-    /// Names of the model's actuators in their order: the action.
-    pub actions: &'static [&'static str],
+    /// Length of the observation; `None`: however long it turns out to be.
+    pub observation: Option<usize>,
+    /// Names of the model's actuators in their order: the action. Empty: whatever actuators the model has.
+    pub actions: Vec<String>,
+    /// What an action is.
+    pub controls: Controls,
     /// Names of the reward's terms in the order in which `step_reward` adds them.
-    pub reward_terms: &'static [&'static str],
+    pub reward_terms: Vec<String>,
+    /// Names of the numbers that [`Agent::info`] reports.
+    pub info: Vec<String>,
     /// Geoms that the agent speaks of, see [`Part`].
-    pub parts: &'static [&'static str],
+    pub parts: Vec<String>,
+    /// Bodies that the agent speaks of, see [`Body`].
+    pub bodies: Vec<String>,
     /// Geoms that may touch the ground.
-    pub feet: &'static [&'static str],
+    pub feet: Vec<String>,
     /// Geoms with a touch sensor, in the order of the observation.
-    pub touch: &'static [&'static str],
+    pub touch: Vec<String>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`].
     pub memory: usize,
-    /// Randomness of the start.
-    pub reset: ResetNoise,
-    /// Reward of a decision in which the agent failed; it replaces all other terms.
-    pub termination_reward: f64,
+    /// What it sees of the physics.
+    pub view: View,
+    /// Reward of a decision in which the agent failed, in place of all other terms; `None`: the terms count on.
+    pub termination_reward: Option<f64>,
+}
+
+impl Default for Facts {
+    fn default() -> Self {
+        Facts {
+            id: String::new(),
+            summary: String::new(),
+            model: ModelSource::Text("".into()),
+            frame_skip: 1,
+            max_episode_steps: 1000,
+            observation: None,
+            actions: Vec::new(),
+            controls: Controls::Nominal,
+            reward_terms: Vec::new(),
+            info: Vec::new(),
+            parts: Vec::new(),
+            bodies: Vec::new(),
+            feet: Vec::new(),
+            touch: Vec::new(),
+            memory: 0,
+            view: View::default(),
+            termination_reward: Some(-1.0),
+        }
+    }
+}
+
+/// A list of names, for [`Facts`].
+pub fn names<S: AsRef<str>>(list: impl IntoIterator<Item = S>) -> Vec<String> {
+    list.into_iter().map(|name| name.as_ref().to_string()).collect()
+}
+
+/// Where an agent's model comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ModelSource {
+    /// MJCF text that refers to no other files.
+    Text(Cow<'static, str>),
+    /// An MJCF file.
+    File(PathBuf),
+}
+
+impl ModelSource {
+    /// The text, unless it is in a file.
+    pub fn text(&self) -> Option<&str> {
+        match self {
+            ModelSource::Text(text) => Some(text),
+            ModelSource::File(_) => None,
+        }
+    }
+}
+
+impl From<&'static str> for ModelSource {
+    fn from(text: &'static str) -> Self {
+        ModelSource::Text(text.into())
+    }
+}
+impl From<String> for ModelSource {
+    fn from(text: String) -> Self {
+        ModelSource::Text(text.into())
+    }
+}
+
+/// What an action is, and what its bounds are ([`Spec::action_low`](crate::Spec::action_low)).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Controls {
+    /// A number in [-1, 1] per actuator, clipped to it before anything else sees it: the suite's own agents.
+    #[default]
+    Nominal,
+    /// The actuator's control in its own units, within its `ctrlrange`. It is not clipped: the agent sees and pays for
+    /// what was asked for, while the physics clamps what acts. So in Gymnasium and dm_control.
+    Raw,
+}
+
+/// What an agent sees of the physics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct View {
+    /// Frames and velocities of bodies, geoms and sites are those from which the last physics step computed its forces,
+    /// as MuJoCo's `mj_step` leaves them: of the state before it, or of the last stage of RK4. `qpos` and `qvel` are of
+    /// the present state in any case. (At the start of an episode all is of the present state.)
+    pub of_last_step: bool,
+    /// [`Readings::cinert`](marathon_physics::Readings::cinert), `cvel` and `cfrc_ext` can be read.
+    pub bodies: bool,
+    /// [`Readings::qfrc_actuator`](marathon_physics::Readings::qfrc_actuator) and `qfrc_constraint` can be read.
+    pub joints: bool,
 }
 
 /// How far the start of an episode strays from the spawn pose at rest; every number is the half width of a uniform
@@ -87,6 +178,21 @@ impl Part {
     /// If there is no such name.
     pub const fn named(parts: &[&str], name: &str) -> Part {
         Part(find(parts, name))
+    }
+}
+
+/// A body of the model by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Body(pub(crate) usize);
+
+impl Body {
+    /// The body called `name` among an agent's [`Facts::bodies`]. Meant for a `const`, where an unknown name is a compile
+    /// error.
+    ///
+    /// # Panics
+    /// If there is no such name.
+    pub const fn named(bodies: &[&str], name: &str) -> Body {
+        Body(find(bodies, name))
     }
 }
 
@@ -163,11 +269,52 @@ pub trait Agent: Send + Sync + 'static {
     /// Lanes whose agent has failed.
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask;
 
+    /// Puts the agent where an episode starts. It finds itself in the spawn pose with the spawn velocity; what it adds of
+    /// chance comes from [`Start::random`].
+    fn reset(&self, start: &mut Start) {
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    /// Reports numbers that are neither observed nor rewarded, as many as [`Facts::info`] names: for a user's logs.
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let _ = (s, out);
+    }
+
+    /// Sets the agent's own variables at the start of an episode, where they are zero.
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let _ = (s, memory);
+    }
+
     /// Updates the agent's own variables, [`Facts::memory`] of them per lane, once per decision, before `step_reward`
-    /// reads them through [`Senses::memory`]. They are zero at the start of an episode and belong to snapshots.
+    /// reads them through [`Senses::memory`]. They start at zero, or at what [`Agent::begin`] sets, and belong to snapshots.
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let _ = (s, memory);
+    }
+
+    /// The named arguments that it takes, with the values that it has, see [`options!`](crate::options!).
+    fn options(&self) -> Vec<OptionInfo> {
+        Vec::new()
+    }
+
+    /// The agent with other values for some of its arguments; `None` if it takes none.
+    fn with_options(&self, options: &Options) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        let _ = options;
+        None
+    }
+
+    /// Whether it can do with a model that is not its own, if one of its arguments is a model.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        let _ = model;
+        Ok(())
     }
 }
 
@@ -178,8 +325,15 @@ pub trait AnyAgent: Send + Sync {
     /// The compiled model.
     ///
     /// # Errors
-    /// If the model text is not valid MJCF.
+    /// If the model is not valid MJCF.
     fn model(&self) -> Result<Model, EnvError>;
+    /// The named arguments that it takes, with the values that it has.
+    fn options(&self) -> Vec<OptionInfo>;
+    /// The agent with other values for some of its arguments.
+    ///
+    /// # Errors
+    /// If it does not take an argument, or not this value for it.
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError>;
     /// Checks the agent against its model and prepares it for stepping with an instruction set.
     ///
     /// # Errors
@@ -196,6 +350,34 @@ impl<A: Agent> AnyAgent for A {
     fn model(&self) -> Result<Model, EnvError> {
         let facts = Agent::facts(self);
         Blueprint::model(&facts)
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        Agent::options(self)
+    }
+
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        if options.is_empty() {
+            return Ok(self);
+        }
+        let known = Agent::options(&*self);
+        for (name, value) in options.iter() {
+            let id = Agent::facts(&*self).id;
+            let Some(info) = known.iter().find(|info| info.name == name) else {
+                let names = || known.iter().map(|info| info.name);
+                let nearest = nearest(name, names()).map(Into::into);
+                let known = if known.is_empty() { "none".into() } else { names().collect::<Vec<_>>().join(", ") };
+                return Err(EnvError::UnknownOption { id, name: name.into(), nearest, known });
+            };
+            if !info.takes(value) {
+                let (option, found) = (name.to_string(), value.to_string());
+                return Err(EnvError::OptionValue { id, option, found, expected: info.expected });
+            }
+        }
+        Ok(match Agent::with_options(&*self, options) {
+            Some(agent) => Arc::new(agent),
+            None => self,
+        })
     }
 
     fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {

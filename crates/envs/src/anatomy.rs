@@ -4,7 +4,7 @@ use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, Readings, Sim, SimOptions, Work};
 
-use crate::agent::Facts;
+use crate::agent::{Facts, ModelSource};
 use crate::error::{EnvError, nearest};
 
 /// Name of the keyframe that holds the start pose and velocity.
@@ -60,6 +60,7 @@ pub(crate) struct Motor<C> {
 /// The indices that [`Senses`](crate::Senses) work with.
 pub(crate) struct Anatomy<T: Real> {
     pub parts: Vec<PartFrame<T::Scalar>>,
+    pub bodies: Vec<usize>,
     /// Geoms with touch sensors.
     pub touch: Vec<usize>,
     /// Geoms that must not touch the ground.
@@ -73,17 +74,20 @@ pub(crate) struct Anatomy<T: Real> {
 impl Blueprint {
     /// Compiles the model of an agent.
     pub fn model(facts: &Facts) -> Result<Model, EnvError> {
-        Model::from_xml_str(&facts.model, facts.id)
-            .map_err(|source| EnvError::Model { id: facts.id.into(), source: Box::new(source) })
+        let loaded = match &facts.model {
+            ModelSource::Text(text) => Model::from_xml_str(text, &facts.id),
+            ModelSource::File(path) => Model::from_xml_file(path),
+        };
+        loaded.map_err(|source| EnvError::Model { id: facts.id.clone(), source: Box::new(source) })
     }
 
     pub fn new(facts: &Facts) -> Result<Blueprint, EnvError> {
-        let wrong = |problem: String| EnvError::Agent { id: facts.id.into(), problem };
+        let wrong = |problem: String| EnvError::Agent { id: facts.id.clone(), problem };
         let model = Self::model(facts)?;
         for (what, n) in [
             ("frame_skip", facts.frame_skip),
             ("max_episode_steps", facts.max_episode_steps),
-            ("observation", facts.observation),
+            ("observation", facts.observation.unwrap_or(1)),
             ("the number of actuators", model.nu),
             ("the number of reward terms", facts.reward_terms.len()),
         ] {
@@ -92,19 +96,12 @@ impl Blueprint {
             }
         }
         let found: Vec<_> = model.actuators.iter().map(|a| a.name.as_str()).collect();
-        if found != facts.actions {
+        if !facts.actions.is_empty() && found != facts.actions {
             return Err(wrong(format!(
                 "its actions are {:?}, but the actuators of its model are {found:?}",
                 facts.actions
             )));
         }
-        let noise = facts.reset;
-        for half_width in [noise.joint_position, noise.joint_velocity, noise.root_velocity] {
-            if !(half_width >= 0.0 && half_width.is_finite()) {
-                return Err(wrong(format!("a reset noise is {half_width}, expected 0 or more")));
-            }
-        }
-
         let (spawn, spawn_velocity) = match model.keyframes.iter().find(|k| k.name == SPAWN) {
             Some(key) => (key.qpos.clone(), key.qvel.clone()),
             None => (model.qpos0.clone(), vec![0.0; model.nv]),
@@ -132,20 +129,26 @@ impl Blueprint {
 impl<T: Real> Anatomy<T> {
     pub fn new(facts: &Facts, blueprint: &Blueprint) -> Result<Self, EnvError> {
         let model = &blueprint.model;
+        let missing = |role: &str, name: &str, kind: &str, known: Vec<&str>| {
+            let hint = nearest(name, known.iter().copied()).map(|n| format!("; did you mean '{n}'?"));
+            let (hint, known) = (hint.unwrap_or_default(), known.join(", "));
+            let problem = format!("{role} '{name}' is not a {kind} of its model{hint} known: {known}");
+            EnvError::Agent { id: facts.id.clone(), problem }
+        };
         let geom = |role: &str, name: &str| -> Result<usize, EnvError> {
             let known = || model.geoms.iter().filter(|g| g.body != 0).map(|g| g.name.as_str());
-            model.geoms.iter().position(|g| g.body != 0 && g.name == name).ok_or_else(|| {
-                let hint = nearest(name, known()).map(|n| format!("; did you mean '{n}'?")).unwrap_or_default();
-                let known: Vec<_> = known().collect();
-                EnvError::Agent {
-                    id: facts.id.into(),
-                    problem: format!("{role} '{name}' is not a geom of its model{hint} known: {}", known.join(", ")),
-                }
-            })
+            let found = model.geoms.iter().position(|g| g.body != 0 && g.name == name);
+            found.ok_or_else(|| missing(role, name, "geom", known().collect()))
         };
+        let body = |name: &String| -> Result<usize, EnvError> {
+            let known = || model.bodies.iter().map(|b| b.name.as_str());
+            let found = model.bodies.iter().position(|b| b.name == *name);
+            found.ok_or_else(|| missing("body", name, "body", known().collect()))
+        };
+        let bodies = facts.bodies.iter().map(body).collect::<Result<Vec<_>, _>>()?;
         let axes = spawn_axes(facts, blueprint)?;
         let mut parts = Vec::new();
-        for name in facts.parts {
+        for name in &facts.parts {
             let geom = geom("body part", name)?;
             let body = model.geoms[geom].body;
             // a world axis in body coordinates: that component of each body axis
@@ -157,18 +160,18 @@ impl<T: Real> Anatomy<T> {
         let moves = |g: usize| model.bodies[model.geoms[g].body].weld_id != 0;
         let not_feet = (0..model.geoms.len()).filter(|g| moves(*g) && !feet.contains(g)).collect();
 
-        let mut bodies: Vec<usize> = Vec::new();
+        let mut driven: Vec<usize> = Vec::new();
         let mut motors = Vec::new();
         for joint in model.actuators.iter().filter_map(Actuator::joint) {
             let j = &model.joints[joint];
             let rotates = matches!(j.kind, JointType::Hinge | JointType::Ball);
-            if rotates && !bodies.contains(&j.body) {
-                bodies.push(j.body);
+            if rotates && !driven.contains(&j.body) {
+                driven.push(j.body);
             }
             let scale = if rotates { std::f64::consts::FRAC_1_PI } else { 1.0 };
             motors.push(Motor { dof: j.dof_adr, velocity_scale: T::scalar(scale) });
         }
-        let pairs = bodies.iter().map(|b| Pair::new::<T>(model, *b)).collect();
+        let pairs = driven.iter().map(|b| Pair::new::<T>(model, *b)).collect();
 
         let mut along_x = Vec::new();
         for j in &model.joints {
@@ -182,7 +185,7 @@ impl<T: Real> Anatomy<T> {
                 _ => {}
             }
         }
-        Ok(Anatomy { parts, touch, not_feet, pairs, motors, along_x })
+        Ok(Anatomy { parts, bodies, touch, not_feet, pairs, motors, along_x })
     }
 }
 
@@ -194,7 +197,7 @@ fn first_root(model: &Model) -> usize {
 /// World axes of every body in the spawn pose.
 fn spawn_axes(facts: &Facts, blueprint: &Blueprint) -> Result<Vec<[[f64; 3]; 3]>, EnvError> {
     let sim = Sim::<f64>::new(&blueprint.model, sim_options())
-        .map_err(|source| EnvError::Sim { id: facts.id.into(), source })?;
+        .map_err(|source| EnvError::Sim { id: facts.id.clone(), source })?;
     let mut group = Group::new(&sim);
     group.reset_lane(&sim, 0, &blueprint.spawn, &vec![0.0; blueprint.model.nv]);
     let mut work = Work::new(&sim);

@@ -25,6 +25,30 @@ pub enum EnvError {
         /// A free name.
         suggestion: String,
     },
+    /// An agent does not take an argument.
+    #[error("agent '{id}' takes no option '{name}'; {}known: {known}", did_you_mean(.nearest))]
+    UnknownOption {
+        /// Registry name of the agent.
+        id: String,
+        /// What was given.
+        name: String,
+        /// The argument closest to it, if any is close.
+        nearest: Option<String>,
+        /// All arguments that it takes, comma separated.
+        known: String,
+    },
+    /// An argument cannot have this value.
+    #[error("agent '{id}': option {option} is {found}, expected {expected}")]
+    OptionValue {
+        /// Registry name of the agent.
+        id: String,
+        /// The argument.
+        option: String,
+        /// What was given.
+        found: String,
+        /// What is allowed.
+        expected: &'static str,
+    },
     /// An agent and its model do not fit together.
     #[error("agent '{id}': {problem}")]
     Agent {

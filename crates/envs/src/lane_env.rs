@@ -1,19 +1,21 @@
 //! An agent on the physics kernels: the [`Shard`] of every registered agent, for any lane width.
 //!
-//! A block of sixteen agents is `16 / L` lane groups. One decision of a group is: clip the actions, step the physics
+//! A block of sixteen agents is `16 / L` lane groups. One decision of a group is: take the actions, step the physics
 //! `frame_skip` times, look at the state reached, reward, terminate. Nothing in it allocates and no lane sees another.
 
 use std::sync::Arc;
 
 use marathon_physics::lanes::Real;
-use marathon_physics::{Sim, Work};
+use marathon_physics::model::Actuator;
+use marathon_physics::{Model, Sim, Work};
 
-use crate::agent::{Agent, Facts};
+use crate::agent::{Agent, Controls, Facts};
 use crate::anatomy::{Anatomy, Blueprint, sim_options};
 use crate::error::EnvError;
-use crate::lane_group::LaneGroup;
+use crate::lane_group::{LaneGroup, Rehearsal};
 use crate::random::EpisodeRng;
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use crate::start::Start;
 
 /// Name of the reward term that replaces all others when an agent fails.
 pub const TERMINATION_TERM: &str = "termination";
@@ -39,6 +41,9 @@ pub trait AgentShard: Shard {
     /// # Errors
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
+    /// Writes what the agents in `mask` report about their present states into `info` (`[info][16]`, see
+    /// [`Facts::info`]; lanes outside the mask are left alone).
+    fn info(&self, block: usize, mask: u16, info: &mut [f32]);
     /// Starts all random streams anew from a seed; the next reset begins every agent's first episode under it.
     fn reseed(&mut self, seed: u64);
     /// The same for one agent, numbered within this shard, which gets the streams of agent `number`.
@@ -76,40 +81,85 @@ impl<T: Real, A: Agent> AgentFactory<T, A> {
         let facts = agent.facts();
         let blueprint = Blueprint::new(&facts)?;
         let anatomy = Anatomy::new(&facts, &blueprint)?;
-        let sim = Sim::new(&blueprint.model, sim_options())
-            .map_err(|source| EnvError::Sim { id: facts.id.into(), source })?;
-        let mut reward_terms: Vec<String> = facts.reward_terms.iter().map(|t| t.to_string()).collect();
-        reward_terms.push(TERMINATION_TERM.into());
+        let id = || facts.id.clone();
+        agent.fits(&blueprint.model).map_err(|problem| EnvError::Agent { id: id(), problem })?;
+        let sim = Sim::new(&blueprint.model, sim_options()).map_err(|source| EnvError::Sim { id: id(), source })?;
+        let mut reward_terms = facts.reward_terms.clone();
+        if facts.termination_reward.is_some() {
+            reward_terms.push(TERMINATION_TERM.into());
+        }
+        let [action_low, action_high] = action_bounds(&facts, &blueprint.model);
         let spec = Spec {
-            id: facts.id.into(),
-            obs: facts.observation,
+            id: id(),
+            obs: facts.observation.unwrap_or(0),
             act: blueprint.model.nu,
+            action_low,
+            action_high,
+            action_names: action_names(&blueprint.model),
             dt: blueprint.model.opt.timestep * facts.frame_skip as f64,
             frame_skip: facts.frame_skip,
             max_episode_steps: facts.max_episode_steps,
             reward_terms,
+            info: facts.info.clone(),
+            options: agent.options().into_iter().map(|o| (o.name.to_string(), o.value)).collect(),
         };
-        let task = Task { agent, facts, spec, blueprint, anatomy, sim };
-        task.rehearse()?;
+        let mut task = Task { agent, facts, spec, blueprint, anatomy, sim };
+        task.spec.obs = task.rehearse()?;
         Ok(AgentFactory { task: Arc::new(task) })
     }
 }
 
+/// Names of the actuators; of one without a name, its number.
+fn action_names(model: &Model) -> Vec<String> {
+    let name = |(i, a): (usize, &Actuator)| if a.name.is_empty() { i.to_string() } else { a.name.clone() };
+    model.actuators.iter().enumerate().map(name).collect()
+}
+
+/// Bounds of the actions.
+fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
+    let bound = |side: usize| {
+        let of = |a: &Actuator| match facts.controls {
+            Controls::Nominal => [-1.0, 1.0][side],
+            Controls::Raw if a.ctrl_limited => a.ctrl_range[side] as f32,
+            Controls::Raw => [f32::NEG_INFINITY, f32::INFINITY][side],
+        };
+        model.actuators.iter().map(of).collect()
+    };
+    [bound(0), bound(1)]
+}
+
 impl<T: Real, A: Agent> Task<T, A> {
-    /// Lets the agent observe and reward once, to find out whether it keeps to its facts.
-    fn rehearse(&self) -> Result<(), EnvError> {
-        let wrong = |problem: String| Err(EnvError::Agent { id: self.facts.id.into(), problem });
-        let (written, names) = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
-        if written != self.facts.observation {
-            return wrong(format!("it observes {written} numbers, but its facts say {}", self.facts.observation));
+    /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
+    /// length of its observation.
+    fn rehearse(&self) -> Result<usize, EnvError> {
+        let Task { facts, blueprint, .. } = self;
+        let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
+        let (mut qpos, mut qvel) = (blueprint.spawn.clone(), blueprint.spawn_velocity.clone());
+        self.draw_start(&mut qpos, &mut qvel, &mut EpisodeRng::new(0, 0, 0));
+        if let Some(x) = qpos.iter().chain(&qvel).find(|x| !x.is_finite()) {
+            return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
         }
-        if names != self.facts.reward_terms {
-            return wrong(format!(
-                "it adds the reward terms {names:?}, but its facts say {:?}",
-                self.facts.reward_terms
-            ));
+        let Rehearsal { observed, reported, terms } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
+        if let Some(expected) = facts.observation.filter(|n| *n != observed) {
+            return wrong(format!("it observes {observed} numbers, but its facts say {expected}"));
         }
-        Ok(())
+        if observed == 0 {
+            return wrong("it observes nothing, expected at least one number".into());
+        }
+        if reported != facts.info.len() {
+            return wrong(format!("it reports {reported} numbers, but its facts name {:?}", facts.info));
+        }
+        if terms != facts.reward_terms {
+            return wrong(format!("it adds the reward terms {terms:?}, but its facts say {:?}", facts.reward_terms));
+        }
+        Ok(observed)
+    }
+
+    /// Lets the agent draw the start of an episode. Returns whether quaternions are to be normalized.
+    fn draw_start(&self, qpos: &mut [f64], qvel: &mut [f64], random: &mut EpisodeRng) -> bool {
+        let mut start = Start { qpos, qvel, random, normalize: true, blueprint: &self.blueprint };
+        self.agent.reset(&mut start);
+        start.normalize
     }
 }
 
@@ -173,26 +223,20 @@ impl<T: Real, A: Agent> LaneShard<T, A> {
 
     /// Begins an episode of one agent: the spawn pose with noise of the agent's own.
     fn begin_episode(&mut self, block: usize, agent: usize) {
-        let Task { blueprint, facts, sim, .. } = &*self.task;
+        let task = &*self.task;
         let block = &mut self.blocks[block];
         let life = &mut block.lives[agent];
         life.episode += 1;
         life.steps = 0;
         let mut rng = EpisodeRng::new(life.seed, life.agent, life.episode);
-        self.qpos.clone_from(&blueprint.spawn);
-        self.qvel.clone_from(&blueprint.spawn_velocity);
-        for joint in &blueprint.joints {
-            let q = &mut self.qpos[joint.qpos];
-            *q += rng.around_zero(facts.reset.joint_position);
-            if let Some([low, high]) = joint.range {
-                *q = q.max(low).min(high);
-            }
-            self.qvel[joint.dof] += rng.around_zero(facts.reset.joint_velocity);
+        self.qpos.clone_from(&task.blueprint.spawn);
+        self.qvel.clone_from(&task.blueprint.spawn_velocity);
+        let normalize = task.draw_start(&mut self.qpos, &mut self.qvel, &mut rng);
+        let (group, lane) = (&mut block.groups[agent / T::LANES], agent % T::LANES);
+        group.put(&task.sim, lane, &self.qpos, &self.qvel);
+        if !normalize {
+            group.set_qpos(lane, &self.qpos);
         }
-        for dof in &blueprint.root_dofs {
-            self.qvel[*dof] += rng.around_zero(facts.reset.root_velocity);
-        }
-        block.groups[agent / T::LANES].put(sim, agent % T::LANES, &self.qpos, &self.qvel);
     }
 }
 
@@ -221,6 +265,7 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
         let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
         out.terms.resize(BLOCK * task.spec.reward_terms.len(), 0.0);
+        out.info.resize(BLOCK * task.spec.info.len(), 0.0);
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
@@ -301,8 +346,17 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
         }
         let block = &mut self.blocks[agent / BLOCK];
         block.lives[agent % BLOCK].steps = 0;
-        block.groups[agent % BLOCK / T::LANES].put(&self.task.sim, agent % T::LANES, &state.qpos, &state.qvel);
+        let (group, lane) = (&mut block.groups[agent % BLOCK / T::LANES], agent % T::LANES);
+        group.put(&self.task.sim, lane, &state.qpos, &state.qvel);
+        group.begin(&self.task, &mut self.work, 1 << lane);
         Ok(())
+    }
+
+    fn info(&self, block: usize, mask: u16, info: &mut [f32]) {
+        for (i, group) in self.blocks[block].groups.iter().enumerate() {
+            let first = i * T::LANES;
+            group.report_info(lanes_of::<T>(mask, first), first, info);
+        }
     }
 
     fn reseed(&mut self, seed: u64) {
@@ -321,7 +375,8 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
             let first = i * T::LANES;
             let lanes = lanes_of::<T>(mask, first);
             if lanes != 0 {
-                group.observe_start(task, &mut self.work, lanes, first, obs);
+                group.begin(task, &mut self.work, lanes);
+                group.report_start(lanes, first, obs);
             }
         }
     }

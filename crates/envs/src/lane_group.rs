@@ -3,7 +3,7 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
 
-use crate::agent::Agent;
+use crate::agent::{Agent, Controls};
 use crate::lane_env::Task;
 use crate::senses::Senses;
 use crate::shard::{BLOCK, BlockStep};
@@ -16,11 +16,24 @@ const LARGEST: f64 = 1e6;
 pub(crate) struct LaneGroup<T: Real> {
     physics: Group<T>,
     memory: Vec<T>,
+    /// What the memory is at the start of an episode.
+    start: Vec<T>,
     obs: Vec<T>,
-    /// Terms of the reward, the termination last.
+    /// Terms of the reward; the termination last, if it has a reward of its own.
     terms: Vec<T>,
+    info: Vec<T>,
     reward: T,
     forward: T,
+}
+
+/// What an agent did when it was let do everything once.
+pub(crate) struct Rehearsal {
+    /// How many numbers it observed.
+    pub observed: usize,
+    /// How many numbers it reported.
+    pub reported: usize,
+    /// The terms that it added.
+    pub terms: Vec<&'static str>,
 }
 
 /// Lanes whose episode ended in this decision, a bit each.
@@ -35,8 +48,10 @@ impl<T: Real> LaneGroup<T> {
         let mut group = LaneGroup {
             physics: Group::new(&task.sim),
             memory: vec![T::zero(); task.facts.memory],
+            start: vec![T::zero(); task.facts.memory],
             obs: vec![T::zero(); task.spec.obs],
             terms: vec![T::zero(); task.spec.reward_terms.len()],
+            info: vec![T::zero(); task.spec.info.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -52,6 +67,13 @@ impl<T: Real> LaneGroup<T> {
         self.physics.reset_lane(sim, lane, qpos, qvel);
         for m in &mut self.memory {
             m.set(lane, T::scalar(0.0));
+        }
+    }
+
+    /// Changes the configuration of an agent to these numbers, quaternions that are not normalized included.
+    pub fn set_qpos(&mut self, lane: usize, qpos: &[f64]) {
+        for (v, x) in self.physics.qpos.iter_mut().zip(qpos) {
+            v.set(lane, T::scalar(*x));
         }
     }
 
@@ -78,33 +100,57 @@ impl<T: Real> LaneGroup<T> {
         p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.warm).chain(&mut self.memory)
     }
 
-    /// Observes the start of an episode and writes the observations of `lanes` (a bit each) into a block's `obs`.
-    pub fn observe_start<A: Agent>(
-        &mut self,
-        task: &Task<T, A>,
-        work: &mut Work<T>,
-        lanes: u32,
-        first: usize,
-        obs: &mut [f32],
-    ) {
-        task.sim.refresh(work, &self.physics);
-        T::enter(Perceive { task, group: self, work, fresh: true, names: None });
-        T::enter(Settle { group: self, termination_reward: 0.0, ended: Ended::default() });
-        for (row, value) in obs.chunks_exact_mut(BLOCK).zip(&self.obs) {
-            for lane in (0..T::LANES).filter(|l| lanes >> l & 1 == 1) {
-                row[first + lane] = T::widen(value.get(lane)) as f32;
-            }
+    /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
+    pub fn begin<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, lanes: u32) {
+        self.look(task, work);
+        T::enter(Perceive { task, group: self, work, fresh: Some(lanes), names: None });
+        T::enter(Settle { group: self, termination_reward: None, ended: Ended::default() });
+    }
+
+    /// Brings all readings up to date at the start of an episode.
+    fn look<A: Agent>(&self, task: &Task<T, A>, work: &mut Work<T>) {
+        if task.facts.view.joints {
+            task.sim.forward(work, &self.physics);
+            task.sim.measure_joints(work);
+        } else {
+            task.sim.refresh(work, &self.physics);
         }
+        if task.facts.view.bodies {
+            task.sim.measure_centers(work, &self.physics);
+        }
+    }
+
+    /// Writes the observations of `lanes` (a bit each) into a block's `obs`.
+    pub fn report_start(&self, lanes: u32, first: usize, obs: &mut [f32]) {
+        store_lanes(&self.obs, lanes, first, obs);
+    }
+
+    /// Writes the infos of `lanes` (a bit each) into a block's `info`.
+    pub fn report_info(&self, lanes: u32, first: usize, info: &mut [f32]) {
+        store_lanes(&self.info, lanes, first, info);
     }
 
     /// Makes one decision. `action` is the block's, `[act][16]`.
     pub fn decide<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
-        let along_x = &task.anatomy.along_x;
-        let unsound = T::enter(Act { group: self, along_x, action, first });
-        task.sim.step(work, &mut self.physics, task.facts.frame_skip);
+        let (along_x, view) = (&task.anatomy.along_x, task.facts.view);
+        let clip = task.facts.controls == Controls::Nominal;
+        let unsound = T::enter(Act { group: self, along_x, action, first, clip });
+        task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
+        if view.joints {
+            task.sim.measure_joints(work);
+        }
+        if view.bodies {
+            task.sim.measure_bodies(work, &self.physics);
+        }
+        if !view.of_last_step {
+            task.sim.refresh(work, &self.physics);
+            if view.bodies {
+                task.sim.measure_centers(work, &self.physics);
+            }
+        }
         T::enter(Move { group: self, along_x });
-        let (_, failed) = T::enter(Perceive { task, group: self, work, fresh: false, names: None });
-        let ended = Ended { terminated: failed, diverged: unsound };
+        let perceived = T::enter(Perceive { task, group: self, work, fresh: None, names: None });
+        let ended = Ended { terminated: perceived.failed, diverged: unsound };
         T::enter(Settle { group: self, termination_reward: task.facts.termination_reward, ended })
     }
 
@@ -113,12 +159,13 @@ impl<T: Real> LaneGroup<T> {
         T::enter(Report { group: self, first, obs, out });
     }
 
-    /// Lets an agent observe and reward once. Returns how much it observed and the terms that it added.
-    pub fn rehearse<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>) -> (usize, Vec<&'static str>) {
-        let mut names = Vec::new();
-        task.sim.refresh(work, &self.physics);
-        let (observed, _) = T::enter(Perceive { task, group: self, work, fresh: true, names: Some(&mut names) });
-        (observed, names)
+    /// Lets an agent do everything once.
+    pub fn rehearse<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>) -> Rehearsal {
+        let mut terms = Vec::new();
+        self.look(task, work);
+        let Perceived { observed, reported, .. } =
+            T::enter(Perceive { task, group: self, work, fresh: Some(!0), names: Some(&mut terms) });
+        Rehearsal { observed, reported, terms }
     }
 }
 
@@ -142,6 +189,15 @@ fn store<T: Real>(value: T, to: &mut [f32]) {
     }
 }
 
+/// Writes some lanes of values into a block's rows in single precision.
+fn store_lanes<T: Real>(values: &[T], lanes: u32, first: usize, rows: &mut [f32]) {
+    for (row, value) in rows.chunks_exact_mut(BLOCK).zip(values) {
+        for lane in (0..T::LANES).filter(|l| lanes >> l & 1 == 1) {
+            row[first + lane] = T::widen(value.get(lane)) as f32;
+        }
+    }
+}
+
 /// Lanes in which all values are finite and of a sane size.
 #[inline(always)]
 fn sane<T: Real>(values: &[T]) -> T::Mask {
@@ -160,20 +216,22 @@ struct Act<'a, T: Real> {
     along_x: &'a [(usize, T::Scalar)],
     action: &'a [f32],
     first: usize,
+    /// To [-1, 1].
+    clip: bool,
 }
 
 impl<T: Real> Kernel<T> for Act<'_, T> {
     type Output = u32;
     #[inline(always)]
     fn run(self) -> u32 {
-        let Act { group, along_x, action, first } = self;
+        let Act { group, along_x, action, first, clip } = self;
         let one = T::lit(1.0);
         let mut ok = T::not(T::none());
         for (i, ctrl) in group.physics.ctrl.iter_mut().enumerate() {
             let a = load::<T>(&action[i * BLOCK + first..]);
             let finite = a.is_finite();
             ok = T::and(ok, finite);
-            *ctrl = T::masked(finite, a.max(-one).min(one));
+            *ctrl = T::masked(finite, if clip { a.max(-one).min(one) } else { a });
         }
         group.forward = T::zero();
         for (i, axis) in along_x {
@@ -200,8 +258,7 @@ impl<T: Real> Kernel<T> for Move<'_, T> {
     }
 }
 
-/// Everything that is the agent's own: observe, remember, reward, terminate. Returns how much was observed and the
-/// lanes that failed.
+/// Everything that is the agent's own: begin or remember, observe, reward, report, terminate.
 ///
 /// It is one kernel for decisions, starts of episodes and the rehearsal, because an agent's code is compiled
 /// into it once per instruction set.
@@ -209,40 +266,60 @@ struct Perceive<'a, T: Real, A> {
     task: &'a Task<T, A>,
     group: &'a mut LaneGroup<T>,
     work: &'a Work<T>,
-    /// An episode begins: nothing is remembered, and the reward is not used.
-    fresh: bool,
+    /// Lanes in which an episode begins (a bit each), if this is for the start of episodes; the reward is then not used.
+    fresh: Option<u32>,
     names: Option<&'a mut Vec<&'static str>>,
 }
 
+/// What an agent perceived.
+struct Perceived {
+    observed: usize,
+    reported: usize,
+    /// Lanes that failed.
+    failed: u32,
+}
+
 impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
-    type Output = (usize, u32);
+    type Output = Perceived;
     #[inline(always)]
-    fn run(self) -> (usize, u32) {
+    fn run(self) -> Perceived {
         let Perceive { task, group, work, fresh, names } = self;
-        let LaneGroup { physics, memory, obs, terms, .. } = group;
+        let LaneGroup { physics, memory, start, obs, terms, info, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             anatomy: &task.anatomy,
             action: &physics.ctrl,
             memory: &[],
-            fresh,
+            fresh: fresh.is_some(),
+            dt: task.spec.dt,
         };
-        if !fresh {
-            task.agent.remember(&s, memory);
+        match fresh {
+            None => task.agent.remember(&s, memory),
+            Some(lanes) => {
+                // the others are in the middle of their episodes
+                let on = T::from_bits(lanes & ((1 << T::LANES) - 1));
+                start.fill(T::zero());
+                task.agent.begin(&s, start);
+                for (m, begun) in memory.iter_mut().zip(start) {
+                    *m = T::select(on, *begun, *m);
+                }
+            }
         }
         s.memory = memory;
         let mut obs = Obs::new(obs);
         task.agent.observe(&s, &mut obs);
-        let own = terms.len() - 1;
+        let own = task.facts.reward_terms.len();
         task.agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
-        (obs.len(), T::bits(task.agent.terminated(&s)))
+        let mut info = Obs::new(info);
+        task.agent.info(&s, &mut info);
+        Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(task.agent.terminated(&s)) }
     }
 }
 
 /// Quarantine, termination and the sum of the reward. Nothing that is not a sane number leaves its lane.
 struct Settle<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
-    termination_reward: f64,
+    termination_reward: Option<f64>,
     /// Failed lanes, and lanes known to be unsound.
     ended: Ended,
 }
@@ -252,26 +329,29 @@ impl<T: Real> Kernel<T> for Settle<'_, T> {
     #[inline(always)]
     fn run(self) -> Ended {
         let Settle { group, termination_reward, ended } = self;
-        let LaneGroup { physics, obs, terms, reward, forward, .. } = group;
-        let (termination, own) = terms.split_last_mut().expect("there is always the termination term");
+        let LaneGroup { physics, obs, terms, info, reward, forward, .. } = group;
         let failed = T::from_bits(ended.terminated);
         let mut ok = T::not(T::from_bits(ended.diverged));
         ok = T::and(ok, T::and(sane(&physics.qpos), sane(&physics.qvel)));
-        ok = T::and(ok, T::and(sane(obs), sane(own)));
-        for x in obs.iter_mut() {
+        ok = T::and(ok, T::and(sane(obs), sane(terms)));
+        for x in obs.iter_mut().chain(info) {
             *x = T::masked(ok, *x);
         }
         *forward = T::masked(ok, *forward);
 
-        // a failure costs its own price in place of everything else
-        let alive = T::and(ok, T::not(failed));
+        if let Some(price) = termination_reward {
+            // a failure costs its own price in place of everything else
+            let (termination, own) = terms.split_last_mut().expect("there is a term for it");
+            for term in own {
+                *term = T::masked(T::not(failed), *term);
+            }
+            *termination = T::masked(failed, T::lit(price));
+        }
         *reward = T::zero();
-        for term in own.iter_mut() {
-            *term = T::masked(alive, *term);
+        for term in terms.iter_mut() {
+            *term = T::masked(ok, *term);
             *reward += *term;
         }
-        *termination = T::masked(T::and(ok, failed), T::lit(termination_reward));
-        *reward += *termination;
         Ended { terminated: T::bits(T::or(failed, T::not(ok))), diverged: T::bits(T::not(ok)) }
     }
 }
@@ -293,6 +373,9 @@ impl<T: Real> Kernel<T> for Report<'_, T> {
             store(*value, &mut row[first..]);
         }
         for (row, value) in out.terms.chunks_exact_mut(BLOCK).zip(&group.terms) {
+            store(*value, &mut row[first..]);
+        }
+        for (row, value) in out.info.chunks_exact_mut(BLOCK).zip(&group.info) {
             store(*value, &mut row[first..]);
         }
         store(group.reward, &mut out.reward[first..]);

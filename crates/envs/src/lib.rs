@@ -2,7 +2,8 @@
 //!
 //! * [`factory`] gives a learner the blocks of a task by name: [`ShardFactory`], [`Shard`], [`Spec`].
 //! * [`VecEnv`] is for everybody else: any number of agents, plain row-major arrays, threads, automatic resets.
-//! * [`Agent`] is what one implements to add a creature; [`register`] makes it known by name.
+//! * [`Agent`] is what one implements to add a creature; [`register`] makes it known by name. [`Options`] are named
+//!   arguments that an agent may take.
 //!
 //! The same seed gives the same bits on every machine, for every number of threads, agents and lanes.
 //!
@@ -25,18 +26,23 @@ pub mod error;
 mod lane_env;
 mod lane_group;
 pub mod memory;
+pub mod options;
 mod random;
 pub mod registry;
 pub mod senses;
 pub mod shard;
+mod start;
 pub mod vec_env;
 mod write;
 
-pub use agent::{Agent, AnyAgent, Facts, Motors, Part, ResetNoise};
+pub use agent::{Agent, AnyAgent, Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use error::EnvError;
 pub use lane_env::{AgentShard, AgentShards, AgentState, TERMINATION_TERM};
-pub use registry::{Registry, agent, factory, ids, register};
+pub use options::{OptionInfo, Options, Value};
+pub use random::EpisodeRng;
+pub use registry::{Registry, agent, factory, factory_with, ids, register};
 pub use senses::Senses;
 pub use shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+pub use start::Start;
 pub use vec_env::{Autoreset, Step, StepMut, VecEnv, VecEnvOptions};
 pub use write::{Obs, Terms};

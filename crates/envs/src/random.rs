@@ -10,10 +10,10 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 const DOMAIN: [u8; 8] = *b"marathon";
 
 /// Source of an episode's random numbers.
-pub(crate) struct EpisodeRng(ChaCha8Rng);
+pub struct EpisodeRng(ChaCha8Rng);
 
 impl EpisodeRng {
-    pub fn new(seed: u64, agent: u64, episode: u64) -> Self {
+    pub(crate) fn new(seed: u64, agent: u64, episode: u64) -> Self {
         let mut key = [0; 32];
         for (bytes, part) in
             key.chunks_exact_mut(8).zip([seed.to_le_bytes(), agent.to_le_bytes(), episode.to_le_bytes(), DOMAIN])
@@ -25,9 +25,24 @@ impl EpisodeRng {
 
     /// Uniform in [-half_width, half_width).
     pub fn around_zero(&mut self, half_width: f64) -> f64 {
-        // 53 bits, exact in f64
-        let unit = (self.0.next_u64() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64);
-        (2.0 * unit - 1.0) * half_width
+        (2.0 * self.unit() - 1.0) * half_width
+    }
+
+    /// Uniform in [low, high).
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        (high - low).mul_add(self.unit(), low)
+    }
+
+    /// Normally distributed with mean 0 and standard deviation 1 (Box and Muller's first number of a pair).
+    pub fn normal(&mut self) -> f64 {
+        // never 0, whose logarithm is not finite
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
+        radius * libm::cos(std::f64::consts::TAU * self.unit())
+    }
+
+    /// Uniform in [0, 1): 53 bits, exact in f64.
+    fn unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 }
 
@@ -54,5 +69,17 @@ mod tests {
         let variance = draws.iter().map(|x| x * x).sum::<f64>() / draws.len() as f64;
         // standard errors are 0.002 and 0.0005
         assert!(mean.abs() < 0.01 && (variance - 1.0 / 12.0).abs() < 0.003, "mean {mean}, variance {variance}");
+        assert!((0..1000).map(|_| rng.uniform(2.0, 5.0)).all(|x| (2.0..5.0).contains(&x)));
+    }
+
+    #[test]
+    fn normal_draws_have_the_moments_of_the_normal_distribution() {
+        let mut rng = EpisodeRng::new(7, 0, 1);
+        let draws: Vec<f64> = (0..100_000).map(|_| rng.normal()).collect();
+        let moment = |k: i32| draws.iter().map(|x| x.powi(k)).sum::<f64>() / draws.len() as f64;
+        // four standard errors: 0.0032, 0.0045, 0.012, 0.031 each
+        for (k, expected, error) in [(1, 0.0, 0.013), (2, 1.0, 0.018), (3, 0.0, 0.05), (4, 3.0, 0.13)] {
+            assert!((moment(k) - expected).abs() < error, "moment {k} is {}", moment(k));
+        }
     }
 }

@@ -11,6 +11,7 @@ use crate::agent::AnyAgent;
 use crate::agents;
 use crate::error::{EnvError, nearest};
 use crate::lane_env::AgentShards;
+use crate::options::Options;
 use crate::shard::ShardFactory;
 
 /// Agents by name.
@@ -25,7 +26,7 @@ impl Default for Registry {
     fn default() -> Self {
         let mut registry = Registry::empty();
         for agent in agents::all() {
-            registry.agents.push((agent.facts().id.to_string(), agent));
+            registry.agents.push((agent.facts().id, agent));
         }
         for (alias, id) in agents::ALIASES {
             registry.aliases.push((alias.into(), id.into()));
@@ -50,7 +51,7 @@ impl Registry {
     /// # Errors
     /// If the id is taken, or the agent does not fit its model.
     pub fn register(&mut self, agent: Arc<dyn AnyAgent>) -> Result<(), EnvError> {
-        let id = agent.facts().id.to_string();
+        let id = agent.facts().id;
         if self.find(&id).is_some() {
             let base = id.rsplit_once("-v").map_or(id.as_str(), |(base, _)| base);
             let free = (0..).map(|v| format!("{base}-v{v}")).find(|name| self.find(name).is_none());
@@ -79,12 +80,28 @@ impl Registry {
         })
     }
 
+    /// The agent of a name with other values for some of its arguments.
+    ///
+    /// # Errors
+    /// If there is no such agent, or it does not take an argument or its value; the message names the nearest.
+    pub fn agent_with(&self, name: &str, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        self.agent(name)?.with_options(options)
+    }
+
     /// The blocks of an agent for an instruction set.
     ///
     /// # Errors
     /// If there is no such agent, or it cannot be simulated.
     pub fn shards(&self, name: &str, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
         self.agent(name)?.shards(isa)
+    }
+
+    /// The same with other values for some of the agent's arguments.
+    ///
+    /// # Errors
+    /// As [`Registry::agent_with`] and [`Registry::shards`].
+    pub fn shards_with(&self, name: &str, options: &Options, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        self.agent_with(name, options)?.shards(isa)
     }
 
     fn find(&self, name: &str) -> Option<&Arc<dyn AnyAgent>> {
@@ -139,4 +156,12 @@ pub fn agent(name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
 /// As [`Registry::shards`].
 pub fn factory(name: &str, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> {
     Ok(global().shards(name, isa)?)
+}
+
+/// The same with other values for some of the agent's arguments.
+///
+/// # Errors
+/// As [`Registry::shards_with`].
+pub fn factory_with(name: &str, options: &Options, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> {
+    Ok(global().shards_with(name, options, isa)?)
 }

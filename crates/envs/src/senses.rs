@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 use marathon_physics::Readings;
 use marathon_physics::lanes::Real;
 
-use crate::agent::{Motors, Part};
+use crate::agent::{Body, Motors, Part};
 use crate::anatomy::Anatomy;
 
 /// Speed in m/s that [`Senses::velocity`] calls 1.
@@ -23,11 +23,13 @@ pub const MAX_BONUS: f64 = 0.5;
 pub struct Senses<'a, T: Real> {
     pub(crate) readings: Readings<'a, T>,
     pub(crate) anatomy: &'a Anatomy<T>,
-    /// Clipped to [-1, 1].
+    /// As [`Facts::controls`](crate::Facts::controls) says.
     pub(crate) action: &'a [T],
     pub(crate) memory: &'a [T],
     /// An episode has just begun: there has been no physics step whose contacts could be felt.
     pub(crate) fresh: bool,
+    /// Seconds between decisions.
+    pub(crate) dt: f64,
 }
 
 impl<T: Real> Senses<'_, T> {
@@ -101,7 +103,7 @@ impl<T: Real> Senses<'_, T> {
         self.action.len()
     }
 
-    /// Component `i` of the action, clipped to [-1, 1].
+    /// Component `i` of the action, clipped to [-1, 1] unless the agent takes it [raw](crate::Controls::Raw).
     #[inline(always)]
     pub fn action(&self, i: usize) -> T {
         self.action[i]
@@ -111,6 +113,31 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn memory(&self, i: usize) -> T {
         self.memory[i]
+    }
+
+    /// Index of a body, for the [readings](Senses::readings).
+    #[inline(always)]
+    pub fn body(&self, body: Body) -> usize {
+        self.anatomy.bodies[body.0]
+    }
+
+    /// What contacts do to the body of an index, see [`Readings::cfrc_ext`]: torque, N m, and force, N. Zero at the start
+    /// of an episode.
+    #[inline(always)]
+    pub fn contact_wrench(&self, body: usize) -> [T; 6] {
+        if self.fresh { [T::zero(); 6] } else { self.readings.cfrc_ext(body) }
+    }
+
+    /// Whether an episode has just begun: no physics step has been made yet.
+    #[inline(always)]
+    pub fn fresh(&self) -> bool {
+        self.fresh
+    }
+
+    /// Seconds between decisions.
+    #[inline(always)]
+    pub fn dt(&self) -> f64 {
+        self.dt
     }
 
     /// The physics: every coordinate, velocity, body and geom of the model, by index.

@@ -6,6 +6,8 @@
 //! whole environment: its random stream, and with it its whole life, depends on that number and the seed alone, never
 //! on how the blocks are spread over shards and threads.
 
+use crate::options::Options;
+
 /// Agents per block.
 pub const BLOCK: usize = 16;
 
@@ -16,8 +18,20 @@ pub struct Spec {
     pub id: String,
     /// Observation length.
     pub obs: usize,
-    /// Action length; actions are nominally in [-1, 1] and clipped by the environment.
+    /// Action length.
     pub act: usize,
+    /// Names of the actuators.
+    pub action_names: Vec<String>,
+    /// Lowest sensible action per actuator, in the actuator's own units; -inf for an actuator without bounds.
+    ///
+    /// Every environment takes actions in these units: [-1, 1] for the suite's own agents, which clip them, the
+    /// actuators' `ctrlrange` for Gymnasium's and dm_control's tasks, which do not: their rewards see what was asked for,
+    /// their physics clamps what acts. A learner that acts in [-1, 1] maps that to the bounds with
+    /// [`Spec::action_of`], and so do the policies that it writes: their actions are the environment's, and earn the same
+    /// here and in the original task.
+    pub action_low: Vec<f32>,
+    /// Highest sensible action per actuator.
+    pub action_high: Vec<f32>,
     /// Seconds between decisions.
     pub dt: f64,
     /// Physics steps per decision.
@@ -26,6 +40,33 @@ pub struct Spec {
     pub max_episode_steps: usize,
     /// Names of the reward's terms, in the order of [`BlockStep::terms`].
     pub reward_terms: Vec<String>,
+    /// Names of further numbers for logs, in the order of [`BlockStep::info`].
+    pub info: Vec<String>,
+    /// Arguments that the agent takes, with the values that it has.
+    pub options: Options,
+}
+
+impl Spec {
+    /// Bounds of an actuator's actions for a policy that acts within bounds: [-1, 1] for an actuator that has none.
+    #[inline(always)]
+    pub fn action_range(&self, i: usize) -> [f32; 2] {
+        let (low, high) = (self.action_low[i], self.action_high[i]);
+        if low.is_finite() && high.is_finite() { [low, high] } else { [-1.0, 1.0] }
+    }
+
+    /// The action that a nominal one stands for: clipped to [-1, 1], and mapped to the [range](Spec::action_range) of
+    /// actuator `i`.
+    #[inline(always)]
+    pub fn action_of(&self, i: usize, nominal: f32) -> f32 {
+        scale_action(self.action_range(i), nominal.clamp(-1.0, 1.0))
+    }
+}
+
+/// Maps [-1, 1] to a range.
+#[inline(always)]
+pub fn scale_action([low, high]: [f32; 2], nominal: f32) -> f32 {
+    // the same bits where there is nothing to map
+    if low == -1.0 && high == 1.0 { nominal } else { 0.5 * (low + high) + 0.5 * (high - low) * nominal }
 }
 
 /// What one decision of a block led to.
@@ -44,6 +85,8 @@ pub struct BlockStep {
     pub diverged: u16,
     /// Terms of the reward, `[term][16]`, length `16 * reward_terms.len()`; they add up to the reward.
     pub terms: Vec<f32>,
+    /// Further numbers about the state reached, `[info][16]`.
+    pub info: Vec<f32>,
 }
 
 /// A run of blocks owned by one thread.
@@ -55,7 +98,7 @@ pub trait Shard: Send {
     /// Starts new episodes for the agents in `mask` and writes their first observations into `obs`
     /// (`[obs][16]`; lanes outside the mask are left alone).
     fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]);
-    /// Advances every agent of a block by one decision. `action` is `[act][16]`. Writes the observation of the state
+    /// Advances every agent of a block by one decision. `action` is `[act][16]`, see [`Spec::action_low`]. Writes the observation of the state
     /// reached into `obs` (`[obs][16]`), for ended episodes too: the caller then calls `reset` for those.
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep);
     /// Appends everything that a block's future depends on to `bytes`.

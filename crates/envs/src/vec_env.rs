@@ -9,6 +9,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::EnvError;
 use crate::lane_env::{AgentShard, AgentState};
+use crate::options::Options;
 use crate::registry::{self, Registry};
 use crate::shard::{BLOCK, BlockStep, Spec};
 
@@ -40,6 +41,8 @@ pub struct VecEnvOptions {
     pub autoreset: Autoreset,
     /// Decisions after which an episode is truncated; `None` means the task's own number.
     pub max_episode_steps: Option<usize>,
+    /// Arguments of the agent that differ from its defaults.
+    pub options: Options,
 }
 
 impl Default for VecEnvOptions {
@@ -51,6 +54,7 @@ impl Default for VecEnvOptions {
             isa: None,
             autoreset: Autoreset::SameStep,
             max_episode_steps: None,
+            options: Options::new(),
         }
     }
 }
@@ -66,6 +70,8 @@ pub struct Step {
     pub reward: Vec<f32>,
     /// Terms that add up to the rewards, `[agents][reward_terms]`.
     pub terms: Vec<f32>,
+    /// Further numbers about the states reached, `[agents][info]`.
+    pub info: Vec<f32>,
     /// Distance moved along +x, m, `[agents]`.
     pub forward: Vec<f32>,
     /// The agent failed, `[agents]`.
@@ -84,6 +90,7 @@ impl Step {
             final_obs: &mut self.final_obs,
             reward: &mut self.reward,
             terms: &mut self.terms,
+            info: &mut self.info,
             forward: &mut self.forward,
             terminated: &mut self.terminated,
             truncated: &mut self.truncated,
@@ -103,6 +110,8 @@ pub struct StepMut<'a> {
     pub reward: &'a mut [f32],
     /// See [`Step::terms`].
     pub terms: &'a mut [f32],
+    /// See [`Step::info`].
+    pub info: &'a mut [f32],
     /// See [`Step::forward`].
     pub forward: &'a mut [f32],
     /// See [`Step::terminated`].
@@ -111,6 +120,50 @@ pub struct StepMut<'a> {
     pub truncated: &'a mut [bool],
     /// See [`Step::diverged`].
     pub diverged: &'a mut [bool],
+}
+
+impl<'a> StepMut<'a> {
+    /// The same arrays for a shorter time.
+    fn borrow(&mut self) -> StepMut<'_> {
+        StepMut {
+            obs: self.obs,
+            final_obs: self.final_obs,
+            reward: self.reward,
+            terms: self.terms,
+            info: self.info,
+            forward: self.forward,
+            terminated: self.terminated,
+            truncated: self.truncated,
+            diverged: self.diverged,
+        }
+    }
+
+    /// The rows of the first `n` agents, and those of the others.
+    fn split_at(self, n: usize, spec: &Spec) -> (StepMut<'a>, StepMut<'a>) {
+        let (obs, obs_rest) = self.obs.split_at_mut(n * spec.obs);
+        let (final_obs, final_obs_rest) = self.final_obs.split_at_mut(n * spec.obs);
+        let (reward, reward_rest) = self.reward.split_at_mut(n);
+        let (terms, terms_rest) = self.terms.split_at_mut(n * spec.reward_terms.len());
+        let (info, info_rest) = self.info.split_at_mut(n * spec.info.len());
+        let (forward, forward_rest) = self.forward.split_at_mut(n);
+        let (terminated, terminated_rest) = self.terminated.split_at_mut(n);
+        let (truncated, truncated_rest) = self.truncated.split_at_mut(n);
+        let (diverged, diverged_rest) = self.diverged.split_at_mut(n);
+        (
+            StepMut { obs, final_obs, reward, terms, info, forward, terminated, truncated, diverged },
+            StepMut {
+                obs: obs_rest,
+                final_obs: final_obs_rest,
+                reward: reward_rest,
+                terms: terms_rest,
+                info: info_rest,
+                forward: forward_rest,
+                terminated: terminated_rest,
+                truncated: truncated_rest,
+                diverged: diverged_rest,
+            },
+        )
+    }
 }
 
 /// Agents of one kind that are stepped together.
@@ -159,7 +212,7 @@ impl VecEnv {
         if options.max_episode_steps == Some(0) {
             return wrong("max_episode_steps", "0".into(), "at least 1");
         }
-        let factory = registry.shards(agent, options.isa.unwrap_or_else(Isa::best))?;
+        let factory = registry.shards_with(agent, &options.options, options.isa.unwrap_or_else(Isa::best))?;
         let mut spec = factory.spec().clone();
         spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);
         let blocks = options.agents.div_ceil(BLOCK);
@@ -176,7 +229,7 @@ impl VecEnv {
                     shard,
                     action: vec![0.0; spec.act * BLOCK],
                     obs: vec![0.0; spec.obs * BLOCK],
-                    out: BlockStep { terms: vec![0.0; spec.reward_terms.len() * BLOCK], ..Default::default() },
+                    out: BlockStep::default(),
                     pending: vec![0; own],
                 }
             })
@@ -217,6 +270,7 @@ impl VecEnv {
             final_obs: vec![0.0; n * self.spec.obs],
             reward: vec![0.0; n],
             terms: vec![0.0; n * self.spec.reward_terms.len()],
+            info: vec![0.0; n * self.spec.info.len()],
             forward: vec![0.0; n],
             terminated: vec![false; n],
             truncated: vec![false; n],
@@ -274,17 +328,37 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Advances every agent by one decision. `actions` is `[agents][act]`, nominally in [-1, 1] and clipped to it.
+    /// Writes what the agents report about their present states, `[agents][info]`: after a reset, or of the episodes that
+    /// have begun within a step. [`Step::info`] is about the states that a step reached.
+    ///
+    /// # Errors
+    /// If the array's length is wrong.
+    pub fn info(&self, info: &mut [f32]) -> Result<(), EnvError> {
+        let n = self.spec.info.len();
+        self.check("info [agents][info]", info.len(), n)?;
+        let mut block = vec![0.0; n * BLOCK];
+        for (i, rows) in info.chunks_mut((n * BLOCK).max(1)).enumerate() {
+            let (worker, own) = (&self.workers[i * BLOCK / self.stride], i % (self.stride / BLOCK));
+            worker.shard.info(own, !0, &mut block);
+            to_rows(&block, n, !0, rows);
+        }
+        Ok(())
+    }
+
+    /// Advances every agent by one decision. `actions` is `[agents][act]` in the units of
+    /// [`Spec::action_low`].
     ///
     /// # Errors
     /// If an array's length is wrong; then nothing has been done.
     pub fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), EnvError> {
-        let (obs, act, terms) = (self.spec.obs, self.spec.act, self.spec.reward_terms.len());
+        let (obs, act) = (self.spec.obs, self.spec.act);
+        let (terms, infos) = (self.spec.reward_terms.len(), self.spec.info.len());
         self.check("actions [agents][act]", actions.len(), act)?;
         self.check("obs [agents][obs]", out.obs.len(), obs)?;
         self.check("final_obs [agents][obs]", out.final_obs.len(), obs)?;
         self.check("reward [agents]", out.reward.len(), 1)?;
         self.check("terms [agents][reward_terms]", out.terms.len(), terms)?;
+        self.check("info [agents][info]", out.info.len(), infos)?;
         self.check("forward [agents]", out.forward.len(), 1)?;
         self.check("terminated [agents]", out.terminated.len(), 1)?;
         self.check("truncated [agents]", out.truncated.len(), 1)?;
@@ -296,29 +370,19 @@ impl VecEnv {
             return Ok(());
         };
         // every worker gets the rows of its own agents
-        let n = self.stride;
-        let StepMut { obs: o, final_obs: f, reward, terms: t, forward, terminated, truncated, diverged } = out;
+        let (spec, n) = (&self.spec, self.stride);
+        let mut rest = out.borrow();
+        let mut parts = Vec::with_capacity(self.workers.len());
+        for _ in 1..self.workers.len() {
+            let (part, others) = rest.split_at(n, spec);
+            parts.push(part);
+            rest = others;
+        }
+        parts.push(rest);
         pool.install(|| {
-            (
-                self.workers.par_iter_mut(),
-                actions.par_chunks(n * act),
-                o.par_chunks_mut(n * obs),
-                f.par_chunks_mut(n * obs),
-                reward.par_chunks_mut(n),
-                t.par_chunks_mut(n * terms),
-                forward.par_chunks_mut(n),
-                terminated.par_chunks_mut(n),
-                truncated.par_chunks_mut(n),
-                diverged.par_chunks_mut(n),
-            )
+            (self.workers.par_iter_mut(), actions.par_chunks(n * act), parts)
                 .into_par_iter()
-                .for_each(
-                    |(worker, actions, obs, final_obs, reward, terms, forward, terminated, truncated, diverged)| {
-                        let mut out =
-                            StepMut { obs, final_obs, reward, terms, forward, terminated, truncated, diverged };
-                        worker.step(autoreset, actions, &mut out);
-                    },
-                );
+                .for_each(|(worker, actions, mut out)| worker.step(autoreset, actions, &mut out));
         });
         Ok(())
     }
@@ -456,7 +520,8 @@ impl Worker {
     fn step(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut) {
         let Worker { shard, action, obs, out: o, pending } = self;
         let spec = shard.spec();
-        let (n_obs, n_act, n_terms) = (spec.obs, spec.act, spec.reward_terms.len());
+        let (n_obs, n_act) = (spec.obs, spec.act);
+        let (n_terms, n_info) = (spec.reward_terms.len(), spec.info.len());
         for block in 0..shard.blocks() {
             let first = block * BLOCK;
             let count = BLOCK.min(out.reward.len() - first);
@@ -473,12 +538,14 @@ impl Worker {
             let due = std::mem::take(&mut pending[block]);
             if due != 0 {
                 shard.reset(block, due, obs);
+                shard.info(block, due, &mut o.info);
                 clear(o, due);
             }
 
             out.reward[agents.clone()].copy_from_slice(&o.reward[..count]);
             out.forward[agents.clone()].copy_from_slice(&o.forward[..count]);
             to_rows(&o.terms, n_terms, real, &mut out.terms[first * n_terms..(first + count) * n_terms]);
+            to_rows(&o.info, n_info, real, &mut out.info[first * n_info..(first + count) * n_info]);
             for i in 0..count {
                 out.terminated[first + i] = o.terminated >> i & 1 == 1;
                 out.truncated[first + i] = o.truncated >> i & 1 == 1;
@@ -513,7 +580,8 @@ fn clear(out: &mut BlockStep, mask: u16) {
 
 /// Copies the agents in `mask` from a block's `[column][16]` into rows.
 fn to_rows(block: &[f32], columns: usize, mask: u16, rows: &mut [f32]) {
-    for (i, row) in rows.chunks_exact_mut(columns).enumerate() {
+    // there may be no columns
+    for (i, row) in rows.chunks_exact_mut(columns.max(1)).enumerate() {
         if mask >> i & 1 == 1 {
             for (column, x) in row.iter_mut().enumerate() {
                 *x = block[column * BLOCK + i];

@@ -34,3 +34,118 @@ fn a_name_is_registered_once() {
         "agent 'Ant-v0' is registered already; give the new one another id, such as 'Ant-v2'"
     );
 }
+
+mod with_arguments {
+    use std::sync::Arc;
+
+    use marathon_envs::options::OptionSet;
+    use marathon_envs::{
+        Agent, EnvError, Facts, Obs, OptionInfo, Options, Registry, Senses, Terms, Value, VecEnv, VecEnvOptions, names,
+    };
+    use marathon_physics::lanes::{Isa, Real};
+
+    marathon_envs::options! {
+        /// A cart that is told what to do.
+        struct Cart {
+            /// Price of the effort.
+            effort_weight: f64 = 0.5,
+            /// Whether it sees its position.
+            see_position: bool = true,
+            /// Where it may be.
+            range: [f64; 2] = [-1.0, f64::INFINITY],
+            /// Physics steps per decision.
+            frame_skip: usize = 2,
+        }
+    }
+
+    impl Agent for Cart {
+        fn facts(&self) -> Facts {
+            let model = r#"<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0" damping="1"/>
+                <geom size="0.1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
+            Facts {
+                id: "Cart-v3".into(),
+                model: model.into(),
+                frame_skip: self.frame_skip,
+                reward_terms: names(["effort"]),
+                ..Facts::default()
+            }
+        }
+        #[inline(always)]
+        fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+            if self.see_position {
+                out.scalar(s.readings().qpos(0));
+            }
+            out.scalar(s.readings().qvel(0));
+        }
+        #[inline(always)]
+        fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+            terms.add("effort", -self.effort_weight, s.action(0) * s.action(0));
+        }
+        #[inline(always)]
+        fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+            let x = s.readings().qpos(0);
+            T::or(x.lt(T::lit(self.range[0])), T::lit(self.range[1]).lt(x))
+        }
+        fn options(&self) -> Vec<OptionInfo> {
+            self.infos()
+        }
+        fn with_options(&self, options: &Options) -> Option<Self> {
+            Some(self.with(options))
+        }
+    }
+
+    fn registry() -> Registry {
+        let mut registry = Registry::default();
+        registry.register(Arc::new(Cart::default())).unwrap();
+        registry
+    }
+
+    fn refusal(name: &str, options: &Options) -> String {
+        registry().agent_with(name, options).map(|_| ()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn arguments_change_the_agent() {
+        let options = Options::new().with("effort_weight", 2.0).with("see_position", false).with("frame_skip", 5.0);
+        let options = VecEnvOptions { options, isa: Some(Isa::F64), ..Default::default() };
+        let mut env = VecEnv::from_registry(&registry(), "cart", &options).unwrap();
+        assert_eq!((env.spec().obs, env.spec().frame_skip), (1, 5));
+        assert_eq!(env.spec().options.get("effort_weight"), Some(&2.0.into()));
+        assert_eq!(env.spec().options.get("range"), Some(&[-1.0, f64::INFINITY].into()));
+        let mut step = env.buffers();
+        env.reset(None, &mut step.obs).unwrap();
+        env.step(&[0.5], &mut step.as_mut()).unwrap();
+        assert_eq!(step.reward, [-0.5]);
+    }
+
+    #[test]
+    fn an_unknown_argument_gets_the_nearest_and_the_list() {
+        assert_eq!(
+            refusal("cart", &Options::new().with("efort_weight", 1.0)),
+            "agent 'Cart-v3' takes no option 'efort_weight'; did you mean 'effort_weight'? \
+             known: effort_weight, see_position, range, frame_skip"
+        );
+        assert_eq!(
+            refusal("hopper", &Options::new().with("effort_weight", 1.0)),
+            "agent 'Hopper-v0' takes no option 'effort_weight'; known: none"
+        );
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_type_is_refused() {
+        let cases: [(&str, Value, &str); 4] = [
+            ("effort_weight", true.into(), "option effort_weight is true, expected a number"),
+            ("range", 1.0.into(), "option range is 1, expected two numbers"),
+            ("frame_skip", 2.5.into(), "option frame_skip is 2.5, expected a whole number, 0 or more"),
+            ("see_position", "yes".into(), "option see_position is 'yes', expected true or false"),
+        ];
+        for (name, value, complaint) in cases {
+            let mut options = Options::new();
+            options.set(name, value);
+            assert_eq!(refusal("cart", &options), format!("agent 'Cart-v3': {complaint}"));
+        }
+        // right in itself, wrong for the agent
+        let error = registry().shards_with("cart", &Options::new().with("frame_skip", 0.0), Isa::F32).map(|_| ());
+        assert!(matches!(error, Err(EnvError::Agent { .. })));
+    }
+}

@@ -12,7 +12,8 @@ use common::{action, isas};
 use marathon_envs::memory::Average;
 use marathon_envs::senses::{angle, clamp, unit};
 use marathon_envs::{
-    Agent, AgentState, Autoreset, Facts, Motors, Obs, Part, Registry, ResetNoise, Senses, Terms, VecEnv, VecEnvOptions,
+    Agent, AgentState, Autoreset, Facts, Motors, Obs, Part, Registry, ResetNoise, Senses, Start, Terms, VecEnv,
+    VecEnvOptions, names,
 };
 use marathon_physics::lanes::Real;
 
@@ -52,26 +53,30 @@ struct Probe(Facts);
 
 fn facts() -> Facts {
     Facts {
-        id: "Probe-v0",
-        summary: "observes what the helpers say",
+        id: "Probe-v0".into(),
+        summary: "observes what the helpers say".into(),
         model: MODEL.into(),
         frame_skip: 2,
         max_episode_steps: 30,
-        observation: 32,
-        actions: &ACTIONS,
-        reward_terms: &["speed", "average"],
-        parts: &PARTS,
-        feet: &["ball"],
-        touch: &["arm"],
+        observation: Some(32),
+        actions: names(ACTIONS),
+        reward_terms: names(["speed", "average"]),
+        parts: names(PARTS),
+        feet: names(["ball"]),
+        touch: names(["arm"]),
         memory: Average::SLOTS,
-        reset: ResetNoise { joint_position: 0.3, joint_velocity: 0.5, root_velocity: 2.0 },
-        termination_reward: -5.0,
+        termination_reward: Some(-5.0),
+        ..Facts::default()
     }
 }
 
 impl Agent for Probe {
     fn facts(&self) -> Facts {
         self.0.clone()
+    }
+
+    fn reset(&self, start: &mut Start) {
+        start.add_noise(ResetNoise { joint_position: 0.3, joint_velocity: 0.5, root_velocity: 2.0 });
     }
 
     #[inline(always)]
@@ -271,7 +276,7 @@ fn failure_and_time_limit_are_the_agents_own() {
 
 #[test]
 fn the_global_registry_takes_agents_of_other_crates() {
-    let mine = Facts { id: "Global-v3", ..facts() };
+    let mine = Facts { id: "Global-v3".into(), ..facts() };
     marathon_envs::register(Arc::new(Probe(mine.clone()))).unwrap();
     assert!(marathon_envs::ids().contains(&"Global-v3".to_string()));
     let env = VecEnv::new("global", &VecEnvOptions::default()).unwrap();
@@ -284,18 +289,18 @@ fn the_global_registry_takes_agents_of_other_crates() {
 fn a_wrong_description_is_refused_with_a_helpful_message() {
     let refuse = |facts: Facts| Registry::empty().register(Arc::new(Probe(facts))).unwrap_err().to_string();
     for (facts, message) in [
-        (Facts { observation: 30, ..facts() }, "agent 'Probe-v0': it observes 32 numbers, but its facts say 30"),
-        (Facts { observation: 40, ..facts() }, "agent 'Probe-v0': it observes 32 numbers, but its facts say 40"),
+        (Facts { observation: Some(30), ..facts() }, "agent 'Probe-v0': it observes 32 numbers, but its facts say 30"),
+        (Facts { observation: Some(40), ..facts() }, "agent 'Probe-v0': it observes 32 numbers, but its facts say 40"),
         (
-            Facts { reward_terms: &["speed", "mean"], ..facts() },
+            Facts { reward_terms: names(["speed", "mean"]), ..facts() },
             r#"agent 'Probe-v0': it adds the reward terms ["speed", "average"], but its facts say ["speed", "mean"]"#,
         ),
         (
-            Facts { touch: &["amr"], ..facts() },
+            Facts { touch: names(["amr"]), ..facts() },
             "agent 'Probe-v0': touch sensor 'amr' is not a geom of its model; did you mean 'arm'? known: ball, arm, tail",
         ),
         (
-            Facts { actions: &["rail", "shoulder"], ..facts() },
+            Facts { actions: names(["rail", "shoulder"]), ..facts() },
             r#"agent 'Probe-v0': its actions are ["rail", "shoulder"], but the actuators of its model are ["shoulder", "rail"]"#,
         ),
         (Facts { frame_skip: 0, ..facts() }, "agent 'Probe-v0': frame_skip is 0, expected at least 1"),

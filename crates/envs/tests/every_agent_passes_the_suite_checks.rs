@@ -3,7 +3,7 @@
 mod common;
 
 use common::{go_on, make, play};
-use marathon_envs::{Autoreset, Step, TERMINATION_TERM, VecEnv, VecEnvOptions};
+use marathon_envs::{Autoreset, ResetNoise, Step, TERMINATION_TERM, VecEnv, VecEnvOptions};
 
 /// Observation length, action length, decisions per second, decisions per episode: the paper's numbers.
 #[test]
@@ -136,7 +136,7 @@ fn resets_are_random_and_reproducible() {
 fn resets_stay_near_the_spawn_pose() {
     for id in marathon_envs::ids() {
         let agent = marathon_envs::agent(&id).unwrap();
-        let (model, noise) = (agent.model().unwrap(), agent.facts().reset);
+        let (model, noise) = (agent.model().unwrap(), ResetNoise::MARATHON);
         let spawn = &model.keyframes[0];
         assert_eq!(spawn.name, "spawn");
         let mut env = make(&id, 64, 1, None, Autoreset::SameStep);

@@ -48,7 +48,8 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             env.step(&row, &mut out.as_mut()).unwrap();
             steps.push(out.clone());
         }
-        request.push(json!({ "id": id, "xml": facts.model, "frame_skip": facts.frame_skip, "episodes": episodes }));
+        request
+            .push(json!({ "id": id, "xml": facts.model.text(), "frame_skip": facts.frame_skip, "episodes": episodes }));
         ours.push((env.spec().clone(), steps));
     }
     let answer = oracle("agents.py", &json!({ "agents": request }));

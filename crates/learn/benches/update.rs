@@ -4,7 +4,7 @@
 //! 2. Training: processor microseconds per agent-step around an environment that does nothing, with everything else
 //!    included (acting, advantages, four epochs of updates, optimizer, waiting).
 
-use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
 use marathon_learn::mlp::{CHUNK, Mlp};
 use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
@@ -122,7 +122,20 @@ struct Idle(Spec);
 impl Idle {
     fn new(obs: usize, act: usize) -> Self {
         let reward_terms = vec!["noise".into()];
-        Self(Spec { id: "Idle".into(), obs, act, dt: 0.01, frame_skip: 1, max_episode_steps: 1000, reward_terms })
+        Self(Spec {
+            id: "Idle".into(),
+            obs,
+            act,
+            action_names: vec![String::new(); act],
+            action_low: vec![-1.0; act],
+            action_high: vec![1.0; act],
+            dt: 0.01,
+            frame_skip: 1,
+            max_episode_steps: 1000,
+            reward_terms,
+            info: Vec::new(),
+            options: Options::new(),
+        })
     }
 }
 

@@ -5,8 +5,12 @@
 //!
 //! ```text
 //! x = clamp((obs - obs_mean) * (1 / obs_std), -observation_clip, observation_clip)
-//! action = clamp(mlp(x), -action_clip, action_clip)
+//! nominal = clamp(mlp(x), -action_clip, action_clip)
+//! action = (low + high) / 2 + nominal (high - low) / 2
 //! ```
+//!
+//! with `[low, high]` from `action_range`. The action is in the units of the environment ([`Spec::action_low`]), so that
+//! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
 
 use crate::buffer::Blocks;
 use crate::eval::Evaluation;
@@ -17,6 +21,7 @@ use crate::normalize::{Normalize, Normalizer};
 use crate::ppo::{Clocks, Run};
 use crate::{Activation, BLOCK, Error, PpoConfig, f32_lanes};
 use marathon_envs::Spec;
+use marathon_envs::shard::scale_action;
 use marathon_physics::lanes::{Isa, Real};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -50,8 +55,11 @@ pub struct PolicyMeta {
     pub activation: Activation,
     /// Bound of the normalized observations.
     pub observation_clip: f32,
-    /// Bound of the actions.
+    /// Bound of the network's output.
     pub action_clip: f32,
+    /// What an output of -1 and 1 means to the environment, per actuator; empty: just that.
+    #[serde(default)]
+    pub action_range: Vec<[f32; 2]>,
     /// How the policy was trained, if by Marathon.
     pub training: Option<Training>,
     /// How it did when it was last evaluated.
@@ -106,6 +114,7 @@ impl Policy {
             activation: config.activation,
             observation_clip: config.observation_clip as f32,
             action_clip: 1.0,
+            action_range: (0..spec.act).map(|i| spec.action_range(i)).collect(),
             training: Some(training),
             evaluation: None,
         };
@@ -183,9 +192,16 @@ impl Policy {
     pub fn act(&self, obs: &[f32]) -> Vec<f32> {
         assert_eq!(obs.len(), self.meta.obs, "length of the observation");
         let mut action = self.net.forward_row(&self.params, &self.normalizer.row(obs));
-        let clip = self.meta.action_clip;
-        action.iter_mut().for_each(|a| *a = Real::min(Real::max(*a, -clip), clip));
+        action.iter_mut().enumerate().for_each(|(i, a)| *a = self.action(i, *a));
         action
+    }
+
+    /// The action for output `i` of the network.
+    #[inline(always)]
+    fn action(&self, i: usize, output: f32) -> f32 {
+        let clip = self.meta.action_clip;
+        let nominal = Real::min(Real::max(output, -clip), clip);
+        self.meta.action_range.get(i).map_or(nominal, |range| scale_action(*range, nominal))
     }
 
     /// Writes the policy to a file.
@@ -217,6 +233,13 @@ impl Policy {
         if !positive(meta.observation_clip) || !positive(meta.action_clip) {
             let found = format!("{} and {}", meta.observation_clip, meta.action_clip);
             return Err(Error::file(path, "observation_clip and action_clip", found, "positive numbers"));
+        }
+        let sound = |[low, high]: &[f32; 2]| low.is_finite() && high.is_finite() && low < high;
+        if !(meta.action_range.is_empty() || meta.action_range.len() == meta.act)
+            || !meta.action_range.iter().all(sound)
+        {
+            let found = format!("{:?}", meta.action_range);
+            return Err(Error::file(path, "action_range", found, "a low and a higher number per action, or nothing"));
         }
         let mean = file.finite("obs_mean", &[meta.obs])?;
         let std = file.finite("obs_std", &[meta.obs])?;
@@ -291,7 +314,7 @@ impl<'a> BlockPolicy<'a> {
     /// # Panics
     /// If the lengths do not fit each other.
     pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
-        let (policy, clip) = (self.policy, self.policy.meta.action_clip);
+        let policy = self.policy;
         let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
         assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
         for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
@@ -306,8 +329,8 @@ impl<'a> BlockPolicy<'a> {
             let n = raw.len() / obs_row;
             policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, n);
             for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
-                for (out, x) in out.iter_mut().zip(self.tape.output().block(b)) {
-                    *out = Real::min(Real::max(*x, -clip), clip);
+                for (i, (out, x)) in out.iter_mut().zip(self.tape.output().block(b)).enumerate() {
+                    *out = policy.action(i / BLOCK, *x);
                 }
             }
         }

@@ -147,6 +147,8 @@ pub struct Actor {
     tape: Tape<f32>,
     critic_tape: Tape<f32>,
     eps: Vec<[f32; BLOCK]>,
+    /// The actions of a block in the environment's units, `[act][16]`.
+    action: Vec<f32>,
     out: BlockStep,
 }
 
@@ -176,6 +178,7 @@ impl Actor {
             tape: actor.inference_tape(),
             critic_tape: critic.inference_tape(),
             eps: vec![[0.0; BLOCK]; factory.spec().act],
+            action: vec![0.0; factory.spec().act * BLOCK],
             out: BlockStep::default(),
         }
     }
@@ -271,7 +274,11 @@ impl Actor {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
         let out = &mut self.out;
         let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
-        self.shard.step(b, &rollout.action[item * act_row..(item + 1) * act_row], obs, out);
+        let spec = self.shard.spec();
+        for (i, (action, drawn)) in self.action.iter_mut().zip(&rollout.action[item * act_row..]).enumerate() {
+            *action = spec.action_of(i / BLOCK, *drawn);
+        }
+        self.shard.step(b, &self.action, obs, out);
 
         // running sums of the agents
         let sums = &mut rollout.sums[b];

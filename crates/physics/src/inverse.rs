@@ -4,7 +4,9 @@
 
 use crate::lanes::Real;
 use crate::readings::Readings;
+use crate::sim::Sim;
 use crate::spatial::*;
+use crate::work::Work;
 
 impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
@@ -33,28 +35,11 @@ impl<T: Real> Readings<'_, T> {
 
     /// Contacts, limits and dry friction (`qfrc_constraint`).
     pub fn constraint_forces(&self) -> Vec<T> {
-        let mut forces = vec![[T::zero(); 6]; self.sim.links.len()];
-        for c in &self.work.contacts {
-            let w = c.wrench(&c.force);
-            for i in 0..6 {
-                forces[c.link][i] += w[i];
-            }
-        }
+        let mut links = vec![[T::zero(); 6]; self.sim.links.len()];
         let mut joints = vec![T::zero(); self.sim.model.nv];
-        for b in self.work.blocks.iter() {
-            b.exert(&mut forces, &mut joints);
-        }
-        let mut out = self.joint_space(forces);
-        for (sum, f) in out.iter_mut().zip(joints) {
-            *sum += f;
-        }
-        for l in &self.work.limits {
-            out[l.dof] += l.sign * l.force;
-        }
-        for f in &self.work.dry {
-            out[f.dof] += f.force;
-        }
-        out
+        constraint_wrenches(self.work, &mut links, &mut joints);
+        joint_space(self.sim, self.work, &mut links, &mut joints);
+        joints
     }
 
     /// The mass matrix, `nv` rows of `nv`, armature included.
@@ -80,20 +65,10 @@ impl<T: Real> Readings<'_, T> {
         rows
     }
 
-    /// Forces on links as forces on joints: every joint carries all that is above it.
+    /// Forces on links as forces on joints.
     fn joint_space(&self, mut forces: Vec<V6<T>>) -> Vec<T> {
         let mut out = vec![T::zero(); self.sim.model.nv];
-        for (l, link) in self.sim.links.iter().enumerate().rev() {
-            let f = forces[l];
-            for d in link.dofs.clone() {
-                out[d] = dot6(&self.work.axis[d], &f);
-            }
-            if let Some(p) = link.parent {
-                for i in 0..6 {
-                    forces[p][i] += f[i];
-                }
-            }
-        }
+        joint_space(self.sim, self.work, &mut forces, &mut out);
         out
     }
 
@@ -107,6 +82,45 @@ impl<T: Real> Readings<'_, T> {
             n += T::masked(b.on, T::lit(1.0));
         }
         n
+    }
+}
+
+/// Forces of all constraints, on links and on joints.
+#[inline(always)]
+pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], joints: &mut [T]) {
+    links.fill([T::zero(); 6]);
+    joints.fill(T::zero());
+    for c in &work.contacts {
+        let w = c.wrench(&c.force);
+        for i in 0..6 {
+            links[c.link][i] += w[i];
+        }
+    }
+    for b in work.blocks.iter() {
+        b.exert(links, joints);
+    }
+    for l in &work.limits {
+        joints[l.dof] += l.sign * l.force;
+    }
+    for f in &work.dry {
+        joints[f.dof] += f.force;
+    }
+}
+
+/// Adds what forces on links do to the joints: every joint carries all that is above it. The forces are added up on
+/// the way.
+#[inline(always)]
+pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6<T>], joints: &mut [T]) {
+    for (l, link) in sim.links.iter().enumerate().rev() {
+        let f = links[l];
+        for d in link.dofs.clone() {
+            joints[d] += dot6(&work.axis[d], &f);
+        }
+        if let Some(p) = link.parent {
+            for i in 0..6 {
+                links[p][i] += f[i];
+            }
+        }
     }
 }
 

@@ -149,6 +149,13 @@ impl<T: Real> Sim<T> {
     /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
     /// (positions and velocities) up to date.
     pub fn step(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
+        self.advance(work, group, substeps);
+        self.refresh(work, group);
+    }
+
+    /// The same without bringing the readings up to date: they show the state from which the last physics step computed
+    /// its forces, as after MuJoCo's `mj_step` (with RK4, the state of its last stage).
+    pub fn advance(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
         for touched in work.touched.iter_mut() {
             *touched = T::none();
         }
@@ -160,7 +167,6 @@ impl<T: Real> Sim<T> {
                 self.finish_step(work, group);
             }
         }
-        self.refresh(work, group);
     }
 
     /// Recomputes positions and velocities of bodies at the present state.

@@ -196,6 +196,13 @@ pub struct Work<T: Real> {
     pub(crate) touching_bodies: Vec<T::Mask>,
     /// Centers of the geoms that meet others, relative to their trees' reference points; of static ones, in the world.
     pub(crate) centers: Vec<V3<T>>,
+    /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
+    pub(crate) tree_com: Vec<V3<T>>,
+    /// Per body: torque and force from outside, about the center of mass of its tree.
+    pub(crate) body_force: Vec<V6<T>>,
+    /// Per degree of freedom: forces of actuators and constraints.
+    pub(crate) actuation: Vec<T>,
+    pub(crate) constraint: Vec<T>,
     /// Contacts of one pair of geoms, and of one lane of them.
     pub(crate) touches: Vec<Touch<T>>,
     pub(crate) lane_touches: Touches<T::Scalar>,
@@ -314,6 +321,10 @@ impl<T: Real> Work<T> {
             normal_force: vec![z; sim.geoms.len()],
             touching_bodies: vec![T::none(); sim.geoms.len()],
             centers: vec![[z; 3]; sim.geoms.len()],
+            tree_com: vec![[z; 3]; sim.model.bodies.len()],
+            body_force: vec![[z; 6]; sim.model.bodies.len()],
+            actuation: vec![z; nv],
+            constraint: vec![z; nv],
             touches: Vec::new(),
             lane_touches: Touches::new(),
             gaps: Gaps::new(),

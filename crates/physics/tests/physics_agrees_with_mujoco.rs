@@ -77,6 +77,10 @@ struct Comparison {
     mass: Errors,
     positions: Errors,
     sensors: Errors,
+    /// `cinert`, `cvel`, `qfrc_actuator`.
+    central: Errors,
+    /// `cfrc_ext`.
+    external: Errors,
     next: Errors,
     contact_mismatches: usize,
 }
@@ -114,10 +118,20 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
             }
         }
         sim.forward(&mut work, &group);
+        sim.measure_bodies(&mut work, &group);
+        sim.measure_joints(&mut work);
         let r = Readings::new(&sim, &group, &work);
         let (bias, applied, constraint, mass) =
             (r.bias_forces(), r.applied_forces(), r.constraint_forces(), r.mass_matrix());
         let acc: Vec<T> = (0..model.nv).map(|d| r.qacc(d)).collect();
+        let dofs = 0..model.nv;
+        let measured = dofs.clone().map(|d| r.qfrc_constraint(d)).zip(&constraint);
+        assert!(measured.into_iter().all(|(a, b)| (0..T::LANES).all(|i| T::widen(a.get(i)) == T::widen(b.get(i)))));
+        let actuation: Vec<T> = dofs.map(|d| r.qfrc_actuator(d)).collect();
+        let bodies = 1..model.bodies.len();
+        let cinert: Vec<T> = bodies.clone().flat_map(|b| r.cinert(b)).collect();
+        let cvel: Vec<T> = bodies.clone().flat_map(|b| r.cvel(b)).collect();
+        let cfrc_ext: Vec<T> = bodies.flat_map(|b| r.cfrc_ext(b)).collect();
         let contacts = r.contact_count();
         let positions: Vec<T> = (1..model.bodies.len())
             .flat_map(|b| r.body_pos(b))
@@ -137,6 +151,12 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
             if force.iter().any(|x| x.abs() > 1e-6) {
                 out.constraint.add_force(&lane(&constraint, i), &force);
             }
+            out.central.add(&lane(&cinert, i), &want("cinert"));
+            out.central.add(&lane(&cvel, i), &want("cvel"));
+            if !model.joints.iter().any(|j| j.actuator_gravcomp) {
+                out.central.add(&lane(&actuation, i), &want("qfrc_actuator"));
+            }
+            out.external.add_force(&lane(&cfrc_ext, i), &want("cfrc_ext"));
             let xpos = want("xpos").split_off(3);
             let want_positions: Vec<f64> = xpos.into_iter().chain(want("geom_xpos")).collect();
             out.positions.add(&lane(&positions, i), &want_positions);
@@ -181,7 +201,7 @@ fn check(path: &Path, answer: &Value, ground_contacts_only: bool, bars: &Bars, f
         let constraint_median = if c.constraint.0.is_empty() { 0.0 } else { c.constraint.median() };
         println!(
             "{:70} {:9} qacc {:.0e}/{:.0e} constraint {:.0e}/{:.0e} bias {:.0e} applied {:.0e} mass {:.0e} \
-             positions {:.0e} sensors {:.0e} next {:.0e} contacts differ {}",
+             positions {:.0e} sensors {:.0e} central {:.0e} external {:.0e} next {:.0e} contacts differ {}",
             path.strip_prefix(common::workspace()).unwrap_or(path).display(),
             isa.name(),
             c.qacc.median(),
@@ -193,6 +213,8 @@ fn check(path: &Path, answer: &Value, ground_contacts_only: bool, bars: &Bars, f
             c.mass.max(),
             c.positions.max(),
             c.sensors.max(),
+            c.central.max(),
+            c.external.max(),
             c.next.max(),
             c.contact_mismatches
         );
@@ -209,6 +231,8 @@ fn check(path: &Path, answer: &Value, ground_contacts_only: bool, bars: &Bars, f
             check("mass", c.mass.max(), 1e-9);
             check("positions", c.positions.max(), 1e-9);
             check("sensors", c.sensors.max(), 10.0 * bars.double);
+            check("cinert, cvel, qfrc_actuator", c.central.max(), 1e-9);
+            check("cfrc_ext", c.external.max(), bars.double);
             check("next state", c.next.max(), bars.double);
             check("number of contacts", c.contact_mismatches as f64, bars.contacts as f64);
         } else {
@@ -218,6 +242,7 @@ fn check(path: &Path, answer: &Value, ground_contacts_only: bool, bars: &Bars, f
             check("constraint max", c.constraint.max(), bars.max);
             check("mass", c.mass.max(), 1e-5);
             check("positions", c.positions.max(), 1e-5);
+            check("cinert, cvel, qfrc_actuator", c.central.max(), 2e-5);
         }
     }
 }

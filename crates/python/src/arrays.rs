@@ -11,6 +11,7 @@ pub struct Arrays {
     pub final_obs: Py<PyArray2<f32>>,
     pub reward: Py<PyArray1<f32>>,
     pub terms: Py<PyArray2<f32>>,
+    pub info: Py<PyArray2<f32>>,
     pub forward: Py<PyArray1<f32>>,
     pub terminated: Py<PyArray1<bool>>,
     pub truncated: Py<PyArray1<bool>>,
@@ -25,6 +26,7 @@ impl Arrays {
             final_obs: PyArray2::zeros(py, [agents, spec.obs], false).unbind(),
             reward: list(py, agents),
             terms: PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind(),
+            info: PyArray2::zeros(py, [agents, spec.info.len()], false).unbind(),
             forward: list(py, agents),
             terminated: list(py, agents),
             truncated: list(py, agents),
@@ -36,6 +38,7 @@ impl Arrays {
     pub fn renew(&mut self, py: Python<'_>, agents: usize, spec: &Spec) {
         self.obs = PyArray2::zeros(py, [agents, spec.obs], false).unbind();
         self.terms = PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind();
+        self.info = PyArray2::zeros(py, [agents, spec.info.len()], false).unbind();
         self.reward = list(py, agents);
         self.forward = list(py, agents);
         self.terminated = list(py, agents);
@@ -49,6 +52,7 @@ impl Arrays {
         let mut final_obs = writer(py, "final_obs", &self.final_obs)?;
         let mut reward = writer(py, "reward", &self.reward)?;
         let mut terms = writer(py, "reward_terms", &self.terms)?;
+        let mut info = writer(py, "info", &self.info)?;
         let mut forward = writer(py, "forward", &self.forward)?;
         let mut terminated = writer(py, "terminated", &self.terminated)?;
         let mut truncated = writer(py, "truncated", &self.truncated)?;
@@ -58,6 +62,7 @@ impl Arrays {
             final_obs: final_obs.as_slice_mut()?,
             reward: reward.as_slice_mut()?,
             terms: terms.as_slice_mut()?,
+            info: info.as_slice_mut()?,
             forward: forward.as_slice_mut()?,
             terminated: terminated.as_slice_mut()?,
             truncated: truncated.as_slice_mut()?,

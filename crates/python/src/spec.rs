@@ -18,6 +18,10 @@ pub struct Spec {
     pub act_size: usize,
     /// Names of the actuators, in the order of the action.
     pub action_names: Vec<String>,
+    /// Lowest sensible action per actuator, in the actuator's own units; -inf for one without bounds.
+    pub action_low: Vec<f32>,
+    /// Highest sensible action per actuator.
+    pub action_high: Vec<f32>,
     /// Seconds between two steps.
     pub dt: f64,
     /// Physics steps per step.
@@ -26,6 +30,8 @@ pub struct Spec {
     pub max_episode_steps: usize,
     /// Names of the reward's terms, which add up to the reward.
     pub reward_terms: Vec<String>,
+    /// Names of the numbers in `VecEnv.info`.
+    pub info: Vec<String>,
     /// Length of `qpos`.
     pub nq: usize,
     /// Length of `qvel`.
@@ -62,14 +68,17 @@ impl Spec {
         let (facts, model) = (agent.facts(), agent.model().map_err(error::env)?);
         Ok(Spec {
             id: spec.id.clone(),
-            summary: facts.summary.to_string(),
+            summary: facts.summary,
             obs_size: spec.obs,
             act_size: spec.act,
-            action_names: facts.actions.iter().map(|name| name.to_string()).collect(),
+            action_names: spec.action_names.clone(),
+            action_low: spec.action_low.clone(),
+            action_high: spec.action_high.clone(),
             dt: spec.dt,
             frame_skip: spec.frame_skip,
             max_episode_steps: spec.max_episode_steps,
             reward_terms: spec.reward_terms.clone(),
+            info: spec.info.clone(),
             nq: model.nq,
             nv: model.nv,
         })

@@ -67,7 +67,8 @@ impl VecEnv {
     ) -> PyResult<Self> {
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
         let autoreset = parse_autoreset(autoreset)?;
-        let options = VecEnvOptions { agents: num_envs, seed, threads, isa, autoreset, max_episode_steps };
+        let options =
+            VecEnvOptions { agents: num_envs, seed, threads, isa, autoreset, max_episode_steps, ..Default::default() };
         let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
         let arrays = Arrays::new(py, num_envs, env.spec());
         let spec = Py::new(py, Spec::of(env.spec())?)?;
@@ -121,6 +122,12 @@ impl VecEnv {
     #[getter]
     fn reward_terms(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
         self.arrays.terms.clone_ref(py)
+    }
+
+    /// What the agents report about the states that the last step reached, `(num_envs, len(spec.info))`.
+    #[getter]
+    fn info(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
+        self.arrays.info.clone_ref(py)
     }
 
     /// Distance that each agent moved along +x in the last step, m, `(num_envs,)`.
@@ -178,7 +185,8 @@ impl VecEnv {
         })
     }
 
-    /// Advances every agent by one decision. `actions` is `(num_envs, act_size)`, clipped to [-1, 1].
+    /// Advances every agent by one decision. `actions` is `(num_envs, act_size)`, within
+    /// `spec.action_low` and `spec.action_high`.
     ///
     /// Returns `(obs, reward, terminated, truncated)`, of shapes `(num_envs, obs_size)` and three times `(num_envs,)`;
     /// more is in `final_obs`, `reward_terms`, `forward` and `diverged`. A C-contiguous float32 array is read in place.

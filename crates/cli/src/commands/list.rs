@@ -11,7 +11,7 @@ use serde::Serialize;
 #[derive(Serialize)]
 struct Entry {
     id: String,
-    summary: &'static str,
+    summary: String,
     observation: usize,
     action: usize,
     /// Seconds between decisions.

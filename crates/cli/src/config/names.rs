@@ -10,7 +10,7 @@ const BRAINS: [(&str, &[&str]); 4] = [
 
 /// The registered id of an agent's name; the name itself if no agent is registered under it.
 pub fn id(agent: &str) -> String {
-    marathon_envs::agent(agent).map_or_else(|_| agent.to_string(), |found| found.facts().id.to_string())
+    marathon_envs::agent(agent).map_or_else(|_| agent.to_string(), |found| found.facts().id)
 }
 
 /// An id without its version.

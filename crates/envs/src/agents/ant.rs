@@ -16,7 +16,7 @@
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
-use crate::agent::{Agent, Facts, Motors, Part, ResetNoise};
+use crate::agent::{Agent, Facts, Motors, Part, names};
 use crate::senses::Senses;
 use crate::write::{Obs, Terms};
 
@@ -51,20 +51,18 @@ pub struct AntV0;
 impl Agent for AntV0 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Ant-v0",
-            summary: "four legs: run forward, cheaply",
+            id: "Ant-v0".into(),
+            summary: "four legs: run forward, cheaply".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
-            observation: 53,
-            actions: &ACTIONS,
-            reward_terms: &["velocity", "effort", "joints_at_limit"],
-            parts: &PARTS,
-            feet: &FEET,
-            touch: &FEET,
-            memory: 0,
-            reset: ResetNoise::MARATHON,
-            termination_reward: -1.0,
+            observation: Some(53),
+            actions: names(ACTIONS),
+            reward_terms: names(["velocity", "effort", "joints_at_limit"]),
+            parts: names(PARTS),
+            feet: names(FEET),
+            touch: names(FEET),
+            ..Facts::default()
         }
     }
 
@@ -101,10 +99,10 @@ pub struct AntV1;
 impl Agent for AntV1 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Ant-v1",
-            summary: "four legs, sees its height, reward between 0 and 1",
-            observation: 54,
-            reward_terms: &["velocity", "effort"],
+            id: "Ant-v1".into(),
+            summary: "four legs, sees its height, reward between 0 and 1".into(),
+            observation: Some(54),
+            reward_terms: names(["velocity", "effort"]),
             ..AntV0.facts()
         }
     }

@@ -16,7 +16,7 @@
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
-use crate::agent::{Agent, Facts, Motors, Part, ResetNoise};
+use crate::agent::{Agent, Facts, Motors, Part, names};
 use crate::senses::{Senses, unit};
 use crate::write::{Obs, Terms};
 
@@ -54,20 +54,18 @@ pub struct HopperV0;
 impl Agent for HopperV0 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Hopper-v0",
-            summary: "one leg in a plane: run forward upright, cheaply",
+            id: "Hopper-v0".into(),
+            summary: "one leg in a plane: run forward upright, cheaply".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
-            observation: 31,
-            actions: &ACTIONS,
-            reward_terms: &["velocity", "uprightness", "effort", "joints_at_limit"],
-            parts: &PARTS,
-            feet: &FEET,
-            touch: &["foot"],
-            memory: 0,
-            reset: ResetNoise::MARATHON,
-            termination_reward: -1.0,
+            observation: Some(31),
+            actions: names(ACTIONS),
+            reward_terms: names(["velocity", "uprightness", "effort", "joints_at_limit"]),
+            parts: names(PARTS),
+            feet: names(FEET),
+            touch: names(["foot"]),
+            ..Facts::default()
         }
     }
 
@@ -103,9 +101,9 @@ pub struct HopperV1;
 impl Agent for HopperV1 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Hopper-v1",
-            summary: "one leg in a plane, reward between 0 and 1",
-            reward_terms: &["velocity", "uprightness", "effort"],
+            id: "Hopper-v1".into(),
+            summary: "one leg in a plane, reward between 0 and 1".into(),
+            reward_terms: names(["velocity", "uprightness", "effort"]),
             ..HopperV0.facts()
         }
     }

@@ -19,7 +19,7 @@
 
 use marathon_physics::lanes::Real;
 
-use crate::agent::{Agent, Facts, Motors, Part, ResetNoise};
+use crate::agent::{Agent, Facts, Motors, Part, names};
 use crate::memory::{PhaseBonus, Stride};
 use crate::senses::{Senses, unit};
 use crate::write::{Obs, Terms};
@@ -111,14 +111,14 @@ pub struct HumanoidV0;
 impl Agent for HumanoidV0 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Humanoid-v0",
-            summary: "a figure of 21 motors: walk forward upright, in long steps, cheaply",
+            id: "Humanoid-v0".into(),
+            summary: "a figure of 21 motors: walk forward upright, in long steps, cheaply".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
-            observation: 88,
-            actions: &ACTIONS,
-            reward_terms: &[
+            observation: Some(88),
+            actions: names(ACTIONS),
+            reward_terms: names([
                 "velocity",
                 "uprightness",
                 "facing",
@@ -127,13 +127,12 @@ impl Agent for HumanoidV0 {
                 "limbs",
                 "joints_at_limit",
                 "effort",
-            ],
-            parts: &PARTS,
-            feet: &FEET,
-            touch: &TOUCH,
+            ]),
+            parts: names(PARTS),
+            feet: names(FEET),
+            touch: names(TOUCH),
             memory: PhaseBonus::SLOTS,
-            reset: ResetNoise::MARATHON,
-            termination_reward: -1.0,
+            ..Facts::default()
         }
     }
 
@@ -183,10 +182,10 @@ pub struct HumanoidV1;
 impl Agent for HumanoidV1 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Humanoid-v1",
-            summary: "a figure of 21 motors, sees its feet, reward between 0 and 1",
-            observation: 92,
-            reward_terms: &["velocity", "uprightness", "facing", "phase", "height", "limbs", "effort"],
+            id: "Humanoid-v1".into(),
+            summary: "a figure of 21 motors, sees its feet, reward between 0 and 1".into(),
+            observation: Some(92),
+            reward_terms: names(["velocity", "uprightness", "facing", "phase", "height", "limbs", "effort"]),
             ..HumanoidV0.facts()
         }
     }

@@ -16,7 +16,7 @@
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
-use crate::agent::{Agent, Facts, Motors, Part, ResetNoise};
+use crate::agent::{Agent, Facts, Motors, Part, names};
 use crate::senses::{Senses, unit};
 use crate::write::{Obs, Terms};
 
@@ -56,20 +56,18 @@ pub struct Walker2dV0;
 impl Agent for Walker2dV0 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Walker2d-v0",
-            summary: "two legs in a plane: run forward upright and tall, cheaply",
+            id: "Walker2d-v0".into(),
+            summary: "two legs in a plane: run forward upright and tall, cheaply".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
-            observation: 41,
-            actions: &ACTIONS,
-            reward_terms: &["velocity", "uprightness", "height", "effort"],
-            parts: &PARTS,
-            feet: &FEET,
-            touch: &["left_foot", "right_foot"],
-            memory: 0,
-            reset: ResetNoise::MARATHON,
-            termination_reward: -1.0,
+            observation: Some(41),
+            actions: names(ACTIONS),
+            reward_terms: names(["velocity", "uprightness", "height", "effort"]),
+            parts: names(PARTS),
+            feet: names(FEET),
+            touch: names(["left_foot", "right_foot"]),
+            ..Facts::default()
         }
     }
 
@@ -104,9 +102,9 @@ pub struct Walker2dV1;
 impl Agent for Walker2dV1 {
     fn facts(&self) -> Facts {
         Facts {
-            id: "Walker2d-v1",
-            summary: "two legs in a plane, sees its feet, reward between 0 and 1",
-            observation: 43,
+            id: "Walker2d-v1".into(),
+            summary: "two legs in a plane, sees its feet, reward between 0 and 1".into(),
+            observation: Some(43),
             ..Walker2dV0.facts()
         }
     }

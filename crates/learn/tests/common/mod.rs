@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "every test file uses a part")]
 
-use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
 #[derive(Clone, Copy, Default)]
@@ -30,10 +30,15 @@ impl PuckTask {
             id: "Puck-v0".into(),
             obs: 6,
             act: 2,
+            action_names: vec!["x".into(), "y".into()],
+            action_low: vec![-1.0; 2],
+            action_high: vec![1.0; 2],
             dt: 0.05,
             frame_skip: 2,
             max_episode_steps: limit,
             reward_terms: vec!["near".into(), "effort".into()],
+            info: Vec::new(),
+            options: Options::new(),
         };
         Self { spec, poison: None }
     }

@@ -4,7 +4,8 @@ use super::Readings;
 use crate::lanes::Real;
 use crate::model::EqualityKind;
 use crate::sim::Mount;
-use crate::solver::block::{Jacobian, Source};
+use crate::solver::block::{Block, Jacobian, Source};
+use crate::solver::floor::FloorRow;
 use crate::spatial::*;
 
 /// A contact in some lanes.
@@ -27,24 +28,24 @@ pub(super) struct ContactForce<T: Real> {
 }
 
 /// What a connect or weld constraint does.
-struct TieForce<T: Real> {
+pub(super) struct TieForce<T: Real> {
     /// The force acts on the second body, and its opposite on the first, each at its own point.
-    bodies: [usize; 2],
-    points: [Mount<T::Scalar>; 2],
-    force: V3<T>,
-    torque: V3<T>,
+    pub bodies: [usize; 2],
+    pub points: [Mount<T::Scalar>; 2],
+    pub force: V3<T>,
+    pub torque: V3<T>,
 }
 
 /// A sum of forces, with their torque about one point.
-struct Wrench<T> {
-    force: V3<T>,
-    torque: V3<T>,
+pub(super) struct Wrench<T> {
+    pub force: V3<T>,
+    pub torque: V3<T>,
 }
 
 impl<T: Real> Wrench<T> {
     /// Adds a force that acts at a distance `arm` from the point, and a torque, in the lanes `on`.
     #[inline(always)]
-    fn add(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
+    pub fn add(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
         let t = cross_add(arm, force, torque);
         for k in 0..3 {
             self.force[k] += T::masked(on, force[k]);
@@ -54,7 +55,7 @@ impl<T: Real> Wrench<T> {
 
     /// Takes such a force away.
     #[inline(always)]
-    fn subtract(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
+    pub fn subtract(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
         let (f, t) = ([-force[0], -force[1], -force[2]], [-torque[0], -torque[1], -torque[2]]);
         self.add(arm, &f, &t, on);
     }
@@ -64,49 +65,61 @@ impl<T: Real> Readings<'_, T> {
     /// All contacts of the last physics step.
     #[inline(always)]
     pub(super) fn contact_forces(&self) -> Vec<ContactForce<T>> {
-        let (z, one) = (T::zero(), T::lit(1.0));
         let mut out = Vec::new();
         for row in &self.work.contacts {
-            out.push(ContactForce {
-                geoms: [row.plane, row.geom],
-                natural: true,
-                on: row.on,
-                tree: self.sim.links[row.link].tree,
-                point: row.r,
-                normal: [z, z, one],
-                push: row.force[0],
-                force: lin(&row.wrench(&row.force)),
-                torque: [z; 3],
-            });
+            out.push(self.floor_contact(row));
         }
         for block in self.work.blocks.iter().filter(|b| b.source == Source::Contacts) {
-            let Jacobian::Points { sides, lin: frame, .. } = &block.jacobian else { continue };
             for (index, on) in &block.members {
-                let pair = &self.sim.contacts.pairs[*index];
-                // the second side of a block moves
-                let second = pair.moving();
-                let first = if pair.geoms[0] == second { pair.geoms[1] } else { pair.geoms[0] };
-                let Some(link) = self.sim.geoms[second].link else { continue };
-                let wrench = block.total_wrench(&block.force, &[z; 3]);
-                out.push(ContactForce {
-                    geoms: [first, second],
-                    natural: second == pair.geoms[1],
-                    on: *on,
-                    tree: self.sim.links[link].tree,
-                    point: sides[1].r,
-                    normal: frame[0],
-                    push: block.force[0],
-                    force: lin(&wrench),
-                    torque: ang(&wrench),
-                });
+                out.extend(self.pair_contact(block, *index, *on));
             }
         }
         out
     }
 
+    /// A contact with a level floor.
+    #[inline(always)]
+    pub(super) fn floor_contact(&self, row: &FloorRow<T>) -> ContactForce<T> {
+        let (z, one) = (T::zero(), T::lit(1.0));
+        ContactForce {
+            geoms: [row.plane, row.geom],
+            natural: true,
+            on: row.on,
+            tree: self.sim.links[row.link].tree,
+            point: row.r,
+            normal: [z, z, one],
+            push: row.force[0],
+            force: lin(&row.wrench(&row.force)),
+            torque: [z; 3],
+        }
+    }
+
+    /// A contact of a pair of geoms that a block has in the lanes `on`.
+    #[inline(always)]
+    pub(super) fn pair_contact(&self, block: &Block<T>, index: usize, on: T::Mask) -> Option<ContactForce<T>> {
+        let Jacobian::Points { sides, lin: frame, .. } = &block.jacobian else { return None };
+        let pair = &self.sim.contacts.pairs[index];
+        // the second side of a block moves
+        let second = pair.moving();
+        let first = if pair.geoms[0] == second { pair.geoms[1] } else { pair.geoms[0] };
+        let link = self.sim.geoms[second].link?;
+        let wrench = block.total_wrench(&block.force, &[T::zero(); 3]);
+        Some(ContactForce {
+            geoms: [first, second],
+            natural: second == pair.geoms[1],
+            on,
+            tree: self.sim.links[link].tree,
+            point: sides[1].r,
+            normal: frame[0],
+            push: block.force[0],
+            force: lin(&wrench),
+            torque: ang(&wrench),
+        })
+    }
+
     /// All connect and weld constraints of the last physics step.
     #[inline(always)]
-    fn tie_forces(&self) -> Vec<TieForce<T>> {
+    pub(super) fn tie_forces(&self) -> Vec<TieForce<T>> {
         let mut out = Vec::new();
         for block in self.work.blocks.iter() {
             let Source::Equality(index) = block.source else { continue };

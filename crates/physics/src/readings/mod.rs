@@ -2,6 +2,7 @@
 //!
 //! [`sensors`] evaluates a sensor by its kind; the other files have what it needs.
 
+mod central;
 mod contacts;
 mod energy;
 mod forces;

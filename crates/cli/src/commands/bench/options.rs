@@ -23,7 +23,7 @@ impl Common {
     /// If there is no such agent.
     pub fn agents(&self, tasks_count: bool) -> Result<Vec<String>, CliError> {
         if !self.agent.is_empty() {
-            let id = |name: &String| Ok(registry::agent(name)?.facts().id.to_string());
+            let id = |name: &String| Ok(registry::agent(name)?.facts().id);
             return self.agent.iter().map(id).collect();
         }
         let mut ids: Vec<String> = Vec::new();

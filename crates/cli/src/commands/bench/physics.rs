@@ -5,9 +5,8 @@ use super::options::{Common, Head, isas, seconds, supported};
 use super::row::{Figures, Row, Sample, Table, on_threads, thread_cpu};
 use crate::error::CliError;
 use clap::ValueEnum;
-use marathon_envs::{EnvError, registry};
+use marathon_envs::{EnvError, ModelSource, registry};
 use marathon_physics::lanes::Isa;
-use marathon_physics::mjcf::MjcfError;
 use marathon_physics::workload::{Report, Workload};
 use marathon_physics::{Model, SimError, SimOptions, SolverStats};
 use serde::Serialize;
@@ -144,10 +143,12 @@ fn subjects(args: &PhysicsArgs) -> Result<Vec<Subject>, CliError> {
     let agents =
         if args.common.agent.is_empty() && !args.model.is_empty() { Vec::new() } else { args.common.agents(false)? };
     for id in agents {
-        let text = registry::agent(&id)?.facts().model;
-        let bad = |source: MjcfError| EnvError::Model { id: id.clone(), source: Box::new(source) };
-        let model = Model::from_xml_str(&text, &id).map_err(bad)?;
-        subjects.push(Subject { name: id, model, source: Source::Text(text.to_string()) });
+        let agent = registry::agent(&id)?;
+        let source = match agent.facts().model {
+            ModelSource::Text(text) => Source::Text(text.into()),
+            ModelSource::File(path) => Source::File(path),
+        };
+        subjects.push(Subject { name: id, model: agent.model()?, source });
     }
     for file in &args.model {
         let name = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();

@@ -1,0 +1,356 @@
+//! Named arguments of agents: `ctrl_cost_weight = 0.01`, `healthy_z_range = (0.8, 2)`.
+//!
+//! An agent that takes arguments is a struct declared with [`options!`](crate::options!): one list says the names, types,
+//! defaults and what they mean, and [`Agent::options`](crate::Agent::options) shows it to everybody who makes
+//! environments by name. Who gives a name that is not in the list is told the nearest one that is.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Value of an argument.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Yes or no.
+    Bool(bool),
+    /// A number, which may be infinite but is never NaN.
+    Number(f64),
+    /// Two numbers, such as the ends of a range.
+    Pair([f64; 2]),
+    /// A name or a path.
+    Text(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Value::Bool(x) => write!(f, "{x}"),
+            Value::Number(x) => write!(f, "{x}"),
+            Value::Pair([a, b]) => write!(f, "({a}, {b})"),
+            Value::Text(x) => write!(f, "'{x}'"),
+        }
+    }
+}
+
+/// As on a command line: `true`, `-0.5`, `inf`, `0.7,2` or `(0.7, inf)`; whatever else is a text.
+impl FromStr for Value {
+    type Err = std::convert::Infallible;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        let number = |s: &str| s.trim().parse::<f64>().ok().filter(|x| !x.is_nan());
+        let bare = text.trim_start_matches(['(', '[']).trim_end_matches([')', ']']);
+        let pair = bare.split_once(',').and_then(|(a, b)| Some([number(a)?, number(b)?]));
+        Ok(match (text.to_lowercase().as_str(), number(text), pair) {
+            ("true", ..) => Value::Bool(true),
+            ("false", ..) => Value::Bool(false),
+            (_, Some(x), _) => Value::Number(x),
+            (_, _, Some(x)) => Value::Pair(x),
+            _ => Value::Text(text.into()),
+        })
+    }
+}
+
+impl From<bool> for Value {
+    fn from(x: bool) -> Self {
+        Value::Bool(x)
+    }
+}
+impl From<f64> for Value {
+    fn from(x: f64) -> Self {
+        Value::Number(x)
+    }
+}
+impl From<[f64; 2]> for Value {
+    fn from(x: [f64; 2]) -> Self {
+        Value::Pair(x)
+    }
+}
+impl From<&str> for Value {
+    fn from(x: &str) -> Self {
+        Value::Text(x.into())
+    }
+}
+
+/// Arguments by name, in the order in which they were given.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options(Vec<(String, Value)>);
+
+impl Options {
+    /// No arguments.
+    pub fn new() -> Self {
+        Options::default()
+    }
+
+    /// These and one more, or one replaced.
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.set(name, value);
+        self
+    }
+
+    /// Adds an argument, or replaces its value.
+    pub fn set(&mut self, name: &str, value: impl Into<Value>) {
+        let value = value.into();
+        match self.0.iter_mut().find(|(known, _)| known == name) {
+            Some((_, old)) => *old = value,
+            None => self.0.push((name.into(), value)),
+        }
+    }
+
+    /// Value of an argument, if it is given.
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
+    }
+
+    /// All names and values.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.0.iter().map(|(name, value)| (name.as_str(), value))
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl FromIterator<(String, Value)> for Options {
+    fn from_iter<I: IntoIterator<Item = (String, Value)>>(list: I) -> Self {
+        let mut options = Options::new();
+        for (name, value) in list {
+            options.set(&name, value);
+        }
+        options
+    }
+}
+
+/// An argument that an agent takes.
+#[derive(Clone, Debug)]
+pub struct OptionInfo {
+    /// Name.
+    pub name: &'static str,
+    /// Value that this agent has for it.
+    pub value: Value,
+    /// What is allowed, such as `a number`.
+    pub expected: &'static str,
+    /// What it means.
+    pub about: &'static str,
+    /// Whether it takes a value, see [`OptionInfo::takes`].
+    pub reads: fn(&Value) -> bool,
+}
+
+impl OptionInfo {
+    /// Whether the argument can have a value.
+    pub fn takes(&self, value: &Value) -> bool {
+        (self.reads)(value)
+    }
+}
+
+/// A type that an argument can have.
+pub trait OptionValue: Sized {
+    /// What is allowed, for error messages.
+    const EXPECTED: &'static str;
+    /// As a value.
+    fn value(&self) -> Value;
+    /// From a value; `None` for what is not allowed.
+    fn read(value: &Value) -> Option<Self>;
+}
+
+impl OptionValue for bool {
+    const EXPECTED: &'static str = "true or false";
+    fn value(&self) -> Value {
+        Value::Bool(*self)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Bool(x) => Some(*x),
+            // Python's callers write 0 and 1 too
+            Value::Number(x) if *x == 0.0 || *x == 1.0 => Some(*x == 1.0),
+            _ => None,
+        }
+    }
+}
+
+impl OptionValue for f64 {
+    const EXPECTED: &'static str = "a number";
+    fn value(&self) -> Value {
+        Value::Number(*self)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(x) if !x.is_nan() => Some(*x),
+            _ => None,
+        }
+    }
+}
+
+impl OptionValue for usize {
+    const EXPECTED: &'static str = "a whole number, 0 or more";
+    fn value(&self) -> Value {
+        Value::Number(*self as f64)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            // beyond this a double does not count every whole number
+            Value::Number(x) if x.fract() == 0.0 && (0.0..9e15).contains(x) => Some(*x as usize),
+            _ => None,
+        }
+    }
+}
+
+impl OptionValue for [f64; 2] {
+    const EXPECTED: &'static str = "two numbers";
+    fn value(&self) -> Value {
+        Value::Pair(*self)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Pair(x) if !x[0].is_nan() && !x[1].is_nan() => Some(*x),
+            _ => None,
+        }
+    }
+}
+
+impl OptionValue for String {
+    const EXPECTED: &'static str = "a text";
+    fn value(&self) -> Value {
+        Value::Text(self.clone())
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Text(x) => Some(x.clone()),
+            _ => None,
+        }
+    }
+}
+
+/// A struct whose fields are arguments. Implemented by [`options!`](crate::options!).
+pub trait OptionSet: Clone {
+    /// All arguments with their present values.
+    fn infos(&self) -> Vec<OptionInfo>;
+    /// Sets one by name; `false` if there is none of this name or its type does not fit.
+    fn put(&mut self, name: &str, value: &Value) -> bool;
+
+    /// The same with some arguments set. Those that do not exist or do not fit are left alone; the registry refuses them
+    /// before it comes to this.
+    fn with(&self, options: &Options) -> Self {
+        let mut set = self.clone();
+        for (name, value) in options.iter() {
+            set.put(name, value);
+        }
+        set
+    }
+}
+
+/// Declares a struct whose fields are the named arguments of an agent, with their defaults. The comment of a field is what
+/// the argument's users read.
+///
+/// ```
+/// use marathon_envs::options::{OptionSet, Options};
+///
+/// marathon_envs::options! {
+///     /// Something that jumps.
+///     pub struct Jumper {
+///         /// Reward per meter.
+///         height_weight: f64 = 2.0,
+///         /// Whether a fall ends the episode.
+///         terminate_when_fallen: bool = true,
+///     }
+/// }
+///
+/// let high = Jumper::default().with(&Options::new().with("height_weight", 3.0));
+/// assert_eq!((high.height_weight, high.terminate_when_fallen), (3.0, true));
+/// ```
+#[macro_export]
+macro_rules! options {
+    (
+        $(#[$outer:meta])*
+        $vis:vis struct $name:ident {
+            $($(#[doc = $about:literal])+ $field:ident: $type:ty = $default:expr),* $(,)?
+        }
+    ) => {
+        $(#[$outer])*
+        #[derive(Clone, Debug, PartialEq)]
+        $vis struct $name {
+            $($(#[doc = $about])+ pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                $name { $($field: $default,)* }
+            }
+        }
+
+        impl $crate::options::OptionSet for $name {
+            fn infos(&self) -> Vec<$crate::options::OptionInfo> {
+                vec![$($crate::options::OptionInfo {
+                    name: stringify!($field),
+                    value: <$type as $crate::options::OptionValue>::value(&self.$field),
+                    expected: <$type as $crate::options::OptionValue>::EXPECTED,
+                    about: concat!($($about),+).trim(),
+                    reads: |value| <$type as $crate::options::OptionValue>::read(value).is_some(),
+                },)*]
+            }
+            fn put(&mut self, name: &str, value: &$crate::options::Value) -> bool {
+                match name {
+                    $(stringify!($field) => match <$type as $crate::options::OptionValue>::read(value) {
+                        Some(x) => {
+                            self.$field = x;
+                            true
+                        }
+                        None => false,
+                    },)*
+                    _ => false,
+                }
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_from_text() {
+        let read = |text: &str| text.parse::<Value>().unwrap_or_else(|e| match e {});
+        assert_eq!(read("True"), Value::Bool(true));
+        assert_eq!(read("-1e-3"), Value::Number(-1e-3));
+        assert_eq!(read("inf"), Value::Number(f64::INFINITY));
+        assert_eq!(read("(0.7, inf)"), Value::Pair([0.7, f64::INFINITY]));
+        assert_eq!(read("[1,2]"), Value::Pair([1.0, 2.0]));
+        assert_eq!(read("nan"), Value::Text("nan".into()));
+        assert_eq!(read("bodies/my ant.xml"), Value::Text("bodies/my ant.xml".into()));
+    }
+
+    options! {
+        struct Sample {
+            /// A count
+            /// of things.
+            count: usize = 3,
+            /// A range.
+            range: [f64; 2] = [0.0, f64::INFINITY],
+            /// A name.
+            name: String = "ant.xml".into(),
+            /// A switch.
+            on: bool = true,
+        }
+    }
+
+    #[test]
+    fn types_are_checked() {
+        let mut x = Sample::default();
+        assert!(x.put("count", &5.0.into()) && x.put("on", &0.0.into()) && x.put("range", &[1.0, 2.0].into()));
+        for (name, value) in [
+            ("count", Value::from(-1.0)),
+            ("count", 0.5.into()),
+            ("count", f64::INFINITY.into()),
+            ("range", 1.0.into()),
+            ("range", [f64::NAN, 0.0].into()),
+            ("name", 1.0.into()),
+            ("on", 2.0.into()),
+            ("off", true.into()),
+        ] {
+            assert!(!x.put(name, &value), "{name} {value}");
+        }
+        assert_eq!(x, Sample { count: 5, range: [1.0, 2.0], name: "ant.xml".into(), on: false });
+        assert_eq!(x.infos()[0].about, "A count of things.");
+    }
+}
