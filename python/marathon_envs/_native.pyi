@@ -30,6 +30,12 @@ class Spec:
     def action_names(self) -> list[str]:
         """Names of the actuators, in the order of the action."""
     @property
+    def action_low(self) -> list[float]:
+        """Lowest sensible action per actuator, in the actuator's own units; -inf for one without bounds."""
+    @property
+    def action_high(self) -> list[float]:
+        """Highest sensible action per actuator."""
+    @property
     def dt(self) -> float:
         """Seconds between two steps."""
     @property
@@ -41,6 +47,9 @@ class Spec:
     @property
     def reward_terms(self) -> list[str]:
         """Names of the reward's terms, which add up to the reward."""
+    @property
+    def info(self) -> list[str]:
+        """Names of the numbers in `VecEnv.info`."""
     @property
     def nq(self) -> int:
         """Length of ``qpos``."""
@@ -110,6 +119,9 @@ class VecEnv:
     def reward_terms(self) -> npt.NDArray[np.float32]:
         """Terms of the last step's rewards, ``(num_envs, len(spec.reward_terms))``; they add up to the rewards."""
     @property
+    def info(self) -> npt.NDArray[np.float32]:
+        """What the agents report about the states that the last step reached, ``(num_envs, len(spec.info))``."""
+    @property
     def forward(self) -> npt.NDArray[np.float32]:
         """Distance that each agent moved along +x in the last step, m, ``(num_envs,)``."""
     @property
@@ -130,11 +142,12 @@ class VecEnv:
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``, clipped to [-1, 1].
+        """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``, within `spec.action_low` and
+        `spec.action_high`.
 
         Returns ``(obs, reward, terminated, truncated)``, of shapes ``(num_envs, obs_size)`` and three times
-        ``(num_envs,)``; more is in `final_obs`, `reward_terms`, `forward` and `diverged`. A C-contiguous float32 array
-        is read in place.
+        ``(num_envs,)``; more is in `final_obs`, `reward_terms`, `info`, `forward` and `diverged`. A C-contiguous float32
+        array is read in place.
         """
     def get_state(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """State of every agent in MuJoCo's layout: ``qpos``, ``(num_envs, nq)``, and ``qvel``, ``(num_envs, nv)``.

@@ -101,6 +101,8 @@ impl<T: Real, A: Agent> AgentFactory<T, A> {
             max_episode_steps: facts.max_episode_steps,
             reward_terms,
             info: facts.info.clone(),
+            nq: blueprint.model.nq,
+            nv: blueprint.model.nv,
             options: agent.options().into_iter().map(|o| (o.name.to_string(), o.value)).collect(),
         };
         let mut task = Task { agent, facts, spec, blueprint, anatomy, sim };

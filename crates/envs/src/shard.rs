@@ -44,6 +44,10 @@ pub struct Spec {
     pub info: Vec<String>,
     /// Arguments that the agent takes, with the values that it has.
     pub options: Options,
+    /// Length of a configuration, `qpos`.
+    pub nq: usize,
+    /// Length of a velocity, `qvel`.
+    pub nv: usize,
 }
 
 impl Spec {

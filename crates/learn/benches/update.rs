@@ -135,6 +135,8 @@ impl Idle {
             reward_terms,
             info: Vec::new(),
             options: Options::new(),
+            nq: 2,
+            nv: 2,
         })
     }
 }

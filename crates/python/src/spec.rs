@@ -64,8 +64,7 @@ pub fn spec(id: &str) -> PyResult<Spec> {
 impl Spec {
     /// From the facts that an environment goes by.
     pub fn of(spec: &marathon_envs::Spec) -> PyResult<Self> {
-        let agent = registry::agent(&spec.id).map_err(error::env)?;
-        let (facts, model) = (agent.facts(), agent.model().map_err(error::env)?);
+        let facts = registry::agent(&spec.id).map_err(error::env)?.facts();
         Ok(Spec {
             id: spec.id.clone(),
             summary: facts.summary,
@@ -79,8 +78,8 @@ impl Spec {
             max_episode_steps: spec.max_episode_steps,
             reward_terms: spec.reward_terms.clone(),
             info: spec.info.clone(),
-            nq: model.nq,
-            nv: model.nv,
+            nq: spec.nq,
+            nv: spec.nv,
         })
     }
 }

@@ -39,6 +39,8 @@ impl PuckTask {
             reward_terms: vec!["near".into(), "effort".into()],
             info: Vec::new(),
             options: Options::new(),
+            nq: 2,
+            nv: 2,
         };
         Self { spec, poison: None }
     }
