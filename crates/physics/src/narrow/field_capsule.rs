@@ -90,8 +90,11 @@ pub(crate) fn field_capsule<T: Real>(
                     continue;
                 }
                 let glance = prism.glance(&arm, reach, on);
-                let unclear = T::and(glance.unclear, T::not(is_beside(&prism, &across, reach)));
-                collect(&prism, &arm, reach, &glance.gap, [T::bits(glance.over), T::bits(unclear)], gaps);
+                let mut unclear = T::bits(glance.unclear);
+                if unclear != 0 {
+                    unclear &= !T::bits(is_beside(&prism, &across, reach));
+                }
+                collect(&prism, &arm, reach, &glance.gap, [T::bits(glance.over), unclear], gaps);
             }
             step.col += 1;
         }

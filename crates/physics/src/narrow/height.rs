@@ -128,7 +128,7 @@ impl<'a, T: Real> Terrain<'a, T> {
         }
         for (lane, start) in window.start[..T::LANES].iter_mut().enumerate() {
             let [col, row] = [window.first[0].get(lane), window.first[1].get(lane)];
-            *start = T::widen(row) as usize * field.cols + T::widen(col) as usize;
+            *start = (T::widen(row) * field.cols as f64 + T::widen(col)) as usize;
         }
         window
     }

@@ -72,13 +72,17 @@ impl<'a, T: Real> Prism<'a, T> {
         let mut unclear = T::and(on, T::not(limit.lt(dist)));
         let mut over = T::and(unclear, zero.lt(dist));
         if T::any(unclear) {
-            for face in &self.faces(slope, arm)[1..] {
-                let beside = face.nearest();
-                let cos = dot(&slope.normal, &face.normal);
+            let n = &slope.normal;
+            for (wall, corner) in self.walls.iter().zip(&self.top) {
+                let [x, y] = [T::splat(wall[0]), T::splat(wall[1])];
+                let cos = n[0].mul_add(x, n[1] * y);
+                let middle = -corner[0].mul_add(x, corner[1] * y);
+                let rate = arm[0].mul_add(x, arm[1] * y);
                 // the point of the top below the end
-                let other = cos.neg_mul_add(dist, face.at(along));
+                let other = cos.neg_mul_add(dist, rate.mul_add(along, middle));
                 over = T::and(over, T::not(zero.lt(other)));
                 // beyond both faces: the edge between them is nearer than everything behind it
+                let beside = middle - rate.abs();
                 let (up, out) = (cos.neg_mul_add(beside, dist), cos.neg_mul_add(dist, beside));
                 let edge2 = up.mul_add(dist, out * beside);
                 let far2 = (limit * limit) * cos.neg_mul_add(cos, one);

@@ -47,7 +47,14 @@ kernel_fn! {
                 }
                 Jacobian::Points { sides, .. } if !b.coupled => {
                     if sides[1].links.iter().any(|(l, _)| work.stale[*l]) {
-                        add_to_links(b, &sides[1], &work.stale, &mut work.stiffness, &mut work.wrench);
+                        let (side, stale) = (&sides[1], &work.stale);
+                        let sums = (&mut work.stiffness[..], &mut work.wrench[..]);
+                        match b.dim {
+                            1 => add_to_links::<T, 1>(b, side, stale, sums),
+                            3 => add_to_links::<T, 3>(b, side, stale, sums),
+                            4 => add_to_links::<T, 4>(b, side, stale, sums),
+                            _ => add_to_links::<T, 6>(b, side, stale, sums),
+                        }
                     }
                 }
                 Jacobian::Points { .. } => {}
@@ -56,24 +63,23 @@ kernel_fn! {
     }
 }
 
-/// Adds a block's stiffness and right-hand side to the links that carry its second side.
+/// Adds the stiffness and right-hand side of a block of `N` rows to the links that carry its second side.
 #[inline(always)]
-fn add_to_links<T: Real>(
+fn add_to_links<T: Real, const N: usize>(
     b: &Block<T>,
     side: &Side<T>,
     stale: &[bool],
-    stiffness: &mut [Sym6<T>],
-    wrench: &mut [V6<T>],
+    (stiffness, wrench): (&mut [Sym6<T>], &mut [V6<T>]),
 ) {
     // G W G' for the motion directions G of the rows
     let mut k = [T::zero(); 21];
-    let mut columns = [[T::zero(); 6]; 6];
-    for i in 0..b.dim {
+    let mut columns = [[T::zero(); 6]; N];
+    for i in 0..N {
         columns[i] = b.wrench(i, &side.r);
     }
-    for i in 0..b.dim {
+    for i in 0..N {
         let mut h = [T::zero(); 6];
-        for j in 0..b.dim {
+        for j in 0..N {
             let w = if j <= i { b.stiffness[at(i, j)] } else { b.stiffness[at(j, i)] };
             h = axpy6(&columns[j], -w, &h);
         }
