@@ -7,8 +7,19 @@
     >>> env = marathon_envs.VecEnv("Hopper-v0", num_envs=1024)
     >>> obs = env.reset(seed=1)
     >>> obs, reward, terminated, truncated = env.step(np.zeros((1024, 4), np.float32))
+
+The import registers every task with Gymnasium in the namespace `marathon_envs`:
+
+    >>> import gymnasium
+    >>> env = gymnasium.make("marathon_envs/Hopper-v0")
+    >>> envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=1024)
 """
 
-from marathon_envs._native import Spec, VecEnv, __version__, ids, spec
+from marathon_envs import registration
+from marathon_envs._native import Renderer, Spec, VecEnv, __version__, ids, spec
+from marathon_envs.env import MarathonEnv
+from marathon_envs.vector import MarathonVectorEnv
 
-__all__ = ["Spec", "VecEnv", "__version__", "ids", "spec"]
+__all__ = ["MarathonEnv", "MarathonVectorEnv", "Renderer", "Spec", "VecEnv", "__version__", "ids", "spec"]
+
+registration.register()

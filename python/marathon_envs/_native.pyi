@@ -1,12 +1,12 @@
 """Native part of marathon_envs."""
 
 from collections.abc import Sequence
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Spec", "VecEnv", "__version__", "ids", "main", "spec"]
+__all__ = ["Renderer", "Spec", "VecEnv", "__version__", "ids", "main", "spec"]
 
 __version__: str
 
@@ -51,6 +51,9 @@ class Spec:
     def info(self) -> list[str]:
         """Names of the numbers in `VecEnv.info`."""
     @property
+    def options(self) -> dict[str, bool | float | tuple[float, float] | str]:
+        """Arguments that the task takes, with the values that it has."""
+    @property
     def nq(self) -> int:
         """Length of ``qpos``."""
     @property
@@ -76,6 +79,7 @@ class VecEnv:
         autoreset: Literal["next_step", "same_step", "disabled"] | str = "same_step",
         max_episode_steps: int | None = None,
         copy: bool = False,
+        **options: Any,
     ) -> VecEnv:
         """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
 
@@ -90,6 +94,7 @@ class VecEnv:
                 and returns the first observation with reward 0. "disabled": nothing; use `reset(mask=...)`.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number.
             copy: whether every step returns new arrays.
+            **options: arguments of the task, see `Spec.options`.
         """
     @property
     def spec(self) -> Spec:
@@ -121,6 +126,11 @@ class VecEnv:
     @property
     def info(self) -> npt.NDArray[np.float32]:
         """What the agents report about the states that the last step reached, ``(num_envs, len(spec.info))``."""
+    def read_info(self) -> npt.NDArray[np.float32]:
+        """What the agents report about their present states, ``(num_envs, len(spec.info))``, a new array.
+
+        It differs from `info` where a step has begun an episode.
+        """
     @property
     def forward(self) -> npt.NDArray[np.float32]:
         """Distance that each agent moved along +x in the last step, m, ``(num_envs,)``."""
@@ -142,12 +152,13 @@ class VecEnv:
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``, within `spec.action_low` and
-        `spec.action_high`.
+        """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``.
+
+        Actions are in the units of `Spec.action_low`; the suite's own tasks clip them to [-1, 1].
 
         Returns ``(obs, reward, terminated, truncated)``, of shapes ``(num_envs, obs_size)`` and three times
-        ``(num_envs,)``; more is in `final_obs`, `reward_terms`, `info`, `forward` and `diverged`. A C-contiguous float32
-        array is read in place.
+        ``(num_envs,)``; more is in `final_obs`, `reward_terms`, `info`, `forward` and `diverged`. A C-contiguous
+        float32 array is read in place.
         """
     def get_state(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """State of every agent in MuJoCo's layout: ``qpos``, ``(num_envs, nq)``, and ``qvel``, ``(num_envs, nv)``.
@@ -170,11 +181,27 @@ class VecEnv:
         """Restore what `save` returned for the same task and number of agents."""
     def __len__(self) -> int: ...
 
+@final
+class Renderer:
+    """Draws agents of one kind with a ray caster on the processor, followed by a camera. No window, no GPU."""
+
+    def __new__(cls, id: str, width: int = 480, height: int = 480, *, agents: int = 1, **options: Any) -> Renderer:
+        """Make a renderer for pictures of `width` x `height` pixels with `agents` agents side by side.
+
+        `options` are arguments of the task, see `Spec.options`: some change the model.
+        """
+    def render(self, qpos: npt.ArrayLike, elapsed: float = ...) -> npt.NDArray[np.uint8]:
+        """Draw agents side by side, their states in the rows of `qpos`, ``(agents, nq)``.
+
+        `elapsed` is the time since the last picture, s; the camera jumps to the agents at first and after more than a
+        second. Returns ``(height, width, 3)``, sRGB.
+        """
+
 def ids() -> list[str]:
     """Names of all registered tasks."""
 
-def spec(id: str, /) -> Spec:
-    """Facts of a task, by any of its names."""
+def spec(id: str, /, **options: Any) -> Spec:
+    """Facts of a task, by any of its names, with other values for some of its arguments."""
 
 def main(words: Sequence[str]) -> int:
     """Run the ``marathon`` command with the words of a command line and return its exit code.

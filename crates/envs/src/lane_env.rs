@@ -33,9 +33,9 @@ pub struct AgentState {
 pub trait AgentShard: Shard {
     /// State of an agent, numbered within this shard.
     fn state(&self, agent: usize) -> AgentState;
-    /// Position of an agent's root along x, m: what [`BlockStep::forward`] is a difference of. `None` if the root cannot
-    /// move along x.
-    fn x_position(&self, agent: usize) -> Option<f64>;
+    /// Writes the positions of the agents' roots along x, m, which [`BlockStep::forward`] is a difference of; as many as
+    /// fit. Returns whether roots can move along x.
+    fn x_positions(&self, out: &mut [f64]) -> bool;
     /// Puts an agent into a state, as if an episode had begun there.
     ///
     /// # Errors
@@ -330,10 +330,13 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
         AgentState { qpos, qvel }
     }
 
-    fn x_position(&self, agent: usize) -> Option<f64> {
+    fn x_positions(&self, out: &mut [f64]) -> bool {
         let along_x = &self.task.anatomy.along_x;
-        let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
-        (!along_x.is_empty()).then(|| group.x_position(along_x, agent % T::LANES))
+        let groups = self.blocks.iter().flat_map(|block| &block.groups);
+        for (group, out) in groups.zip(out.chunks_mut(T::LANES)) {
+            group.x_positions(along_x, out);
+        }
+        !along_x.is_empty()
     }
 
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {

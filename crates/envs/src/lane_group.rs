@@ -83,9 +83,14 @@ impl<T: Real> LaneGroup<T> {
         (read(&self.physics.qpos), read(&self.physics.qvel))
     }
 
-    /// Position of an agent along the axes that lead to +x.
-    pub fn x_position(&self, along_x: &[(usize, T::Scalar)], lane: usize) -> f64 {
-        along_x.iter().map(|(i, axis)| T::widen(self.physics.qpos[*i].get(lane)) * T::widen(*axis)).sum()
+    /// Positions of the first agents along the axes that lead to +x.
+    pub fn x_positions(&self, along_x: &[(usize, T::Scalar)], out: &mut [f64]) {
+        for (lane, out) in out.iter_mut().enumerate() {
+            *out = 0.0;
+            for (i, axis) in along_x {
+                *out += T::widen(self.physics.qpos[*i].get(lane)) * T::widen(*axis);
+            }
+        }
     }
 
     /// Everything that the future depends on. Controls do not belong to it: every decision sets them.

@@ -399,9 +399,12 @@ impl VecEnv {
     /// Position of every agent's root along x, m, as the distances `forward` of [`Step`] add up to. `None` if the root
     /// cannot move along x.
     pub fn x_positions(&self) -> Option<Vec<f64>> {
-        let agents = |i| (0..self.stride).map(move |k| (i, k));
-        let all = (0..self.workers.len()).flat_map(agents).take(self.agents);
-        all.map(|(i, k)| self.workers[i].shard.x_position(k)).collect()
+        let mut x = vec![0.0; self.agents];
+        let mut there = true;
+        for (worker, out) in self.workers.iter().zip(x.chunks_mut(self.stride)) {
+            there &= worker.shard.x_positions(out);
+        }
+        there.then_some(x)
     }
 
     /// Puts an agent into a state, as if an episode had begun there.

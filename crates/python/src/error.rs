@@ -2,10 +2,18 @@
 
 use marathon_envs::EnvError;
 use pyo3::PyErr;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 
-/// `ValueError`: everything that can go wrong with an environment comes from an argument.
+/// `TypeError` for an argument that there is not, `ValueError` for all else: it comes from an argument's value.
 pub fn env(error: EnvError) -> PyErr {
+    match error {
+        EnvError::UnknownOption { .. } => PyTypeError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// `ValueError` for another error that comes from an argument.
+pub fn any(error: impl std::error::Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 

@@ -6,6 +6,8 @@
 
 mod arrays;
 mod error;
+mod options;
+mod renderer;
 mod spec;
 mod vec_env;
 
@@ -16,7 +18,7 @@ use std::ffi::OsString;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::{main, spec::Spec, spec::ids, spec::spec, vec_env::VecEnv};
+    use super::{main, renderer::Renderer, spec::Spec, spec::ids, spec::spec, vec_env::VecEnv};
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -1,45 +1,68 @@
 //! Facts of a task.
 
-use crate::error;
-use marathon_envs::registry;
+use crate::{error, options};
+use marathon_envs::{Options, registry};
 use marathon_physics::lanes::Isa;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// Constant facts of a task.
-#[pyclass(frozen, get_all, module = "marathon_envs")]
+#[pyclass(frozen, module = "marathon_envs")]
 pub struct Spec {
     /// Name in the registry, such as `Hopper-v0`.
+    #[pyo3(get)]
     pub id: String,
     /// One line about the task.
+    #[pyo3(get)]
     pub summary: String,
     /// Length of an observation.
+    #[pyo3(get)]
     pub obs_size: usize,
     /// Length of an action.
+    #[pyo3(get)]
     pub act_size: usize,
     /// Names of the actuators, in the order of the action.
+    #[pyo3(get)]
     pub action_names: Vec<String>,
     /// Lowest sensible action per actuator, in the actuator's own units; -inf for one without bounds.
+    #[pyo3(get)]
     pub action_low: Vec<f32>,
     /// Highest sensible action per actuator.
+    #[pyo3(get)]
     pub action_high: Vec<f32>,
     /// Seconds between two steps.
+    #[pyo3(get)]
     pub dt: f64,
     /// Physics steps per step.
+    #[pyo3(get)]
     pub frame_skip: usize,
     /// Steps after which an episode is truncated.
+    #[pyo3(get)]
     pub max_episode_steps: usize,
     /// Names of the reward's terms, which add up to the reward.
+    #[pyo3(get)]
     pub reward_terms: Vec<String>,
     /// Names of the numbers in `VecEnv.info`.
+    #[pyo3(get)]
     pub info: Vec<String>,
     /// Length of `qpos`.
+    #[pyo3(get)]
     pub nq: usize,
     /// Length of `qvel`.
+    #[pyo3(get)]
     pub nv: usize,
+    /// Arguments that the task takes, with the values that it has.
+    pub options: Options,
 }
 
 #[pymethods]
 impl Spec {
+    /// Arguments that the task takes, with the values that it has.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        options::show(py, &self.options)
+    }
+
     fn __repr__(&self) -> String {
         let Spec { id, obs_size, act_size, dt, max_episode_steps, .. } = self;
         format!(
@@ -54,17 +77,19 @@ pub fn ids() -> Vec<String> {
     registry::ids()
 }
 
-/// Facts of a task, by any of its names.
+/// Facts of a task, by any of its names, with other values for some of its arguments.
 #[pyfunction]
-#[pyo3(signature = (id, /))]
-pub fn spec(id: &str) -> PyResult<Spec> {
-    Spec::of(registry::factory(id, Isa::F32).map_err(error::env)?.spec())
+#[pyo3(signature = (id, /, **options))]
+pub fn spec(id: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
+    let options = options::read(options)?;
+    Spec::of(registry::factory_with(id, &options, Isa::F32).map_err(error::env)?.spec())
 }
 
 impl Spec {
     /// From the facts that an environment goes by.
     pub fn of(spec: &marathon_envs::Spec) -> PyResult<Self> {
-        let facts = registry::agent(&spec.id).map_err(error::env)?.facts();
+        let agent = registry::global().agent_with(&spec.id, &spec.options).map_err(error::env)?;
+        let facts = agent.facts();
         Ok(Spec {
             id: spec.id.clone(),
             summary: facts.summary,
@@ -80,6 +105,7 @@ impl Spec {
             info: spec.info.clone(),
             nq: spec.nq,
             nv: spec.nv,
+            options: spec.options.clone(),
         })
     }
 }

@@ -1,8 +1,8 @@
 //! Many agents of one kind as a Python object.
 
 use crate::arrays::Arrays;
-use crate::error;
 use crate::spec::Spec;
+use crate::{error, options};
 use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
 use marathon_physics::lanes::Isa;
 use numpy::{
@@ -10,7 +10,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::borrow::Cow;
 use std::sync::Mutex;
 
@@ -51,7 +51,7 @@ impl VecEnv {
     #[new]
     #[pyo3(signature = (
         id, num_envs = 1, *, seed = 0, threads = 0, isa = None, autoreset = "same_step", max_episode_steps = None,
-        copy = false
+        copy = false, **options
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
@@ -64,11 +64,13 @@ impl VecEnv {
         autoreset: &str,
         max_episode_steps: Option<usize>,
         copy: bool,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
         let autoreset = parse_autoreset(autoreset)?;
-        let options =
-            VecEnvOptions { agents: num_envs, seed, threads, isa, autoreset, max_episode_steps, ..Default::default() };
+        let agents = num_envs;
+        let options = options::read(options)?;
+        let options = VecEnvOptions { agents, seed, threads, isa, autoreset, max_episode_steps, options };
         let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
         let arrays = Arrays::new(py, num_envs, env.spec());
         let spec = Py::new(py, Spec::of(env.spec())?)?;
@@ -128,6 +130,15 @@ impl VecEnv {
     #[getter]
     fn info(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
         self.arrays.info.clone_ref(py)
+    }
+
+    /// What the agents report about their present states, `(num_envs, len(spec.info))`, a new array. It differs from `info`
+    /// where a step has begun an episode.
+    fn read_info<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let (n, columns) = (self.num_envs, self.spec.get().info.len());
+        let mut info = vec![0.0; n * columns];
+        self.env().info(&mut info).map_err(error::env)?;
+        PyArray1::from_vec(py, info).reshape([n, columns])
     }
 
     /// Distance that each agent moved along +x in the last step, m, `(num_envs,)`.

@@ -1,0 +1,53 @@
+//! Pictures of agents as arrays.
+
+use crate::{error, options};
+use marathon_envs::registry;
+use marathon_render::{Follow, Scene};
+use numpy::{AllowTypeChange, PyArray1, PyArray3, PyArrayLike2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Draws agents of one kind with the ray caster, followed by a camera. No window, no GPU.
+#[pyclass(module = "marathon_envs")]
+pub struct Renderer {
+    scene: Scene,
+    renderer: marathon_render::Renderer,
+    camera: Follow,
+}
+
+#[pymethods]
+impl Renderer {
+    #[new]
+    #[pyo3(signature = (id, width = 480, height = 480, *, agents = 1, **options))]
+    fn new(
+        id: &str,
+        width: usize,
+        height: usize,
+        agents: usize,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let options = options::read(options)?;
+        let agent = registry::global().agent_with(id, &options).map_err(error::env)?;
+        let model = agent.model().map_err(error::env)?;
+        let scene = Scene::new(&model);
+        let renderer = marathon_render::Renderer::new(width, height).map_err(error::any)?;
+        let camera = Follow::new(&scene, agents, width, height);
+        Ok(Renderer { scene, renderer, camera })
+    }
+
+    /// Draws agents side by side, their states in the rows of `qpos`, `(agents, nq)`, `elapsed` seconds after the last
+    /// picture; the camera jumps to them at first and after more than a second. Returns `(height, width, 3)`, uint8, sRGB.
+    #[pyo3(signature = (qpos, elapsed = f64::INFINITY))]
+    fn render<'py>(
+        &mut self,
+        py: Python<'py>,
+        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
+        elapsed: f64,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let poses: Vec<Vec<f64>> = qpos.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
+        let frame = self.scene.frame(&poses).map_err(error::any)?;
+        let camera = self.camera.update(&frame, elapsed);
+        let image = py.detach(|| self.renderer.render(&frame, &camera));
+        PyArray1::from_slice(py, image.rgb()).reshape([image.height(), image.width(), 3])
+    }
+}

@@ -1,0 +1,64 @@
+"""Spaces of a task, and what else one agent and many have in common."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from marathon_envs._native import Spec
+
+FloatArray = npt.NDArray[Any]
+BoolArray = npt.NDArray[np.bool_]
+
+# an observation that reaches this size counts as a broken simulation and is replaced by zeros
+LARGEST = 1e6
+
+# number of steps that no episode reaches
+NEVER = 2**63 - 1
+
+
+def is_gymnasiums(spec: Spec) -> bool:
+    """Whether Gymnasium has a task of the same name: then spaces are as there."""
+    return spec.id in gymnasium.registry
+
+
+def observation_space(spec: Spec) -> spaces.Box:
+    """Single observations, `(obs_size,)`."""
+    if is_gymnasiums(spec):
+        return spaces.Box(-np.inf, np.inf, (spec.obs_size,), np.float64)
+    return spaces.Box(-LARGEST, LARGEST, (spec.obs_size,), np.float32)
+
+
+def action_space(spec: Spec) -> spaces.Box:
+    """Single actions, `(act_size,)`."""
+    return spaces.Box(np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32))
+
+
+def info_names(spec: Spec) -> tuple[list[str], bool]:
+    """Names of the numbers that the task reports, and whether the position and velocity along x are to be added."""
+    return spec.info, "x_position" not in spec.info
+
+
+def native_seed(seed: Any) -> int:
+    """Turn a seed of Gymnasium's, which may be of any size, into one of 64 bits."""
+    return int(seed) % 2**64
+
+
+def steps_limit(max_episode_steps: int | None, default: int | None) -> int | None:
+    """Number of steps for the native environment; Gymnasium's -1 means that episodes never end by time."""
+    if max_episode_steps is None:
+        return default
+    return NEVER if max_episode_steps < 0 else max_episode_steps
+
+
+def check_render_mode(render_mode: str | None, metadata: dict[str, Any]) -> None:
+    """Refuse what cannot be drawn."""
+    if render_mode == "human":
+        raise gymnasium.error.Error(
+            "render_mode is 'human', expected 'rgb_array' or None; for a window, make one environment with "
+            "gymnasium.make(..., render_mode='human'), which needs pygame"
+        )
+    if render_mode not in (None, *metadata["render_modes"]):
+        raise gymnasium.error.Error(f"render_mode is {render_mode!r}, expected 'rgb_array' or None")

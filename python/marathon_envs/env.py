@@ -1,0 +1,124 @@
+"""One agent as a Gymnasium environment."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from marathon_envs import _spaces
+from marathon_envs._native import Renderer, VecEnv
+from marathon_envs._spaces import FloatArray
+
+
+class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
+    """One agent with a task.
+
+    `gymnasium.make("marathon_envs/Hopper-v0")` makes it with Gymnasium's time limit; on its own, its episodes end only
+    where the agent fails, unless `max_episode_steps` is given.
+
+    An observation is `(obs_size,)`; its parts and units are on the task's page in the documentation. An action is
+    `(act_size,)`: for Marathon's own tasks, shares of the motors' strengths, clipped to [-1, 1].
+
+    `info` has `reward_terms`, a dictionary of the numbers that add up to the reward; `x_position`, m, and `x_velocity`,
+    the mean velocity along +x during the step, m/s, if the agent can move along x; and what else the task reports.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
+
+    def __init__(
+        self,
+        task: str,
+        *,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        isa: Any = None,
+        width: int = 480,
+        height: int = 480,
+        **options: Any,
+    ) -> None:
+        """Make an environment.
+
+        Args:
+            task: name of the task, as in `marathon_envs.ids()`.
+            render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels. For a window, use
+                `gymnasium.make(..., render_mode="human")`, which shows them with pygame.
+            max_episode_steps: steps after which an episode is truncated; None means never.
+            isa: instruction set, as in `VecEnv`.
+            width: width of a picture, pixels.
+            height: height of a picture, pixels.
+            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+        """
+        _spaces.check_render_mode(render_mode, self.metadata)
+        limit = _spaces.steps_limit(max_episode_steps, _spaces.NEVER)
+        self._env = VecEnv(
+            task, 1, threads=1, isa=isa, autoreset="disabled", max_episode_steps=limit, copy=True, **options
+        )
+        self.task_spec = self._env.spec
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1 / self.dt)}
+        self.observation_space = _spaces.observation_space(self.task_spec)
+        self.action_space = _spaces.action_space(self.task_spec)
+        self._dtype = self.observation_space.dtype
+        self._terms = self.task_spec.reward_terms
+        self._info, self._add_x = _spaces.info_names(self.task_spec)
+        self._size, self._options = (width, height), options
+        self._renderer: Renderer | None = None
+        # for the camera: time, and that of the last picture
+        self._seconds = self._drawn = 0.0
+        self._seeded = False
+
+    @property
+    def dt(self) -> float:
+        """Seconds between two steps."""
+        return self.task_spec.dt
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode. A seed gives the episodes of agent 0 of a native environment with that seed."""
+        super().reset(seed=seed)
+        if seed is None and not self._seeded:
+            seed = int(self.np_random.integers(2**63))
+        self._seeded = True
+        obs = self._env.reset(None if seed is None else _spaces.native_seed(seed))
+        # far from the last picture, so that the camera jumps to the start
+        self._seconds += 2.0
+        return obs[0].astype(self._dtype), self._report(self._env.read_info())
+
+    def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Make one decision. An episode that has ended goes on until `reset`."""
+        env = self._env
+        obs, reward, terminated, truncated = env.step(np.asarray(action, np.float32)[None])
+        self._seconds += self.dt
+        info = self._report(env.info)
+        if self._add_x and "x_position" in info:
+            info["x_velocity"] = float(env.forward[0]) / self.dt
+        info["reward_terms"] = dict(zip(self._terms, env.reward_terms[0].tolist(), strict=True))
+        return obs[0].astype(self._dtype), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def _report(self, info: FloatArray) -> dict[str, Any]:
+        report: dict[str, Any] = dict(zip(self._info, info[0].tolist(), strict=True))
+        x = self._env.x_position if self._add_x else None
+        if x is not None:
+            report["x_position"] = float(x[0])
+        return report
+
+    def get_state(self) -> tuple[FloatArray, FloatArray]:
+        """`qpos`, `(nq,)`, and `qvel`, `(nv,)`, in MuJoCo's layout, float64."""
+        qpos, qvel = self._env.get_state()
+        return qpos[0], qvel[0]
+
+    def set_state(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        """Begin an episode in a state; returns its observation."""
+        obs: FloatArray = self._env.set_state(np.asarray(qpos)[None], np.asarray(qvel)[None])[0]
+        return obs.astype(self._dtype)
+
+    def render(self) -> FloatArray | None:
+        """Draw the agent: `(height, width, 3)`, uint8; None without a render mode."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
+            return None
+        if self._renderer is None:
+            self._renderer = Renderer(self.task_spec.id, *self._size, **self._options)
+        elapsed, self._drawn = self._seconds - self._drawn, self._seconds
+        return self._renderer.render(self._env.get_state()[0], elapsed)

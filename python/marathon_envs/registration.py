@@ -1,0 +1,26 @@
+"""Registers the tasks with Gymnasium."""
+
+import gymnasium
+from gymnasium.envs.registration import registry
+
+from marathon_envs._native import ids, spec
+
+NAMESPACE = "marathon_envs"
+
+
+def register() -> None:
+    """Register every task as `marathon_envs/<id>`, for `gymnasium.make` and `gymnasium.make_vec`."""
+    for task in ids():
+        name = f"{NAMESPACE}/{task}"
+        if name in registry:
+            continue
+        gymnasium.register(
+            id=name,
+            entry_point="marathon_envs.env:MarathonEnv",
+            vector_entry_point="marathon_envs.vector:MarathonVectorEnv",
+            max_episode_steps=spec(task).max_episode_steps,
+            kwargs={"task": task},
+        )
+        # versions are different tasks here, not older and newer ones: Gymnasium must not call any of them outdated
+        registry[name].name = task
+        registry[name].version = None

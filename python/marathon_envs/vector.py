@@ -1,0 +1,226 @@
+"""Many agents as a Gymnasium vector environment."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from marathon_envs import _spaces
+from marathon_envs._native import Renderer, VecEnv
+from marathon_envs._spaces import BoolArray, FloatArray
+
+Infos = dict[str, Any]
+
+
+class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
+    """Many agents with a task, stepped together by native threads.
+
+    `gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=1024)` makes it. Spaces and infos are those of
+    `MarathonEnv`, batched as Gymnasium batches them: `infos["x_velocity"]` is an array with a number for each agent,
+    and `infos["_x_velocity"]` tells for which agents there is one.
+
+    All three autoreset modes of Gymnasium work. With `SAME_STEP`, `infos["final_obs"]` and `infos["final_info"]` belong
+    to the episodes that ended. With `DISABLED`, ended episodes are reset by `reset(options={"reset_mask": mask})`.
+
+    A seed is for all agents together: agent `i` has random streams of its own, made of the seed and `i`. A list of
+    seeds makes agent `i` live as a `MarathonEnv` with the seed `seeds[i]`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        task: str,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        threads: int = 0,
+        isa: Any = None,
+        copy: bool = True,
+        width: int = 480,
+        height: int = 480,
+        **options: Any,
+    ) -> None:
+        """Make an environment.
+
+        Args:
+            task: name of the task, as in `marathon_envs.ids()`.
+            num_envs: number of agents.
+            autoreset_mode: what happens to an agent whose episode ended.
+            render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels, one for each agent.
+            max_episode_steps: steps after which an episode is truncated; None means the task's own number, -1 never.
+            threads: number of threads, as in `VecEnv`.
+            isa: instruction set, as in `VecEnv`.
+            copy: whether every step returns new arrays. Without, observations, terminations and truncations are
+                overwritten by the next step: faster, for code that uses them up before.
+            width: width of a picture, pixels.
+            height: height of a picture, pixels.
+            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+        """
+        _spaces.check_render_mode(render_mode, self.metadata)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self._env = VecEnv(
+            task,
+            num_envs,
+            threads=threads,
+            isa=isa,
+            autoreset=self.autoreset_mode.value,
+            max_episode_steps=_spaces.steps_limit(max_episode_steps, None),
+            copy=copy,
+            **options,
+        )
+        self.task_spec = self._env.spec
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.metadata = {
+            **self.metadata,
+            "autoreset_mode": self.autoreset_mode,
+            "render_fps": round(1 / self.task_spec.dt),
+        }
+        self.single_observation_space = _spaces.observation_space(self.task_spec)
+        self.single_action_space = _spaces.action_space(self.task_spec)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._dtype = self.single_observation_space.dtype
+        self._terms = self.task_spec.reward_terms
+        self._info, self._add_x = _spaces.info_names(self.task_spec)
+        self._size, self._options = (width, height), options
+        self._renderers: list[Renderer] | None = None
+        # for the cameras: time of each agent, and of its last picture
+        self._seconds, self._drawn = np.zeros(num_envs), np.zeros(num_envs)
+        self._seeded = False
+        # agents whose last step ended their episode
+        self._ended = np.zeros(num_envs, np.bool_)
+        self._x: FloatArray | None = None
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, Infos]:
+        """Start episodes of all agents, or of those in `options["reset_mask"]`, a boolean array `(num_envs,)`."""
+        mask = self._reset_mask(options)
+        if seed is None and not self._seeded:
+            seed = int(self.np_random.integers(2**63))
+        elif isinstance(seed, (int, np.integer)):
+            super().reset(seed=int(seed))
+        self._seeded = True
+        native: int | list[int | None] | None
+        if seed is None or isinstance(seed, (int, np.integer)):
+            native = None if seed is None else _spaces.native_seed(seed)
+        else:
+            native = [None if s is None else _spaces.native_seed(s) for s in seed]
+        obs = self._env.reset(native, mask)
+        begun = np.ones(self.num_envs, np.bool_) if mask is None else mask.copy()
+        self._ended &= ~begun
+        self._jump(begun)
+        self._x = self._env.x_position if self._add_x else None
+        return self._observed(obs), self._report(self._env.read_info(), self._x, begun)
+
+    def _reset_mask(self, options: dict[str, Any] | None) -> BoolArray | None:
+        if options is None or "reset_mask" not in options:
+            return None
+        mask = options["reset_mask"]
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            found = f"{mask.dtype} {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
+            raise ValueError(f"reset_mask is {found}, expected a boolean array of shape ({self.num_envs},)")
+        if not mask.any():
+            raise ValueError("reset_mask chooses no agent, expected at least one")
+        return mask
+
+    def step(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, Infos]:
+        """Make one decision of every agent; `actions` is `(num_envs, act_size)`."""
+        env, mode, begun = self._env, self.autoreset_mode, self._ended
+        if mode is AutoresetMode.DISABLED and begun.any():
+            raise gymnasium.error.ResetNeeded(
+                f"the episodes of agents {np.flatnonzero(begun).tolist()} have ended; "
+                "reset them with reset(options={'reset_mask': ...})"
+            )
+        obs, reward, terminated, truncated = env.step(actions)
+        ended = self._ended = terminated | truncated
+        before, self._x = self._x, env.x_position if self._add_x else None
+        if self.render_mode is not None:
+            self._seconds += self.task_spec.dt
+            self._jump(ended)
+
+        rewards, every = reward.astype(np.float64), np.ones(self.num_envs, np.bool_)
+        terms = env.reward_terms if env.copy else env.reward_terms.copy()
+        info = env.info if env.copy else env.info.copy()
+        # float64 before anything else, as Gymnasium's single environments have it
+        distance = env.forward.astype(np.float64)
+        if mode is not AutoresetMode.SAME_STEP or not ended.any():
+            # those that begin an episode in this step have not acted
+            acted = ~begun if mode is AutoresetMode.NEXT_STEP else every
+            infos = self._report(info, self._x, every)
+            self._add_step(infos, terms, distance, acted)
+            return self._observed(obs), rewards, terminated, truncated, infos
+
+        # what is told of the agents whose episode ended belongs to the end, the rest to the next beginning
+        acted, rows = ~ended, ended[:, None]
+        last_x = None if before is None else np.where(ended, before + distance, 0.0)
+        final = self._report(np.where(rows, info, 0), last_x, ended)
+        self._add_step(final, np.where(rows, terms, 0), np.where(ended, distance, 0.0), ended)
+        infos = self._report(env.read_info(), self._x, every)
+        self._add_step(infos, np.where(rows, 0, terms), np.where(acted, distance, 0.0), acted)
+        infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(ended):
+            infos["final_obs"][i] = env.final_obs[i].astype(self._dtype)
+        infos["final_info"] = final
+        infos["_final_obs"] = infos["_final_info"] = ended.copy()
+        return self._observed(obs), rewards, terminated, truncated, infos
+
+    def _observed(self, obs: FloatArray) -> FloatArray:
+        return obs.astype(self._dtype, copy=False)
+
+    def _jump(self, agents: BoolArray) -> None:
+        """Make the cameras of agents jump to where they are next."""
+        self._seconds[agents] += 2.0
+
+    def _report(self, info: FloatArray, x: FloatArray | None, mask: BoolArray) -> Infos:
+        """What the agents in `mask` report of a state."""
+        infos: Infos = {}
+        for i, name in enumerate(self._info):
+            infos[name], infos[f"_{name}"] = info[:, i].astype(np.float64), mask
+        if x is not None:
+            infos["x_position"], infos["_x_position"] = x.copy(), mask
+        return infos
+
+    def _add_step(self, infos: Infos, terms: FloatArray, distance: FloatArray, mask: BoolArray) -> None:
+        """Add what a step tells of the agents in `mask`."""
+        shares: Infos = {}
+        for i, name in enumerate(self._terms):
+            shares[name], shares[f"_{name}"] = terms[:, i], mask
+        infos["reward_terms"], infos["_reward_terms"] = shares, mask
+        if self._x is not None:
+            infos["x_velocity"], infos["_x_velocity"] = distance / self.task_spec.dt, mask
+
+    def get_state(self) -> tuple[FloatArray, FloatArray]:
+        """`qpos`, `(num_envs, nq)`, and `qvel`, `(num_envs, nv)`, in MuJoCo's layout, float64."""
+        return self._env.get_state()
+
+    def set_state(self, qpos: FloatArray, qvel: FloatArray, mask: BoolArray | None = None) -> FloatArray:
+        """Begin episodes of all agents, or of those in a mask, in states; returns the observations."""
+        obs = self._env.set_state(qpos, qvel, mask)
+        self._ended &= False if mask is None else ~np.asarray(mask)
+        self._x = self._env.x_position if self._add_x else None
+        return self._observed(obs)
+
+    def render(self) -> tuple[FloatArray, ...] | None:
+        """Draw every agent by itself: `(height, width, 3)`, uint8, for each; None without a render mode."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
+            return None
+        if self._renderers is None:
+            self._renderers = [Renderer(self.task_spec.id, *self._size, **self._options) for _ in range(self.num_envs)]
+        elapsed = self._seconds - self._drawn
+        self._drawn = self._seconds.copy()
+        qpos = self._env.get_state()[0]
+        drawn = zip(self._renderers, qpos, elapsed, strict=True)
+        return tuple(renderer.render(q[None], float(t)) for renderer, q, t in drawn)

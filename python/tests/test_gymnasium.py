@@ -1,0 +1,186 @@
+"""Gymnasium's checks pass without warnings on every task, and many agents behave as Gymnasium's own vector environment
+of single ones does. (A warning is an error in all of these tests.)"""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
+
+import marathon_envs
+from marathon_envs import MarathonEnv, MarathonVectorEnv
+
+IDS = marathon_envs.ids()
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_gymnasium_checks_every_task(id: str) -> None:
+    env = gymnasium.make(f"marathon_envs/{id}", render_mode="rgb_array", width=64, height=48)
+    assert isinstance(env.unwrapped, MarathonEnv)
+    check_env(env.unwrapped)
+    # the passive checker and the order enforcer are on
+    env.reset(seed=1)
+    for _ in range(20):
+        obs, reward, _, _, info = env.step(env.action_space.sample())
+        assert obs in env.observation_space and obs.dtype == np.float32
+        assert sum(info["reward_terms"].values()) == pytest.approx(reward, abs=1e-4)
+    env.close()
+
+
+def test_names_of_gymnasium() -> None:
+    names = {f"marathon_envs/{id}" for id in IDS}
+    assert names <= set(gymnasium.registry)
+    env = gymnasium.make("marathon_envs:marathon_envs/Walker2d-v0")
+    assert env.spec is not None and env.spec.id == "marathon_envs/Walker2d-v0"
+    assert env.spec.make().spec == env.spec
+    vector = gymnasium.make_vec("marathon_envs/Walker2d-v1", num_envs=3)
+    assert isinstance(vector, MarathonVectorEnv) and gymnasium.make_vec(vector.spec).num_envs == 3
+    with pytest.raises(gymnasium.error.NameNotFound, match=r"Hopper-v\d"):
+        gymnasium.make("marathon_envs/Hoper-v0")
+
+
+def test_a_single_environment_is_agent_0_of_a_native_one() -> None:
+    env, native = MarathonEnv("ant"), marathon_envs.VecEnv("ant", 1, autoreset="disabled")
+    obs, info = env.reset(seed=5)
+    assert np.array_equal(obs, native.reset(seed=5)[0]) and info["x_position"] == native.x_position[0]
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        action = rng.uniform(-1, 1, 8)
+        obs, reward, terminated, truncated, info = env.step(action)
+        expected = native.step(action[None])
+        assert np.array_equal(obs, expected[0][0]) and reward == expected[1][0]
+        assert (terminated, truncated) == (expected[2][0], expected[3][0])
+        assert info["x_velocity"] == pytest.approx(native.forward[0] / env.dt)
+        assert info["x_position"] == native.get_state()[0][0, 0]
+    qpos, qvel = env.get_state()
+    other = MarathonEnv("ant")
+    other.reset()
+    np.testing.assert_allclose(other.set_state(qpos, qvel), obs, atol=1e-4)
+
+
+def test_episodes_without_a_seed_differ() -> None:
+    first = [MarathonEnv("hopper").reset()[0] for _ in range(2)]
+    assert not np.array_equal(*first)
+    first = [MarathonVectorEnv("hopper", 2).reset()[0] for _ in range(2)]
+    assert not np.array_equal(*first)
+
+
+def test_time_limits() -> None:
+    for limit in (None, 5):
+        env = gymnasium.make("marathon_envs/Hopper-v0", max_episode_steps=limit)
+        env.reset(seed=0)
+        flags = [env.step(np.zeros(4))[2:4] for _ in range(5)]
+        assert flags[-1] == (False, limit == 5)
+    env = MarathonEnv("hopper", max_episode_steps=3)
+    env.reset(seed=0)
+    assert [env.step(np.zeros(4))[3] for _ in range(3)] == [False, False, True]
+    vector = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, max_episode_steps=3)
+    vector.reset(seed=0)
+    assert [vector.step(np.zeros((2, 4)))[3].tolist() for _ in range(4)] == [[False] * 2] * 2 + [
+        [True] * 2,
+        [False] * 2,
+    ]
+
+
+def same(a: dict, b: dict, everywhere: np.ndarray) -> bool:
+    """Whether infos agree in their masks, and wherever those say that there is something."""
+    for key in {key for key in a.keys() | b.keys() if not key.startswith("_")}:
+        mask = everywhere & a.get(f"_{key}", False)
+        if not np.array_equal(mask, everywhere & b.get(f"_{key}", False)):
+            return False
+        if not mask.any():
+            continue
+        x, y = a[key], b[key]
+        if isinstance(x, dict):
+            agree = same(x, y, mask)
+        else:
+            agree = all(np.allclose(x[i], y[i], atol=1e-5) for i in np.flatnonzero(mask))
+        if not agree:
+            return False
+    return True
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("id", ["Hopper-v0", "Ant-v1"])
+def test_many_agents_behave_as_gymnasiums_vector_of_single_ones(id: str, mode: AutoresetMode) -> None:
+    name, n, limit = f"marathon_envs/{id}", 5, 30
+    ours = gymnasium.make_vec(name, num_envs=n, autoreset_mode=mode, max_episode_steps=limit)
+    theirs = SyncVectorEnv([lambda: gymnasium.make(name, max_episode_steps=limit)] * n, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] is mode
+    for space in ("observation_space", "action_space", "single_observation_space", "single_action_space"):
+        assert getattr(ours, space) == getattr(theirs, space)
+    seeds, every = [3, 1, 4, 1, 5], np.ones(n, bool)
+    (obs, info), (expected, expected_info) = ours.reset(seed=seeds), theirs.reset(seed=seeds)
+    assert np.array_equal(obs, expected) and same(info, expected_info, every)
+    assert np.array_equal(obs[1], obs[3]) and not np.array_equal(obs[0], obs[1])
+    ours.action_space.seed(0)
+    begun = 0
+    for _ in range(100):
+        actions = ours.action_space.sample()
+        x, y = ours.step(actions), theirs.step(actions)
+        for a, b in zip(x[:4], y[:4], strict=True):
+            assert a.dtype == b.dtype
+            np.testing.assert_allclose(a, b, atol=1e-6)
+        assert same(x[4], y[4], every)
+        ended = x[2] | x[3]
+        begun += ended.sum()
+        if mode is AutoresetMode.DISABLED and ended.any():
+            with pytest.raises(gymnasium.error.ResetNeeded):
+                ours.step(actions)
+            a, b = (env.reset(options={"reset_mask": ended}) for env in (ours, theirs))
+            assert np.array_equal(a[0], b[0]) and same(a[1], b[1], every)
+    assert begun > 10
+    ours.close()
+
+
+def test_steps_return_new_arrays_unless_told_otherwise() -> None:
+    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=4)
+    first, _ = envs.reset(seed=1)
+    results = [first] + [x for _ in range(3) for x in envs.step(np.full((4, 4), 0.5))[:4]]
+    kept = [x.copy() for x in results]
+    envs.step(np.zeros((4, 4)))
+    assert all(np.array_equal(x, old) for x, old in zip(results, kept, strict=True))
+    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=4, copy=False)
+    first, _ = envs.reset(seed=1)
+    assert envs.step(np.zeros((4, 4)))[0] is first
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_gymnasiums_wrappers_work(mode: AutoresetMode) -> None:
+    envs = gymnasium.make_vec("marathon_envs/Walker2d-v0", num_envs=6, autoreset_mode=mode, max_episode_steps=20)
+    if mode is AutoresetMode.NEXT_STEP:
+        envs = NormalizeObservation(envs)
+    envs = RecordEpisodeStatistics(envs)
+    envs.reset(seed=1)
+    lengths = []
+    for _ in range(60):
+        *_, infos = envs.step(envs.action_space.sample())
+        if "episode" in infos:
+            lengths += infos["episode"]["l"][infos["_episode"]].tolist()
+    assert len(lengths) >= 12 and max(lengths) == 20
+
+
+def test_masks_of_resets_are_checked() -> None:
+    envs = MarathonVectorEnv("hopper", 3)
+    envs.reset(seed=1)
+    for mask in ([True] * 3, np.ones(2, bool), np.ones(3), np.zeros(3, bool)):
+        with pytest.raises(ValueError, match="reset_mask"):
+            envs.reset(options={"reset_mask": mask})
+
+
+def test_pictures() -> None:
+    env = gymnasium.make("marathon_envs/Hopper-v0", render_mode="rgb_array", width=64, height=48)
+    env.reset(seed=1)
+    first = env.render()
+    assert first.shape == (48, 64, 3) and first.dtype == np.uint8 and first.std() > 10
+    for _ in range(10):
+        env.step(env.action_space.sample())
+    assert not np.array_equal(env.render(), first)
+    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, render_mode="rgb_array", width=32, height=32)
+    envs.reset(seed=1)
+    assert [frame.shape for frame in envs.render()] == [(32, 32, 3)] * 2
+    with pytest.raises(gymnasium.error.Error, match="pygame"):
+        MarathonEnv("hopper", render_mode="human")
+    with pytest.raises(gymnasium.error.Error, match="'rgb_array' or None"):
+        MarathonVectorEnv("hopper", render_mode="ansi")
