@@ -13,13 +13,44 @@ The import registers every task with Gymnasium in the namespace `marathon_envs`:
     >>> import gymnasium
     >>> env = gymnasium.make("marathon_envs/Hopper-v0")
     >>> envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=1024)
+
+`train` is the native trainer, `load_policy` reads what it has learned, `evaluate` tells how good that is:
+
+    >>> result = marathon_envs.train("Hopper-v0", callback=lambda metrics: print(metrics["return_mean"]))
+    >>> actions = result.policy(obs)
 """
 
 from marathon_envs import registration
-from marathon_envs._native import Renderer, Spec, VecEnv, __version__, ids, spec
+from marathon_envs._native import (
+    Policy,
+    Renderer,
+    Spec,
+    TrainResult,
+    VecEnv,
+    __version__,
+    evaluate,
+    ids,
+    load_policy,
+    spec,
+    train,
+)
 from marathon_envs.env import MarathonEnv
 from marathon_envs.vector import MarathonVectorEnv
 
-__all__ = ["MarathonEnv", "MarathonVectorEnv", "Renderer", "Spec", "VecEnv", "__version__", "ids", "spec"]
+__all__ = [
+    "MarathonEnv",
+    "MarathonVectorEnv",
+    "Policy",
+    "Renderer",
+    "Spec",
+    "TrainResult",
+    "VecEnv",
+    "__version__",
+    "evaluate",
+    "ids",
+    "load_policy",
+    "spec",
+    "train",
+]
 
 registration.register()

@@ -1,12 +1,27 @@
 """Native part of marathon_envs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import Any, Literal, final
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Renderer", "Spec", "VecEnv", "__version__", "ids", "main", "spec"]
+__all__ = [
+    "Policy",
+    "Renderer",
+    "Spec",
+    "TrainResult",
+    "VecEnv",
+    "__version__",
+    "evaluate",
+    "ids",
+    "load_policy",
+    "main",
+    "spec",
+    "train",
+]
 
 __version__: str
 
@@ -196,6 +211,97 @@ class Renderer:
         `elapsed` is the time since the last picture, s; the camera jumps to the agents at first and after more than a
         second. Returns ``(height, width, 3)``, sRGB.
         """
+
+@final
+class Policy:
+    """A trained policy: a function from observations to actions."""
+
+    @property
+    def task(self) -> str:
+        """Task that the policy is for, such as ``Hopper-v0``."""
+    @property
+    def obs_size(self) -> int:
+        """Length of an observation."""
+    @property
+    def act_size(self) -> int:
+        """Length of an action."""
+    @property
+    def dt(self) -> float:
+        """Seconds between two actions."""
+    @property
+    def meta(self) -> dict[str, Any]:
+        """All that the file says of the policy: network, training with its configuration, evaluation."""
+    def __call__(self, obs: npt.ArrayLike, rng: np.random.Generator | int | None = None) -> npt.NDArray[np.float32]:
+        """The actions for observations, ``(obs_size,)`` or ``(n, obs_size)``; ``(act_size,)`` or ``(n, act_size)``.
+
+        Without `rng`, the best actions. With a generator or a seed for one, actions drawn as in training.
+        """
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the policy to a file, ``.safetensors``."""
+
+@final
+class TrainResult:
+    """What a run has led to."""
+
+    @property
+    def policy(self) -> Policy:
+        """The policy."""
+    @property
+    def steps(self) -> int:
+        """Steps of all agents together."""
+    @property
+    def interrupted(self) -> bool:
+        """Whether the run was stopped before its last step."""
+    @property
+    def folder(self) -> Path | None:
+        """Folder with the results, if they were written to one."""
+    @property
+    def evaluation(self) -> dict[str, float] | None:
+        """How the policy's best actions do over 100 episodes, as `evaluate` tells it; None if interrupted."""
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The run in numbers, as in ``summary.json``."""
+
+def train(
+    task: str | None = None,
+    config: str | PathLike[str] | dict[str, Any] | None = None,
+    *,
+    callback: Callable[[dict[str, float | None]], bool | None] | None = None,
+    seed: int | None = None,
+    steps: int | None = None,
+    agents: int | None = None,
+    threads: int | None = None,
+    out: str | PathLike[str] | None = None,
+    resume: str | PathLike[str] | None = None,
+) -> TrainResult:
+    """Train a policy with the native trainer, without the GIL, and evaluate it.
+
+    Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
+    `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
+
+    Args:
+        task: its name.
+        config: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; None means the task's own
+            fast configuration.
+        callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
+            ``return_mean`` (None if no episode ended), ``steps_per_second``; if it returns False, training stops.
+        seed: seed of everything random.
+        steps: steps of all agents together.
+        agents: agents that act side by side, a multiple of 16.
+        threads: number of threads; 0 means one per processor core.
+        out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
+        resume: the folder of a run to go on with, in place of a task and a configuration.
+    """
+
+def load_policy(path: str | PathLike[str]) -> Policy:
+    """Read a policy from a file, or from the folder of a run."""
+
+def evaluate(policy: Policy, episodes: int = 100, *, seed: int = ..., threads: int = 0) -> dict[str, float]:
+    """Play whole episodes with a policy's best actions.
+
+    Returns ``return_mean``, ``return_std``, ``return_min``, ``return_max``, ``length_mean`` (decisions),
+    ``distance_mean`` (m), ``speed_mean`` (m/s), ``falls``, ``diverged`` and ``episodes``.
+    """
 
 def ids() -> list[str]:
     """Names of all registered tasks."""

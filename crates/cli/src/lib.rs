@@ -11,6 +11,7 @@ mod error;
 mod folder;
 mod interrupt;
 mod report;
+pub mod session;
 mod text;
 
 use args::{Args, Command};

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! x = clamp((obs - obs_mean) * (1 / obs_std), -observation_clip, observation_clip)
-//! nominal = clamp(mlp(x), -action_clip, action_clip)
+//! nominal = clamp(mlp(x), -action_clip, action_clip)        with `squash`: clamp(tanh(mlp(x)), ...)
 //! action = (low + high) / 2 + nominal (high - low) / 2
 //! ```
 //!
@@ -15,6 +15,7 @@
 use crate::buffer::Blocks;
 use crate::eval::Evaluation;
 use crate::files::{TensorReader, TensorWriter, write_atomic};
+use crate::gaussian::Gaussian;
 use crate::learner::Learner;
 use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::normalize::{Normalize, Normalizer};
@@ -57,6 +58,9 @@ pub struct PolicyMeta {
     pub observation_clip: f32,
     /// Bound of the network's output.
     pub action_clip: f32,
+    /// Whether the network's output goes through the hyperbolic tangent before all else.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub squash: bool,
     /// What an output of -1 and 1 means to the environment, per actuator; empty: just that.
     #[serde(default)]
     pub action_range: Vec<[f32; 2]>,
@@ -64,6 +68,30 @@ pub struct PolicyMeta {
     pub training: Option<Training>,
     /// How it did when it was last evaluated.
     pub evaluation: Option<Evaluation>,
+}
+
+impl PolicyMeta {
+    /// Of a policy for a task, with nothing known about its training; actions of the network in [-1, 1].
+    pub fn of(spec: &Spec, hidden: Vec<usize>, activation: Activation) -> Self {
+        PolicyMeta {
+            format: FORMAT.into(),
+            version: VERSION,
+            agent: spec.id.clone(),
+            obs: spec.obs,
+            act: spec.act,
+            control_dt: spec.dt,
+            frame_skip: spec.frame_skip,
+            physics_dt: spec.dt / spec.frame_skip as f64,
+            hidden,
+            activation,
+            observation_clip: 10.0,
+            action_clip: 1.0,
+            squash: false,
+            action_range: (0..spec.act).map(|i| spec.action_range(i)).collect(),
+            training: None,
+            evaluation: None,
+        }
+    }
 }
 
 /// Summary of a policy's training.
@@ -101,23 +129,9 @@ impl Policy {
             wall_seconds: clocks.wall,
             cpu_seconds: clocks.cpu,
         };
-        let meta = PolicyMeta {
-            format: FORMAT.into(),
-            version: VERSION,
-            agent: spec.id.clone(),
-            obs: spec.obs,
-            act: spec.act,
-            control_dt: spec.dt,
-            frame_skip: spec.frame_skip,
-            physics_dt: spec.dt / spec.frame_skip as f64,
-            hidden: config.actor_hidden.clone(),
-            activation: config.activation,
-            observation_clip: config.observation_clip as f32,
-            action_clip: 1.0,
-            action_range: (0..spec.act).map(|i| spec.action_range(i)).collect(),
-            training: Some(training),
-            evaluation: None,
-        };
+        let mut meta = PolicyMeta::of(spec, config.actor_hidden.clone(), config.activation);
+        meta.observation_clip = config.observation_clip as f32;
+        meta.training = Some(training);
         Self {
             meta,
             net: layout.actor.clone(),
@@ -200,6 +214,7 @@ impl Policy {
     #[inline(always)]
     fn action(&self, i: usize, output: f32) -> f32 {
         let clip = self.meta.action_clip;
+        let output = if self.meta.squash { Real::tanh(output) } else { output };
         let nominal = Real::min(Real::max(output, -clip), clip);
         self.meta.action_range.get(i).map_or(nominal, |range| scale_action(*range, nominal))
     }
@@ -318,21 +333,58 @@ impl<'a> BlockPolicy<'a> {
         let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
         assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
         for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
-            f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
-                normalizer: &policy.normalizer,
-                raw,
-                input: &mut self.input,
-                copy: None,
-                sums: None,
-                lanes: PhantomData,
-            }));
-            let n = raw.len() / obs_row;
-            policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, n);
+            self.forward(raw);
             for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
                 for (i, (out, x)) in out.iter_mut().zip(self.tape.output().block(b)).enumerate() {
                     *out = policy.action(i / BLOCK, *x);
                 }
             }
         }
+    }
+
+    /// The best actions, `[n][act]`, for any number of raw observations, `[n][obs]`. With `noise`, `[n][act]` standard
+    /// normal numbers, the actions are drawn as in training.
+    ///
+    /// # Panics
+    /// If the lengths do not fit each other.
+    pub fn act_rows(&mut self, obs: &[f32], noise: Option<&[f32]>, action: &mut [f32]) {
+        let policy = self.policy;
+        let (n_obs, n_act) = (policy.meta.obs, policy.meta.act);
+        assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "whole rows");
+        assert!(noise.is_none_or(|noise| noise.len() == action.len()), "noise for every action");
+        let std = Gaussian::new(&policy.log_std).std;
+        let rows = CHUNK * BLOCK;
+        for (chunk, (obs, action)) in obs.chunks(rows * n_obs).zip(action.chunks_mut(rows * n_act)).enumerate() {
+            let mut raw = vec![0.0; (action.len() / n_act).div_ceil(BLOCK) * BLOCK * n_obs];
+            for (i, row) in obs.chunks_exact(n_obs).enumerate() {
+                let block = &mut raw[i / BLOCK * BLOCK * n_obs..];
+                for (k, x) in row.iter().enumerate() {
+                    block[k * BLOCK + i % BLOCK] = *x;
+                }
+            }
+            self.forward(&raw);
+            for (i, row) in action.chunks_exact_mut(n_act).enumerate() {
+                let mean = self.tape.output().block(i / BLOCK);
+                for (k, out) in row.iter_mut().enumerate() {
+                    let drawn = noise.map_or(0.0, |noise| std[k] * noise[(chunk * rows + i) * n_act + k]);
+                    *out = policy.action(k, mean[k * BLOCK + i % BLOCK] + drawn);
+                }
+            }
+        }
+    }
+
+    /// Runs the network for at most [`CHUNK`] blocks of raw observations.
+    fn forward(&mut self, raw: &[f32]) {
+        let policy = self.policy;
+        f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
+            normalizer: &policy.normalizer,
+            raw,
+            input: &mut self.input,
+            copy: None,
+            sums: None,
+            lanes: PhantomData,
+        }));
+        let blocks = raw.len() / (policy.meta.obs * BLOCK);
+        policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, blocks);
     }
 }

@@ -1,13 +1,36 @@
 //! Errors as Python knows them. The texts are those of the Rust crates.
 
+use marathon_cli::session::CliError;
 use marathon_envs::EnvError;
+use marathon_learn::Error;
 use pyo3::PyErr;
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyTypeError, PyValueError};
+use std::io::ErrorKind;
 
 /// `TypeError` for an argument that there is not, `ValueError` for all else: it comes from an argument's value.
 pub fn env(error: EnvError) -> PyErr {
     match error {
         EnvError::UnknownOption { .. } => PyTypeError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// `OSError` for files that cannot be read or written, `ValueError` for all else of the trainer.
+pub fn learn(error: Error) -> PyErr {
+    let text = error.to_string();
+    match error {
+        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
+        Error::Io { .. } => PyOSError::new_err(text),
+        _ => PyValueError::new_err(text),
+    }
+}
+
+/// The same for what the command line shares with Python.
+pub fn cli(error: CliError) -> PyErr {
+    match error {
+        CliError::Learn(error) => learn(error),
+        CliError::Env(error) => env(error),
+        CliError::Stopped { .. } => PyOSError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }

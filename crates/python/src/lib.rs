@@ -7,8 +7,10 @@
 mod arrays;
 mod error;
 mod options;
+mod policy;
 mod renderer;
 mod spec;
+mod train;
 mod vec_env;
 
 use pyo3::prelude::*;
@@ -18,7 +20,10 @@ use std::ffi::OsString;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::{main, renderer::Renderer, spec::Spec, spec::ids, spec::spec, vec_env::VecEnv};
+    use super::{
+        main, policy::Policy, policy::evaluate, policy::load_policy, renderer::Renderer, spec::Spec, spec::ids,
+        spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+    };
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -8,7 +8,6 @@ pub mod tensorboard;
 
 use crate::error::CliError;
 use crate::folder::{RunFile, RunFolder};
-use crate::interrupt;
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot};
 use progress::Progress;
@@ -17,13 +16,17 @@ use tensorboard::EventLog;
 
 pub use crate::console::print_json;
 
-/// Follows a run: shows progress, writes rows, events and checkpoints. Ends the run when the user asks for it, or when
-/// something cannot be written.
+/// Asked after every iteration whether to go on.
+pub type Watch<'a> = dyn FnMut(&IterationStats) -> Control + 'a;
+
+/// Follows a run: shows progress, writes rows, events and checkpoints. Ends the run when it is told to, or when something
+/// cannot be written.
 pub struct Reporter<'a> {
     folder: &'a RunFolder,
     run: &'a RunFile,
     terms: Vec<String>,
-    progress: Progress,
+    progress: Option<Progress>,
+    watch: &'a mut Watch<'a>,
     csv: CsvLog,
     events: EventLog,
     /// Steps at which the next checkpoint is due.
@@ -35,7 +38,8 @@ pub struct Reporter<'a> {
 }
 
 impl<'a> Reporter<'a> {
-    /// For a run that goes on from a checkpoint, or begins. What its files say of later iterations is cut.
+    /// For a run that goes on from a checkpoint, or begins. What its files say of later iterations is cut. `show`: with
+    /// progress on stderr; `watch` may end the run.
     ///
     /// # Errors
     /// If a file cannot be read or written.
@@ -44,6 +48,7 @@ impl<'a> Reporter<'a> {
         run: &'a RunFile,
         terms: &[String],
         resume: Option<&Checkpoint>,
+        (show, watch): (bool, &'a mut Watch<'a>),
     ) -> Result<Self, CliError> {
         let (iteration, steps) = resume.map_or((0, 0), |c| (c.iteration(), c.steps()));
         let csv = CsvLog::open(&folder.progress(), iteration)?;
@@ -53,7 +58,8 @@ impl<'a> Reporter<'a> {
             folder,
             run,
             terms: terms.to_vec(),
-            progress: Progress::new(run.config.total_steps, steps, run.summary_freq),
+            progress: show.then(|| Progress::new(run.config.total_steps, steps, run.summary_freq)),
+            watch,
             csv,
             events,
             due: 0,
@@ -66,7 +72,9 @@ impl<'a> Reporter<'a> {
 
     /// Takes the progress bar away.
     pub fn finish(&self) {
-        self.progress.finish();
+        if let Some(progress) = &self.progress {
+            progress.finish();
+        }
     }
 
     fn plan(&mut self, steps: u64) {
@@ -109,12 +117,14 @@ impl<'a> Reporter<'a> {
 
 impl Observer for Reporter<'_> {
     fn iteration(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Control {
-        self.progress.update(stats);
+        if let Some(progress) = &mut self.progress {
+            progress.update(stats);
+        }
         if let Err(error) = self.report(stats, snapshot) {
             self.error = Some(error);
             return Control::Stop;
         }
-        if interrupt::requested() { Control::Stop } else { Control::Continue }
+        (self.watch)(stats)
     }
 }
 

@@ -1,0 +1,227 @@
+//! A training run: begun or gone on with, carried out, written to its folder. The command and the Python package share it.
+
+pub use crate::args::TrainArgs;
+pub use crate::config::Loaded;
+pub use crate::error::CliError;
+pub use crate::folder::{RunFile, RunFolder, policy_path};
+pub use crate::report::Watch;
+pub use crate::report::csv::columns as metrics;
+pub use crate::report::summary::Summary;
+
+use crate::config;
+use crate::folder::write_json;
+use crate::report::csv::History;
+use crate::report::summary::EPISODES;
+use crate::report::{Reporter, curve, save};
+use crate::text;
+use marathon_envs::{ShardFactory, registry};
+use marathon_learn::{
+    Checkpoint, EvalOptions, Evaluation, IterationStats, Policy, Snapshot, TrainOutput, evaluate, train,
+};
+use marathon_physics::lanes::Isa;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What the text of a configuration file says about an agent; the path is for messages.
+///
+/// # Errors
+/// If it is no configuration for the agent; the text names the line and the key.
+pub fn configuration(path: &Path, text: &[u8], agent: &str) -> Result<Loaded, CliError> {
+    let agent = registry::agent(agent)?.facts().id;
+    Ok(config::parse(path, text, &agent)?)
+}
+
+/// A run about to begin or to go on.
+pub struct Session {
+    /// What the run is.
+    pub run: RunFile,
+    /// Its folder; without one, nothing is written.
+    pub folder: Option<RunFolder>,
+    /// Its task.
+    pub factory: Arc<dyn ShardFactory>,
+    /// Where it goes on from.
+    pub checkpoint: Option<Checkpoint>,
+}
+
+/// What a run has led to.
+pub struct Outcome {
+    /// The policy, which knows its evaluation.
+    pub policy: Policy,
+    /// Agent-steps done.
+    pub steps: u64,
+    /// How its best actions do; none if the run was stopped before its last step.
+    pub evaluation: Option<Evaluation>,
+    /// The run in numbers.
+    pub summary: Summary,
+    /// The folder, which stays locked as long as this lives.
+    pub folder: Option<RunFolder>,
+}
+
+impl Session {
+    /// The run that a command line asks for: with the configuration given, or the one of its file, or the agent's own fast
+    /// one; with a folder of its own unless `dry`.
+    ///
+    /// # Errors
+    /// If there is no such agent, its configuration is not usable, or the folder cannot be made.
+    pub fn begin(args: &TrainArgs, loaded: Option<Loaded>, dry: bool) -> Result<(Self, Vec<String>), CliError> {
+        // the command line requires it unless resuming
+        let name = args.agent.as_deref().unwrap_or_default();
+        let factory = registry::factory(name, Isa::best())?;
+        let agent = factory.spec().id.clone();
+        let mut loaded = match (loaded, &args.config) {
+            (Some(loaded), _) => loaded,
+            (None, Some(path)) => config::load(path, &agent)?,
+            (None, None) => config::default_for(&agent),
+        };
+        let ppo = &mut loaded.ppo;
+        ppo.agents = args.agents.unwrap_or(ppo.agents);
+        ppo.total_steps = args.steps.unwrap_or(ppo.total_steps);
+        ppo.seed = args.seed.unwrap_or(ppo.seed);
+        ppo.threads = args.threads.unwrap_or(ppo.threads);
+        ppo.validate()?;
+        loaded.summary_freq = loaded.summary_freq.max(1);
+        loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
+        let run = RunFile::new(&agent, &loaded);
+        let mut folder = None;
+        if !dry {
+            let made = RunFolder::create(args.out.as_deref(), &agent)?;
+            made.write_run(&run)?;
+            folder = Some(made);
+        }
+        Ok((Session { run, folder, factory, checkpoint: None }, loaded.notes))
+    }
+
+    /// The run in a folder, from its last checkpoint.
+    ///
+    /// # Errors
+    /// If it is complete, or not the run that the command line means, or cannot be read.
+    pub fn resume(args: &TrainArgs, path: &Path) -> Result<Self, CliError> {
+        let (folder, mut run) = RunFolder::open(path)?;
+        let factory = registry::factory(&run.agent, Isa::best())?;
+        if let Some(name) = &args.agent {
+            let asked = registry::agent(name)?.facts().id;
+            if asked != run.agent {
+                return Err(CliError::file(path, "agent", &run.agent, asked));
+            }
+        }
+        // a run that ended before its first checkpoint begins again, which gives the same bits
+        let has_checkpoint = folder.checkpoint().join("checkpoint.json").exists();
+        let checkpoint = if has_checkpoint { Some(Checkpoint::load(&folder.checkpoint())?) } else { None };
+        let done = checkpoint.as_ref().map_or(0, Checkpoint::steps);
+
+        if let Some(steps) = args.steps {
+            if steps < done {
+                let done = text::thousands(done);
+                return Err(CliError::Usage(format!(
+                    "--steps is {}, but {done} steps are done",
+                    text::thousands(steps)
+                )));
+            }
+            run.config.total_steps = steps;
+        }
+        if done >= run.config.total_steps && folder.summary().exists() && is_finished(&folder)? {
+            let (done, more) = (text::thousands(done), text::thousands(done * 2));
+            return Err(CliError::Usage(format!(
+                "{}: the run is complete with {done} steps; to let it learn on, give it more, such as --steps {more}",
+                path.display()
+            )));
+        }
+        run.config.threads = args.threads.unwrap_or(run.config.threads);
+        folder.write_run(&run)?;
+        Ok(Session { folder: Some(folder), run, factory, checkpoint })
+    }
+
+    /// Agent-steps done before.
+    pub fn steps(&self) -> u64 {
+        self.checkpoint.as_ref().map_or(0, Checkpoint::steps)
+    }
+
+    /// Trains to the last step, or until `watch` wants to stop, evaluates, and writes everything to the folder.
+    /// `show`: with a bar or lines on stderr.
+    ///
+    /// # Errors
+    /// If files cannot be written; the text says what is left and how to go on.
+    pub fn carry_out(self, show: bool, watch: &mut Watch) -> Result<Outcome, CliError> {
+        let Session { run, folder, factory, checkpoint } = self;
+        let mut history = History::default();
+        let TrainOutput { mut policy, checkpoint, .. } = match &folder {
+            None => {
+                let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
+                train(&*factory, Isa::best(), &run.config, checkpoint, &mut observer)?
+            }
+            Some(folder) => {
+                let terms = &factory.spec().reward_terms;
+                let mut reporter = Reporter::new(folder, &run, terms, checkpoint.as_ref(), (show, watch))?;
+                let result = train(&*factory, Isa::best(), &run.config, checkpoint, &mut reporter);
+                reporter.finish();
+                let error = reporter.error.take();
+                let output = result?;
+                // what was learned is safe before anything else happens
+                let saved = save(folder, &output.policy, &output.checkpoint);
+                let steps = output.checkpoint.steps();
+                if let Some(cause) = error {
+                    return Err(stopped(folder, cause, saved.is_ok(), steps));
+                }
+                saved.map_err(|cause| stopped(folder, cause, false, steps))?;
+                output
+            }
+        };
+        let mut drawn = Ok(());
+        if let Some(folder) = &folder {
+            match History::read(&folder.progress()) {
+                Ok(read) => {
+                    history = read;
+                    drawn = curve::draw(folder, &run, &history);
+                }
+                Err(error) => drawn = Err(error),
+            }
+        }
+
+        let steps = checkpoint.steps();
+        let mut evaluation = None;
+        if steps >= run.config.total_steps {
+            let options = EvalOptions { episodes: EPISODES, threads: run.config.threads, ..Default::default() };
+            let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
+            policy.set_evaluation(eval);
+            evaluation = Some(eval);
+        }
+        let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
+        let summary = Summary::new(path, &policy, &history, evaluation.is_none(), evaluation);
+        if let Some(folder) = &folder {
+            policy.save(&folder.policy())?;
+            write_json(&folder.summary(), &summary)?;
+        }
+        drawn?;
+        Ok(Outcome { policy, steps, evaluation, summary, folder })
+    }
+}
+
+/// Whether the summary has an evaluation, the last thing that a run does.
+fn is_finished(folder: &RunFolder) -> Result<bool, CliError> {
+    let path = folder.summary();
+    let text = std::fs::read_to_string(&path).map_err(CliError::io(&path, "read"))?;
+    Ok(serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.eval.is_some()))
+}
+
+/// The error of a run whose files could no longer be written.
+fn stopped(folder: &RunFolder, cause: CliError, saved: bool, steps: u64) -> CliError {
+    let command = resume_command(folder.path());
+    let advice = if saved {
+        format!("training stopped; its {} steps are saved: mend that and go on by `{command}`", text::thousands(steps))
+    } else {
+        match Checkpoint::load(&folder.checkpoint()) {
+            Ok(old) => format!(
+                "training stopped; the last whole checkpoint has {} of {} steps: mend that and go on by `{command}`",
+                text::thousands(old.steps()),
+                text::thousands(steps)
+            ),
+            Err(_) => format!("training stopped before its first checkpoint: mend that and start again by `{command}`"),
+        }
+    };
+    CliError::Stopped { cause: Box::new(cause), advice }
+}
+
+/// How to go on with a run.
+pub fn resume_command(folder: &Path) -> String {
+    format!("{} train --resume {}", text::program(), text::path_word(folder))
+}

@@ -1,0 +1,121 @@
+//! Policies as functions of NumPy arrays.
+
+use crate::error;
+use marathon_envs::registry;
+use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
+use marathon_physics::lanes::Isa;
+use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+
+/// A trained policy: a function from observations to actions.
+#[pyclass(frozen, module = "marathon_envs")]
+pub struct Policy(pub marathon_learn::Policy);
+
+#[pymethods]
+impl Policy {
+    /// Task that the policy is for, such as `Hopper-v0`.
+    #[getter]
+    fn task(&self) -> &str {
+        &self.0.meta().agent
+    }
+
+    /// Length of an observation.
+    #[getter]
+    fn obs_size(&self) -> usize {
+        self.0.meta().obs
+    }
+
+    /// Length of an action.
+    #[getter]
+    fn act_size(&self) -> usize {
+        self.0.meta().act
+    }
+
+    /// Seconds between two actions.
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.0.meta().control_dt
+    }
+
+    /// All that the file says of the policy: network, training with its configuration, evaluation.
+    #[getter]
+    fn meta<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json(py, self.0.meta())
+    }
+
+    /// The actions for observations, `(obs_size,)` or `(n, obs_size)`; float32, `(act_size,)` or `(n, act_size)`.
+    ///
+    /// Without `rng`, the best actions. With a `numpy.random.Generator` or a seed for one, actions drawn as in training.
+    #[pyo3(signature = (obs, rng = None))]
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        obs: PyArrayLikeDyn<'_, f32, AllowTypeChange>,
+        rng: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let meta = self.0.meta();
+        let mut shape = obs.shape().to_vec();
+        if !(1..=2).contains(&shape.len()) || shape.last() != Some(&meta.obs) {
+            let n = meta.obs;
+            return Err(error::value(format!("observations have the shape {shape:?}, expected [{n}] or [n, {n}]")));
+        }
+        *shape.last_mut().expect("there are one or two") = meta.act;
+        let mut action = vec![0.0_f32; shape.iter().product()];
+        let noise = rng.map(|rng| normal(py, rng, action.len())).transpose()?;
+        let obs: Vec<f32> = obs.as_array().iter().copied().collect();
+        py.detach(|| BlockPolicy::new(&self.0, Isa::best()).act_rows(&obs, noise.as_deref(), &mut action));
+        PyArray1::from_vec(py, action).reshape(shape)
+    }
+
+    /// Writes the policy to a file, `.safetensors`.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        self.0.save(&path).map_err(error::learn)
+    }
+
+    fn __repr__(&self) -> String {
+        let meta = self.0.meta();
+        format!("Policy({:?}, obs_size={}, act_size={}, hidden={:?})", meta.agent, meta.obs, meta.act, meta.hidden)
+    }
+}
+
+/// Reads a policy from a file, or from the folder of a run.
+#[pyfunction]
+pub fn load_policy(path: PathBuf) -> PyResult<Policy> {
+    let path = marathon_cli::session::policy_path(&path).map_err(error::cli)?;
+    Ok(Policy(marathon_learn::Policy::load(&path).map_err(error::learn)?))
+}
+
+/// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,
+/// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`.
+#[pyfunction]
+#[pyo3(signature = (policy, episodes = 100, *, seed = EvalOptions::default().seed, threads = 0))]
+pub fn evaluate<'py>(
+    py: Python<'py>,
+    policy: &Policy,
+    episodes: usize,
+    seed: u64,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let factory = registry::factory(policy.task(), Isa::best()).map_err(error::env)?;
+    let options = EvalOptions { episodes, seed, threads };
+    let result = py.detach(|| play(&*factory, Isa::best(), &policy.0, &options)).map_err(error::learn)?;
+    Ok(json(py, &result)?.cast_into()?)
+}
+
+/// `n` standard normal numbers of a generator, or of a new one with the given seed.
+fn normal<'py>(py: Python<'py>, rng: Bound<'py, PyAny>, n: usize) -> PyResult<Vec<f32>> {
+    let rng = match rng.hasattr("standard_normal")? {
+        true => rng,
+        false => py.import("numpy.random")?.call_method1("default_rng", (rng,))?,
+    };
+    let drawn = rng.call_method1("standard_normal", (n, "float32"))?;
+    Ok(drawn.cast_into::<PyArray1<f32>>()?.to_vec()?)
+}
+
+/// A document as Python's dictionaries and lists.
+pub fn json<'py>(py: Python<'py>, document: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(document).map_err(error::any)?;
+    py.import("json")?.call_method1("loads", (text,))
+}

@@ -1,0 +1,160 @@
+//! The native trainer, called from Python.
+
+use crate::error;
+use crate::policy::{Policy, json};
+use marathon_cli::session::{self, Session, TrainArgs};
+use marathon_learn::Control;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::{Path, PathBuf};
+
+/// Where the configuration comes from.
+#[derive(FromPyObject)]
+pub enum Config {
+    /// A file.
+    #[pyo3(transparent)]
+    Path(PathBuf),
+    /// A dictionary in the schema of the files.
+    #[pyo3(transparent)]
+    Table(Py<PyDict>),
+}
+
+/// What a run has led to.
+#[pyclass(frozen, module = "marathon_envs")]
+pub struct TrainResult {
+    /// The policy.
+    #[pyo3(get)]
+    policy: Py<Policy>,
+    /// Steps of all agents together.
+    #[pyo3(get)]
+    steps: u64,
+    /// Whether the run was stopped before its last step.
+    #[pyo3(get)]
+    interrupted: bool,
+    /// Folder with the results, if they were written to one.
+    #[pyo3(get)]
+    folder: Option<PathBuf>,
+    summary: serde_json::Value,
+}
+
+#[pymethods]
+impl TrainResult {
+    /// How the policy's best actions do over 100 episodes, as `evaluate` tells it; None if the run was interrupted.
+    #[getter]
+    fn evaluation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json(py, &self.summary["eval"])
+    }
+
+    /// The run in numbers, as in `summary.json`.
+    #[getter]
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json(py, &self.summary)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("TrainResult(steps={}, interrupted={})", self.steps, self.interrupted)
+    }
+}
+
+/// Trains a policy with the native trainer, without the GIL, and evaluates it.
+///
+/// `task`: its name. `config`: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; without, the
+/// task's own fast configuration. `seed`, `steps` (of all agents together), `agents` (a multiple of 16) and `threads`
+/// change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv` holds; if it
+/// returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes; without,
+/// nothing is written. `resume`: the folder of a run to go on with, in place of a task and a configuration.
+///
+/// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
+/// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
+#[pyfunction]
+#[pyo3(signature = (
+    task = None, config = None, *, callback = None, seed = None, steps = None, agents = None, threads = None, out = None,
+    resume = None
+))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
+pub fn train(
+    py: Python<'_>,
+    task: Option<String>,
+    config: Option<Config>,
+    callback: Option<Py<PyAny>>,
+    seed: Option<u64>,
+    steps: Option<u64>,
+    agents: Option<usize>,
+    threads: Option<usize>,
+    out: Option<PathBuf>,
+    resume: Option<PathBuf>,
+) -> PyResult<TrainResult> {
+    let (dry, path) = (out.is_none(), resume.clone());
+    let mut args = TrainArgs { agent: task, config: None, agents, steps, seed, threads, out, resume };
+    let session = match (path, config) {
+        (Some(_), Some(_)) => return Err(error::value("config and resume exclude each other: a run keeps its own")),
+        (Some(_), None) if seed.is_some() || agents.is_some() || args.out.is_some() => {
+            return Err(error::value("seed, agents and out belong to a new run, not to one that resume goes on with"));
+        }
+        (Some(path), None) => Session::resume(&args, &path).map_err(error::cli)?,
+        (None, config) => {
+            let name =
+                args.agent.as_deref().ok_or_else(|| error::value("task is missing, expected a task or resume"))?;
+            let loaded = match config {
+                None => None,
+                Some(Config::Path(file)) => {
+                    args.config = Some(file);
+                    None
+                }
+                Some(Config::Table(table)) => {
+                    // YAML reads JSON
+                    let options = PyDict::new(py);
+                    options.set_item("indent", 1)?;
+                    let text: String = py.import("json")?.call_method("dumps", (table,), Some(&options))?.extract()?;
+                    Some(session::configuration(Path::new("config"), text.as_bytes(), name).map_err(error::cli)?)
+                }
+            };
+            let (session, notes) = Session::begin(&args, loaded, dry).map_err(error::cli)?;
+            for note in notes {
+                PyErr::warn(py, &py.get_type::<pyo3::exceptions::PyUserWarning>(), &std::ffi::CString::new(note)?, 1)?;
+            }
+            session
+        }
+    };
+
+    let terms = session.factory.spec().reward_terms.clone();
+    let mut failure: Option<PyErr> = None;
+    let mut last = (session.steps(), 0.0);
+    let result = py.detach(|| {
+        session.carry_out(false, &mut |stats| {
+            let (steps, wall) = std::mem::replace(&mut last, (stats.steps, stats.wall_seconds));
+            let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
+            let ask = |py: Python<'_>| {
+                py.check_signals()?;
+                let Some(callback) = &callback else { return Ok(true) };
+                let metrics = PyDict::new(py);
+                for (name, value) in session::metrics(stats, rate, &terms) {
+                    metrics.set_item(name, value)?;
+                }
+                let answer = callback.bind(py).call1((metrics,))?;
+                // only False stops: a callback that returns nothing goes on
+                Ok(answer.extract::<bool>().unwrap_or(true))
+            };
+            match Python::attach(ask) {
+                Ok(true) => Control::Continue,
+                Ok(false) => Control::Stop,
+                Err(error) => {
+                    failure = Some(error);
+                    Control::Stop
+                }
+            }
+        })
+    });
+    // what was learned has been written by now
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    let outcome = result.map_err(error::cli)?;
+    Ok(TrainResult {
+        policy: Py::new(py, Policy(outcome.policy))?,
+        steps: outcome.steps,
+        interrupted: outcome.evaluation.is_none(),
+        folder: outcome.folder.map(|folder| folder.path().into()),
+        summary: serde_json::to_value(&outcome.summary).map_err(error::any)?,
+    })
+}

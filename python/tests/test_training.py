@@ -1,0 +1,164 @@
+"""The native trainer from Python: the same bits as the command's, stopped by callbacks and Ctrl-C, resumed exactly."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import marathon_envs
+from marathon_envs import MarathonEnv, Policy, evaluate, load_policy, train
+
+ROOT = Path(__file__).parents[2]
+# 64 agents make 4096 steps per iteration
+SMALL = {"agents": 64, "seed": 3, "threads": 2}
+CONFIG = {
+    "behaviors": {
+        "Hopper": {
+            "trainer_type": "ppo",
+            "hyperparameters": {"batch_size": 1024, "buffer_size": 4096, "num_epoch": 2},
+            "network_settings": {"normalize": True, "hidden_units": 16, "num_layers": 1},
+            "max_steps": 8192,
+            "time_horizon": 64,
+            "marathon": {"agents": 64, "activation": "elu"},
+        }
+    }
+}
+
+
+@pytest.fixture
+def obs() -> np.ndarray:
+    env = marathon_envs.VecEnv("hopper", 40)
+    return env.reset(seed=8).copy()
+
+
+def command(folder: Path, *words: str) -> str:
+    """The console script, as pip makes it."""
+    code = "import sys; from marathon_envs._command import main; sys.argv[0] = 'marathon'; main()"
+    done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def test_the_same_seed_gives_the_same_policy_here_and_by_the_command(tmp_path: Path, obs: np.ndarray) -> None:
+    rows = []
+    result = train("hopper", steps=12_288, callback=rows.append, **SMALL)
+    assert not result.interrupted and result.steps == 12_288 and result.folder is None
+    assert [row["iteration"] for row in rows] == [1, 2, 3] and rows[-1]["steps"] == 12_288
+    assert {"return_mean", "kl", "steps_per_second", "reward/velocity"} <= rows[0].keys()
+    assert result.evaluation["episodes"] == 100 == result.policy.meta["evaluation"]["episodes"]
+    assert result.summary["seed"] == 3
+    words = ["train", "hopper", "--steps", "12288", "--agents", "64", "--seed", "3", "--out", "run"]
+    command(tmp_path, *words)
+    assert np.array_equal(load_policy(tmp_path / "run")(obs), result.policy(obs))
+    assert not np.array_equal(train("hopper", steps=12_288, **{**SMALL, "seed": 4}).policy(obs), result.policy(obs))
+
+
+def test_configurations() -> None:
+    result = train("hopper", CONFIG)
+    assert result.policy.meta["hidden"] == [16] and result.policy.meta["activation"] == "elu"
+    assert result.policy.meta["training"]["config"]["epochs"] == 2
+    result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, agents=16)
+    assert result.policy.meta["hidden"] == [32, 32]
+    wrong = {"behaviors": {"Hopper": {**CONFIG["behaviors"]["Hopper"], "time_horizn": 3}}}
+    with pytest.raises(ValueError, match=r"config:\d+: behaviors.Hopper.time_horizn: .*time_horizon"):
+        train("hopper", wrong)
+
+
+def test_what_is_wrong_is_said() -> None:
+    with pytest.raises(ValueError, match="did you mean 'Hopper-v0'"):
+        train("hoper")
+    with pytest.raises(ValueError, match="agents is 17, expected a multiple of 16, such as 16"):
+        train("hopper", agents=17)
+    with pytest.raises(ValueError, match="task is missing"):
+        train()
+    with pytest.raises(ValueError, match="exclude each other"):
+        train("hopper", CONFIG, resume="runs/hopper-1")
+    with pytest.raises(ValueError, match="seed, agents and out belong to a new run"):
+        train(resume="runs/hopper-1", seed=1)
+    with pytest.raises(ValueError, match="no such file"):
+        load_policy("nowhere.safetensors")
+
+
+def test_a_callback_can_stop(tmp_path: Path) -> None:
+    result = train("hopper", callback=lambda row: row["iteration"] < 2, out=tmp_path / "run", **SMALL)
+    assert result.interrupted and result.steps == 8192 and result.evaluation is None
+    assert result.folder == tmp_path / "run" and (tmp_path / "run/policy.safetensors").exists()
+
+    def fail(row: dict[str, float | None]) -> None:
+        raise RuntimeError("the callback's own")
+
+    with pytest.raises(RuntimeError, match="the callback's own"):
+        train("hopper", callback=fail, **SMALL)
+
+
+def test_ctrl_c_ends_training_and_a_resumed_run_is_as_if_nothing_had_happened(tmp_path: Path, obs: np.ndarray) -> None:
+    rows = []
+
+    def interrupt(row: dict[str, float | None]) -> None:
+        rows.append(row)
+        if row["iteration"] == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        train("hopper", steps=16_384, callback=interrupt, out=tmp_path / "run", **SMALL)
+    assert 2 <= len(rows) <= 3
+    result = train(resume=tmp_path / "run")
+    assert not result.interrupted and result.steps == 16_384
+    whole = train("hopper", steps=16_384, **SMALL)
+    assert np.array_equal(result.policy(obs), whole.policy(obs))
+    assert (tmp_path / "run/progress.csv").read_text().count("\n") == 5
+    with pytest.raises(ValueError, match="the run is complete"):
+        train(resume=tmp_path / "run")
+
+
+def test_other_threads_run_while_it_trains() -> None:
+    turns, done = 0, threading.Event()
+    thread = threading.Thread(target=lambda: (train("hopper", steps=65_536, **SMALL), done.set()))
+    thread.start()
+    while not done.wait(1e-4):
+        turns += 1
+    thread.join()
+    assert turns > 20
+
+
+def test_policies_are_functions_of_arrays(tmp_path: Path, obs: np.ndarray) -> None:
+    policy = load_policy(ROOT / "assets/policies/hopper.safetensors")
+    assert isinstance(policy, Policy) and (policy.task, policy.obs_size, policy.act_size) == ("Hopper-v0", 31, 4)
+    actions = policy(obs)
+    assert actions.shape == (40, 4) and actions.dtype == np.float32 and np.abs(actions).max() <= 1
+    # one observation, any batch, any type: the same bits
+    assert np.array_equal(policy(obs[17]), actions[17]) and policy(obs[17]).shape == (4,)
+    assert np.array_equal(policy(np.tile(obs, (30, 1)).astype(np.float64))[-40:], actions)
+    assert policy(obs[:0]).shape == (0, 4)
+    # drawn actions come from the seed, and scatter about the best ones
+    drawn = policy(obs, rng=1)
+    assert np.array_equal(policy(obs, rng=np.random.default_rng(1)), drawn) and not np.array_equal(drawn, actions)
+    assert not np.array_equal(policy(obs, rng=2), drawn)
+    many = np.mean([policy(obs[:1], rng=seed) for seed in range(400)], axis=0)
+    inside = np.abs(actions[0]) < 0.5
+    assert np.abs(many[0] - actions[0])[inside].max(initial=0) < 0.05
+    policy.save(tmp_path / "copy.safetensors")
+    assert np.array_equal(load_policy(tmp_path / "copy.safetensors")(obs), actions)
+    for wrong in (obs[:, :30], obs[None], np.float32(1)):
+        with pytest.raises(ValueError, match=r"expected \[31\] or \[n, 31\]"):
+            policy(wrong)
+
+
+def test_evaluation_agrees_with_playing_by_hand() -> None:
+    policy = load_policy(ROOT / "assets/policies/hopper.safetensors")
+    result = evaluate(policy, 20, seed=5)
+    assert result == evaluate(policy, 20, seed=5, threads=1) and result["episodes"] == 20
+    env, total, ended = MarathonEnv("hopper", max_episode_steps=1000), 0.0, False
+    obs, _ = env.reset(seed=1)
+    while not ended:
+        obs, reward, terminated, truncated, _ = env.step(policy(obs))
+        total, ended = total + reward, terminated or truncated
+    assert result["return_min"] - 20 < total < result["return_max"] + 20
+
+
+def test_the_command_comes_with_the_package(tmp_path: Path) -> None:
+    assert "Hopper-v0" in command(tmp_path, "list") and "marathon 0" in command(tmp_path, "--version")
