@@ -30,7 +30,7 @@ mod variation;
 mod work;
 pub mod workload;
 
-pub use batch::{AgentState, Batch, BatchOptions, Blowup, BodyReading, Replay, Snapshot};
+pub use batch::{AgentState, Batch, BatchOptions, Blowup, BodyReading, Quantity, Replay, Snapshot};
 pub use lanes::{Isa, Real};
 pub use model::Model;
 pub use readings::{Readings, rot_to_quat};

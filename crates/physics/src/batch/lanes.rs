@@ -1,6 +1,7 @@
 //! The agents of a batch in lanes of one width.
 
-use super::{AgentState, BodyReading};
+use super::gather::Felt;
+use super::{AgentState, BodyReading, Quantity};
 use crate::lanes::Real;
 use crate::readings::Readings;
 use crate::sim::Sim;
@@ -18,6 +19,7 @@ pub(super) trait Lanes: Send {
     fn read(&self, agent: usize) -> (Vec<f64>, Vec<f64>);
     fn bodies(&mut self, agent: usize) -> Vec<BodyReading>;
     fn sensors(&mut self, agent: usize) -> Vec<f64>;
+    fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]);
     fn save(&self, agent: usize) -> AgentState;
     fn load(&mut self, agent: usize, state: &AgentState);
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
@@ -31,10 +33,12 @@ pub(super) trait Lanes: Send {
 }
 
 pub(super) struct LaneBatch<T: Real> {
-    sim: Arc<Sim<T>>,
-    groups: Vec<Group<T>>,
+    pub(super) sim: Arc<Sim<T>>,
+    pub(super) groups: Vec<Group<T>>,
     /// One per thread.
-    works: Vec<Work<T>>,
+    pub(super) works: Vec<Work<T>>,
+    /// Contacts of each group in the last step.
+    pub(super) felt: Vec<Felt<T>>,
     /// Earlier states, oldest first.
     past: VecDeque<Vec<Group<T>>>,
 }
@@ -43,7 +47,8 @@ impl<T: Real> LaneBatch<T> {
     pub(super) fn new(sim: Sim<T>, agents: usize, threads: usize) -> Self {
         let groups = vec![Group::new(&sim); agents.div_ceil(T::LANES)];
         let works = vec![Work::new(&sim); threads.min(groups.len())];
-        LaneBatch { sim: Arc::new(sim), groups, works, past: VecDeque::new() }
+        let felt = vec![Felt::new(sim.model()); groups.len()];
+        LaneBatch { sim: Arc::new(sim), groups, works, felt, past: VecDeque::new() }
     }
 
     fn slot(agent: usize) -> (usize, usize) {
@@ -60,21 +65,21 @@ impl<T: Real> Lanes for LaneBatch<T> {
     }
 
     fn step(&mut self, substeps: usize) {
-        let share = self.groups.len().div_ceil(self.works.len());
-        let sim = &self.sim;
-        if self.works.len() == 1 {
-            for group in &mut self.groups {
-                sim.step(&mut self.works[0], group, substeps);
+        let LaneBatch { sim, groups, works, felt, .. } = self;
+        let share = groups.len().div_ceil(works.len());
+        let run = |groups: &mut [Group<T>], felt: &mut [Felt<T>], work: &mut Work<T>| {
+            for (group, felt) in groups.iter_mut().zip(felt) {
+                // readings are brought up to date when they are asked for
+                sim.advance(work, group, substeps);
+                felt.keep(work);
             }
-            return;
+        };
+        if works.len() == 1 {
+            return run(groups, felt, &mut works[0]);
         }
         std::thread::scope(|scope| {
-            for (groups, work) in self.groups.chunks_mut(share).zip(&mut self.works) {
-                scope.spawn(move || {
-                    for group in groups {
-                        sim.step(work, group, substeps);
-                    }
-                });
+            for ((groups, felt), work) in groups.chunks_mut(share).zip(felt.chunks_mut(share)).zip(works) {
+                scope.spawn(move || run(groups, felt, work));
             }
         });
     }
@@ -91,6 +96,7 @@ impl<T: Real> Lanes for LaneBatch<T> {
     fn reset(&mut self, agent: usize, qpos: &[f64], qvel: &[f64]) {
         let (g, lane) = Self::slot(agent);
         self.groups[g].reset_lane(&self.sim, lane, qpos, qvel);
+        self.felt[g].forget(lane);
     }
 
     fn read(&self, agent: usize) -> (Vec<f64>, Vec<f64>) {
@@ -131,6 +137,10 @@ impl<T: Real> Lanes for LaneBatch<T> {
         out
     }
 
+    fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {
+        self.gather_rows(wanted);
+    }
+
     fn save(&self, agent: usize) -> AgentState {
         let (g, lane) = Self::slot(agent);
         self.groups[g].save(&self.sim, lane)
@@ -139,6 +149,7 @@ impl<T: Real> Lanes for LaneBatch<T> {
     fn load(&mut self, agent: usize, state: &AgentState) {
         let (g, lane) = Self::slot(agent);
         self.groups[g].load(&self.sim, lane, state);
+        self.felt[g].forget(lane);
     }
 
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {

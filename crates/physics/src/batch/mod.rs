@@ -1,13 +1,16 @@
 //! Any number of agents, on any number of threads, in the widest lanes the processor has.
 //!
-//! [`Batch`] hides the lane width: states go in and out in MuJoCo's layout, agent by agent. The same agents give the same
+//! [`Batch`] hides the lane width: states go in and out in MuJoCo's layout, agent by agent or, with [`Batch::gather`], in
+//! arrays of all agents. The same agents give the same
 //! bits whatever the width, the number of threads, the number of other agents and the slots they sit in.
 
 mod blowup;
+mod gather;
 mod lanes;
 mod state;
 
 pub use blowup::{Blowup, Replay};
+pub use gather::Quantity;
 pub use state::AgentState;
 
 use crate::lanes::Isa;

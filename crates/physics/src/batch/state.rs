@@ -1,6 +1,7 @@
 //! The complete state of one agent, independent of lanes.
 
 use crate::lanes::Real;
+use crate::model::Model;
 use crate::sim::Sim;
 use crate::variation::Variation;
 use crate::work::Group;
@@ -20,6 +21,23 @@ pub struct AgentState {
     variation: Option<Variation>,
     /// Elevations of its own, m, by height field.
     grounds: Vec<Option<Vec<f32>>>,
+}
+
+impl AgentState {
+    /// Whether it has the sizes of a state of this model. One that has not cannot be put into a [`Batch`](crate::Batch).
+    pub fn fits(&self, model: &Model) -> bool {
+        let Model { nq, nv, nu, na, bodies, .. } = model;
+        let varied = |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu;
+        let grid = |(i, elevations): (usize, &Option<Vec<f32>>)| match (elevations, model.hfields.get(i)) {
+            (Some(elevations), Some(field)) => elevations.len() == field.nrow * field.ncol,
+            (Some(_), None) => false,
+            (None, _) => true,
+        };
+        self.numbers.len() == nq + 2 * nv + nu + na
+            && (self.pushes.is_empty() || self.pushes.len() == 6 * bodies.len())
+            && self.variation.as_ref().is_none_or(varied)
+            && self.grounds.iter().enumerate().all(grid)
+    }
 }
 
 impl PartialEq for AgentState {

@@ -1,0 +1,291 @@
+//! Readings of all agents at once, in arrays with a row per agent: for callers to whom an agent at a time is too slow.
+
+use super::{Batch, lanes::LaneBatch};
+use crate::lanes::{Kernel, Real};
+use crate::model::Model;
+use crate::readings::Readings;
+use crate::sim::Sim;
+use crate::spatial::V3;
+use crate::work::{Group, Work};
+
+/// What [`Batch::gather`] can write. World axes and SI units; indices are those of the [`Model`].
+///
+/// Positions and velocities are those of the present state. Contacts are those of the last [`Batch::step`], with the
+/// static world; an agent that was put into a state since has none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Configuration, `[nq]`.
+    Qpos,
+    /// Velocity, `[nv]`.
+    Qvel,
+    /// Origins of the bodies' frames, m, `[body][3]`.
+    BodyPos,
+    /// Directions of the bodies' x, y and z axes, `[body][axis][3]`.
+    BodyAxes,
+    /// Velocities of the origins of the bodies' frames, m/s, `[body][3]`.
+    BodyVelocity,
+    /// Angular velocities of the bodies, rad/s, `[body][3]`.
+    BodyAngularVelocity,
+    /// Centers of the geoms, m, `[geom][3]`.
+    GeomPos,
+    /// Velocities of the geoms' centers, m/s, `[geom][3]`.
+    GeomVelocity,
+    /// 1 for a geom that touched the static world at the last physics step, else 0, `[geom]`.
+    Touching,
+    /// 1 for a geom that touched the static world at any physics step of the last call, else 0, `[geom]`.
+    Touched,
+    /// Normal force of a geom's contacts at the last physics step, N, `[geom]`.
+    NormalForce,
+    /// Sensors as in [`Batch::sensors`], in the model's order.
+    Sensors,
+}
+
+impl Quantity {
+    /// Numbers per agent.
+    pub fn width(self, model: &Model) -> usize {
+        match self {
+            Quantity::Qpos => model.nq,
+            Quantity::Qvel => model.nv,
+            Quantity::BodyPos | Quantity::BodyVelocity | Quantity::BodyAngularVelocity => 3 * model.bodies.len(),
+            Quantity::BodyAxes => 9 * model.bodies.len(),
+            Quantity::GeomPos | Quantity::GeomVelocity => 3 * model.geoms.len(),
+            Quantity::Touching | Quantity::Touched | Quantity::NormalForce => model.geoms.len(),
+            Quantity::Sensors => model.sensors.iter().map(|s| s.dim).sum(),
+        }
+    }
+
+    /// It needs the frames of the present state.
+    fn is_frame(self) -> bool {
+        use Quantity as Q;
+        matches!(
+            self,
+            Q::BodyPos | Q::BodyAxes | Q::BodyVelocity | Q::BodyAngularVelocity | Q::GeomPos | Q::GeomVelocity
+        )
+    }
+}
+
+impl Batch {
+    /// Writes readings of all agents, `[agents][width]` each, row-major; on the batch's threads.
+    ///
+    /// # Panics
+    /// If an array does not have `agents * width` entries.
+    pub fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {
+        for (quantity, rows) in wanted.iter() {
+            assert_eq!(rows.len(), self.agents * quantity.width(&self.model), "a row of {quantity:?} per agent");
+        }
+        self.inner.gather(wanted);
+    }
+}
+
+/// Contacts of a group in the last call of [`Batch::step`], by geom.
+#[derive(Clone, Debug)]
+pub(super) struct Felt<T: Real> {
+    touching: Vec<T::Mask>,
+    touched: Vec<T::Mask>,
+    normal_force: Vec<T>,
+}
+
+impl<T: Real> Felt<T> {
+    pub(super) fn new(model: &Model) -> Self {
+        let n = model.geoms.len();
+        Felt { touching: vec![T::none(); n], touched: vec![T::none(); n], normal_force: vec![T::zero(); n] }
+    }
+
+    /// Those of the group that was stepped last with `work`.
+    pub(super) fn keep(&mut self, work: &Work<T>) {
+        self.touching.copy_from_slice(&work.touching);
+        self.touched.copy_from_slice(&work.touched);
+        self.normal_force.copy_from_slice(&work.normal_force);
+    }
+
+    /// An agent has left where it was.
+    pub(super) fn forget(&mut self, lane: usize) {
+        let others = T::from_bits(!(1 << lane) & ((1 << T::LANES) - 1));
+        for mask in self.touching.iter_mut().chain(&mut self.touched) {
+            *mask = T::and(*mask, others);
+        }
+        for force in &mut self.normal_force {
+            force.set(lane, T::scalar(0.0));
+        }
+    }
+}
+
+/// Rows of consecutive agents, the first of which begins a group.
+struct Part<'a> {
+    quantity: Quantity,
+    width: usize,
+    rows: &'a mut [f64],
+}
+
+impl<T: Real> LaneBatch<T> {
+    pub(super) fn gather_rows(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {
+        let LaneBatch { sim, groups, works, felt, .. } = self;
+        let share = groups.len().div_ceil(works.len());
+        let mut rest: Vec<Part<'_>> = wanted
+            .iter_mut()
+            .map(|(quantity, rows)| Part { quantity: *quantity, width: quantity.width(sim.model()), rows })
+            .filter(|part| part.width > 0)
+            .collect();
+        let read = |groups: &[Group<T>], felt: &[Felt<T>], work: &mut Work<T>, mut parts: Vec<Part<'_>>| {
+            for (i, (group, felt)) in groups.iter().zip(felt).enumerate() {
+                read_group(sim, group, felt, work, i, &mut parts);
+            }
+        };
+        if works.len() == 1 {
+            return read(groups, felt, &mut works[0], rest);
+        }
+        std::thread::scope(|scope| {
+            for ((groups, felt), work) in groups.chunks(share).zip(felt.chunks(share)).zip(works) {
+                // every thread gets the rows of its own agents
+                let mut own = Vec::new();
+                for part in &mut rest {
+                    let rows = std::mem::take(&mut part.rows);
+                    let (mine, others) = rows.split_at_mut(rows.len().min(share * T::LANES * part.width));
+                    part.rows = others;
+                    own.push(Part { rows: mine, ..*part });
+                }
+                let read = &read;
+                scope.spawn(move || read(groups, felt, work, own));
+            }
+        });
+    }
+}
+
+/// Writes the rows of the `i`-th group of `parts`.
+fn read_group<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    felt: &Felt<T>,
+    work: &mut Work<T>,
+    i: usize,
+    parts: &mut [Part<'_>],
+) {
+    if parts.iter().any(|part| part.quantity == Quantity::Sensors) {
+        sim.forward(work, group);
+    } else if parts.iter().any(|part| part.quantity.is_frame()) {
+        sim.refresh(work, group);
+    }
+    let readings = Readings::new(sim, group, work);
+    for part in parts {
+        let own = part.rows.chunks_mut(T::LANES * part.width).nth(i);
+        let rows = Rows { rows: own.unwrap_or_default(), width: part.width };
+        match part.quantity {
+            Quantity::Sensors => read_sensors(&readings, rows),
+            quantity => T::enter(Read { readings, felt, quantity, rows }),
+        }
+    }
+}
+
+fn read_sensors<T: Real>(readings: &Readings<'_, T>, mut rows: Rows<'_>) {
+    let mut column = 0;
+    for (i, sensor) in readings.sim.model().sensors.iter().enumerate() {
+        let values = readings.sensor(i).unwrap_or_else(|| vec![T::lit(f64::NAN); sensor.dim]);
+        for x in values {
+            rows.put(column, x);
+            column += 1;
+        }
+    }
+}
+
+/// Rows of the agents of one group, of which the last may be missing.
+struct Rows<'a> {
+    rows: &'a mut [f64],
+    width: usize,
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn put<T: Real>(&mut self, column: usize, value: T) {
+        let mut lanes = [T::Scalar::default(); 16];
+        value.store(&mut lanes[..T::LANES]);
+        for (row, x) in self.rows.chunks_exact_mut(self.width).zip(lanes) {
+            row[column] = T::widen(x);
+        }
+    }
+
+    #[inline(always)]
+    fn put3<T: Real>(&mut self, column: usize, v: V3<T>) {
+        self.put(column, v[0]);
+        self.put(column + 1, v[1]);
+        self.put(column + 2, v[2]);
+    }
+}
+
+struct Read<'a, T: Real> {
+    readings: Readings<'a, T>,
+    felt: &'a Felt<T>,
+    quantity: Quantity,
+    rows: Rows<'a>,
+}
+
+impl<T: Real> Kernel<T> for Read<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Read { readings: r, felt, quantity, mut rows } = self;
+        let (bodies, geoms) = (r.sim.model().bodies.len(), r.sim.model().geoms.len());
+        let one = T::lit(1.0);
+        match quantity {
+            Quantity::Qpos => {
+                for i in 0..r.group.qpos.len() {
+                    rows.put(i, r.group.qpos[i]);
+                }
+            }
+            Quantity::Qvel => {
+                for i in 0..r.group.qvel.len() {
+                    rows.put(i, r.group.qvel[i]);
+                }
+            }
+            Quantity::BodyPos => {
+                for b in 0..bodies {
+                    rows.put3(3 * b, r.body_pos(b));
+                }
+            }
+            Quantity::BodyAxes => {
+                for b in 0..bodies {
+                    let [x, y, z] = r.body_axes(b);
+                    rows.put3(9 * b, x);
+                    rows.put3(9 * b + 3, y);
+                    rows.put3(9 * b + 6, z);
+                }
+            }
+            Quantity::BodyVelocity => {
+                for b in 0..bodies {
+                    rows.put3(3 * b, r.body_velocity(b));
+                }
+            }
+            Quantity::BodyAngularVelocity => {
+                for b in 0..bodies {
+                    rows.put3(3 * b, r.body_angular_velocity(b));
+                }
+            }
+            Quantity::GeomPos => {
+                for g in 0..geoms {
+                    rows.put3(3 * g, r.geom_pos(g));
+                }
+            }
+            Quantity::GeomVelocity => {
+                for g in 0..geoms {
+                    rows.put3(3 * g, r.geom_velocity(g));
+                }
+            }
+            Quantity::Touching => {
+                for g in 0..geoms {
+                    rows.put(g, T::masked(felt.touching[g], one));
+                }
+            }
+            Quantity::Touched => {
+                for g in 0..geoms {
+                    rows.put(g, T::masked(felt.touched[g], one));
+                }
+            }
+            Quantity::NormalForce => {
+                for g in 0..geoms {
+                    rows.put(g, felt.normal_force[g]);
+                }
+            }
+            // evaluated outside of this kernel: every sensor has one of its own
+            Quantity::Sensors => {}
+        }
+    }
+}
