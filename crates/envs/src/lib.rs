@@ -4,6 +4,7 @@
 //! * [`VecEnv`] is for everybody else: any number of agents, plain row-major arrays, threads, automatic resets.
 //! * [`Agent`] is what one implements to add a creature; [`register`] makes it known by name. [`Options`] are named
 //!   arguments that an agent may take.
+//! * [`Lockstep`] gives a learner the blocks of a [`Crowd`]: a task from elsewhere, whose agents are stepped all at once.
 //!
 //! The same seed gives the same bits on every machine, for every number of threads, agents and lanes.
 //!
@@ -25,6 +26,7 @@ mod anatomy;
 pub mod error;
 mod lane_env;
 mod lane_group;
+pub mod lockstep;
 pub mod memory;
 pub mod options;
 mod random;
@@ -38,6 +40,7 @@ mod write;
 pub use agent::{Agent, AnyAgent, Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use error::EnvError;
 pub use lane_env::{AgentShard, AgentShards, AgentState, TERMINATION_TERM};
+pub use lockstep::{Crowd, CrowdError, Lockstep};
 pub use options::{OptionInfo, Options, Value};
 pub use random::EpisodeRng;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};

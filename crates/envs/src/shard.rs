@@ -102,8 +102,14 @@ pub trait Shard: Send {
     /// Starts new episodes for the agents in `mask` and writes their first observations into `obs`
     /// (`[obs][16]`; lanes outside the mask are left alone).
     fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]);
-    /// Advances every agent of a block by one decision. `action` is `[act][16]`, see [`Spec::action_low`]. Writes the observation of the state
-    /// reached into `obs` (`[obs][16]`), for ended episodes too: the caller then calls `reset` for those.
+    /// Tells the actions of all blocks of a decision, `[block][act][16]`, before the [`Shard::step`] of each: for tasks whose
+    /// agents are stepped all at once, such as [`Lockstep`](crate::Lockstep)'s. Others need not know.
+    fn announce(&mut self, actions: &[f32]) {
+        let _ = actions;
+    }
+    /// Advances every agent of a block by one decision. `action` is `[act][16]`, see [`Spec::action_low`]. Writes the
+    /// observation of the state reached into `obs` (`[obs][16]`), for ended episodes too: the caller then calls `reset` for
+    /// those.
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep);
     /// Appends everything that a block's future depends on to `bytes`.
     fn save(&self, block: usize, bytes: &mut Vec<u8>);

@@ -6,6 +6,7 @@
 use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::ops::Range;
 
 use crate::error::EnvError;
 use crate::lane_env::{AgentShard, AgentState};
@@ -83,6 +84,35 @@ pub struct Step {
 }
 
 impl Step {
+    /// Zeros for a number of agents.
+    pub(crate) fn new(n: usize, spec: &Spec) -> Self {
+        Step {
+            obs: vec![0.0; n * spec.obs],
+            final_obs: vec![0.0; n * spec.obs],
+            reward: vec![0.0; n],
+            terms: vec![0.0; n * spec.reward_terms.len()],
+            info: vec![0.0; n * spec.info.len()],
+            forward: vec![0.0; n],
+            terminated: vec![false; n],
+            truncated: vec![false; n],
+            diverged: vec![false; n],
+        }
+    }
+
+    /// Copies consecutive agents' rows out of those of more agents.
+    pub(crate) fn copy_rows(&mut self, from: &Step, spec: &Spec, agents: Range<usize>) {
+        let rows = |columns: usize| agents.start * columns..agents.end * columns;
+        self.obs.copy_from_slice(&from.obs[rows(spec.obs)]);
+        self.final_obs.copy_from_slice(&from.final_obs[rows(spec.obs)]);
+        self.reward.copy_from_slice(&from.reward[rows(1)]);
+        self.terms.copy_from_slice(&from.terms[rows(spec.reward_terms.len())]);
+        self.info.copy_from_slice(&from.info[rows(spec.info.len())]);
+        self.forward.copy_from_slice(&from.forward[rows(1)]);
+        self.terminated.copy_from_slice(&from.terminated[rows(1)]);
+        self.truncated.copy_from_slice(&from.truncated[rows(1)]);
+        self.diverged.copy_from_slice(&from.diverged[rows(1)]);
+    }
+
     /// Borrows all arrays.
     pub fn as_mut(&mut self) -> StepMut<'_> {
         StepMut {
@@ -264,18 +294,7 @@ impl VecEnv {
 
     /// Arrays of the right shapes for [`VecEnv::step`].
     pub fn buffers(&self) -> Step {
-        let n = self.agents;
-        Step {
-            obs: vec![0.0; n * self.spec.obs],
-            final_obs: vec![0.0; n * self.spec.obs],
-            reward: vec![0.0; n],
-            terms: vec![0.0; n * self.spec.reward_terms.len()],
-            info: vec![0.0; n * self.spec.info.len()],
-            forward: vec![0.0; n],
-            terminated: vec![false; n],
-            truncated: vec![false; n],
-            diverged: vec![false; n],
-        }
+        Step::new(self.agents, &self.spec)
     }
 
     /// Starts a new episode for every agent and writes the first observations, `[agents][obs]`. A seed starts all random

@@ -147,7 +147,7 @@ pub struct Actor {
     tape: Tape<f32>,
     critic_tape: Tape<f32>,
     eps: Vec<[f32; BLOCK]>,
-    /// The actions of a block in the environment's units, `[act][16]`.
+    /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
     out: BlockStep,
 }
@@ -178,7 +178,7 @@ impl Actor {
             tape: actor.inference_tape(),
             critic_tape: critic.inference_tape(),
             eps: vec![[0.0; BLOCK]; factory.spec().act],
-            action: vec![0.0; factory.spec().act * BLOCK],
+            action: vec![0.0; blocks * factory.spec().act * BLOCK],
             out: BlockStep::default(),
         }
     }
@@ -232,6 +232,8 @@ impl Actor {
                 self.act(acting, rollout, t * blocks, first, CHUNK.min(blocks - first));
             }
             let start = clock::wall();
+            let row = blocks * rollout.act_len * BLOCK;
+            self.announce(&rollout.action[t * row..(t + 1) * row]);
             for b in 0..blocks {
                 self.step(acting, rollout, t * blocks + b, b);
             }
@@ -269,16 +271,21 @@ impl Actor {
         }));
     }
 
+    /// Tells the environments the actions of all blocks, in their own units.
+    fn announce(&mut self, drawn: &[f32]) {
+        let spec = self.shard.spec();
+        for (i, (action, drawn)) in self.action.iter_mut().zip(drawn).enumerate() {
+            *action = spec.action_of(i / BLOCK % spec.act, *drawn);
+        }
+        self.shard.announce(&self.action);
+    }
+
     /// One decision of one block, with all bookkeeping.
     fn step(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, b: usize) {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
         let out = &mut self.out;
         let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
-        let spec = self.shard.spec();
-        for (i, (action, drawn)) in self.action.iter_mut().zip(&rollout.action[item * act_row..]).enumerate() {
-            *action = spec.action_of(i / BLOCK, *drawn);
-        }
-        self.shard.step(b, &self.action, obs, out);
+        self.shard.step(b, &self.action[b * act_row..(b + 1) * act_row], obs, out);
 
         // running sums of the agents
         let sums = &mut rollout.sums[b];

@@ -1,0 +1,272 @@
+//! Tasks whose agents can only be stepped all at once, behind the blocks that a learner works with: environments of
+//! another language, to which one call for all agents costs what a call for one does.
+//!
+//! A learner's threads own blocks, and go through a rollout without waiting for each other. Here they meet at every
+//! decision: each [announces](Shard::announce) its actions, the last one to do so steps the whole [`Crowd`], and all go
+//! on with their own rows of the result.
+
+use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use crate::vec_env::{Step, StepMut, VecEnv};
+use std::any::Any;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Why a [`Crowd`] could not go on.
+pub type CrowdError = Box<dyn std::error::Error + Send + Sync>;
+
+/// All agents of a task, stepped together; an episode that ends is followed by the next within the same step.
+pub trait Crowd: Send {
+    /// Starts the first episodes under a seed and writes the observations, `[agents][obs]`.
+    ///
+    /// # Errors
+    /// If the task fails.
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError>;
+    /// Makes one decision of every agent. `actions` is `[agents][act]`.
+    ///
+    /// # Errors
+    /// If the task fails.
+    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError>;
+    /// Everything that the future depends on.
+    ///
+    /// # Errors
+    /// If the task fails.
+    fn save(&self) -> Result<Vec<u8>, CrowdError>;
+    /// Restores what [`Crowd::save`] returned.
+    ///
+    /// # Errors
+    /// If it is something else.
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError>;
+}
+
+/// A [`VecEnv`] with [`Autoreset::SameStep`](crate::Autoreset::SameStep).
+impl Crowd for VecEnv {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
+        Ok(VecEnv::reset(self, Some(seed), obs)?)
+    }
+
+    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+        Ok(VecEnv::step(self, actions, out)?)
+    }
+
+    fn save(&self) -> Result<Vec<u8>, CrowdError> {
+        Ok(VecEnv::save(self))
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
+        Ok(VecEnv::load(self, bytes)?)
+    }
+}
+
+/// What a thread unwinds with, without a message, when the crowd has failed: see [`Lockstep::take_error`].
+#[derive(Debug)]
+pub struct CrowdFailed;
+
+/// Makes shards of one [`Crowd`]. Together they must have all of its blocks, and announce all of their decisions.
+pub struct Lockstep {
+    spec: Spec,
+    agents: usize,
+    meeting: Arc<Meeting>,
+}
+
+/// Where the shards meet.
+struct Meeting {
+    hall: Mutex<Hall>,
+    decided: Condvar,
+}
+
+struct Hall {
+    crowd: Box<dyn Crowd>,
+    /// The crowd's first episodes have begun, under this seed.
+    begun: Option<u64>,
+    /// `[agents][act]`.
+    actions: Vec<f32>,
+    out: Step,
+    /// Agents whose actions are known.
+    present: usize,
+    /// Decisions made.
+    round: u64,
+    error: Option<CrowdError>,
+    failed: bool,
+}
+
+impl Lockstep {
+    /// Of a crowd of `agents` agents, a multiple of [`BLOCK`].
+    ///
+    /// # Panics
+    /// If it is not.
+    pub fn new(crowd: Box<dyn Crowd>, spec: Spec, agents: usize) -> Self {
+        assert!(agents > 0 && agents.is_multiple_of(BLOCK), "{agents} agents are not whole blocks of {BLOCK}");
+        let out = Step::new(agents, &spec);
+        let actions = vec![0.0; agents * spec.act];
+        let hall = Hall { crowd, begun: None, actions, out, present: 0, round: 0, error: None, failed: false };
+        Lockstep { spec, agents, meeting: Arc::new(Meeting { hall: Mutex::new(hall), decided: Condvar::new() }) }
+    }
+
+    /// Why the crowd failed. When it fails, all threads that use its shards unwind with [`CrowdFailed`]; whoever started
+    /// them catches that.
+    pub fn take_error(&self) -> Option<CrowdError> {
+        self.meeting.enter().error.take()
+    }
+}
+
+impl ShardFactory for Lockstep {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
+        let agents = first * BLOCK..(first + blocks) * BLOCK;
+        assert!(agents.end <= self.agents, "block {} of {}", first + blocks, self.agents / BLOCK);
+        Box::new(LockstepShard {
+            spec: self.spec.clone(),
+            own: Step::new(agents.len(), &self.spec),
+            meeting: self.meeting.clone(),
+            agents,
+            seed,
+            announced: 0,
+        })
+    }
+}
+
+impl Meeting {
+    fn enter(&self) -> MutexGuard<'_, Hall> {
+        // a crowd that panicked has left nothing half done that anybody will see
+        self.hall.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Lets the crowd do something; if it fails, all who wait and whoever comes unwind.
+    fn attempt<R>(&self, hall: &mut Hall, f: impl FnOnce(&mut Hall) -> Result<R, CrowdError>) -> R {
+        let mut reason: Box<dyn Any + Send> = Box::new(CrowdFailed);
+        if !hall.failed {
+            match catch_unwind(AssertUnwindSafe(|| f(hall))) {
+                Ok(Ok(result)) => return result,
+                Ok(Err(error)) => hall.error = Some(error),
+                Err(panic) => reason = panic,
+            }
+            hall.failed = true;
+            self.decided.notify_all();
+        }
+        resume_unwind(reason)
+    }
+}
+
+/// A run of blocks of a [`Crowd`].
+struct LockstepShard {
+    spec: Spec,
+    meeting: Arc<Meeting>,
+    agents: Range<usize>,
+    seed: u64,
+    /// The last decision's results of the shard's own agents.
+    own: Step,
+    /// Blocks whose step of the announced decision is still to be asked for.
+    announced: usize,
+}
+
+impl LockstepShard {
+    /// Copies the agents in `mask` of `[agents][columns]` into a block's `[column][16]`.
+    fn show(&self, rows: &[f32], block: usize, mask: u16, out: &mut [f32]) {
+        let columns = rows.len() / self.agents.len();
+        for (i, row) in rows[block * BLOCK * columns..].chunks_exact(columns.max(1)).take(BLOCK).enumerate() {
+            if mask >> i & 1 == 1 {
+                for (column, x) in row.iter().enumerate() {
+                    out[column * BLOCK + i] = *x;
+                }
+            }
+        }
+    }
+}
+
+impl Shard for LockstepShard {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn blocks(&self) -> usize {
+        self.agents.len() / BLOCK
+    }
+
+    /// At the start, begins the episodes of all agents of the crowd at once; later, shows the first observations of the
+    /// episodes that the last decision began by itself.
+    fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
+        let meeting = self.meeting.clone();
+        let mut hall = meeting.enter();
+        if hall.begun.is_none() {
+            let seed = self.seed;
+            meeting.attempt(&mut hall, |hall| hall.crowd.reset(seed, &mut hall.out.obs));
+            hall.begun = Some(seed);
+        }
+        let n = self.spec.obs;
+        self.show(&hall.out.obs[self.agents.start * n..self.agents.end * n], block, mask, obs);
+    }
+
+    fn announce(&mut self, actions: &[f32]) {
+        let act = self.spec.act;
+        let meeting = self.meeting.clone();
+        let mut hall = meeting.enter();
+        let rows = &mut hall.actions[self.agents.start * act..self.agents.end * act];
+        for (rows, block) in rows.chunks_exact_mut(BLOCK * act).zip(actions.chunks_exact(act * BLOCK)) {
+            for (i, row) in rows.chunks_exact_mut(act).enumerate() {
+                for (a, x) in row.iter_mut().enumerate() {
+                    *x = block[a * BLOCK + i];
+                }
+            }
+        }
+        hall.present += self.agents.len();
+        if hall.present * act == hall.actions.len() {
+            meeting.attempt(&mut hall, |hall| {
+                let Hall { crowd, actions, out, .. } = hall;
+                crowd.step(actions, &mut out.as_mut())
+            });
+            hall.present = 0;
+            hall.round += 1;
+            meeting.decided.notify_all();
+        } else {
+            let round = hall.round;
+            while hall.round == round && !hall.failed {
+                hall = meeting.decided.wait(hall).unwrap_or_else(PoisonError::into_inner);
+            }
+            if hall.round == round {
+                resume_unwind(Box::new(CrowdFailed));
+            }
+        }
+        self.own.copy_rows(&hall.out, &self.spec, self.agents.clone());
+        self.announced = self.blocks();
+    }
+
+    /// # Panics
+    /// If the decision was not announced.
+    fn step(&mut self, block: usize, _: &[f32], obs: &mut [f32], out: &mut BlockStep) {
+        assert!(self.announced > 0, "the actions of all blocks are announced before the step of each");
+        self.announced -= 1;
+        let own = &self.own;
+        self.show(&own.final_obs, block, !0, obs);
+        out.terms.resize(BLOCK * self.spec.reward_terms.len(), 0.0);
+        self.show(&own.terms, block, !0, &mut out.terms);
+        out.info.resize(BLOCK * self.spec.info.len(), 0.0);
+        self.show(&own.info, block, !0, &mut out.info);
+        let agents = block * BLOCK..(block + 1) * BLOCK;
+        out.reward.copy_from_slice(&own.reward[agents.clone()]);
+        out.forward.copy_from_slice(&own.forward[agents.clone()]);
+        let bits = |flags: &[bool]| flags[agents.clone()].iter().rev().fold(0, |bits, on| bits << 1 | u16::from(*on));
+        out.terminated = bits(&own.terminated);
+        out.truncated = bits(&own.truncated) & !out.terminated;
+        out.diverged = bits(&own.diverged);
+    }
+
+    /// The whole crowd belongs to its first block.
+    fn save(&self, block: usize, bytes: &mut Vec<u8>) {
+        if self.agents.start + block == 0 {
+            let mut hall = self.meeting.enter();
+            bytes.extend(self.meeting.attempt(&mut hall, |hall| hall.crowd.save()));
+        }
+    }
+
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        if self.agents.start + block > 0 {
+            return Some(bytes);
+        }
+        self.meeting.enter().crowd.load(bytes).ok()?;
+        Some(&[])
+    }
+}

@@ -1,0 +1,107 @@
+//! Contract: agents that are stepped all at once ([`Lockstep`]) are learned from as if they came in blocks: the same bits,
+//! for any number of threads and over an interruption. A crowd that fails ends the run, and says why.
+
+mod common;
+
+use common::{silent, small_config};
+use marathon_envs::{
+    AgentShards, Crowd, CrowdError, Lockstep, Shard, ShardFactory, Spec, StepMut, VecEnv, VecEnvOptions, lockstep,
+    registry,
+};
+use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, TrainOutput, train};
+use marathon_physics::lanes::Isa;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+const TASK: &str = "Hopper-v0";
+
+fn config(threads: usize) -> PpoConfig {
+    PpoConfig { threads, total_steps: 3 * small_config().rollout_steps(), ..small_config() }
+}
+
+fn crowd() -> VecEnv {
+    // an end in each rollout, and a seed that must not matter
+    let agents = small_config().agents;
+    let options = VecEnvOptions { agents, seed: 99, max_episode_steps: Some(20), ..Default::default() };
+    VecEnv::new(TASK, &options).unwrap()
+}
+
+fn lockstep(crowd: impl Crowd + 'static) -> Lockstep {
+    Lockstep::new(Box::new(crowd), self::crowd().spec().clone(), small_config().agents)
+}
+
+/// The task's own blocks, with the crowd's limit.
+struct Blocks(Arc<dyn AgentShards>);
+
+impl ShardFactory for Blocks {
+    fn spec(&self) -> &Spec {
+        self.0.spec()
+    }
+    fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
+        let mut shard = self.0.agent_shard(first, blocks, seed);
+        shard.limit_episodes(20);
+        shard
+    }
+}
+
+fn bits(output: &TrainOutput) -> Vec<u32> {
+    let policy = &output.policy;
+    policy.params().iter().chain(policy.normalizer().mean()).map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn the_same_bits_for_any_number_of_threads() {
+    let blocks = Blocks(registry::global().shards(TASK, Isa::best()).unwrap());
+    let want = train(&blocks, Isa::best(), &config(2), None, &mut silent).unwrap();
+    for threads in [1, 2, 3] {
+        let got = train(&lockstep(crowd()), Isa::best(), &config(threads), None, &mut silent).unwrap();
+        assert_eq!(bits(&want), bits(&got), "{threads} threads");
+        let (a, b) = (want.last.as_ref().unwrap(), got.last.as_ref().unwrap());
+        assert_eq!((a.episodes, a.return_mean, a.speed_mean), (b.episodes, b.return_mean, b.speed_mean));
+        assert_eq!((&a.reward_terms, a.fall_fraction), (&b.reward_terms, b.fall_fraction));
+    }
+}
+
+#[test]
+fn the_same_bits_over_an_interruption() {
+    let want = train(&lockstep(crowd()), Isa::best(), &config(2), None, &mut silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut stop = |_: &IterationStats, snapshot: &Snapshot<'_>| {
+        snapshot.checkpoint().save(folder.path()).unwrap();
+        Control::Stop
+    };
+    train(&lockstep(crowd()), Isa::best(), &config(1), None, &mut stop).unwrap();
+    let checkpoint = Checkpoint::load(folder.path()).unwrap();
+    let got = train(&lockstep(crowd()), Isa::best(), &config(2), Some(checkpoint), &mut silent).unwrap();
+    assert_eq!(bits(&want), bits(&got));
+}
+
+/// Fails at a decision.
+struct Fragile(VecEnv, usize);
+
+impl Crowd for Fragile {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
+        Crowd::reset(&mut self.0, seed, obs)
+    }
+    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+        self.1 = self.1.checked_sub(1).ok_or("it has had enough")?;
+        Crowd::step(&mut self.0, actions, out)
+    }
+    fn save(&self) -> Result<Vec<u8>, CrowdError> {
+        Crowd::save(&self.0)
+    }
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
+        Crowd::load(&mut self.0, bytes)
+    }
+}
+
+#[test]
+fn a_crowd_that_fails_ends_the_run() {
+    for threads in [1, 3] {
+        let factory = lockstep(Fragile(crowd(), 7));
+        let run = || train(&factory, Isa::best(), &config(threads), None, &mut silent).map(|_| ());
+        let panic = catch_unwind(AssertUnwindSafe(run)).expect_err("it fails");
+        assert!(panic.is::<lockstep::CrowdFailed>(), "{threads} threads");
+        assert_eq!(factory.take_error().expect("a reason").to_string(), "it has had enough");
+    }
+}
