@@ -189,14 +189,15 @@ fn what_mujoco_refuses_is_passed_on() {
 
 #[test]
 fn gait_trains_until_the_bar_is_met() {
-    let args =
-        ["gait", "--agent", "hopper", "--seeds", "1", "--every", "100000", "--speed=-9", "--falls", "100", "--json"];
-    let out = bench(&args);
+    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/configs/hopper-fast.yaml");
+    let bar = ["--every", "100000", "--speed=-9", "--falls", "100"];
+    let seed = ["--seeds", "1", "--first-seed", "7", "--config", config, "--json"];
+    let out = bench(&[&["gait", "--agent", "hopper"][..], &bar, &seed].concat());
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
     assert_eq!((&document["bench"], &document["threads"]), (&"gait".into(), &1.into()));
     let runs = document["runs"].as_array().unwrap();
-    assert_eq!((runs.len(), &runs[0]["agent"], &runs[0]["seed"]), (1, &"Hopper-v0".into(), &1.into()));
+    assert_eq!((runs.len(), &runs[0]["agent"], &runs[0]["seed"]), (1, &"Hopper-v0".into(), &7.into()));
     assert_eq!((&runs[0]["reached"], &runs[0]["diverged"]), (&true.into(), &0.into()), "{runs:?}");
     assert!((100_000..200_000).contains(&runs[0]["steps"].as_u64().unwrap()), "{runs:?}");
 }
@@ -220,6 +221,7 @@ fn mistakes_are_named() {
         (&["physics", "--agent", "hoper"][..], 1, "did you mean 'Hopper-v0'?"),
         (&["env", "--model", "x.xml"], 2, "unexpected argument '--model'"),
         (&["physics", "--model", "no-such.xml"], 1, "no-such.xml"),
+        (&["gait", "--config", "no-such.yaml"], 1, "no-such.yaml"),
         (&["train", "--isa", "f64"], 2, "single precision"),
         (&["physics", "--isa", "mmx"], 2, "unknown instruction set 'mmx'"),
         (&["physics", "--seconds", "0"], 2, "expected a positive number of seconds"),

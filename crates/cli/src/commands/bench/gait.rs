@@ -1,4 +1,4 @@
-//! Processor seconds until a gait: training with the agent's own configuration, interrupted every so many steps by an
+//! Processor seconds until a gait: training with a configuration, interrupted every so many steps by an
 //! evaluation that is off the clock, until all the episodes of one meet the demand.
 
 use super::options::{Common, Head, for_networks};
@@ -10,6 +10,7 @@ use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
 use marathon_physics::lanes::Isa;
 use serde::Serialize;
+use std::path::PathBuf;
 
 /// Episodes of an evaluation.
 const EPISODES: usize = 100;
@@ -22,9 +23,15 @@ pub struct GaitArgs {
     /// Instruction set: f32, baseline, avx2 or avx512 [default: the best that the processor has].
     #[arg(long, value_name = "ISA", value_parser = for_networks)]
     pub isa: Option<Isa>,
-    /// Seeds: 1 to N.
+    /// Configuration of all the agents; without it, each has its own fast one.
+    #[arg(long, value_name = "F.yaml")]
+    pub config: Option<PathBuf>,
+    /// Number of seeds.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
+    /// The first seed; the others follow it.
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::MAX - 1000))]
+    pub first_seed: u64,
     /// Mean speed that is asked for, m/s.
     #[arg(long, value_name = "M/S", default_value_t = 2.0)]
     pub speed: f64,
@@ -80,7 +87,7 @@ pub fn run(args: &GaitArgs, json: bool) -> Result<(), CliError> {
         ));
     }
     for id in &agents {
-        for seed in 1..=args.seeds {
+        for seed in args.first_seed..args.first_seed + args.seeds {
             let run = one(args, threads, id, seed)?;
             if !json {
                 print(&run);
@@ -114,7 +121,11 @@ pub fn run(args: &GaitArgs, json: bool) -> Result<(), CliError> {
 fn one(args: &GaitArgs, threads: usize, id: &str, seed: u64) -> Result<Run, CliError> {
     let isa = args.isa.unwrap_or_else(Isa::best);
     let factory = registry::factory(id, isa)?;
-    let config = PpoConfig { seed, threads, ..config::default_for(id).ppo };
+    let loaded = match &args.config {
+        Some(path) => config::load(path, id)?,
+        None => config::default_for(id),
+    };
+    let config = PpoConfig { seed, threads, ..loaded.ppo };
     let options = EvalOptions { episodes: EPISODES, ..Default::default() };
     let mut next = args.every;
     let mut failed = None;
