@@ -125,4 +125,11 @@ fn help_is_worth_reading() {
     let agents = json(&succeed(temp.path(), &["list", "--json"]))["agents"].clone();
     assert_eq!(agents[0]["id"], "Hopper-v0");
     assert_eq!(agents[0]["observation"], 31);
+    let humanoid = agents.as_array().unwrap().iter().find(|agent| agent["id"] == "Humanoid-v5").unwrap();
+    assert_eq!(
+        (humanoid["action_range"][16][1].as_f64(), humanoid["info"].as_array().map(Vec::len)),
+        (Some(0.4_f32.into()), Some(5))
+    );
+    let option = humanoid["options"].as_array().unwrap().iter().find(|o| o["name"] == "healthy_z_range").unwrap();
+    assert_eq!((option["default"].as_str(), option["expected"].as_str()), (Some("(1, 2)"), Some("two numbers")));
 }

@@ -14,13 +14,14 @@ const DECISIONS: usize = 60;
 /// Everything the first `agents` agents saw and earned, by decision.
 fn lives(id: &str, agents: usize, n: usize, threads: usize, isa: Isa) -> Vec<Vec<u32>> {
     let mut env = make(id, n, threads, Some(isa), Autoreset::SameStep);
-    let (obs, terms) = (env.spec().obs, env.spec().reward_terms.len());
+    let (obs, terms, infos) = (env.spec().obs, env.spec().reward_terms.len(), env.spec().info.len());
     let mut lives = vec![Vec::new(); agents];
     play(&mut env, DECISIONS, 0.9, |_, step: &Step| {
         for (i, life) in lives.iter_mut().enumerate() {
             life.extend(step.obs[i * obs..][..obs].iter().map(|x| x.to_bits()));
             life.extend(step.final_obs[i * obs..][..obs].iter().map(|x| x.to_bits()));
             life.extend(step.terms[i * terms..][..terms].iter().map(|x| x.to_bits()));
+            life.extend(step.info[i * infos..][..infos].iter().map(|x| x.to_bits()));
             life.extend([step.reward[i].to_bits(), step.forward[i].to_bits()]);
             life.push(u32::from(step.terminated[i]) | u32::from(step.truncated[i]) << 1);
         }
@@ -62,6 +63,22 @@ fn humanoid() {
 #[test]
 fn ant() {
     check("Ant-v0");
+}
+
+/// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
+#[test]
+fn gymnasiums_ant() {
+    check("Ant-v5");
+}
+
+#[test]
+fn gymnasiums_humanoid() {
+    check("Humanoid-v5");
+}
+
+#[test]
+fn gymnasiums_double_pendulum() {
+    check("InvertedDoublePendulum-v5");
 }
 
 /// Agents differ from each other: otherwise the tests above would pass for the wrong reason.

@@ -1,7 +1,7 @@
 //! What an agent observes, earns and fails by is what the environment's page says, computed by other people's software.
 //!
-//! Every registered agent plays the same actions from the same starts in this engine (double precision) and in MuJoCo,
-//! where `tests/oracle/agents.py` computes observations, reward terms and terminations in plain Python.
+//! Every agent of the suite's own plays the same actions from the same starts in this engine (double precision) and in
+//! MuJoCo, where `tests/oracle/agents.py` computes observations, reward terms and terminations in plain Python.
 
 mod common;
 
@@ -21,7 +21,7 @@ const SCALES: [f32; 3] = [0.1, 0.6, 1.3];
 
 #[test]
 fn observations_rewards_and_terminations_agree_with_mujoco() {
-    let ids = marathon_envs::ids();
+    let ids = common::own_agents();
     let mut request = Vec::new();
     let mut ours = Vec::new();
     for id in &ids {

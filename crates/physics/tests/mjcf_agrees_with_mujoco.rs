@@ -2,9 +2,9 @@
 //!
 //! Whatever the file, the loader accepts it and every number of the model equals MuJoCo's to 1e-9 relative: frames,
 //! masses, inertias, inverse weights, joints, geoms, sites, height fields, tendons, equality constraints, cameras, lights,
-//! actuators, sensors, keyframes, contact pairs, options and statistics. The files are Marathon's agents, the models that come with dm_control and
-//! Gymnasium, and one small model per feature of the format in `models/mjcf`. Colors and
-//! elevations are single precision in MuJoCo and agree to 1e-6.
+//! actuators, sensors, keyframes, contact pairs, options and statistics. The files are Marathon's agents, the models that
+//! come with dm_control and Gymnasium, Marathon's own files of the latter, and one small model per feature of the format in
+//! `models/mjcf`. Colors and elevations are single precision in MuJoCo and agree to 1e-6.
 
 mod common;
 
@@ -158,6 +158,48 @@ fn gymnasium_mujoco() {
         "walker2d_v5",
     ];
     compare(&names.map(|name| folder.join(format!("{name}.xml"))));
+}
+
+/// Marathon's own files of Gymnasium's models are Gymnasium's models: all that the physics and the tasks know of them.
+#[test]
+fn gymnasiums_models_written_anew() {
+    let installed = package("gymnasium").join("envs/mujoco/assets");
+    let own = xml_files(&workspace().join("assets/gymnasium"));
+    assert_eq!(own.len(), 9);
+    let original = |file: &PathBuf| {
+        let name = file.file_name().expect("a file").to_str().expect("a name");
+        installed.join(if name == "walker2d.xml" { "walker2d_v5.xml" } else { name })
+    };
+    let answers = oracle("compiled_model.py", &json!({ "files": own.iter().map(original).collect::<Vec<_>>() }));
+    for (file, theirs) in own.iter().zip(answers["files"].as_array().expect("one answer per file")) {
+        let model = Model::from_xml_file(file).unwrap_or_else(|e| panic!("{e}"));
+        let mut theirs = theirs.clone();
+        forget_looks(&mut theirs);
+        let mut differences = Vec::new();
+        differ("", &serde_json::to_value(&model).expect("a model is JSON"), &theirs, &mut differences);
+        assert!(differences.is_empty(), "{}: {}", file.display(), differences.join("\n"));
+    }
+}
+
+/// Makes `null`, which is not compared, of how a model looks, of what its tasks do not use, and of missing names.
+fn forget_looks(model: &mut Value) {
+    const LOOKS: [&str; 8] = ["rgba", "material", "cameras", "lights", "keyframes", "numerics", "extent", "center"];
+    match model {
+        Value::Array(list) => list.iter_mut().for_each(forget_looks),
+        Value::Object(fields) => {
+            // how much of an infinite plane is drawn
+            let plane = fields.get("kind").is_some_and(|kind| kind == "Plane");
+            for (name, value) in fields {
+                let nameless = name == "name" && value == "";
+                if LOOKS.contains(&name.as_str()) || nameless || plane && name == "size" {
+                    *value = Value::Null;
+                } else {
+                    forget_looks(value);
+                }
+            }
+        }
+        _ => {}
+    }
 }
 
 /// The frame of equal moments is arbitrary; the tensor that it stands for is not.

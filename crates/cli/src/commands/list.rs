@@ -3,7 +3,7 @@
 use crate::console::say;
 use crate::error::CliError;
 use crate::report::print_json;
-use marathon_envs::registry;
+use marathon_envs::{OptionInfo, registry};
 use marathon_physics::lanes::Isa;
 use serde::Serialize;
 
@@ -19,6 +19,19 @@ struct Entry {
     frame_skip: usize,
     max_episode_steps: usize,
     reward_terms: Vec<String>,
+    info: Vec<String>,
+    /// Lowest and highest action per actuator; null for one without bounds.
+    action_range: Vec<[Option<f32>; 2]>,
+    options: Vec<Argument>,
+}
+
+/// A named argument that an agent takes.
+#[derive(Serialize)]
+struct Argument {
+    name: &'static str,
+    default: String,
+    expected: &'static str,
+    about: &'static str,
 }
 
 /// Lists the agents.
@@ -28,7 +41,8 @@ struct Entry {
 pub fn run(json: bool) -> Result<(), CliError> {
     let mut entries = Vec::new();
     for id in registry::ids() {
-        let facts = registry::agent(&id)?.facts();
+        let agent = registry::agent(&id)?;
+        let facts = agent.facts();
         let factory = registry::factory(&id, Isa::F32)?;
         let spec = factory.spec();
         entries.push(Entry {
@@ -39,6 +53,14 @@ pub fn run(json: bool) -> Result<(), CliError> {
             frame_skip: spec.frame_skip,
             max_episode_steps: spec.max_episode_steps,
             reward_terms: spec.reward_terms.clone(),
+            info: spec.info.clone(),
+            action_range: spec
+                .action_low
+                .iter()
+                .zip(&spec.action_high)
+                .map(|(a, b)| [finite(*a), finite(*b)])
+                .collect(),
+            options: agent.options().into_iter().map(argument).collect(),
             id,
         });
     }
@@ -55,6 +77,16 @@ pub fn run(json: bool) -> Result<(), CliError> {
             e.id, e.observation, e.action, e.summary
         ));
     }
-    say("\nNames work in any case; without a version they mean v0.");
+    say("\nNames work in any case; without a version they mean the lowest.");
     Ok(())
+}
+
+fn argument(info: OptionInfo) -> Argument {
+    let OptionInfo { name, value, expected, about, .. } = info;
+    Argument { name, default: value.to_string(), expected, about }
+}
+
+/// JSON has no infinities.
+fn finite(x: f32) -> Option<f32> {
+    x.is_finite().then_some(x)
 }

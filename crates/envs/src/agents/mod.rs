@@ -1,9 +1,10 @@
-//! The agents of the Marathon Environments, one file each.
+//! The agents of the Marathon Environments, one file each, and the tasks of others.
 //!
 //! `-v0` is the paper's text and its code at release (31, 41, 88, 53 observations); `-v1` is the paper's Table 1, the
 //! code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
 
 pub mod ant;
+pub mod gymnasium;
 pub mod hopper;
 pub mod humanoid;
 pub mod walker2d;
@@ -14,7 +15,7 @@ use crate::agent::AnyAgent;
 
 /// All agents that come with the crate, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
-    vec![
+    let mut agents: Vec<Arc<dyn AnyAgent>> = vec![
         Arc::new(hopper::HopperV0),
         Arc::new(hopper::HopperV1),
         Arc::new(walker2d::Walker2dV0),
@@ -23,7 +24,9 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(humanoid::HumanoidV1),
         Arc::new(ant::AntV0),
         Arc::new(ant::AntV1),
-    ]
+    ];
+    agents.extend(gymnasium::all());
+    agents
 }
 
 /// Names besides the registered ones, which are the ids without their version. `(alias, id)`.

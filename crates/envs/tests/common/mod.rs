@@ -9,13 +9,19 @@ use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions};
 use marathon_physics::lanes::Isa;
 use serde_json::Value;
 
+/// The root of the repository.
+fn workspace() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The Python that has the oracles.
+fn python() -> PathBuf {
+    std::env::var_os("MARATHON_PYTHON").map_or_else(|| workspace().join(".venv/bin/python"), PathBuf::from)
+}
+
 /// Asks a Python script in `tests/oracle`: JSON in, JSON out.
 pub fn oracle(script: &str, request: &Value) -> Value {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let python = match std::env::var_os("MARATHON_PYTHON") {
-        Some(python) => PathBuf::from(python),
-        None => root.join(".venv/bin/python"),
-    };
+    let (root, python) = (workspace(), python());
     let spawned = Command::new(&python)
         .arg(root.join("tests/oracle").join(script))
         .stdin(Stdio::piped())
@@ -31,6 +37,20 @@ pub fn oracle(script: &str, request: &Value) -> Value {
     let output = child.wait_with_output().expect("the oracle ends");
     assert!(output.status.success(), "{script} failed");
     serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
+}
+
+/// Folder of an installed Python package.
+pub fn package(name: &str) -> PathBuf {
+    let code = format!("import importlib.util,os;print(os.path.dirname(importlib.util.find_spec('{name}').origin))");
+    let output = Command::new(python()).args(["-c", &code]).output().expect("Python starts");
+    assert!(output.status.success(), "package {name} is not installed: run ./test.sh");
+    PathBuf::from(String::from_utf8(output.stdout).expect("a path").trim())
+}
+
+/// The suite's own agents, whose rewards end with a price of failure.
+pub fn own_agents() -> Vec<String> {
+    let own = |id: &String| marathon_envs::agent(id).is_ok_and(|agent| agent.facts().termination_reward.is_some());
+    marathon_envs::ids().into_iter().filter(own).collect()
 }
 
 /// Instruction sets of this processor.

@@ -90,16 +90,22 @@ impl<T: Real> Readings<'_, T> {
         self.work.constraint[dof]
     }
 
-    /// Length of a tendon at the last physics step, m or rad.
+    /// Center of mass of all bodies, m. After [`Sim::measure_centers`].
     #[inline(always)]
-    pub fn ten_length(&self, tendon: usize) -> T {
-        self.work.tendon_length[tendon]
-    }
-
-    /// Rate of change of a tendon's length at the last physics step.
-    #[inline(always)]
-    pub fn ten_velocity(&self, tendon: usize) -> T {
-        self.work.tendon_velocity[tendon]
+    pub fn center_of_mass(&self) -> V3<T> {
+        let bodies = &self.sim.model.bodies;
+        let mut sum = [T::zero(); 3];
+        for (root, body) in bodies.iter().enumerate().skip(1) {
+            if body.root_id == root {
+                let center = add3(&self.mount_pos(&self.sim.coms[root]), &self.work.tree_com[root]);
+                // one tree has all of the mass, and then no digit is lost
+                let share = T::lit(body.subtree_mass / bodies[0].subtree_mass);
+                for k in 0..3 {
+                    sum[k] = center[k].mul_add(share, sum[k]);
+                }
+            }
+        }
+        sum
     }
 
     /// From the center of mass of a body's tree to a frame.

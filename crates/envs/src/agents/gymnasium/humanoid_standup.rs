@@ -1,0 +1,109 @@
+//! `HumanoidStandup-v5`: the humanoid on its back, 17 motors.
+//!
+//! Observation: that of `Humanoid-v5`. Reward: height of the torso over the physics' timestep + 1 - 0.1 sum of squared
+//! actions - 5e-7 sum of squared contact forces, at most 10. It never fails.
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+use super::Noise;
+use super::humanoid::Sight;
+use crate::agent::{Agent, Facts, Motors, names};
+use crate::options::{OptionInfo, OptionSet, Options};
+use crate::senses::{Senses, clamp};
+use crate::start::Start;
+use crate::write::{Obs, Terms};
+
+crate::options! {
+    /// Gymnasium's humanoid that is to stand up, with its keyword arguments.
+    pub struct HumanoidStandup {
+        /// Model: `humanoidstandup.xml`, or the path of an MJCF file.
+        xml_file: String = "humanoidstandup.xml".into(),
+        /// Physics steps per decision.
+        frame_skip: usize = 5,
+        /// Accepted and, as in Gymnasium 1.4, not used: the weight of the height is 1.
+        uph_cost_weight: f64 = 1.0,
+        /// Weight of the squared actions.
+        ctrl_cost_weight: f64 = 0.1,
+        /// Weight of the squared contact forces.
+        impact_cost_weight: f64 = 0.5e-6,
+        /// Range that the cost of the contact forces is clipped to.
+        impact_cost_range: [f64; 2] = [f64::NEG_INFINITY, 10.0],
+        /// Half width of the uniform noise of the start.
+        reset_noise_scale: f64 = 1e-2,
+        /// Whether x and y are left out of the observation.
+        exclude_current_positions_from_observation: bool = true,
+        /// Whether inertias of the bodies are observed.
+        include_cinert_in_observation: bool = true,
+        /// Whether velocities of the bodies are observed.
+        include_cvel_in_observation: bool = true,
+        /// Whether torques of the motors are observed.
+        include_qfrc_actuator_in_observation: bool = true,
+        /// Whether contact forces are observed.
+        include_cfrc_ext_in_observation: bool = true,
+    }
+}
+
+impl Agent for HumanoidStandup {
+    fn facts(&self) -> Facts {
+        let id = "HumanoidStandup-v5";
+        Facts {
+            // the last is not in Gymnasium's info, but it is in its reward
+            reward_terms: names(["reward_linup", "reward_quadctrl", "reward_impact", "reward_alive"]),
+            info: names(["x_position", "y_position", "z_distance_from_origin"]),
+            view: Sight::view(),
+            ..super::facts(id, "Gymnasium's humanoid that is to stand up", &self.xml_file, self.frame_skip)
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.infos()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(self.with(options))
+    }
+
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        super::has(model, 7, 6)
+    }
+
+    fn reset(&self, start: &mut Start) {
+        super::start(start, self.reset_noise_scale, Noise::Uniform);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let sight = Sight {
+            position: !self.exclude_current_positions_from_observation,
+            cinert: self.include_cinert_in_observation,
+            cvel: self.include_cvel_in_observation,
+            qfrc_actuator: self.include_qfrc_actuator_in_observation,
+            cfrc_ext: self.include_cfrc_ext_in_observation,
+        };
+        sight.observe(s, out);
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let impact = T::lit(self.impact_cost_weight) * Sight::contact_squares(s);
+        let [low, high] = self.impact_cost_range;
+        let timestep = T::lit(s.readings().sim.model().opt.timestep);
+        terms.add("reward_linup", 1.0, s.readings().qpos(2).div(timestep));
+        terms.add("reward_quadctrl", -self.ctrl_cost_weight, s.effort(Motors::NONE));
+        terms.add("reward_impact", -1.0, clamp(impact, low, high));
+        terms.add("reward_alive", 1.0, T::lit(1.0));
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.scalar(s.readings().qpos(0));
+        out.scalar(s.readings().qpos(1));
+        out.scalar(super::from_origin(s, 2));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        s.terminate_never()
+    }
+}

@@ -1,0 +1,177 @@
+//! Gymnasium's own MuJoCo tasks, version 5: a policy, a return and a distribution of starts carry over in both directions.
+//!
+//! Everything is Gymnasium's (1.4): models, physics steps per decision, integrator, observations, keyword arguments,
+//! reward terms under the keys of its `info`, terminations, starts (drawn from the same distributions by another
+//! generator). `tests/a_gymnasium_return_agrees_with_gymnasium.rs` holds them to it.
+//!
+//! What an observation sees after a step is as in Gymnasium: `qpos` and `qvel` of the present state, but what MuJoCo derives
+//! from them (positions and velocities of bodies, inertias, contact forces) of the state from which the last physics step
+//! computed its forces.
+
+pub mod ant;
+pub mod half_cheetah;
+pub mod hopper;
+pub mod humanoid;
+pub mod humanoid_standup;
+pub mod inverted_double_pendulum;
+pub mod inverted_pendulum;
+pub mod swimmer;
+pub mod walker2d;
+
+use std::sync::Arc;
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+use crate::agent::{AnyAgent, Controls, Facts, ModelSource, View};
+use crate::senses::{Senses, clamp};
+use crate::start::Start;
+use crate::write::Obs;
+
+/// All of them, in the order of listings.
+pub fn all() -> Vec<Arc<dyn AnyAgent>> {
+    vec![
+        Arc::new(hopper::Hopper::default()),
+        Arc::new(walker2d::Walker2d::default()),
+        Arc::new(half_cheetah::HalfCheetah::default()),
+        Arc::new(ant::Ant::default()),
+        Arc::new(humanoid::Humanoid::default()),
+        Arc::new(humanoid_standup::HumanoidStandup::default()),
+        Arc::new(swimmer::Swimmer::default()),
+        Arc::new(inverted_pendulum::InvertedPendulum::default()),
+        Arc::new(inverted_double_pendulum::InvertedDoublePendulum::default()),
+    ]
+}
+
+/// The models that come with Gymnasium, by the names that `xml_file` has for them.
+const MODELS: [(&str, &str); 9] = [
+    ("hopper.xml", include_str!("../../../../../assets/gymnasium/hopper.xml")),
+    ("walker2d_v5.xml", include_str!("../../../../../assets/gymnasium/walker2d.xml")),
+    ("half_cheetah.xml", include_str!("../../../../../assets/gymnasium/half_cheetah.xml")),
+    ("ant.xml", include_str!("../../../../../assets/gymnasium/ant.xml")),
+    ("humanoid.xml", include_str!("../../../../../assets/gymnasium/humanoid.xml")),
+    ("humanoidstandup.xml", include_str!("../../../../../assets/gymnasium/humanoidstandup.xml")),
+    ("swimmer.xml", include_str!("../../../../../assets/gymnasium/swimmer.xml")),
+    ("inverted_pendulum.xml", include_str!("../../../../../assets/gymnasium/inverted_pendulum.xml")),
+    ("inverted_double_pendulum.xml", include_str!("../../../../../assets/gymnasium/inverted_double_pendulum.xml")),
+];
+
+/// What the tasks have in common.
+fn facts(id: &str, summary: &str, xml_file: &str, frame_skip: usize) -> Facts {
+    let built_in = MODELS.iter().find(|(name, _)| *name == xml_file);
+    Facts {
+        id: id.into(),
+        summary: summary.into(),
+        model: built_in.map_or_else(|| ModelSource::File(xml_file.into()), |(_, text)| (*text).into()),
+        frame_skip,
+        max_episode_steps: 1000,
+        controls: Controls::Raw,
+        view: View { of_last_step: true, ..View::default() },
+        termination_reward: None,
+        ..Facts::default()
+    }
+}
+
+/// Refuses a model with fewer coordinates, velocities or actuators than the task speaks of.
+fn has(model: &Model, nq: usize, nv: usize) -> Result<(), String> {
+    for (what, found, least) in [("coordinates", model.nq, nq), ("velocities", model.nv, nv)] {
+        if found < least {
+            return Err(format!("its model has {found} {what}, expected at least {least}"));
+        }
+    }
+    Ok(())
+}
+
+/// The start: the reference configuration at rest, with uniform noise of `scale` on every coordinate, quaternions included
+/// (which are not normalized before they are first observed), and noise on every velocity.
+fn start(start: &mut Start, scale: f64, velocities: Noise) {
+    let (qpos0, nv) = (start.model().qpos0.clone(), start.model().nv);
+    for (q, q0) in start.qpos.iter_mut().zip(&qpos0) {
+        *q = q0 + start.random.around_zero(scale);
+    }
+    for d in 0..nv {
+        start.qvel[d] = match velocities {
+            Noise::Uniform => start.random.around_zero(scale),
+            Noise::Normal => start.random.normal() * scale,
+        };
+    }
+    start.normalize = false;
+}
+
+/// A distribution.
+#[derive(Clone, Copy)]
+enum Noise {
+    /// Uniform in [-scale, scale).
+    Uniform,
+    /// Normal with standard deviation `scale`.
+    Normal,
+}
+
+/// Coordinates from `skip` on.
+#[inline(always)]
+fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
+    for i in skip..s.readings().sim.model().nq {
+        out.scalar(s.readings().qpos(i));
+    }
+}
+
+/// All velocities.
+#[inline(always)]
+fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    for i in 0..s.readings().sim.model().nv {
+        out.scalar(s.readings().qvel(i));
+    }
+}
+
+/// All velocities, clipped to [-10, 10].
+#[inline(always)]
+fn observe_clipped_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    for i in 0..s.readings().sim.model().nv {
+        out.scalar(clamp(s.readings().qvel(i), -10.0, 10.0));
+    }
+}
+
+/// Lanes with `low < x < high`.
+#[inline(always)]
+fn within<T: Real>(x: T, [low, high]: [f64; 2]) -> T::Mask {
+    T::and(T::lit(low).lt(x), x.lt(T::lit(high)))
+}
+
+/// How far coordinate `i` is from its reference.
+#[inline(always)]
+fn from_origin<T: Real>(s: &Senses<T>, i: usize) -> T {
+    s.readings().qpos(i) - T::lit(s.readings().sim.model().qpos0[i])
+}
+
+/// Length of (x, y).
+#[inline(always)]
+fn distance<T: Real>([x, y]: [T; 2]) -> T {
+    x.mul_add(x, y * y).sqrt()
+}
+
+/// The mean velocity of a point between two decisions, kept in an agent's memory.
+struct Travel;
+
+impl Travel {
+    /// Slots it needs: where the point was, and its velocity.
+    const SLOTS: usize = 4;
+    /// Slot of the velocity along x.
+    const X_VELOCITY: usize = 2;
+    /// Slot of the velocity along y.
+    const Y_VELOCITY: usize = 3;
+
+    /// An episode begins at a point.
+    #[inline(always)]
+    fn begin<T: Real>(memory: &mut [T], at: [T; 2]) {
+        memory[..2].copy_from_slice(&at);
+    }
+
+    /// A decision led to a point.
+    #[inline(always)]
+    fn update<T: Real>(memory: &mut [T], at: [T; 2], dt: f64) {
+        for i in 0..2 {
+            memory[2 + i] = (at[i] - memory[i]).div(T::lit(dt));
+            memory[i] = at[i];
+        }
+    }
+}
