@@ -18,12 +18,16 @@ The import registers every task with Gymnasium in the namespace `marathon_envs`:
 
     >>> result = marathon_envs.train("Hopper-v0", callback=lambda metrics: print(metrics["return_mean"]))
     >>> actions = result.policy(obs)
+
+`MarathonAgent` is what one subclasses to write an agent in Python, `Simulation` the bare physics of a `Model`.
 """
 
 from marathon_envs import registration
 from marathon_envs._native import (
+    Model,
     Policy,
     Renderer,
+    Simulation,
     Spec,
     TrainResult,
     VecEnv,
@@ -34,14 +38,19 @@ from marathon_envs._native import (
     spec,
     train,
 )
+from marathon_envs.agents import MarathonAgent, ResetNoise
 from marathon_envs.env import MarathonEnv
 from marathon_envs.vector import MarathonVectorEnv
 
 __all__ = [
+    "MarathonAgent",
     "MarathonEnv",
     "MarathonVectorEnv",
+    "Model",
     "Policy",
     "Renderer",
+    "ResetNoise",
+    "Simulation",
     "Spec",
     "TrainResult",
     "VecEnv",

@@ -9,14 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "Model",
     "Policy",
     "Renderer",
+    "Simulation",
     "Spec",
     "TrainResult",
     "VecEnv",
     "__version__",
     "evaluate",
     "ids",
+    "learn",
     "load_policy",
     "main",
     "spec",
@@ -205,6 +208,9 @@ class Renderer:
 
         `options` are arguments of the task, see `Spec.options`: some change the model.
         """
+    @staticmethod
+    def of(model: Model, width: int = 480, height: int = 480, *, agents: int = 1) -> Renderer:
+        """Make a renderer for a compiled model."""
     def render(self, qpos: npt.ArrayLike, elapsed: float = ...) -> npt.NDArray[np.uint8]:
         """Draw agents side by side, their states in the rows of `qpos`, ``(agents, nq)``.
 
@@ -301,6 +307,218 @@ def evaluate(policy: Policy, episodes: int = 100, *, seed: int = ..., threads: i
 
     Returns ``return_mean``, ``return_std``, ``return_min``, ``return_max``, ``length_mean`` (decisions),
     ``distance_mean`` (m), ``speed_mean`` (m/s), ``falls``, ``diverged`` and ``episodes``.
+    """
+
+@final
+class Model:
+    """A compiled MJCF model, the counterpart of MuJoCo's `MjModel`.
+
+    SI units, radians, quaternions w x y z; body 0 is the world. Where the file gives no name, the name is empty.
+    """
+
+    @staticmethod
+    def load(path: str | PathLike[str], /) -> Model:
+        """Read a model file; included files and height fields are looked up beside it."""
+    @staticmethod
+    def parse(xml: str, /, name: str = "model") -> Model:
+        """Compile a model given as text, which has no other files; `name` stands for the file in messages."""
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+    @property
+    def timestep(self) -> float:
+        """Seconds per physics step."""
+    @property
+    def nq(self) -> int:
+        """Length of ``qpos``."""
+    @property
+    def nv(self) -> int:
+        """Length of ``qvel``."""
+    @property
+    def nu(self) -> int:
+        """Number of actuators."""
+    @property
+    def body_names(self) -> list[str]:
+        """Names of the bodies, the first being the world."""
+    @property
+    def geom_names(self) -> list[str]:
+        """Names of the geoms."""
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of the joints."""
+    @property
+    def actuator_names(self) -> list[str]:
+        """Names of the actuators."""
+    @property
+    def sensor_names(self) -> list[str]:
+        """Names of the sensors."""
+    @property
+    def keyframe_names(self) -> list[str]:
+        """Names of the keyframes."""
+    def body(self, name: str) -> int:
+        """Index of a body."""
+    def geom(self, name: str) -> int:
+        """Index of a geom."""
+    def joint(self, name: str) -> int:
+        """Index of a joint."""
+    def actuator(self, name: str) -> int:
+        """Index of an actuator."""
+    def sensor(self, name: str) -> tuple[int, int]:
+        """First value of a sensor among all sensors' values, and their number."""
+    def keyframe(self, name: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """``qpos``, ``(nq,)``, and ``qvel``, ``(nv,)``, of a keyframe."""
+    @property
+    def qpos0(self) -> npt.NDArray[np.float64]:
+        """Reference configuration, ``(nq,)``."""
+    @property
+    def body_parent(self) -> npt.NDArray[np.int64]:
+        """Parent of each body, ``(nbody,)``."""
+    @property
+    def body_weld(self) -> npt.NDArray[np.int64]:
+        """Body that each body follows rigidly, ``(nbody,)``: itself if it has joints; 0 if it does not move."""
+    @property
+    def body_root(self) -> npt.NDArray[np.int64]:
+        """First body of each body's tree, ``(nbody,)``."""
+    @property
+    def body_quat(self) -> npt.NDArray[np.float64]:
+        """Orientation of each body in its parent, ``(nbody, 4)``."""
+    @property
+    def body_mass(self) -> npt.NDArray[np.float64]:
+        """Mass of each body, kg, ``(nbody,)``."""
+    @property
+    def geom_body(self) -> npt.NDArray[np.int64]:
+        """Body of each geom, ``(ngeom,)``."""
+    @property
+    def joint_type(self) -> list[Literal["free", "ball", "slide", "hinge"]]:
+        """Type of each joint."""
+    @property
+    def joint_body(self) -> npt.NDArray[np.int64]:
+        """Body that each joint moves, ``(njoint,)``."""
+    @property
+    def joint_qpos(self) -> npt.NDArray[np.int64]:
+        """First coordinate of each joint in ``qpos``, ``(njoint,)``."""
+    @property
+    def joint_dof(self) -> npt.NDArray[np.int64]:
+        """First velocity of each joint in ``qvel``, ``(njoint,)``."""
+    @property
+    def joint_axis(self) -> npt.NDArray[np.float64]:
+        """Axis of each hinge or slide in its body's frame, ``(njoint, 3)``."""
+    @property
+    def joint_range(self) -> npt.NDArray[np.float64]:
+        """Limits of each joint, rad or m, infinite where there are none, ``(njoint, 2)``."""
+    @property
+    def actuator_joint(self) -> npt.NDArray[np.int64]:
+        """Joint that each actuator acts on, -1 for one that acts on something else, ``(nu,)``."""
+    @property
+    def actuator_range(self) -> npt.NDArray[np.float64]:
+        """Range of each actuator's control in its own units, infinite where there is none, ``(nu, 2)``."""
+
+@final
+class Simulation:
+    """Physics of many agents of one model, stepped together by native threads without the GIL.
+
+    Readings are read-only arrays with one row per agent, in world axes and SI units. They are computed when they are
+    first asked for after a step or a reset, and never overwritten.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        num_agents: int = 1,
+        *,
+        threads: int = 0,
+        isa: Literal["f64", "f32", "baseline", "avx2", "avx512"] | None = None,
+    ) -> Simulation:
+        """Make a simulation with all agents in the reference configuration, at rest.
+
+        Args:
+            model: the model.
+            num_agents: number of agents.
+            threads: number of threads; 0 means one per processor core, but not more than one for every 64 agents.
+            isa: instruction set; None means the widest that the processor has. The results do not depend on it (but for
+                f64) and on the number of threads.
+        """
+    @property
+    def model(self) -> Model:
+        """The model."""
+    @property
+    def num_agents(self) -> int:
+        """Number of agents."""
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+    def step(self, ctrl: npt.ArrayLike, substeps: int = 1) -> npt.NDArray[np.bool_]:
+        """Advance every agent by `substeps` physics steps under `ctrl`, ``(num_agents, nu)``.
+
+        Returns which agents broke, ``(num_agents,)``: their states stopped being finite, so they were put into the
+        reference configuration at rest.
+        """
+    def reset(self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> None:
+        """Put agents, all or those of a mask, into states.
+
+        The states are rows of `qpos`, ``(num_agents, nq)``, and `qvel`, ``(num_agents, nv)``. Quaternions are
+        normalized; controls, pushes and contacts are forgotten.
+        """
+    def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:
+        """Push a body of an agent until told otherwise or reset.
+
+        Force, N, and torque, N m, are in world axes, at the body's center of mass.
+        """
+    def save(self) -> bytes:
+        """Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits."""
+    def load(self, snapshot: bytes) -> None:
+        """Restore what `save` returned for the same model and number of agents."""
+    @property
+    def qpos(self) -> npt.NDArray[np.float64]:
+        """Configuration, ``(num_agents, nq)``."""
+    @property
+    def qvel(self) -> npt.NDArray[np.float64]:
+        """Velocity, ``(num_agents, nv)``."""
+    @property
+    def body_pos(self) -> npt.NDArray[np.float64]:
+        """Origins of the bodies' frames, m, ``(num_agents, nbody, 3)``."""
+    @property
+    def body_axes(self) -> npt.NDArray[np.float64]:
+        """Directions of the bodies' x, y and z axes, ``(num_agents, nbody, 3, 3)``: ``[..., 0, :]`` is that of x."""
+    @property
+    def body_velocity(self) -> npt.NDArray[np.float64]:
+        """Velocities of the origins of the bodies' frames, m/s, ``(num_agents, nbody, 3)``."""
+    @property
+    def body_angular_velocity(self) -> npt.NDArray[np.float64]:
+        """Angular velocities of the bodies, rad/s, ``(num_agents, nbody, 3)``."""
+    @property
+    def geom_pos(self) -> npt.NDArray[np.float64]:
+        """Centers of the geoms, m, ``(num_agents, ngeom, 3)``."""
+    @property
+    def geom_velocity(self) -> npt.NDArray[np.float64]:
+        """Velocities of the geoms' centers, m/s, ``(num_agents, ngeom, 3)``."""
+    @property
+    def touching(self) -> npt.NDArray[np.bool_]:
+        """Geoms that touched the static world at the last physics step, ``(num_agents, ngeom)``."""
+    @property
+    def touched(self) -> npt.NDArray[np.bool_]:
+        """Geoms that touched the static world at any physics step of the last `step`, ``(num_agents, ngeom)``."""
+    @property
+    def normal_force(self) -> npt.NDArray[np.float64]:
+        """Normal forces of the geoms' contacts at the last physics step, N, ``(num_agents, ngeom)``."""
+    @property
+    def sensors(self) -> npt.NDArray[np.float64]:
+        """Sensors' values at the present state and controls, in the model's order, ``(num_agents, ...)``.
+
+        NaN for those that cannot be evaluated. This costs about as much as a physics step.
+        """
+    def __len__(self) -> int: ...
+
+def learn(
+    env: Any,
+    config: str,
+    path: str | PathLike[str],
+    callback: Callable[[dict[str, Any]], object] | None = None,
+) -> dict[str, Any] | None:
+    """Train a policy for an object with the interface of `VecEnv` and write it to a file.
+
+    `config` is the JSON of the trainer's settings. `callback` is called after every iteration with its statistics; if
+    it returns a false value other than None, training ends. Returns the last statistics.
     """
 
 def ids() -> list[str]:

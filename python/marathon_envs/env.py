@@ -5,9 +5,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from marathon_envs import _spaces
-from marathon_envs._native import Renderer, VecEnv
+from marathon_envs import _spaces, _tasks
+from marathon_envs._native import Renderer
 from marathon_envs._spaces import FloatArray
+from marathon_envs._tasks import Task
 
 
 class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
@@ -27,7 +28,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def __init__(
         self,
-        task: str,
+        task: Task,
         *,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
@@ -39,7 +40,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`.
+            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
             render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels. For a window, use
                 `gymnasium.make(..., render_mode="human")`, which shows them with pygame.
             max_episode_steps: steps after which an episode is truncated; None means never.
@@ -50,7 +51,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         """
         _spaces.check_render_mode(render_mode, self.metadata)
         limit = _spaces.steps_limit(max_episode_steps, _spaces.NEVER)
-        self._env = VecEnv(
+        self._env = _tasks.vec_env(
             task, 1, threads=1, isa=isa, autoreset="disabled", max_episode_steps=limit, copy=True, **options
         )
         self.task_spec = self._env.spec
@@ -61,7 +62,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._dtype = self.observation_space.dtype
         self._terms = self.task_spec.reward_terms
         self._info, self._add_x = _spaces.info_names(self.task_spec)
-        self._size, self._options = (width, height), options
+        self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
         # for the camera: time, and that of the last picture
         self._seconds = self._drawn = 0.0
@@ -119,6 +120,6 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
             return None
         if self._renderer is None:
-            self._renderer = Renderer(self.task_spec.id, *self._size, **self._options)
+            self._renderer = _tasks.renderer(self._task, *self._size, **self._options)
         elapsed, self._drawn = self._seconds - self._drawn, self._seconds
         return self._renderer.render(self._env.get_state()[0], elapsed)

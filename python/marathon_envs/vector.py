@@ -8,9 +8,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from marathon_envs import _spaces
-from marathon_envs._native import Renderer, VecEnv
+from marathon_envs import _spaces, _tasks
+from marathon_envs._native import Renderer
 from marathon_envs._spaces import BoolArray, FloatArray
+from marathon_envs._tasks import Task
 
 Infos = dict[str, Any]
 
@@ -37,7 +38,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
 
     def __init__(
         self,
-        task: str,
+        task: Task,
         num_envs: int = 1,
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -53,7 +54,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`.
+            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
             num_envs: number of agents.
             autoreset_mode: what happens to an agent whose episode ended.
             render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels, one for each agent.
@@ -68,7 +69,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         """
         _spaces.check_render_mode(render_mode, self.metadata)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self._env = VecEnv(
+        self._env = _tasks.vec_env(
             task,
             num_envs,
             threads=threads,
@@ -93,7 +94,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._dtype = self.single_observation_space.dtype
         self._terms = self.task_spec.reward_terms
         self._info, self._add_x = _spaces.info_names(self.task_spec)
-        self._size, self._options = (width, height), options
+        self._task, self._size, self._options = task, (width, height), options
         self._renderers: list[Renderer] | None = None
         # for the cameras: time of each agent, and of its last picture
         self._seconds, self._drawn = np.zeros(num_envs), np.zeros(num_envs)
@@ -218,7 +219,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
             return None
         if self._renderers is None:
-            self._renderers = [Renderer(self.task_spec.id, *self._size, **self._options) for _ in range(self.num_envs)]
+            self._renderers = [_tasks.renderer(self._task, *self._size, **self._options) for _ in range(self.num_envs)]
         elapsed = self._seconds - self._drawn
         self._drawn = self._seconds.copy()
         qpos = self._env.get_state()[0]

@@ -11,8 +11,8 @@ fi
 target="${CARGO_TARGET_DIR:-$PWD/target}"
 wheels="$target/wheels" clean="$target/clean-venv" site="$target/python-site"
 
-"$python" -m ruff check python
-"$python" -m ruff format --check python
+"$python" -m ruff check python examples/python
+"$python" -m ruff format --check python examples/python
 rm -rf "$wheels" "$clean" "$site"
 "$python" -m maturin build --quiet --release --out "$wheels"
 

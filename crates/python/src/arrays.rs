@@ -1,9 +1,13 @@
-//! The NumPy arrays that a step writes to.
+//! The NumPy arrays that a step writes to, and those that it reads.
 
 use crate::error;
 use marathon_envs::{Spec, StepMut};
-use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray, ndarray::Dimension};
+use numpy::{
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike1, PyArrayMethods, PyReadonlyArray2,
+    PyReadwriteArray, PyUntypedArrayMethods, ndarray::Dimension,
+};
 use pyo3::prelude::*;
+use std::borrow::Cow;
 
 /// Results of a step, the fields of [`marathon_envs::Step`].
 pub struct Arrays {
@@ -90,4 +94,22 @@ fn writer<'py, T: Element, D: Dimension>(
     array: &Py<PyArray<T, D>>,
 ) -> PyResult<PyReadwriteArray<'py, T, D>> {
     array.bind(py).try_readwrite().map_err(|e| error::array(name, e))
+}
+
+/// The numbers of an array, row by row, without a copy if they lie so.
+pub fn rows<'a, T: Element + Copy>(array: &'a PyReadonlyArray2<'_, T>) -> Cow<'a, [T]> {
+    match array.as_slice() {
+        // a slice may lie column by column too
+        Ok(slice) if array.is_c_contiguous() => slice.into(),
+        _ => array.as_array().iter().copied().collect(),
+    }
+}
+
+/// A mask of `n` agents as a list; all agents without one.
+pub fn mask(mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>, n: usize) -> PyResult<Vec<bool>> {
+    let Some(mask) = mask else { return Ok(vec![true; n]) };
+    if mask.len() != n {
+        return Err(error::value(format!("mask has {} values, expected {n}", mask.len())));
+    }
+    Ok(mask.as_array().to_vec())
 }

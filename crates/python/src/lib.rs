@@ -5,10 +5,13 @@
 //! Nothing here knows of Gymnasium or another framework.
 
 mod arrays;
+mod crowd;
 mod error;
+mod model;
 mod options;
 mod policy;
 mod renderer;
+mod simulation;
 mod spec;
 mod train;
 mod vec_env;
@@ -21,8 +24,8 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        main, policy::Policy, policy::evaluate, policy::load_policy, renderer::Renderer, spec::Spec, spec::ids,
-        spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        crowd::learn, main, model::Model, policy::Policy, policy::evaluate, policy::load_policy, renderer::Renderer,
+        simulation::Simulation, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
     };
     use pyo3::prelude::*;
 

@@ -1,5 +1,6 @@
 //! Pictures of agents as arrays.
 
+use crate::model::Model;
 use crate::{error, options};
 use marathon_envs::registry;
 use marathon_render::{Follow, Scene};
@@ -28,11 +29,14 @@ impl Renderer {
     ) -> PyResult<Self> {
         let options = options::read(options)?;
         let agent = registry::global().agent_with(id, &options).map_err(error::env)?;
-        let model = agent.model().map_err(error::env)?;
-        let scene = Scene::new(&model);
-        let renderer = marathon_render::Renderer::new(width, height).map_err(error::any)?;
-        let camera = Follow::new(&scene, agents, width, height);
-        Ok(Renderer { scene, renderer, camera })
+        Self::with(&agent.model().map_err(error::env)?, width, height, agents)
+    }
+
+    /// The same for a compiled model.
+    #[staticmethod]
+    #[pyo3(signature = (model, width = 480, height = 480, *, agents = 1))]
+    fn of(model: &Model, width: usize, height: usize, agents: usize) -> PyResult<Self> {
+        Self::with(&model.inner, width, height, agents)
     }
 
     /// Draws agents side by side, their states in the rows of `qpos`, `(agents, nq)`, `elapsed` seconds after the last
@@ -49,5 +53,14 @@ impl Renderer {
         let camera = self.camera.update(&frame, elapsed);
         let image = py.detach(|| self.renderer.render(&frame, &camera));
         PyArray1::from_slice(py, image.rgb()).reshape([image.height(), image.width(), 3])
+    }
+}
+
+impl Renderer {
+    fn with(model: &marathon_physics::Model, width: usize, height: usize, agents: usize) -> PyResult<Self> {
+        let scene = Scene::new(model);
+        let renderer = marathon_render::Renderer::new(width, height).map_err(error::any)?;
+        let camera = Follow::new(&scene, agents, width, height);
+        Ok(Renderer { scene, renderer, camera })
     }
 }

@@ -1,17 +1,13 @@
 //! Many agents of one kind as a Python object.
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, mask, rows};
 use crate::spec::Spec;
 use crate::{error, options};
 use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
 use marathon_physics::lanes::Isa;
-use numpy::{
-    AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyReadonlyArray2,
-    PyUntypedArrayMethods,
-};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::borrow::Cow;
 use std::sync::Mutex;
 
 /// Names of the autoreset modes; those of Gymnasium's `AutoresetMode` work too.
@@ -171,7 +167,7 @@ impl VecEnv {
         seed: Option<Seeds>,
         mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
     ) -> PyResult<Py<PyArray2<f32>>> {
-        let mask = self.mask(mask)?;
+        let mask = self::mask(mask, self.num_envs)?;
         if !self.ready && mask.contains(&false) {
             return Err(error::value("the first reset must be of all agents; mask has some that are False"));
         }
@@ -244,7 +240,7 @@ impl VecEnv {
         qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
         mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
     ) -> PyResult<Py<PyArray2<f32>>> {
-        let mask = self.mask(mask)?;
+        let mask = self::mask(mask, self.num_envs)?;
         let spec = self.spec.get();
         for (name, array, columns) in [("qpos", &qpos, spec.nq), ("qvel", &qvel, spec.nv)] {
             if array.shape() != [self.num_envs, columns] {
@@ -306,15 +302,6 @@ impl VecEnv {
         self.ready = true;
         Ok(self.arrays.obs.clone_ref(py))
     }
-
-    /// The mask as a list; all agents without one.
-    fn mask(&self, mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>) -> PyResult<Vec<bool>> {
-        let Some(mask) = mask else { return Ok(vec![true; self.num_envs]) };
-        if mask.len() != self.num_envs {
-            return Err(error::value(format!("mask has {} values, expected {}", mask.len(), self.num_envs)));
-        }
-        Ok(mask.as_array().to_vec())
-    }
 }
 
 fn parse_autoreset(name: &str) -> PyResult<Autoreset> {
@@ -323,15 +310,6 @@ fn parse_autoreset(name: &str) -> PyResult<Autoreset> {
     found.map(|(_, mode)| *mode).ok_or_else(|| {
         error::value(format!("autoreset is '{name}', expected one of 'next_step', 'same_step', 'disabled'"))
     })
-}
-
-/// The numbers of an array, row by row, without a copy if they lie so.
-fn rows<'a>(array: &'a PyReadonlyArray2<'_, f32>) -> Cow<'a, [f32]> {
-    match array.as_slice() {
-        // a slice may lie column by column too
-        Ok(slice) if array.is_c_contiguous() => slice.into(),
-        _ => array.as_array().iter().copied().collect(),
-    }
 }
 
 fn all_finite<'a, const N: usize>(rows: [numpy::ndarray::ArrayView1<'a, f64>; N]) -> bool {

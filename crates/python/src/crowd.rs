@@ -1,0 +1,158 @@
+//! Learning natively what is defined in Python: an object with the interface of `VecEnv`, which is called once per
+//! decision for all of its agents.
+
+use crate::error;
+use marathon_envs::{Crowd, CrowdError, Lockstep, Options, ShardFactory, Spec, StepMut};
+use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_physics::lanes::Isa;
+use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::PathBuf;
+
+/// Agents behind a Python object with the interface of `VecEnv` that resets in the same step.
+struct PyCrowd {
+    env: Py<PyAny>,
+    agents: usize,
+    act: usize,
+}
+
+impl Crowd for PyCrowd {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
+        Python::attach(|py| copy("obs", &self.env.bind(py).call_method1("reset", (seed,))?, obs)).map_err(Into::into)
+    }
+
+    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+        let result = Python::attach(|py| -> PyResult<()> {
+            let env = self.env.bind(py);
+            let actions = PyArray1::from_slice(py, actions).reshape([self.agents, self.act])?;
+            let result = env.call_method1("step", (actions,))?;
+            copy("obs", &result.get_item(0)?, out.obs)?;
+            copy("reward", &result.get_item(1)?, out.reward)?;
+            copy("terminated", &result.get_item(2)?, out.terminated)?;
+            copy("truncated", &result.get_item(3)?, out.truncated)?;
+            copy("final_obs", &env.getattr("final_obs")?, out.final_obs)?;
+            copy("reward_terms", &env.getattr("reward_terms")?, out.terms)?;
+            copy("info", &env.getattr("info")?, out.info)?;
+            copy("forward", &env.getattr("forward")?, out.forward)?;
+            copy("diverged", &env.getattr("diverged")?, out.diverged)
+        });
+        result.map_err(Into::into)
+    }
+
+    fn save(&self) -> Result<Vec<u8>, CrowdError> {
+        Python::attach(|py| -> PyResult<Vec<u8>> { self.env.bind(py).call_method0("save")?.extract() })
+            .map_err(Into::into)
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
+        Python::attach(|py| self.env.bind(py).call_method1("load", (PyBytes::new(py, bytes),)).map(|_| ()))
+            .map_err(Into::into)
+    }
+}
+
+/// Copies an array that Python returned.
+fn copy<T: Element + Copy + for<'a> FromPyObjectOwned<'a>>(
+    name: &str,
+    array: &Bound<'_, PyAny>,
+    to: &mut [T],
+) -> PyResult<()> {
+    let array: PyArrayLikeDyn<'_, T, AllowTypeChange> = array.extract()?;
+    if array.len() != to.len() {
+        let (found, expected) = (array.len(), to.len());
+        return Err(error::value(format!("{name} of the environment has {found} values, expected {expected}")));
+    }
+    match array.as_slice() {
+        Ok(slice) if array.is_c_contiguous() => to.copy_from_slice(slice),
+        _ => to.iter_mut().zip(array.as_array()).for_each(|(to, x)| *to = *x),
+    }
+    Ok(())
+}
+
+/// The blocks of a Python object with the interface of `VecEnv`.
+pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
+    let spec = env.getattr("spec")?;
+    let spec = Spec {
+        id: spec.getattr("id")?.extract()?,
+        obs: spec.getattr("obs_size")?.extract()?,
+        act: spec.getattr("act_size")?.extract()?,
+        action_names: spec.getattr("action_names")?.extract()?,
+        action_low: spec.getattr("action_low")?.extract()?,
+        action_high: spec.getattr("action_high")?.extract()?,
+        dt: spec.getattr("dt")?.extract()?,
+        frame_skip: spec.getattr("frame_skip")?.extract()?,
+        max_episode_steps: spec.getattr("max_episode_steps")?.extract()?,
+        reward_terms: spec.getattr("reward_terms")?.extract()?,
+        info: spec.getattr("info")?.extract()?,
+        options: Options::new(),
+        nq: spec.getattr("nq")?.extract()?,
+        nv: spec.getattr("nv")?.extract()?,
+    };
+    let (agents, autoreset) = (env.len()?, env.getattr("autoreset")?.extract::<String>()?);
+    if agents == 0 || !agents.is_multiple_of(marathon_envs::BLOCK) {
+        let block = marathon_envs::BLOCK;
+        return Err(error::value(format!("the environment has {agents} agents, expected a multiple of {block}")));
+    }
+    if autoreset != "same_step" {
+        return Err(error::value(format!("the environment's autoreset is '{autoreset}', expected 'same_step'")));
+    }
+    let crowd = PyCrowd { env: env.clone().unbind(), agents, act: spec.act };
+    Ok(Lockstep::new(Box::new(crowd), spec, agents))
+}
+
+/// Trains a policy for a Python object with the interface of `VecEnv` and writes it to a file.
+///
+/// `config` is the JSON of the trainer's settings; their number of agents is that of the environment. `callback` is called
+/// after every iteration with its statistics, a dictionary; if it returns False, training ends. Returns the last statistics.
+#[pyfunction]
+#[pyo3(signature = (env, config, path, callback = None))]
+pub fn learn(
+    py: Python<'_>,
+    env: &Bound<'_, PyAny>,
+    config: &str,
+    path: PathBuf,
+    callback: Option<Py<PyAny>>,
+) -> PyResult<Option<Py<PyAny>>> {
+    let config: PpoConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
+    let config = PpoConfig { agents: env.len()?, ..config };
+    let factory = lockstep(env)?;
+    let mut interrupt = None;
+    let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+        let go_on = Python::attach(|py| -> PyResult<bool> {
+            py.check_signals()?;
+            let Some(callback) = &callback else { return Ok(true) };
+            let answer = callback.bind(py).call1((dictionary(py, stats)?,))?;
+            Ok(answer.is_none() || answer.is_truthy()?)
+        });
+        match go_on {
+            Ok(true) => Control::Continue,
+            Ok(false) => Control::Stop,
+            Err(e) => {
+                interrupt = Some(e);
+                Control::Stop
+            }
+        }
+    };
+    let run = || train(&factory as &dyn ShardFactory, Isa::best(), &config, None, &mut observer);
+    let output = py.detach(AssertUnwindSafe(|| catch_unwind(AssertUnwindSafe(run))));
+    if let Some(error) = interrupt {
+        return Err(error);
+    }
+    let output = match output {
+        Ok(output) => output.map_err(|e| error::value(e.to_string()))?,
+        Err(panic) => match factory.take_error().map(|e| e.downcast::<PyErr>()) {
+            Some(Ok(error)) => return Err(*error),
+            Some(Err(error)) => return Err(error::value(error.to_string())),
+            None => resume_unwind(panic),
+        },
+    };
+    output.policy.save(&path).map_err(|e| error::value(e.to_string()))?;
+    output.last.map(|stats| dictionary(py, &stats)).transpose()
+}
+
+fn dictionary(py: Python<'_>, stats: &IterationStats) -> PyResult<Py<PyAny>> {
+    let json = serde_json::to_string(stats).map_err(|e| error::value(e.to_string()))?;
+    Ok(py.import("json")?.call_method1("loads", (json,))?.unbind())
+}

@@ -1,0 +1,256 @@
+//! A compiled model file: what is in it, by name and by index.
+
+use crate::error;
+use marathon_physics::model::{Joint, JointType};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+type Table<'py> = Bound<'py, PyArray2<f64>>;
+type Indices<'py> = Bound<'py, PyArray1<i64>>;
+
+/// A compiled MJCF model, the counterpart of MuJoCo's `MjModel`: SI units, radians, quaternions w x y z, body 0 is the
+/// world. Where the file gives no name, the name is empty.
+#[pyclass(frozen, module = "marathon_envs")]
+pub struct Model {
+    pub(crate) inner: Arc<marathon_physics::Model>,
+}
+
+#[pymethods]
+impl Model {
+    /// Reads a model file; included files and height fields are looked up beside it.
+    #[staticmethod]
+    #[pyo3(signature = (path, /))]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Self::of(py.detach(|| marathon_physics::Model::from_xml_file(path)))
+    }
+
+    /// Compiles a model given as text, which has no other files; `name` stands for the file in messages.
+    #[staticmethod]
+    #[pyo3(signature = (xml, /, name = "model"))]
+    fn parse(py: Python<'_>, xml: &str, name: &str) -> PyResult<Self> {
+        Self::of(py.detach(|| marathon_physics::Model::from_xml_str(xml, name)))
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    /// Seconds per physics step.
+    #[getter]
+    fn timestep(&self) -> f64 {
+        self.inner.opt.timestep
+    }
+
+    /// Length of `qpos`.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.inner.nq
+    }
+
+    /// Length of `qvel`.
+    #[getter]
+    fn nv(&self) -> usize {
+        self.inner.nv
+    }
+
+    /// Number of actuators.
+    #[getter]
+    fn nu(&self) -> usize {
+        self.inner.nu
+    }
+
+    #[getter]
+    fn body_names(&self) -> Vec<&str> {
+        self.inner.bodies.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn geom_names(&self) -> Vec<&str> {
+        self.inner.geoms.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn joint_names(&self) -> Vec<&str> {
+        self.inner.joints.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn actuator_names(&self) -> Vec<&str> {
+        self.inner.actuators.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn sensor_names(&self) -> Vec<&str> {
+        self.inner.sensors.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn keyframe_names(&self) -> Vec<&str> {
+        self.inner.keyframes.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    /// Index of a body.
+    fn body(&self, name: &str) -> PyResult<usize> {
+        find("body", name, self.body_names())
+    }
+
+    /// Index of a geom.
+    fn geom(&self, name: &str) -> PyResult<usize> {
+        find("geom", name, self.geom_names())
+    }
+
+    /// Index of a joint.
+    fn joint(&self, name: &str) -> PyResult<usize> {
+        find("joint", name, self.joint_names())
+    }
+
+    /// Index of an actuator.
+    fn actuator(&self, name: &str) -> PyResult<usize> {
+        find("actuator", name, self.actuator_names())
+    }
+
+    /// First value of a sensor among all sensors' values, and their number.
+    fn sensor(&self, name: &str) -> PyResult<(usize, usize)> {
+        let sensor = &self.inner.sensors[find("sensor", name, self.sensor_names())?];
+        Ok((sensor.adr, sensor.dim))
+    }
+
+    /// `qpos`, `(nq,)`, and `qvel`, `(nv,)`, of a keyframe.
+    fn keyframe<'py>(&self, py: Python<'py>, name: &str) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
+        let key = &self.inner.keyframes[find("keyframe", name, self.keyframe_names())?];
+        Ok((PyArray1::from_slice(py, &key.qpos), PyArray1::from_slice(py, &key.qvel)))
+    }
+
+    /// Reference configuration, `(nq,)`.
+    #[getter]
+    fn qpos0<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        PyArray1::from_slice(py, &self.inner.qpos0)
+    }
+
+    /// Parent of each body, `(nbody,)`.
+    #[getter]
+    fn body_parent<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.bodies.iter().map(|b| b.parent))
+    }
+
+    /// Body that each body follows rigidly: itself if it has joints; 0 if it does not move. `(nbody,)`.
+    #[getter]
+    fn body_weld<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.bodies.iter().map(|b| b.weld_id))
+    }
+
+    /// First body of each body's tree, `(nbody,)`.
+    #[getter]
+    fn body_root<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.bodies.iter().map(|b| b.root_id))
+    }
+
+    /// Orientation of each body in its parent, `(nbody, 4)`.
+    #[getter]
+    fn body_quat<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
+        table(py, self.inner.bodies.iter().map(|b| b.quat))
+    }
+
+    /// Mass of each body, kg, `(nbody,)`.
+    #[getter]
+    fn body_mass<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        PyArray1::from_iter(py, self.inner.bodies.iter().map(|b| b.mass))
+    }
+
+    /// Body of each geom, `(ngeom,)`.
+    #[getter]
+    fn geom_body<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.geoms.iter().map(|g| g.body))
+    }
+
+    /// "free", "ball", "slide" or "hinge" for each joint.
+    #[getter]
+    fn joint_type(&self) -> Vec<&'static str> {
+        let name = |joint: &Joint| match joint.kind {
+            JointType::Free => "free",
+            JointType::Ball => "ball",
+            JointType::Slide => "slide",
+            JointType::Hinge => "hinge",
+        };
+        self.inner.joints.iter().map(name).collect()
+    }
+
+    /// Body that each joint moves, `(njoint,)`.
+    #[getter]
+    fn joint_body<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.joints.iter().map(|j| j.body))
+    }
+
+    /// First coordinate of each joint in `qpos`, `(njoint,)`.
+    #[getter]
+    fn joint_qpos<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.joints.iter().map(|j| j.qpos_adr))
+    }
+
+    /// First velocity of each joint in `qvel`, `(njoint,)`.
+    #[getter]
+    fn joint_dof<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.joints.iter().map(|j| j.dof_adr))
+    }
+
+    /// Axis of each hinge or slide in its body's frame, `(njoint, 3)`.
+    #[getter]
+    fn joint_axis<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
+        table(py, self.inner.joints.iter().map(|j| j.axis))
+    }
+
+    /// Limits of each joint, rad or m, infinite where there are none, `(njoint, 2)`.
+    #[getter]
+    fn joint_range<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
+        let range = |j: &Joint| if j.limited { j.range } else { [f64::NEG_INFINITY, f64::INFINITY] };
+        table(py, self.inner.joints.iter().map(range))
+    }
+
+    /// Joint that each actuator acts on, -1 for one that acts on something else, `(nu,)`.
+    #[getter]
+    fn actuator_joint<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        PyArray1::from_iter(py, self.inner.actuators.iter().map(|a| a.joint().map_or(-1, |joint| joint as i64)))
+    }
+
+    /// Range of each actuator's control in its own units, infinite where there is none, `(nu, 2)`.
+    #[getter]
+    fn actuator_range<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
+        let unlimited = [f64::NEG_INFINITY, f64::INFINITY];
+        table(py, self.inner.actuators.iter().map(|a| if a.ctrl_limited { a.ctrl_range } else { unlimited }))
+    }
+
+    fn __repr__(&self) -> String {
+        let m = &self.inner;
+        format!("Model({:?}, nq={}, nv={}, nu={})", m.name, m.nq, m.nv, m.nu)
+    }
+}
+
+impl Model {
+    fn of(model: Result<marathon_physics::Model, marathon_physics::mjcf::MjcfError>) -> PyResult<Self> {
+        Ok(Model { inner: Arc::new(model.map_err(|e| error::value(e.to_string()))?) })
+    }
+}
+
+fn indices(py: Python<'_>, all: impl ExactSizeIterator<Item = usize>) -> Indices<'_> {
+    PyArray1::from_iter(py, all.map(|i| i as i64))
+}
+
+fn table<const N: usize>(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f64; N]>) -> PyResult<Table<'_>> {
+    let n = rows.len();
+    PyArray1::from_iter(py, rows.flatten()).reshape([n, N])
+}
+
+/// Index of a name, or an error that names the nearest.
+fn find(what: &str, name: &str, known: Vec<&str>) -> PyResult<usize> {
+    known.iter().position(|k| *k == name && !name.is_empty()).ok_or_else(|| {
+        let named: Vec<&str> = known.into_iter().filter(|k| !k.is_empty()).collect();
+        let distance = |k: &&&str| strsim::damerau_levenshtein(&name.to_lowercase(), &k.to_lowercase());
+        let nearest = named.iter().min_by_key(distance).filter(|k| distance(k) <= 2.max(k.len() / 3));
+        let hint = nearest.map(|k| format!(" did you mean '{k}'?")).unwrap_or_default();
+        error::value(format!("the model has no {what} '{name}';{hint} known: {}", named.join(", ")))
+    })
+}

@@ -1,0 +1,309 @@
+//! The bare physics of many agents as a Python object: controls in, readings out, no task.
+
+use crate::arrays::{mask, rows};
+use crate::error;
+use crate::model::Model;
+use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity};
+use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::basic::CompareOp;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::sync::Mutex;
+
+/// Agents per thread that are worth a thread.
+const AGENTS_PER_THREAD: usize = 64;
+
+/// What is read together, because it all comes from the frames of the bodies.
+const FRAMES: [Quantity; 6] = [
+    Quantity::BodyPos,
+    Quantity::BodyAxes,
+    Quantity::BodyVelocity,
+    Quantity::BodyAngularVelocity,
+    Quantity::GeomPos,
+    Quantity::GeomVelocity,
+];
+
+/// Physics of many agents of one model, stepped together by native threads without the GIL.
+///
+/// Readings are read-only float64 arrays with one row per agent, in world axes and SI units. They are computed when they
+/// are first asked for after a step or a reset, and never overwritten.
+#[pyclass(module = "marathon_envs")]
+pub struct Simulation {
+    /// Behind a lock because a Python object may be dropped on any thread; never contended.
+    batch: Mutex<Batch>,
+    model: Py<Model>,
+    num_agents: usize,
+    threads: usize,
+    /// Readings of the present state.
+    read: Vec<(Quantity, Py<PyAny>)>,
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (model, num_agents = 1, *, threads = 0, isa = None))]
+    fn new(py: Python<'_>, model: Py<Model>, num_agents: usize, threads: usize, isa: Option<&str>) -> PyResult<Self> {
+        if num_agents == 0 {
+            return Err(error::value("num_agents is 0, expected at least 1"));
+        }
+        let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?.unwrap_or_else(Isa::best);
+        if !isa.supported() {
+            let (found, best) = (isa.name(), Isa::best().name());
+            return Err(error::value(format!("this processor cannot run '{found}'; the best it has is '{best}'")));
+        }
+        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+        let threads = if threads == 0 { cores().min(num_agents.div_ceil(AGENTS_PER_THREAD)) } else { threads };
+        let options = BatchOptions { agents: num_agents, threads, isa, ..Default::default() };
+        let inner = &model.get().inner;
+        let batch = py.detach(|| Batch::new(inner, &options)).map_err(|e| error::value(e.to_string()))?;
+        Ok(Simulation { batch: Mutex::new(batch), model, num_agents, threads, read: Vec::new() })
+    }
+
+    #[getter]
+    fn model(&self, py: Python<'_>) -> Py<Model> {
+        self.model.clone_ref(py)
+    }
+
+    /// Number of agents.
+    #[getter]
+    fn num_agents(&self) -> usize {
+        self.num_agents
+    }
+
+    /// Number of threads.
+    #[getter]
+    fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// Advances every agent by `substeps` physics steps under `ctrl`, `(num_agents, nu)`.
+    ///
+    /// Returns which agents broke, `(num_agents,)`: their states stopped being finite, so they were put into the reference
+    /// configuration at rest.
+    #[pyo3(signature = (ctrl, substeps = 1))]
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        ctrl: PyArrayLike2<'_, f64, AllowTypeChange>,
+        substeps: usize,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        if substeps == 0 {
+            return Err(error::value("substeps is 0, expected at least 1"));
+        }
+        let expected = [self.num_agents, self.model.get().inner.nu];
+        if ctrl.shape() != expected {
+            return Err(error::value(format!("ctrl has the shape {:?}, expected {expected:?}", ctrl.shape())));
+        }
+        self.read.clear();
+        let (ctrl, n) = (rows(&ctrl), self.num_agents);
+        let batch = self.batch();
+        let broken = py.detach(|| batch.step(&ctrl, substeps));
+        let mut out = vec![false; n];
+        for agent in broken {
+            out[agent] = true;
+        }
+        Ok(PyArray1::from_vec(py, out))
+    }
+
+    /// Puts agents, all or those of a mask, `(num_agents,)`, into the states in the rows of `qpos`, `(num_agents, nq)`, and
+    /// `qvel`, `(num_agents, nv)`. Quaternions are normalized; controls, pushes and contacts are forgotten.
+    #[pyo3(signature = (qpos, qvel, mask = None))]
+    fn reset(
+        &mut self,
+        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
+        qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
+        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+    ) -> PyResult<()> {
+        let mask = self::mask(mask, self.num_agents)?;
+        let model = &self.model.get().inner;
+        for (name, array, columns) in [("qpos", &qpos, model.nq), ("qvel", &qvel, model.nv)] {
+            let expected = [self.num_agents, columns];
+            if array.shape() != expected {
+                return Err(error::value(format!("{name} has the shape {:?}, expected {expected:?}", array.shape())));
+            }
+        }
+        let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
+        let chosen = || (0..mask.len()).filter(|i| mask[*i]);
+        if let Some(i) = chosen().find(|i| !qpos.row(*i).iter().chain(qvel.row(*i)).all(|x| x.is_finite())) {
+            return Err(error::value(format!("the state of agent {i} is not finite")));
+        }
+        self.read.clear();
+        for i in chosen() {
+            self.batch().reset(i, &qpos.row(i).to_vec(), &qvel.row(i).to_vec());
+        }
+        Ok(())
+    }
+
+    /// Pushes a body of an agent until told otherwise or reset: force, N, and torque, N m, in world axes at the body's
+    /// center of mass.
+    #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]
+    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) -> PyResult<()> {
+        let bodies = self.model.get().inner.bodies.len();
+        for (what, found, n) in [("agent", agent, self.num_agents), ("body", body, bodies)] {
+            if found >= n {
+                return Err(error::value(format!("{what} is {found}, expected less than {n}")));
+            }
+        }
+        self.read.clear();
+        self.batch().push(agent, body, force, torque);
+        Ok(())
+    }
+
+    /// Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits.
+    fn save<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let n = self.num_agents;
+        let batch = self.batch();
+        let json = py.detach(move || {
+            let states: Vec<AgentState> = (0..n).map(|i| batch.agent_state(i)).collect();
+            serde_json::to_vec(&states)
+        });
+        Ok(PyBytes::new(py, &json.map_err(|e| error::value(e.to_string()))?))
+    }
+
+    /// Restores what [`save`](Simulation::save) returned for the same model and number of agents.
+    fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
+        let states: Vec<AgentState> =
+            serde_json::from_slice(snapshot).map_err(|e| error::value(format!("snapshot: {e}")))?;
+        if states.len() != self.num_agents {
+            let (found, expected) = (states.len(), self.num_agents);
+            return Err(error::value(format!("the snapshot has {found} agents, expected {expected}")));
+        }
+        if let Some(i) = states.iter().position(|state| !state.fits(&self.model.get().inner)) {
+            return Err(error::value(format!(
+                "the snapshot's agent {i} is not of model '{}'",
+                self.model.get().inner.name
+            )));
+        }
+        self.read.clear();
+        for (i, state) in states.iter().enumerate() {
+            self.batch().set_agent_state(i, state);
+        }
+        Ok(())
+    }
+
+    /// Configuration, `(num_agents, nq)`.
+    #[getter]
+    fn qpos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::Qpos)
+    }
+
+    /// Velocity, `(num_agents, nv)`.
+    #[getter]
+    fn qvel(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::Qvel)
+    }
+
+    /// Origins of the bodies' frames, m, `(num_agents, nbody, 3)`.
+    #[getter]
+    fn body_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::BodyPos)
+    }
+
+    /// Directions of the bodies' x, y and z axes, `(num_agents, nbody, 3, 3)`: `[..., 0, :]` is that of x.
+    #[getter]
+    fn body_axes(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::BodyAxes)
+    }
+
+    /// Velocities of the origins of the bodies' frames, m/s, `(num_agents, nbody, 3)`.
+    #[getter]
+    fn body_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::BodyVelocity)
+    }
+
+    /// Angular velocities of the bodies, rad/s, `(num_agents, nbody, 3)`.
+    #[getter]
+    fn body_angular_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::BodyAngularVelocity)
+    }
+
+    /// Centers of the geoms, m, `(num_agents, ngeom, 3)`.
+    #[getter]
+    fn geom_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::GeomPos)
+    }
+
+    /// Velocities of the geoms' centers, m/s, `(num_agents, ngeom, 3)`.
+    #[getter]
+    fn geom_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::GeomVelocity)
+    }
+
+    /// Geoms that touched the static world at the last physics step, `(num_agents, ngeom)`, bool.
+    #[getter]
+    fn touching(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::Touching)
+    }
+
+    /// Geoms that touched the static world at any physics step of the last `step`, `(num_agents, ngeom)`, bool.
+    #[getter]
+    fn touched(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::Touched)
+    }
+
+    /// Normal forces of the geoms' contacts with the static world at the last physics step, N, `(num_agents, ngeom)`.
+    #[getter]
+    fn normal_force(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::NormalForce)
+    }
+
+    /// Sensors' values at the present state and controls, in the model's order, `(num_agents, ...)`; NaN for those that
+    /// cannot be evaluated. This costs about as much as a physics step.
+    #[getter]
+    fn sensors(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.reading(py, Quantity::Sensors)
+    }
+
+    fn __len__(&self) -> usize {
+        self.num_agents
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Simulation({:?}, num_agents={})", self.model.get().inner.name, self.num_agents)
+    }
+}
+
+impl Simulation {
+    fn batch(&mut self) -> &mut Batch {
+        self.batch.get_mut().expect("no thread panics with the lock")
+    }
+
+    /// A reading of the present state, computed if it has not been yet.
+    fn reading(&mut self, py: Python<'_>, quantity: Quantity) -> PyResult<Py<PyAny>> {
+        if let Some((_, array)) = self.read.iter().find(|(q, _)| *q == quantity) {
+            return Ok(array.clone_ref(py));
+        }
+        let wanted = if FRAMES.contains(&quantity) { &FRAMES[..] } else { std::slice::from_ref(&quantity) };
+        let arrays: Vec<_> = wanted.iter().map(|q| PyArrayDyn::<f64>::zeros(py, self.shape(*q), false)).collect();
+        let mut writers = Vec::new();
+        for array in &arrays {
+            writers.push(array.try_readwrite().map_err(|e| error::array("readings", e))?);
+        }
+        let mut parts = Vec::new();
+        for (quantity, writer) in wanted.iter().zip(&mut writers) {
+            parts.push((*quantity, writer.as_slice_mut()?));
+        }
+        let batch = self.batch();
+        py.detach(|| batch.gather(&mut parts));
+        drop(parts);
+        drop(writers);
+        for (quantity, array) in wanted.iter().zip(arrays) {
+            let flag = matches!(quantity, Quantity::Touching | Quantity::Touched);
+            let array = if flag { array.rich_compare(0.0, CompareOp::Ne)? } else { array.into_any() };
+            array.call_method1("setflags", (false,))?;
+            self.read.push((*quantity, array.unbind()));
+        }
+        self.reading(py, quantity)
+    }
+
+    fn shape(&self, quantity: Quantity) -> Vec<usize> {
+        let model = &self.model.get().inner;
+        let (n, bodies, geoms) = (self.num_agents, model.bodies.len(), model.geoms.len());
+        match quantity {
+            Quantity::BodyPos | Quantity::BodyVelocity | Quantity::BodyAngularVelocity => vec![n, bodies, 3],
+            Quantity::BodyAxes => vec![n, bodies, 3, 3],
+            Quantity::GeomPos | Quantity::GeomVelocity => vec![n, geoms, 3],
+            flat => vec![n, flat.width(model)],
+        }
+    }
+}

@@ -1,0 +1,347 @@
+"""Episodes of agents written in Python, with the interface of the native `VecEnv`."""
+
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from marathon_envs._arrays import BoolArray, FloatArray, Streams
+from marathon_envs.agents import MarathonAgent
+
+LARGEST = 1e6
+"""A coordinate, velocity, observation or reward beyond this is a broken simulation, though it may still be finite."""
+TERMINATION_TERM = "termination"
+"""Name of the reward term that replaces all others when an agent fails."""
+_AUTORESET = {"nextstep": "next_step", "samestep": "same_step", "disabled": "disabled"}
+_SAVED = ("memory", "seeds", "numbers", "episodes", "steps", "pending")
+
+
+@dataclass(frozen=True)
+class AgentSpec:
+    """Constant facts of a task, those of the native `Spec`."""
+
+    id: str
+    summary: str
+    obs_size: int
+    act_size: int
+    action_names: list[str]
+    action_low: list[float]
+    action_high: list[float]
+    dt: float
+    frame_skip: int
+    max_episode_steps: int
+    reward_terms: list[str]
+    info: list[str]
+    nq: int
+    nv: int
+
+
+class AgentVecEnv:
+    """Many agents of a `MarathonAgent` class, stepped together, with the interface of the native `VecEnv`.
+
+    Physics runs on native threads without the GIL; the agents' own functions run once per step for all of them. Every
+    step returns new arrays. The life of an agent depends on its seed and its number alone.
+    """
+
+    copy = True
+
+    def __init__(
+        self,
+        agent: type[MarathonAgent],
+        num_envs: int = 1,
+        *,
+        seed: int = 0,
+        threads: int = 0,
+        isa: Any = None,
+        autoreset: str = "same_step",
+        max_episode_steps: int | None = None,
+        copy: bool = True,
+        **options: Any,
+    ) -> None:
+        """Make an environment with the arguments of `VecEnv`; the options are those of the agent's own constructor.
+
+        Arrays are new at every step, whatever `copy` says.
+        """
+        mode = _AUTORESET.get(autoreset.replace("_", "").lower())
+        if mode is None:
+            raise ValueError(f"autoreset is '{autoreset}', expected one of 'next_step', 'same_step', 'disabled'")
+        limit = agent.max_episode_steps if max_episode_steps is None else max_episode_steps
+        for name, number in (("max_episode_steps", limit), ("frame_skip", agent.frame_skip), ("num_envs", num_envs)):
+            if number < 1:
+                raise ValueError(f"{name} is {number}, expected at least 1")
+        self.autoreset = mode
+        self.num_envs = num_envs
+        self.agent = agent(num_envs, threads=threads, isa=isa, **options)
+        self.threads = self.agent.sim.threads
+        self._id = agent.task_id()
+        self._terms: list[str] | None = None
+        self.memory = self.agent.memory
+        self.seeds = np.full(num_envs, seed, np.uint64)
+        self.numbers = np.arange(num_envs, dtype=np.uint64)
+        self.episodes = np.zeros(num_envs, np.uint64)
+        self.steps = np.zeros(num_envs, np.int64)
+        self.pending = np.zeros(num_envs, np.bool_)
+        self._ready = False
+        self._rehearse()
+        model = self.agent.model
+        self._clip = agent.controls == "nominal"
+        bounds = np.tile([-1.0, 1.0], (model.nu, 1)) if self._clip else model.actuator_range
+        self.spec = AgentSpec(
+            id=self._id,
+            summary=agent.summary(),
+            obs_size=self._obs_size,
+            act_size=model.nu,
+            action_names=model.actuator_names,
+            action_low=bounds[:, 0].tolist(),
+            action_high=bounds[:, 1].tolist(),
+            dt=model.timestep * agent.frame_skip,
+            frame_skip=agent.frame_skip,
+            max_episode_steps=limit,
+            reward_terms=self._rewarded + [TERMINATION_TERM] * (agent.termination_reward is not None),
+            info=self._reported,
+            nq=model.nq,
+            nv=model.nv,
+        )
+        n = num_envs
+        self.obs: npt.NDArray[np.float32] = np.zeros((n, self._obs_size), np.float32)
+        self.final_obs = self.obs
+        self.reward_terms: npt.NDArray[np.float32] = np.zeros((n, len(self.spec.reward_terms)), np.float32)
+        self.info: npt.NDArray[np.float32] = np.zeros((n, len(self._reported)), np.float32)
+        self.forward: npt.NDArray[np.float32] = np.zeros(n, np.float32)
+        self.diverged: BoolArray = np.zeros(n, np.bool_)
+
+    def _rehearse(self) -> None:
+        """Let the agents observe and reward once in the spawn pose, to find out how much they do."""
+        agent, n = self.agent, self.num_envs
+        if agent.model.nu == 0:
+            raise ValueError(f"{self._id}: its model has no actuators, expected at least 1")
+        self._put(np.tile(agent.spawn_qpos, (n, 1)), np.tile(agent.spawn_qvel, (n, 1)), np.ones(n, np.bool_))
+        self._obs_size = 0
+        self._obs_size = self._observe().shape[1]
+        if self._obs_size == 0:
+            raise ValueError(f"{self._id}: its observations are empty, expected at least 1 number")
+        self._rewarded, self._reported = list(agent.step_reward()), list(agent.info())
+        if not self._rewarded:
+            raise ValueError(f"{self._id}: its reward has no terms, expected at least 1")
+        self._numbers("reward", agent.step_reward(), self._rewarded)
+        self._numbers("info", agent.info(), self._reported)
+        self._failed()
+
+    # ---------------------------------------------------------------------------------- what the agents say, checked
+
+    def _observe(self) -> FloatArray:
+        """Observations, `(N, obs_size)`."""
+        said = self.agent.observations()
+        n = self.num_envs
+        parts = [said] if isinstance(said, np.ndarray) else list(said)
+        for part in parts:
+            if np.ndim(part) not in (1, 2) or len(part) != n:
+                found = np.shape(part)
+                raise ValueError(f"{self._id}: observations have the shape {found}, expected ({n},) or ({n}, k)")
+        obs: FloatArray = np.concatenate([np.reshape(part, (n, -1)) for part in parts], axis=1)
+        if self._obs_size and obs.shape[1] != self._obs_size:
+            raise ValueError(f"{self._id}: it observes {obs.shape[1]} numbers, but {self._obs_size} at first")
+        return obs
+
+    def _numbers(self, what: str, said: Mapping[str, FloatArray], names: list[str]) -> FloatArray:
+        """Named numbers side by side, `(N, names)`."""
+        if list(said) != names:
+            raise ValueError(f"{self._id}: its {what} has the names {list(said)}, but {names} at first")
+        n = self.num_envs
+        for name, numbers in said.items():
+            if np.shape(numbers) != (n,):
+                raise ValueError(f"{self._id}: {what} '{name}' has the shape {np.shape(numbers)}, expected ({n},)")
+        return np.stack(list(said.values()), axis=1) if said else np.zeros((n, 0))
+
+    def _failed(self) -> BoolArray:
+        """Agents that have failed, `(N,)`."""
+        failed = np.asarray(self.agent.terminate())
+        if failed.shape != (self.num_envs,) or failed.dtype != np.bool_:
+            found = f"{failed.dtype} {failed.shape}"
+            raise ValueError(f"{self._id}: terminate returns {found}, expected bool ({self.num_envs},)")
+        return failed
+
+    # ------------------------------------------------------------------------------------------------------- episodes
+
+    def _put(self, qpos: FloatArray, qvel: FloatArray, mask: BoolArray) -> None:
+        """Put agents into states, where their episodes begin."""
+        self.agent.sim.reset(qpos, qvel, mask)
+        self.agent.action[mask] = 0.0
+        self.memory[mask] = 0.0
+        self.steps[mask] = 0
+        self.pending &= ~mask
+
+    def _begin(self, mask: BoolArray) -> None:
+        """Begin new episodes of the agents in a mask."""
+        if not mask.any():
+            return
+        self.episodes[mask] += np.uint64(1)
+        random = Streams(self.seeds[mask], self.numbers[mask], self.episodes[mask])
+        starts = self.agent.agent_reset(random)
+        model, n = self.agent.model, len(random)
+        states = []
+        for name, start, columns in zip(("qpos", "qvel"), starts, (model.nq, model.nv), strict=True):
+            if np.shape(start) != (n, columns):
+                found = np.shape(start)
+                raise ValueError(f"{self._id}: agent_reset returns {name} of shape {found}, expected ({n}, {columns})")
+            state = np.zeros((self.num_envs, columns))
+            state[mask] = start
+            states.append(state)
+        self._put(states[0], states[1], mask)
+
+    def _show(self, mask: BoolArray) -> npt.NDArray[np.float32]:
+        """Observe those in a mask, whose episodes have just begun; the rows of others stay."""
+        obs = self._observe()
+        sound = (np.abs(obs) < LARGEST).all(1, keepdims=True)
+        shown = np.where(sound, obs, 0.0).astype(np.float32)
+        self.obs = shown if mask.all() else np.where(mask[:, None], shown, self.obs)
+        self._ready = True
+        return self.obs
+
+    def reset(
+        self, seed: int | Sequence[int | None] | None = None, mask: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Start new episodes and return the observations; seeds and mask as in `VecEnv.reset`."""
+        chosen = self._mask(mask)
+        if not self._ready and not chosen.all():
+            raise ValueError("the first reset must be of all agents; mask has some that are False")
+        if seed is not None:
+            if isinstance(seed, (int, np.integer)):
+                seeds: Sequence[int | None] = [int(seed)] * self.num_envs
+                numbers = np.arange(self.num_envs, dtype=np.uint64)
+            else:
+                seeds, numbers = seed, np.zeros(self.num_envs, np.uint64)
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"seed has {len(seeds)} numbers, expected {self.num_envs}")
+            given = chosen & np.array([one is not None for one in seeds])
+            self.seeds[given] = np.array([one or 0 for one in seeds], np.uint64)[given]
+            self.numbers[given] = numbers[given]
+            self.episodes[given] = 0
+        self._begin(chosen)
+        return self._show(chosen)
+
+    def step(
+        self, actions: npt.ArrayLike
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], BoolArray, BoolArray]:
+        """Advance every agent by one decision, as `VecEnv.step`."""
+        if not self._ready:
+            raise ValueError("reset must be called before the first step")
+        agent, given = self.agent, np.asarray(actions, np.float32)
+        expected = (self.num_envs, self.spec.act_size)
+        if given.shape != expected:
+            raise ValueError(f"actions have the shape {given.shape}, expected {expected}")
+        finite = np.isfinite(given)
+        agent.action[:] = np.where(finite, np.clip(given, -1.0, 1.0) if self._clip else given, 0.0)
+        before, begun = agent.x_position(), self.pending.copy()
+        broken = agent.sim.step(agent.action, agent.frame_skip)
+        agent.remember()
+        obs, failed = self._observe(), self._failed()
+        terms = self._numbers("reward", agent.step_reward(), self._rewarded)
+        reported = self._numbers("info", agent.info(), self._reported)
+
+        # quarantine: nothing that is not a sane number leaves its row
+        sound = ~broken & finite.all(1)
+        for values in (agent.sim.qpos, agent.sim.qvel, obs, terms, reported):
+            sound &= (np.abs(values) < LARGEST).all(1)
+        self.steps += 1
+        terminated = (failed | ~sound) & ~begun
+        truncated = (self.steps >= self.spec.max_episode_steps) & ~terminated & ~begun
+        self.diverged = ~sound & ~begun
+        after = agent.x_position()
+        moved = np.zeros(self.num_envs) if before is None or after is None else after - before
+        self.forward = np.where(sound & ~begun, moved, 0.0).astype(np.float32)
+
+        price = agent.termination_reward
+        counted = sound & ~begun
+        shares = np.zeros_like(self.reward_terms)
+        if price is None:
+            shares[:] = np.where(counted[:, None], terms, 0.0)
+        else:
+            # a failure costs its own price in place of everything else
+            shares[:, :-1] = np.where((counted & ~failed)[:, None], terms, 0.0)
+            shares[:, -1] = np.where(counted & failed, price, 0.0)
+        self.reward_terms = shares
+        self.info = np.where(counted[:, None], reported, 0.0).astype(np.float32)
+        reward = shares.sum(1)
+        self.final_obs = self.obs = np.where(sound[:, None], obs, 0.0).astype(np.float32)
+
+        ended = terminated | truncated
+        if self.autoreset == "next_step":
+            self.pending = ended
+        elif self.autoreset == "disabled" and self.diverged.any():
+            # a broken state is put away at once
+            n = self.num_envs
+            steps = self.steps.copy()
+            self._put(np.tile(agent.spawn_qpos, (n, 1)), np.zeros((n, agent.model.nv)), self.diverged)
+            self.steps = steps
+        due = ended if self.autoreset == "same_step" else begun
+        if due.any():
+            self._begin(due)
+            self._show(due)
+            if self.autoreset == "next_step":
+                self.final_obs = self.obs
+        return self.obs, reward, terminated, truncated
+
+    def read_info(self) -> npt.NDArray[np.float32]:
+        """What the agents report about their present states, `(N, len(spec.info))`."""
+        return self._numbers("info", self.agent.info(), self._reported).astype(np.float32)
+
+    @property
+    def x_position(self) -> npt.NDArray[np.float64] | None:
+        """Position of each agent's root along x, m, `(N,)`; None if it cannot move along x."""
+        return self.agent.x_position()
+
+    def get_state(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """State of every agent, as `VecEnv.get_state`."""
+        return self.agent.sim.qpos.copy(), self.agent.sim.qvel.copy()
+
+    def set_state(
+        self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Put agents into states where their episodes begin, as `VecEnv.set_state`."""
+        chosen = self._mask(mask)
+        self._put(np.asarray(qpos, float), np.asarray(qvel, float), chosen)
+        return self._show(chosen)
+
+    def _mask(self, mask: npt.ArrayLike | None) -> BoolArray:
+        chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask, np.bool_)
+        if chosen.shape != (self.num_envs,):
+            raise ValueError(f"mask has the shape {chosen.shape}, expected ({self.num_envs},)")
+        return chosen
+
+    def save(self) -> bytes:
+        """Everything that the future depends on: NumPy's `.npz`, without pickles."""
+        file = io.BytesIO()
+        simulation = np.frombuffer(self.agent.sim.save(), np.uint8)
+        np.savez(file, simulation=simulation, **{name: getattr(self, name) for name in _SAVED})
+        return file.getvalue()
+
+    def load(self, snapshot: bytes) -> None:
+        """Restore what `save` returned for the same task and number of agents."""
+        if not zipfile.is_zipfile(io.BytesIO(snapshot)):
+            raise ValueError(f"snapshot: it is not one of {self._id}")
+        try:
+            with np.load(io.BytesIO(snapshot), allow_pickle=False) as file:
+                saved = {name: file[name] for name in ("simulation", *_SAVED)}
+        except (KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise ValueError(f"snapshot: it is not one of {self._id}: {error}") from None
+        for name in _SAVED:
+            present = getattr(self, name)
+            if saved[name].shape != present.shape or saved[name].dtype != present.dtype:
+                found, expected = saved[name].shape, present.shape
+                raise ValueError(f"snapshot: {name} has the shape {found}, expected {expected}")
+        self.agent.sim.load(saved["simulation"].tobytes())
+        for name in _SAVED:
+            getattr(self, name)[...] = saved[name]
+        self._ready = True
+
+    def __len__(self) -> int:
+        """Return the number of agents."""
+        return self.num_envs
+
+    def __repr__(self) -> str:
+        return f"AgentVecEnv({self._id!r}, num_envs={self.num_envs}, autoreset={self.autoreset!r})"
