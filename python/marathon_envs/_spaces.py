@@ -8,6 +8,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from marathon_envs._native import Spec
+from marathon_envs.agent_env import AgentSpec
 
 FloatArray = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]
@@ -19,24 +20,24 @@ LARGEST = 1e6
 NEVER = 2**63 - 1
 
 
-def is_gymnasiums(spec: Spec) -> bool:
+def is_gymnasiums(spec: Spec | AgentSpec) -> bool:
     """Whether Gymnasium has a task of the same name: then spaces are as there."""
-    return spec.id in gymnasium.registry
+    return isinstance(spec, Spec) and spec.id in gymnasium.registry
 
 
-def observation_space(spec: Spec) -> spaces.Box:
+def observation_space(spec: Spec | AgentSpec) -> spaces.Box:
     """Single observations, `(obs_size,)`."""
     if is_gymnasiums(spec):
         return spaces.Box(-np.inf, np.inf, (spec.obs_size,), np.float64)
     return spaces.Box(-LARGEST, LARGEST, (spec.obs_size,), np.float32)
 
 
-def action_space(spec: Spec) -> spaces.Box:
+def action_space(spec: Spec | AgentSpec) -> spaces.Box:
     """Single actions, `(act_size,)`."""
     return spaces.Box(np.array(spec.action_low, np.float32), np.array(spec.action_high, np.float32))
 
 
-def info_names(spec: Spec) -> tuple[list[str], bool]:
+def info_names(spec: Spec | AgentSpec) -> tuple[list[str], bool]:
     """Names of the numbers that the task reports, and whether the position and velocity along x are to be added."""
     return spec.info, "x_position" not in spec.info
 

@@ -38,6 +38,8 @@ class AgentSpec:
     info: list[str]
     nq: int
     nv: int
+    options: dict[str, Any]
+    """Arguments of the agent's constructor that were given."""
 
 
 class AgentVecEnv:
@@ -105,6 +107,7 @@ class AgentVecEnv:
             info=self._reported,
             nq=model.nq,
             nv=model.nv,
+            options=options,
         )
         n = num_envs
         self.obs: npt.NDArray[np.float32] = np.zeros((n, self._obs_size), np.float32)
