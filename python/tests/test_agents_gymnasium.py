@@ -42,9 +42,14 @@ class Arm(MarathonAgent):
 
 
 def test_the_checkers_pass() -> None:
+    # Gymnasium's warns of an environment that it did not make itself
+    gymnasium.register("Checked-v0", entry_point="marathon_envs.env:MarathonEnv", kwargs={"task": Arm})
+    check_env(gymnasium.make("Checked-v0", render_mode="rgb_array", width=64, height=48).unwrapped)
+    del gymnasium.registry["Checked-v0"]
     env = Arm.make(render_mode="rgb_array", width=64, height=48)
-    check_env(env)
     check_env_sb3(env)
+    picture = env.render()
+    assert picture is not None and picture.shape == (48, 64, 3) and picture.std() > 0
     obs, info = env.reset(seed=3)
     assert obs in env.observation_space and "angle" in info
     _, reward, _, _, info = env.step(np.array([1.0]))
