@@ -7,10 +7,11 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  for requirements in tests/oracle python/tests; do
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement $requirements/requirements.txt
-  done
+  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement)
+  "${pip[@]}" tests/oracle/requirements.txt
+  # before what depends on it and would bring the version for GPUs
   .venv/bin/python tests/oracle/install_torch.py
+  "${pip[@]}" python/tests/requirements.txt
   .venv/bin/python tests/oracle/foreign_models.py --install
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
