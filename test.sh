@@ -7,11 +7,10 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --requirement)
-  "${pip[@]}" tests/oracle/requirements.txt
-  # before what depends on it and would bring the version for GPUs
+  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
+  "${pip[@]}" --requirement tests/oracle/requirements.txt --requirement python/tests/requirements.txt
   .venv/bin/python tests/oracle/install_torch.py
-  "${pip[@]}" python/tests/requirements.txt
+  "${pip[@]}" --no-deps --requirement python/tests/requirements-no-deps.txt
   .venv/bin/python tests/oracle/foreign_models.py --install
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the wheel, installs it into a clean environment as a user would, and tests it. Part of ./test.sh; the Python of
-# MARATHON_PYTHON (or .venv) needs python/tests/requirements.txt. Arguments go to pytest.
+# MARATHON_PYTHON (or .venv) needs python/tests/requirements*.txt. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python="${MARATHON_PYTHON:-$PWD/.venv/bin/python}"
