@@ -356,6 +356,9 @@ fn every_agent_has_a_valid_default() {
     }
     assert_eq!(default_for("walker").ppo, default_for("Walker2d-v0").ppo);
     assert_ne!(default_for("hopper").ppo, default_for("humanoid").ppo);
+    // Gymnasium's tasks have settings of their own
+    assert_ne!(default_for("hopper").ppo, default_for("Hopper-v5").ppo);
+    assert_eq!((default_for("Walker2d-v5").ppo.gamma, default_for("Ant-v5").ppo.total_steps), (0.99, 10_000_000));
     // an agent of somebody else's
     assert_eq!(default_for("MyRobot-v3"), Loaded::default());
 }

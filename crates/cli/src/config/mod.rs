@@ -23,12 +23,20 @@ pub use error::ConfigError;
 use marathon_learn::PpoConfig;
 use std::path::Path;
 
-/// The configurations that come with the agents, by the agent's id without its version.
-const FAST: [(&str, &str); 4] = [
-    ("Hopper", include_str!("../../../../assets/configs/hopper-fast.yaml")),
-    ("Walker2d", include_str!("../../../../assets/configs/walker2d-fast.yaml")),
-    ("Humanoid", include_str!("../../../../assets/configs/humanoid-fast.yaml")),
-    ("Ant", include_str!("../../../../assets/configs/ant-fast.yaml")),
+/// For Gymnasium's own tasks.
+const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../../assets/configs/gymnasium-fast.yaml"));
+
+/// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
+const FAST: [(&str, (&str, &str)); 9] = [
+    ("Hopper-v5", GYMNASIUM),
+    ("Walker2d-v5", GYMNASIUM),
+    ("HalfCheetah-v5", GYMNASIUM),
+    ("Ant-v5", GYMNASIUM),
+    ("Humanoid-v5", GYMNASIUM),
+    ("Hopper", ("hopper-fast.yaml", include_str!("../../../../assets/configs/hopper-fast.yaml"))),
+    ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../../assets/configs/walker2d-fast.yaml"))),
+    ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../../assets/configs/humanoid-fast.yaml"))),
+    ("Ant", ("ant-fast.yaml", include_str!("../../../../assets/configs/ant-fast.yaml"))),
 ];
 
 /// What a file says about the training of an agent.
@@ -89,11 +97,11 @@ pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigErr
 /// If a configuration that is part of the program is wrong, which a test rules out.
 pub fn default_for(agent: &str) -> Loaded {
     let id = names::id(agent);
-    let base = names::base(&id);
-    match FAST.iter().find(|(name, _)| name.eq_ignore_ascii_case(base)) {
-        Some((name, text)) => {
-            let path = format!("{}-fast.yaml", name.to_lowercase());
-            parse(path.as_ref(), text.as_bytes(), &id).expect("the program's own configurations are right")
+    let names = [id.as_str(), names::base(&id)];
+    let found = names.iter().find_map(|name| FAST.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)));
+    match found {
+        Some((_, (file, text))) => {
+            parse(file.as_ref(), text.as_bytes(), &id).expect("the program's own configurations are right")
         }
         None => Loaded::default(),
     }
