@@ -213,18 +213,6 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._x = self._env.x_position if self._add_x else None
         return self._observed(obs)
 
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Value or result of an attribute, for each agent: as Gymnasium's other vector environments have it."""
-        value = getattr(self, name)
-        value = value(*args, **kwargs) if callable(value) else value
-        if isinstance(value, tuple) and len(value) == self.num_envs:
-            return value
-        return (value,) * self.num_envs
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Value of an attribute, for each agent."""
-        return self.call(name)
-
     def render(self) -> tuple[FloatArray, ...] | None:
         """Draw every agent by itself: `(height, width, 3)`, uint8, for each; None without a render mode."""
         if self.render_mode is None:
