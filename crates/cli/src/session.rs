@@ -3,8 +3,7 @@
 pub use crate::args::TrainArgs;
 pub use crate::config::Loaded;
 pub use crate::error::CliError;
-pub use crate::folder::{RunFile, RunFolder};
-pub use crate::policy_file::{load as load_policy, save as save_policy};
+pub use crate::folder::{RunFile, RunFolder, policy_path};
 pub use crate::report::Watch;
 pub use crate::report::csv::columns as metrics;
 pub use crate::report::summary::Summary;

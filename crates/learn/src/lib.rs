@@ -62,7 +62,6 @@ pub mod mlp;
 mod noise;
 mod normalize;
 mod observer;
-mod onnx;
 mod policy;
 mod ppo;
 mod rollout;

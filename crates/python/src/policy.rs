@@ -1,7 +1,6 @@
 //! Policies as functions of NumPy arrays.
 
 use crate::error;
-use marathon_cli::session;
 use marathon_envs::registry;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
@@ -70,9 +69,9 @@ impl Policy {
         PyArray1::from_vec(py, action).reshape(shape)
     }
 
-    /// Writes the policy to a file: `.safetensors`, or `.onnx` by the contract of ML-Agents' models.
+    /// Writes the policy to a file, `.safetensors`.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        session::save_policy(&self.0, &path).map_err(error::cli)
+        self.0.save(&path).map_err(error::learn)
     }
 
     fn __repr__(&self) -> String {
@@ -81,12 +80,11 @@ impl Policy {
     }
 }
 
-/// Reads a policy from a file, `.safetensors` or `.onnx`, or from the folder of a run. `task` is needed for ONNX files that
-/// another program has written: multi-layer perceptrons from observations to actions.
+/// Reads a policy from a file, or from the folder of a run.
 #[pyfunction]
-#[pyo3(signature = (path, task = None))]
-pub fn load_policy(path: PathBuf, task: Option<&str>) -> PyResult<Policy> {
-    Ok(Policy(session::load_policy(&path, task).map_err(error::cli)?.0))
+pub fn load_policy(path: PathBuf) -> PyResult<Policy> {
+    let path = marathon_cli::session::policy_path(&path).map_err(error::cli)?;
+    Ok(Policy(marathon_learn::Policy::load(&path).map_err(error::learn)?))
 }
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,
