@@ -121,6 +121,16 @@ pub trait Real:
     fn exp2_int(self) -> Self;
     /// `(m, e)` with `self = m * 2^e`, `1 <= m < 2`, for positive normal numbers.
     fn split_exponent(self) -> (Self, Self);
+    /// The number of lane `from[i]` in lane `i`, for `from` within `LANES`. For work that is spread over the lanes
+    /// regardless of whose it is; the numbers of an agent still meet no others.
+    #[inline(always)]
+    fn rearrange(self, from: &[i32; MAX_LANES]) -> Self {
+        let mut out = self;
+        for i in 0..Self::LANES {
+            out.set(i, self.get(from[i] as usize));
+        }
+        out
+    }
     /// Sum over the lanes in the order of a halving tree: `x[i] + x[i + L/2]`, and so on.
     fn reduce_add(self) -> Self::Scalar;
 

@@ -117,6 +117,38 @@ fn functions_are_accurate() {
 }
 
 #[test]
+fn rearranging_moves_every_lane() {
+    struct Turn<T>(std::marker::PhantomData<T>);
+    impl<T: Real<Scalar = f32>> Kernel<T> for Turn<T> {
+        type Output = ();
+        #[inline(always)]
+        fn run(self) {
+            let (mut numbers, mut from) = ([0.0; MAX_LANES], [0; MAX_LANES]);
+            for i in 0..T::LANES {
+                numbers[i] = 10.0 + i as f32;
+                from[i] = ((5 * i + 3) % T::LANES) as i32;
+            }
+            let turned = T::load(&numbers[..T::LANES]).rearrange(&from);
+            for i in 0..T::LANES {
+                assert_eq!(turned.get(i), numbers[from[i] as usize], "{}, lane {i}", T::ISA);
+            }
+        }
+    }
+    fn turn<T: Real<Scalar = f32>>() {
+        if T::supported() {
+            T::enter(Turn::<T>(std::marker::PhantomData));
+        }
+    }
+    turn::<f32>();
+    turn::<F32x4>();
+    #[cfg(target_arch = "x86_64")]
+    {
+        turn::<F32x8>();
+        turn::<F32x16>();
+    }
+}
+
+#[test]
 fn sums_do_not_depend_on_width() {
     let (x, _) = arguments();
     let x = &x[16..32];

@@ -1,6 +1,6 @@
 //! Sixteen lanes on AVX-512F, eight on AVX2 with FMA.
 
-use super::{Kernel, Real, assign_ops};
+use super::{Kernel, MAX_LANES, Real, assign_ops};
 use std::arch::x86_64::*;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -174,6 +174,10 @@ x86_backend!(F32x16, __m512, 16, __mmask16, "avx512", "avx512f,avx512vl,fma,avx2
         }
     }
     #[inline(always)]
+    fn rearrange(self, from: &[i32; MAX_LANES]) -> Self {
+        unsafe { F32x16(_mm512_permutexvar_ps(_mm512_loadu_epi32(from.as_ptr()), self.0)) }
+    }
+    #[inline(always)]
     fn reduce_add(self) -> f32 {
         unsafe {
             let x = _mm512_castps_pd(self.0);
@@ -268,6 +272,10 @@ x86_backend!(F32x8, __m256, 8, Mask8, "avx2", "avx2,fma", ["avx2", "fma"],
             let m = _mm256_or_si256(_mm256_and_si256(bits, _mm256_set1_epi32(0x7f_ffff)), _mm256_set1_epi32(0x3f80_0000));
             (F32x8(_mm256_castsi256_ps(m)), F32x8(_mm256_cvtepi32_ps(e)))
         }
+    }
+    #[inline(always)]
+    fn rearrange(self, from: &[i32; MAX_LANES]) -> Self {
+        unsafe { F32x8(_mm256_permutevar8x32_ps(self.0, _mm256_loadu_si256(from.as_ptr().cast()))) }
     }
     #[inline(always)]
     fn reduce_add(self) -> f32 {

@@ -1,10 +1,10 @@
 //! A height field and a sphere or capsule.
 //!
-//! All lanes look at the faces of their prisms at once, each at those of its own window on the grid. That tells most
-//! of them apart: too far away, or an end of the capsule over the top face. What is left (edges, and segments that have
-//! sunk in) needs branches and goes prism by prism.
+//! The cells that the lanes have to look at are dealt out over all lanes, and the faces of their prisms are looked at in
+//! all at once. That tells most of them apart: too far away, or an end of the capsule over the top face. What is left
+//! (edges, and segments that have sunk in) needs branches and goes prism by prism.
 
-use super::height::{Step, Terrain};
+use super::height::{Cells, Terrain};
 use super::prism::{Gap, Prism, gap};
 use super::*;
 use crate::lanes::MAX_LANES;
@@ -72,33 +72,40 @@ pub(crate) fn field_capsule<T: Real>(
     let across = [-arm[1] * inv, arm[0] * inv];
 
     gaps.clear();
-    let window = a.window(&center, &extent, near);
-    let mut step = Step::default();
-    loop {
-        let in_row = window.has_row(step);
-        if !T::any(in_row) {
-            break;
-        }
-        loop {
-            let on = T::and(in_row, window.has_col(step));
-            if !T::any(on) {
-                break;
+    let mut window = a.window(&center, &extent, near);
+    let mut cells = Cells::new();
+    while a.next_cells(&mut window, &mut cells) {
+        let owner = &cells.owner;
+        let arm = rearrange3(&arm, owner);
+        let across = [across[0].rearrange(owner), across[1].rearrange(owner)];
+        let (reach, lowest) = (reach.rearrange(owner), -extent[2].rearrange(owner));
+        let prisms = a.prisms(&cells, &rearrange3(&center, owner));
+        let glances = [prisms[0].glance(&arm, reach), prisms[1].glance(&arm, reach)];
+        let (mut over, mut unclear) = ([0; 2], [0; 2]);
+        for (k, prism) in prisms.iter().enumerate() {
+            let glance = &glances[k];
+            let on = T::and(cells.on(), T::not(prism.highest().lt(lowest)));
+            over[k] = T::bits(T::and(on, glance.over));
+            let left = T::and(on, glance.unclear);
+            if T::any(left) {
+                unclear[k] = T::bits(T::and(left, T::not(is_beside(prism, &across, reach))));
             }
-            for prism in a.cell(&window, step, &center, on) {
-                let on = T::and(on, T::not(prism.highest().lt(-extent[2])));
-                if !T::any(on) {
-                    continue;
-                }
-                let glance = prism.glance(&arm, reach, on);
-                let mut unclear = T::bits(glance.unclear);
-                if unclear != 0 {
-                    unclear &= !T::bits(is_beside(&prism, &across, reach));
-                }
-                collect(&prism, &arm, reach, &glance.gap, [T::bits(glance.over), unclear], gaps);
-            }
-            step.col += 1;
         }
-        step = Step { col: 0, row: step.row + 1 };
+        let mut left = over[0] | over[1] | unclear[0] | unclear[1];
+        while left != 0 {
+            let at = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let lane = owner[at] as usize;
+            for (k, prism) in prisms.iter().enumerate() {
+                if over[k] >> at & 1 == 1 {
+                    gaps.push(lane, glances[k].gap.lane(at));
+                } else if unclear[k] >> at & 1 == 1
+                    && let Some(gap) = gap(&prism.lane(at), &pick(&arm, at), reach.get(at))
+                {
+                    gaps.push(lane, gap);
+                }
+            }
+        }
     }
 
     for (on, gap) in &gaps.items {
@@ -111,27 +118,10 @@ pub(crate) fn field_capsule<T: Real>(
     }
 }
 
-/// Adds the gaps of one prism: those found, and those of the lanes that have to be looked at one by one.
+/// A vector's lanes in another order.
 #[inline(always)]
-fn collect<T: Real>(
-    prism: &Prism<T>,
-    arm: &V3<T>,
-    limit: T,
-    found: &Gap<T>,
-    [over, unclear]: [u32; 2],
-    gaps: &mut Gaps<T>,
-) {
-    let mut left = over | unclear;
-    while left != 0 {
-        let lane = left.trailing_zeros() as usize;
-        left &= left - 1;
-        if over >> lane & 1 == 1 {
-            let normal = pick(&found.normal, lane);
-            gaps.push(lane, Gap { dist: found.dist.get(lane), normal, along: found.along.get(lane) });
-        } else if let Some(gap) = gap(&prism.lane(lane), &pick(arm, lane), limit.get(lane)) {
-            gaps.push(lane, gap);
-        }
-    }
+fn rearrange3<T: Real>(v: &V3<T>, from: &[i32; MAX_LANES]) -> V3<T> {
+    [v[0].rearrange(from), v[1].rearrange(from), v[2].rearrange(from)]
 }
 
 /// Lanes in which a prism is farther than `reach` from the vertical plane through the origin with this normal.

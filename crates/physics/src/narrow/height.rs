@@ -80,42 +80,50 @@ pub(crate) struct Terrain<'a, T: Real> {
     pub axes: Rot<T>,
 }
 
-/// Cells of the grid, lane by lane: the first along x and along y, and how many from there on.
-pub(super) struct Window<T: Real> {
-    pub first: [T; 2],
-    pub count: [T; 2],
-    /// Where the lower left corner of the first cell is among the heights.
+/// Cells of the grid, lane by lane.
+pub(super) struct Window {
+    /// The first along x and along y.
+    first: [[u32; 2]; MAX_LANES],
+    /// How many from there on.
+    count: [[u32; 2]; MAX_LANES],
+    /// The next one to visit: its lane, and which it is along x and along y.
+    lane: usize,
+    step: [u32; 2],
+}
+
+/// Cells one beside the other, whichever lane they belong to: windows differ in size, and a lane that waited for the
+/// largest would do little.
+pub(super) struct Cells<T: Real> {
+    /// The lanes that they belong to.
+    pub owner: [i32; MAX_LANES],
+    len: usize,
+    col: [T::Scalar; MAX_LANES],
+    row: [T::Scalar; MAX_LANES],
+    /// Where the lower left corner is among the heights.
     start: [usize; MAX_LANES],
 }
 
-/// A cell of every lane's window, counted from its first along x and along y.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Step {
-    pub col: usize,
-    pub row: usize,
-}
-
-impl<T: Real> Window<T> {
-    /// Lanes whose window has this row.
+impl<T: Real> Cells<T> {
     #[inline(always)]
-    pub(super) fn has_row(&self, step: Step) -> T::Mask {
-        T::lit(step.row as f64).lt(self.count[1])
+    pub(super) fn new() -> Self {
+        let zero = [T::Scalar::default(); MAX_LANES];
+        Cells { owner: [0; MAX_LANES], len: 0, col: zero, row: zero, start: [0; MAX_LANES] }
     }
 
-    /// Lanes whose window has this column.
+    /// Lanes that hold a cell.
     #[inline(always)]
-    pub(super) fn has_col(&self, step: Step) -> T::Mask {
-        T::lit(step.col as f64).lt(self.count[0])
+    pub(super) fn on(&self) -> T::Mask {
+        T::from_bits(((1u64 << self.len) - 1) as u32)
     }
 }
 
 impl<'a, T: Real> Terrain<'a, T> {
     /// Cells that come within `extent` of `center` (in the field's frame) along each axis, in the lanes `near`.
     #[inline(always)]
-    pub(super) fn window(&self, center: &V3<T>, extent: &V3<T>, near: T::Mask) -> Window<T> {
+    pub(super) fn window(&self, center: &V3<T>, extent: &V3<T>, near: T::Mask) -> Window {
         let zero = T::zero();
         let field = self.fields[0];
-        let mut window = Window { first: [zero; 2], count: [zero; 2], start: [0; MAX_LANES] };
+        let mut window = Window { first: [[0; 2]; MAX_LANES], count: [[0; 2]; MAX_LANES], lane: 0, step: [0; 2] };
         for (i, lines) in [field.cols, field.rows].into_iter().enumerate() {
             let last = T::lit((lines - 1) as f64);
             let (half, scale) = (T::splat(field.half[i]), T::splat(field.per_cell[i]));
@@ -123,37 +131,62 @@ impl<'a, T: Real> Terrain<'a, T> {
             let to = -((-(center[i] + extent[i] + half)) * scale).floor();
             // written so that NaN finds no cell
             let on = T::and(near, T::and(from.lt(last), zero.lt(to)));
-            window.first[i] = T::masked(on, from.max(zero));
-            window.count[i] = T::masked(on, to.min(last) - window.first[i]);
-        }
-        for (lane, start) in window.start[..T::LANES].iter_mut().enumerate() {
-            let [col, row] = [window.first[0].get(lane), window.first[1].get(lane)];
-            *start = (T::widen(row) * field.cols as f64 + T::widen(col)) as usize;
+            let first = T::masked(on, from.max(zero));
+            let count = T::masked(on, to.min(last) - first);
+            for lane in 0..T::LANES {
+                window.first[lane][i] = T::widen(first.get(lane)) as u32;
+                window.count[lane][i] = T::widen(count.get(lane)) as u32;
+            }
         }
         window
     }
 
-    /// The two prisms of each lane's cell in the lanes `on`, relative to `center`: the upper left half, then the lower
-    /// right.
+    /// Fills `cells` with the next cells of a window: lane after lane, row after row. Returns whether there are any.
     #[inline(always)]
-    pub(super) fn cell(&self, window: &Window<T>, step: Step, center: &V3<T>, on: T::Mask) -> [Prism<'a, T>; 2] {
+    pub(super) fn next_cells(&self, window: &mut Window, cells: &mut Cells<T>) -> bool {
+        let field = self.fields[0];
+        cells.len = 0;
+        while window.lane < T::LANES {
+            let lane = window.lane;
+            let ([x, y], [cols, rows]) = (window.first[lane], window.count[lane]);
+            while cols > 0 && window.step[1] < rows {
+                let k = cells.len;
+                if k == T::LANES {
+                    return true;
+                }
+                let (col, row) = (x + window.step[0], y + window.step[1]);
+                cells.owner[k] = lane as i32;
+                cells.col[k] = T::scalar(f64::from(col));
+                cells.row[k] = T::scalar(f64::from(row));
+                cells.start[k] = row as usize * field.cols + col as usize;
+                cells.len = k + 1;
+                window.step[0] += 1;
+                if window.step[0] == cols {
+                    window.step = [0, window.step[1] + 1];
+                }
+            }
+            window.lane += 1;
+            window.step = [0; 2];
+        }
+        cells.len > 0
+    }
+
+    /// The two prisms of each cell: the upper left half, then the lower right. Relative to `center`, the center in the
+    /// cells' order.
+    #[inline(always)]
+    pub(super) fn prisms(&self, cells: &Cells<T>, center: &V3<T>) -> [Prism<'a, T>; 2] {
         let field = self.fields[0];
         let mut heights = [[T::Scalar::default(); MAX_LANES]; 4];
-        let here = step.row * field.cols + step.col;
-        let mut left = T::bits(on);
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let at = window.start[lane] + here;
-            let own = &self.fields[lane].heights[at..at + field.cols + 2];
-            heights[0][lane] = own[0];
-            heights[1][lane] = own[1];
-            heights[2][lane] = own[field.cols];
-            heights[3][lane] = own[field.cols + 1];
+        for k in 0..cells.len {
+            let at = cells.start[k];
+            let own = &self.fields[cells.owner[k] as usize].heights[at..at + field.cols + 2];
+            heights[0][k] = own[0];
+            heights[1][k] = own[1];
+            heights[2][k] = own[field.cols];
+            heights[3][k] = own[field.cols + 1];
         }
         let one = T::lit(1.0);
-        let col = window.first[0] + T::lit(step.col as f64);
-        let row = window.first[1] + T::lit(step.row as f64);
+        let (col, row) = (T::load(&cells.col[..T::LANES]), T::load(&cells.row[..T::LANES]));
         let (x, y) = (
             [self.line(0, col, center), self.line(0, col + one, center)],
             [self.line(1, row, center), self.line(1, row + one, center)],
@@ -190,25 +223,17 @@ kernel_fn! {
                 extent[i] += arms[k][i].abs();
             }
         }
-        let all = S::not(S::none());
-        let window = a.window(&center, &extent, all);
-        let mut step = Step::default();
-        while S::any(window.has_row(step)) {
-            while S::any(window.has_col(step)) {
-                for prism in a.cell(&window, step, &center, all) {
-                    if S::any(prism.highest().lt(-extent[2])) {
-                        continue;
-                    }
-                    let Some(gap) = prism.gap_to_box(&arms, &b.half, margin) else { continue };
-                    let pos = rotate_add(&a.axes, &gap.pos, &b.center);
-                    out.push(Touch::new(gap.dist, pos, rotate(&a.axes, &gap.normal), margin));
+        let mut window = a.window(&center, &extent, S::not(S::none()));
+        let mut cells = Cells::new();
+        while !out.is_full() && a.next_cells(&mut window, &mut cells) {
+            for prism in a.prisms(&cells, &center) {
+                if S::any(prism.highest().lt(-extent[2])) {
+                    continue;
                 }
-                if out.is_full() {
-                    return;
-                }
-                step.col += 1;
+                let Some(gap) = prism.gap_to_box(&arms, &b.half, margin) else { continue };
+                let pos = rotate_add(&a.axes, &gap.pos, &b.center);
+                out.push(Touch::new(gap.dist, pos, rotate(&a.axes, &gap.normal), margin));
             }
-            step = Step { col: 0, row: step.row + 1 };
         }
     }
 }

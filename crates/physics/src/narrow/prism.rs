@@ -26,6 +26,14 @@ pub(super) struct Gap<S: Real> {
     pub along: S,
 }
 
+impl<T: Real> Gap<T> {
+    /// One lane's gap.
+    #[inline(always)]
+    pub(super) fn lane(&self, lane: usize) -> Gap<T::Scalar> {
+        Gap { dist: self.dist.get(lane), normal: pick(&self.normal, lane), along: self.along.get(lane) }
+    }
+}
+
 /// A face's plane: outward unit normal, and the signed distance of the point `t arm` as `middle + slope t`.
 #[derive(Clone, Copy)]
 pub(super) struct Face<S: Real> {
@@ -61,36 +69,43 @@ pub(super) struct Glance<T: Real> {
 }
 
 impl<'a, T: Real> Prism<'a, T> {
-    /// Looks at the segment from `-arm` to `arm` from above, in the lanes `on`.
+    /// Looks at the segment from `-arm` to `arm` from above.
     #[inline(always)]
-    pub(super) fn glance(&self, arm: &V3<T>, limit: T, on: T::Mask) -> Glance<T> {
+    pub(super) fn glance(&self, arm: &V3<T>, limit: T) -> Glance<T> {
         let (zero, one) = (T::zero(), T::lit(1.0));
         let slope = self.slope(arm);
         let along = T::select(zero.lt(slope.slope), -one, one);
         let dist = slope.at(along);
         let gap = Gap { dist, normal: slope.normal, along };
-        let mut unclear = T::and(on, T::not(limit.lt(dist)));
-        let mut over = T::and(unclear, zero.lt(dist));
-        if T::any(unclear) {
-            let n = &slope.normal;
-            for (wall, corner) in self.walls.iter().zip(&self.top) {
-                let [x, y] = [T::splat(wall[0]), T::splat(wall[1])];
-                let cos = n[0].mul_add(x, n[1] * y);
-                let middle = -corner[0].mul_add(x, corner[1] * y);
-                let rate = arm[0].mul_add(x, arm[1] * y);
-                // the point of the top below the end
-                let other = cos.neg_mul_add(dist, rate.mul_add(along, middle));
-                over = T::and(over, T::not(zero.lt(other)));
-                // beyond both faces: the edge between them is nearer than everything behind it
-                let beside = middle - rate.abs();
-                let (up, out) = (cos.neg_mul_add(beside, dist), cos.neg_mul_add(dist, beside));
-                let edge2 = up.mul_add(dist, out * beside);
-                let far2 = (limit * limit) * cos.neg_mul_add(cos, one);
-                let past_edge = T::and(T::and(zero.lt(up), zero.lt(out)), far2.lt(edge2));
-                unclear = T::and(unclear, T::not(T::or(limit.lt(beside), past_edge)));
-            }
+        let mut unclear = T::not(limit.lt(dist));
+        if !T::any(unclear) {
+            return Glance { over: unclear, gap, unclear };
         }
-        Glance { over, gap, unclear: T::and(unclear, T::not(over)) }
+        let mut over = T::and(unclear, zero.lt(dist));
+        // the part of the segment that is not too far beyond a wall
+        let (mut from, mut to) = (-one, one);
+        let n = &slope.normal;
+        for (wall, corner) in self.walls.iter().zip(&self.top) {
+            let [x, y] = [T::splat(wall[0]), T::splat(wall[1])];
+            let cos = n[0].mul_add(x, n[1] * y);
+            let middle = -corner[0].mul_add(x, corner[1] * y);
+            let rate = arm[0].mul_add(x, arm[1] * y);
+            // the point of the top below the end
+            let other = cos.neg_mul_add(dist, rate.mul_add(along, middle));
+            over = T::and(over, T::not(zero.lt(other)));
+            let crossing = (limit - middle).div(rate);
+            to = T::select(zero.lt(rate), to.min(crossing), to);
+            from = T::select(rate.lt(zero), from.max(crossing), from);
+            // beyond both faces: the edge between them is nearer than everything behind it
+            let beside = middle - rate.abs();
+            let (up, out) = (cos.neg_mul_add(beside, dist), cos.neg_mul_add(dist, beside));
+            let edge2 = up.mul_add(dist, out * beside);
+            let far2 = (limit * limit) * cos.neg_mul_add(cos, one);
+            let past_edge = T::and(T::and(zero.lt(up), zero.lt(out)), far2.lt(edge2));
+            unclear = T::and(unclear, T::not(T::or(limit.lt(beside), past_edge)));
+        }
+        let too_high = T::or(to.lt(from), limit.lt(slope.at(from).min(slope.at(to))));
+        Glance { over, gap, unclear: T::and(unclear, T::not(T::or(over, too_high))) }
     }
 
     /// Height of the highest corner.
