@@ -243,7 +243,7 @@ class Policy:
         Without `rng`, the best actions. With a generator or a seed for one, actions drawn as in training.
         """
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the policy to a file, ``.safetensors``."""
+        """Write the policy to a file: ``.safetensors``, or ``.onnx`` by the contract of ML-Agents' models."""
 
 @final
 class TrainResult:
@@ -299,8 +299,12 @@ def train(
         resume: the folder of a run to go on with, in place of a task and a configuration.
     """
 
-def load_policy(path: str | PathLike[str]) -> Policy:
-    """Read a policy from a file, or from the folder of a run."""
+def load_policy(path: str | PathLike[str], task: str | None = None) -> Policy:
+    """Read a policy from a file, ``.safetensors`` or ``.onnx``, or from the folder of a run.
+
+    Without `task`, it is for the one that the file names. ONNX files that another program has written, multi-layer
+    perceptrons from observations to actions, name none.
+    """
 
 def evaluate(policy: Policy, episodes: int = 100, *, seed: int = ..., threads: int = 0) -> dict[str, float]:
     """Play whole episodes with a policy's best actions.

@@ -10,6 +10,7 @@ Examples:
   marathon render runs/hopper-1 --out hop.gif   see it
   marathon eval runs/hopper-1 --episodes 1000   measure it
   marathon train --resume runs/hopper-1 --steps 20000000   let it learn on
+  marathon export runs/hopper-1                 for Unity, ONNX Runtime and others
   marathon list                                 all agents
   marathon bench physics                        how fast this computer is
 
@@ -36,6 +37,10 @@ pub enum Command {
     Eval(EvalArgs),
     /// Draw a policy in action: a strip of frames, an animation or a film.
     Render(RenderArgs),
+    /// Write a policy as ONNX, for Unity ML-Agents, ONNX Runtime and others.
+    Export(ExportArgs),
+    /// Turn an ONNX network of another trainer into a policy.
+    Import(ImportArgs),
     /// List the agents.
     List,
     /// Measure the speed of the physics, the environments or the training.
@@ -140,6 +145,42 @@ pub struct RenderArgs {
     /// Agent that the policy must be for [default: the one it was trained for].
     #[arg(long, value_name = "AGENT")]
     pub agent: Option<String>,
+}
+
+const EXPORT_HELP: &str = "\
+The file follows the contract of ML-Agents' models: input obs_0 [batch, obs], the raw observation; outputs
+deterministic_continuous_actions and continuous_actions [batch, act]; version_number, memory_size and
+continuous_action_output_shape. Normalization and bounds are inside.";
+
+/// Options of `export`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXPORT_HELP)]
+pub struct ExportArgs {
+    /// Policy file, or folder of a run.
+    pub policy: PathBuf,
+    /// File to write [default: beside the policy, .onnx].
+    #[arg(long, value_name = "F.onnx")]
+    pub out: Option<PathBuf>,
+}
+
+const IMPORT_HELP: &str = "\
+Reads multi-layer perceptrons with one observation as input and actions as output, as ML-Agents, PyTorch and
+Stable-Baselines3 write them: normalization, layers with swish, tanh, elu or relu, a final tanh, bounds.
+`eval` and `render` take such files as they are.";
+
+/// Options of `import`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = IMPORT_HELP)]
+pub struct ImportArgs {
+    /// Network to read.
+    #[arg(value_name = "F.onnx")]
+    pub network: PathBuf,
+    /// Agent that it is for [default: the one that the file names, if Marathon has written it].
+    #[arg(long, value_name = "AGENT")]
+    pub agent: Option<String>,
+    /// File to write [default: beside the network, .safetensors].
+    #[arg(long, value_name = "F.safetensors")]
+    pub out: Option<PathBuf>,
 }
 
 /// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.

@@ -10,6 +10,7 @@ mod console;
 mod error;
 mod folder;
 mod interrupt;
+mod policy_file;
 mod report;
 pub mod session;
 mod text;
@@ -52,6 +53,8 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Train(train) => commands::train::run(train, args.json),
         Command::Eval(eval) => commands::eval::run(eval, args.json),
         Command::Render(render) => commands::render::run(render, args.json),
+        Command::Export(export) => commands::convert::export(export, args.json),
+        Command::Import(import) => commands::convert::import(import, args.json),
         Command::List => commands::list::run(args.json),
         Command::Bench(bench) => commands::bench::run(bench, args.json),
     }

@@ -3,7 +3,8 @@
 pub use crate::args::TrainArgs;
 pub use crate::config::Loaded;
 pub use crate::error::CliError;
-pub use crate::folder::{RunFile, RunFolder, policy_path};
+pub use crate::folder::{RunFile, RunFolder};
+pub use crate::policy_file::{read as read_policy, save as save_policy};
 pub use crate::report::Watch;
 pub use crate::report::csv::columns as metrics;
 pub use crate::report::summary::Summary;

@@ -62,6 +62,7 @@ pub mod mlp;
 mod noise;
 mod normalize;
 mod observer;
+mod onnx;
 mod policy;
 mod ppo;
 mod rollout;

@@ -1,7 +1,8 @@
 //! Policies as functions of NumPy arrays.
 
 use crate::error;
-use marathon_envs::registry;
+use marathon_cli::session;
+use marathon_envs::{ShardFactory, registry};
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
@@ -69,9 +70,9 @@ impl Policy {
         PyArray1::from_vec(py, action).reshape(shape)
     }
 
-    /// Writes the policy to a file, `.safetensors`.
+    /// Writes the policy to a file: `.safetensors`, or `.onnx` by the contract of ML-Agents' models.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        self.0.save(&path).map_err(error::learn)
+        session::save_policy(&self.0, &path).map_err(error::cli)
     }
 
     fn __repr__(&self) -> String {
@@ -80,11 +81,15 @@ impl Policy {
     }
 }
 
-/// Reads a policy from a file, or from the folder of a run.
+/// Reads a policy from a file, `.safetensors` or `.onnx`, or from the folder of a run. Without `task`, it is for the one that
+/// the file names; ONNX files that another program has written, multi-layer perceptrons from observations to actions, name
+/// none.
 #[pyfunction]
-pub fn load_policy(path: PathBuf) -> PyResult<Policy> {
-    let path = marathon_cli::session::policy_path(&path).map_err(error::cli)?;
-    Ok(Policy(marathon_learn::Policy::load(&path).map_err(error::learn)?))
+#[pyo3(signature = (path, task = None))]
+pub fn load_policy(path: PathBuf, task: Option<&str>) -> PyResult<Policy> {
+    let factory = task.map(|task| registry::factory(task, Isa::best())).transpose().map_err(error::env)?;
+    let policy = session::read_policy(&path, factory.as_deref().map(ShardFactory::spec)).map_err(error::cli)?;
+    Ok(Policy(policy))
 }
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,

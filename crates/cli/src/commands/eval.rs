@@ -1,9 +1,9 @@
 //! `marathon eval`: how good a policy is.
 
-use super::load_policy;
 use crate::args::EvalArgs;
 use crate::console::say;
 use crate::error::CliError;
+use crate::policy_file;
 use crate::report::{print_json, summary};
 use marathon_learn::{EvalOptions, evaluate};
 use marathon_physics::lanes::Isa;
@@ -13,7 +13,7 @@ use marathon_physics::lanes::Isa;
 /// # Errors
 /// If there is no such policy, or it is for another agent.
 pub fn run(args: &EvalArgs, json: bool) -> Result<(), CliError> {
-    let (policy, factory) = load_policy(&args.policy, args.agent.as_deref())?;
+    let (policy, factory) = policy_file::load(&args.policy, args.agent.as_deref())?;
     let options = EvalOptions { episodes: args.episodes as usize, seed: args.seed, threads: args.threads };
     let result = evaluate(&*factory, Isa::best(), &policy, &options)?;
     if json {

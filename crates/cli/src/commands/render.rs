@@ -1,12 +1,11 @@
 //! `marathon render`: a policy in pictures.
 
-use super::load_policy;
 use crate::args::RenderArgs;
 use crate::console::say;
 use crate::error::CliError;
 use crate::report::print_json;
 use crate::text::unsigned_zero;
-use crate::{interrupt, text};
+use crate::{interrupt, policy_file, text};
 use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::Policy;
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene, status_line};
@@ -53,7 +52,7 @@ struct Report {
 /// If there is no such policy, an option makes no sense, or the picture cannot be written.
 pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = Shot::new(args)?;
-    let (policy, factory) = load_policy(&args.policy, args.agent.as_deref())?;
+    let (policy, factory) = policy_file::load(&args.policy, args.agent.as_deref())?;
     let spec = factory.spec();
     interrupt::install("leaving without a picture")?;
     let scene = Scene::new(&registry::agent(&spec.id)?.model()?);

@@ -1,0 +1,59 @@
+//! `marathon export` and `marathon import`: policies to and from ONNX.
+
+use crate::args::{ExportArgs, ImportArgs};
+use crate::console::say;
+use crate::error::CliError;
+use crate::policy_file;
+use crate::report::print_json;
+use crate::text::path_word;
+use marathon_learn::Policy;
+use std::path::Path;
+
+/// Writes a policy as ONNX.
+///
+/// # Errors
+/// If there is no such policy, or the file cannot be written.
+pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
+    let (policy, _) = policy_file::load(&args.policy, None)?;
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None if args.policy.is_dir() => args.policy.join("policy.onnx"),
+        None => args.policy.with_extension("onnx"),
+    };
+    if !policy_file::is_onnx(&out) {
+        return Err(CliError::Usage(format!("--out is {}, expected a name that ends with .onnx", path_word(&out))));
+    }
+    policy_file::save(&policy, &out)?;
+    tell(&policy, &out, json);
+    Ok(())
+}
+
+/// Turns an ONNX file into a policy.
+///
+/// # Errors
+/// If the file is not of a network that a policy of the agent can be, or the policy cannot be written.
+pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
+    if !policy_file::is_onnx(&args.network) {
+        let found = path_word(&args.network);
+        return Err(CliError::Usage(format!("the network is {found}, expected a name that ends with .onnx")));
+    }
+    let (policy, _) = policy_file::load(&args.network, args.agent.as_deref())?;
+    let out = args.out.clone().unwrap_or_else(|| args.network.with_extension("safetensors"));
+    policy_file::save(&policy, &out)?;
+    tell(&policy, &out, json);
+    Ok(())
+}
+
+fn tell(policy: &Policy, out: &Path, json: bool) {
+    let meta = policy.meta();
+    if json {
+        print_json(&serde_json::json!({
+            "out": out, "agent": meta.agent, "observation": meta.obs, "action": meta.act, "hidden": meta.hidden,
+            "activation": meta.activation,
+        }));
+    } else {
+        let layers: Vec<String> = meta.hidden.iter().map(|n| n.to_string()).collect();
+        let network = format!("{} -> {} -> {}", meta.obs, layers.join(" -> "), meta.act).replace(">  ->", ">");
+        say(format!("wrote {}: {}, {network}, {}", path_word(out), meta.agent, meta.activation.name()));
+    }
+}

@@ -1,0 +1,47 @@
+//! `marathon export` and `marathon import`: a policy that went to ONNX and came back does as it did, and `eval` takes either.
+
+mod common;
+
+use common::{assert_no_leftovers, fail, json, succeed};
+use serde_json::Value;
+use std::path::Path;
+
+fn shipped(name: &str) -> String {
+    format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn eval(folder: &Path, policy: &str) -> Value {
+    json(&succeed(folder, &["eval", policy, "--episodes", "16", "--json"]))
+}
+
+#[test]
+fn there_and_back() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let text = succeed(folder, &["export", &shipped("hopper"), "--out", "hopper.onnx"]);
+    assert!(text.starts_with("wrote hopper.onnx: Hopper-v0, 31 -> "), "{text}");
+    let text = succeed(folder, &["import", "hopper.onnx"]);
+    assert!(text.starts_with("wrote hopper.safetensors: Hopper-v0, 31 -> "), "{text}");
+    let (before, after) = (eval(folder, &shipped("hopper")), eval(folder, "hopper.safetensors"));
+    let mean = |report: &Value| report["return_mean"].as_f64().unwrap();
+    // the bits of a division may differ, and with them single episodes
+    assert!((mean(&before) / mean(&after) - 1.0).abs() < 0.05, "{before} {after}");
+    assert_eq!(eval(folder, "hopper.onnx")["return_mean"], after["return_mean"]);
+    assert_no_leftovers(folder);
+}
+
+#[test]
+fn mistakes_are_told() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let error = fail(folder, 2, &["export", &shipped("hopper"), "--out", "hopper.pt"]);
+    assert!(error.contains("--out is hopper.pt, expected a name that ends with .onnx"), "{error}");
+    let error = fail(folder, 2, &["import", &shipped("hopper")]);
+    assert!(error.contains("expected a name that ends with .onnx"), "{error}");
+    std::fs::write(folder.join("x.onnx"), b"").unwrap();
+    let error = fail(folder, 1, &["import", "x.onnx"]);
+    assert!(error.contains("x.onnx: agent: found none, expected one"), "{error}");
+    succeed(folder, &["export", &shipped("hopper"), "--out", "hopper.onnx"]);
+    let error = fail(folder, 1, &["import", "hopper.onnx", "--agent", "ant"]);
+    assert!(error.contains("expected one observation of 53 numbers, as Ant-v0 has"), "{error}");
+}

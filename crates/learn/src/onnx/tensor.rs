@@ -1,0 +1,129 @@
+//! Constants of a graph.
+
+use super::proto::{DOUBLE, FLOAT, INT64, Tensor};
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
+
+/// Files beside the model's that hold the numbers of large tensors (PyTorch writes `model.onnx.data`).
+pub struct Neighbors {
+    folder: PathBuf,
+    read: RefCell<BTreeMap<String, Rc<Vec<u8>>>>,
+}
+
+impl Neighbors {
+    /// Of a model's file.
+    pub fn of(model: &Path) -> Self {
+        Neighbors { folder: model.parent().unwrap_or(Path::new("")).into(), read: RefCell::default() }
+    }
+
+    /// The numbers of a tensor.
+    fn bytes(&self, tensor: &Tensor) -> Result<Vec<u8>, String> {
+        let entry = |key: &str| tensor.external_data.iter().find(|e| e.key == key).map(|e| e.value.as_str());
+        let number = |key: &str| entry(key).map(str::parse::<usize>).transpose();
+        let name = entry("location").unwrap_or_default();
+        let mut parts = Path::new(name).components();
+        // a model must not reach for files elsewhere
+        if !matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None)) {
+            return Err(format!("tensor '{}' in file '{name}', expected one in the model's folder", tensor.name));
+        }
+        if !self.read.borrow().contains_key(name) {
+            let bytes = std::fs::read(self.folder.join(name))
+                .map_err(|e| format!("tensor '{}' in file '{name}' beside the model's: {e}", tensor.name))?;
+            self.read.borrow_mut().insert(name.into(), Rc::new(bytes));
+        }
+        let bytes = self.read.borrow()[name].clone();
+        let (Ok(offset), Ok(length)) = (number("offset"), number("length")) else {
+            return Err(format!("tensor '{}' at a place of file '{name}' that is not a number", tensor.name));
+        };
+        let rest = bytes.get(offset.unwrap_or(0)..);
+        let part = rest.and_then(|rest| rest.get(..length.unwrap_or(rest.len())));
+        part.map(<[u8]>::to_vec).ok_or_else(|| format!("tensor '{}' beyond the end of file '{name}'", tensor.name))
+    }
+}
+
+/// A constant array, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    pub shape: Vec<usize>,
+    pub data: Vec<f64>,
+}
+
+impl Array {
+    /// A single number.
+    pub fn scalar(x: f64) -> Self {
+        Array { shape: Vec::new(), data: vec![x] }
+    }
+
+    /// Reads a tensor of the file, or of a file beside it; the text says what is wrong with it.
+    pub fn read(tensor: &Tensor, neighbors: &Neighbors) -> Result<Self, String> {
+        let raw = match tensor.data_location {
+            0 => Cow::Borrowed(&tensor.raw_data),
+            _ => Cow::Owned(neighbors.bytes(tensor)?),
+        };
+        let data: Vec<f64> = match tensor.data_type {
+            FLOAT if raw.is_empty() => tensor.float_data.iter().map(|x| f64::from(*x)).collect(),
+            FLOAT => raw.as_chunks().0.iter().map(|x| f64::from(f32::from_le_bytes(*x))).collect(),
+            DOUBLE if raw.is_empty() => tensor.double_data.clone(),
+            DOUBLE => raw.as_chunks().0.iter().map(|x| f64::from_le_bytes(*x)).collect(),
+            INT64 if raw.is_empty() => tensor.int64_data.iter().map(|x| *x as f64).collect(),
+            INT64 => raw.as_chunks().0.iter().map(|x| i64::from_le_bytes(*x) as f64).collect(),
+            other => {
+                let expected = "float, double or int64 (1, 11 or 7)";
+                return Err(format!("tensor '{}' of ONNX's data type {other}, expected {expected}", tensor.name));
+            }
+        };
+        let shape: Option<Vec<usize>> = tensor.dims.iter().map(|n| usize::try_from(*n).ok()).collect();
+        let count = shape.as_ref().and_then(|s| s.iter().try_fold(1_usize, |n, d| n.checked_mul(*d)));
+        match (shape, count) {
+            (Some(shape), Some(count)) if count == data.len() => Ok(Array { shape, data }),
+            _ => Err(format!("tensor '{}' of shape {:?} with {} numbers", tensor.name, tensor.dims, data.len())),
+        }
+    }
+
+    /// The only number, if there is just one.
+    pub fn single(&self) -> Option<f64> {
+        if let [x] = self.data[..] { Some(x) } else { None }
+    }
+
+    /// The numbers as a list of a length: one for all, or as many as there are.
+    pub fn spread(&self, n: usize) -> Option<Vec<f64>> {
+        match self.single() {
+            Some(x) => Some(vec![x; n]),
+            // ones before the last dimension do not matter
+            None => (self.data.len() == n && self.shape.last() == Some(&n)).then(|| self.data.clone()),
+        }
+    }
+
+    /// Rows and columns, if it is a matrix.
+    pub fn matrix(&self) -> Option<(usize, usize)> {
+        if let [rows, columns] = self.shape[..] { Some((rows, columns)) } else { None }
+    }
+
+    /// With rows and columns exchanged.
+    pub fn transposed(&self) -> Option<Array> {
+        let (rows, columns) = self.matrix()?;
+        let data = (0..rows * columns).map(|i| self.data[i % rows * columns + i / rows]).collect();
+        Some(Array { shape: vec![columns, rows], data })
+    }
+
+    /// Number by number.
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Array {
+        Array { shape: self.shape.clone(), data: self.data.iter().map(|x| f(*x)).collect() }
+    }
+
+    /// Number by number with another of the same shape, or with a single number.
+    pub fn zip(&self, other: &Array, f: impl Fn(f64, f64) -> f64) -> Option<Array> {
+        match (self.single(), other.single()) {
+            (_, Some(b)) => Some(self.map(|a| f(a, b))),
+            (Some(a), None) => Some(other.map(|b| f(a, b))),
+            (None, None) if self.shape == other.shape => {
+                let data = self.data.iter().zip(&other.data).map(|(a, b)| f(*a, *b)).collect();
+                Some(Array { shape: self.shape.clone(), data })
+            }
+            _ => None,
+        }
+    }
+}
