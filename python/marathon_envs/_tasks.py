@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from marathon_envs._native import Renderer, VecEnv
+from marathon_envs._native import Renderer, VecEnv, spec
 from marathon_envs.agent_env import AgentVecEnv
 from marathon_envs.agents import MarathonAgent
 
@@ -14,8 +14,13 @@ def vec_env(task: Task, num_envs: int, **options: Any) -> VecEnv | AgentVecEnv:
     return VecEnv(task, num_envs, **options) if isinstance(task, str) else task.vec_env(num_envs, **options)
 
 
-def renderer(task: Task, width: int, height: int, **options: Any) -> Renderer:
-    """Pictures of a task's agents."""
+def renderer(task: Task, width: int, height: int, agents: int = 1, **options: Any) -> Renderer:
+    """Pictures of a task's agents, so many side by side."""
     if isinstance(task, str):
-        return Renderer(task, width, height, **options)
-    return Renderer.of(task.load_model(), width, height)
+        return Renderer(task, width, height, agents=agents, **options)
+    return Renderer.of(task.load_model(), width, height, agents=agents)
+
+
+def max_episode_steps(task: Task, **options: Any) -> int:
+    """Steps after which a task truncates its episodes."""
+    return spec(task, **options).max_episode_steps if isinstance(task, str) else task.max_episode_steps

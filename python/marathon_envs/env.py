@@ -22,6 +22,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     `info` has `reward_terms`, a dictionary of the numbers that add up to the reward; `x_position`, m, and `x_velocity`,
     the mean velocity along +x during the step, m/s, if the agent can move along x; and what else the task reports.
+    Gymnasium's own tasks have the terms of the reward under Gymnasium's names, too.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
@@ -62,6 +63,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._dtype = self.observation_space.dtype
         self._terms = self.task_spec.reward_terms
         self._info, self._add_x = _spaces.info_names(self.task_spec)
+        self._flat = _spaces.is_gymnasiums(self.task_spec)
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
         # for the camera: time, and that of the last picture
@@ -94,7 +96,10 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         info = self._report(env.info)
         if self._add_x and "x_position" in info:
             info["x_velocity"] = float(env.forward[0]) / self.dt
-        info["reward_terms"] = dict(zip(self._terms, env.reward_terms[0].tolist(), strict=True))
+        terms = dict(zip(self._terms, env.reward_terms[0].tolist(), strict=True))
+        if self._flat:
+            info |= terms
+        info["reward_terms"] = terms
         return obs[0].astype(self._dtype), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def _report(self, info: FloatArray) -> dict[str, Any]:

@@ -94,6 +94,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._dtype = self.single_observation_space.dtype
         self._terms = self.task_spec.reward_terms
         self._info, self._add_x = _spaces.info_names(self.task_spec)
+        self._flat = _spaces.is_gymnasiums(self.task_spec)
         self._task, self._size, self._options = task, (width, height), options
         self._renderers: list[Renderer] | None = None
         # for the cameras: time of each agent, and of its last picture
@@ -198,6 +199,8 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         shares: Infos = {}
         for i, name in enumerate(self._terms):
             shares[name], shares[f"_{name}"] = terms[:, i], mask
+        if self._flat:
+            infos |= shares
         infos["reward_terms"], infos["_reward_terms"] = shares, mask
         if self._x is not None:
             infos["x_velocity"], infos["_x_velocity"] = distance / self.task_spec.dt, mask
@@ -212,6 +215,18 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._ended &= False if mask is None else ~np.asarray(mask)
         self._x = self._env.x_position if self._add_x else None
         return self._observed(obs)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Value or result of an attribute, for each agent: as Gymnasium's other vector environments have it."""
+        value = getattr(self, name)
+        value = value(*args, **kwargs) if callable(value) else value
+        if isinstance(value, tuple) and len(value) == self.num_envs:
+            return value
+        return (value,) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Value of an attribute, for each agent."""
+        return self.call(name)
 
     def render(self) -> tuple[FloatArray, ...] | None:
         """Draw every agent by itself: `(height, width, 3)`, uint8, for each; None without a render mode."""
