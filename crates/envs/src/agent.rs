@@ -54,6 +54,8 @@ pub struct Facts {
     pub feet: Vec<String>,
     /// Geoms with a touch sensor, in the order of the observation.
     pub touch: Vec<String>,
+    /// Sites with a touch sensor, see [`Senses::touch_force`].
+    pub touch_sites: Vec<String>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`].
     pub memory: usize,
     /// What it sees of the physics.
@@ -79,6 +81,7 @@ impl Default for Facts {
             bodies: Vec::new(),
             feet: Vec::new(),
             touch: Vec::new(),
+            touch_sites: Vec::new(),
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),
@@ -270,7 +273,7 @@ pub trait Agent: Send + Sync + 'static {
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask;
 
     /// Puts the agent where an episode starts. It finds itself in the spawn pose with the spawn velocity; what it adds of
-    /// chance comes from [`Start::random`].
+    /// chance comes from [`Start::random`]. It is a function of these alone, and may be called before the episode is due.
     fn reset(&self, start: &mut Start) {
         start.add_noise(ResetNoise::MARATHON);
     }

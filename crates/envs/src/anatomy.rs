@@ -63,6 +63,8 @@ pub(crate) struct Anatomy<T: Real> {
     pub bodies: Vec<usize>,
     /// Geoms with touch sensors.
     pub touch: Vec<usize>,
+    /// Sites with touch sensors.
+    pub touch_sites: Vec<usize>,
     /// Geoms that must not touch the ground.
     pub not_feet: Vec<usize>,
     pub pairs: Vec<Pair<T::Scalar>>,
@@ -145,6 +147,12 @@ impl<T: Real> Anatomy<T> {
             let found = model.bodies.iter().position(|b| b.name == *name);
             found.ok_or_else(|| missing("body", name, "body", known().collect()))
         };
+        let site = |name: &String| -> Result<usize, EnvError> {
+            let known = || model.sites.iter().map(|s| s.name.as_str());
+            let found = model.sites.iter().position(|s| s.name == *name);
+            found.ok_or_else(|| missing("touch sensor", name, "site", known().collect()))
+        };
+        let touch_sites = facts.touch_sites.iter().map(site).collect::<Result<Vec<_>, _>>()?;
         let bodies = facts.bodies.iter().map(body).collect::<Result<Vec<_>, _>>()?;
         let axes = spawn_axes(facts, blueprint)?;
         let mut parts = Vec::new();
@@ -185,7 +193,7 @@ impl<T: Real> Anatomy<T> {
                 _ => {}
             }
         }
-        Ok(Anatomy { parts, bodies, touch, not_feet, pairs, motors, along_x })
+        Ok(Anatomy { parts, bodies, touch, touch_sites, not_feet, pairs, motors, along_x })
     }
 }
 

@@ -13,7 +13,8 @@ use crate::agent::{Agent, Controls, Facts};
 use crate::anatomy::{Anatomy, Blueprint, sim_options};
 use crate::error::EnvError;
 use crate::lane_group::{LaneGroup, Rehearsal};
-use crate::random::EpisodeRng;
+use crate::prepared::Prepared;
+use crate::random::{EpisodeId, EpisodeRng};
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
 use crate::start::Start;
 
@@ -134,11 +135,11 @@ impl<T: Real, A: Agent> Task<T, A> {
     /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
     /// length of its observation.
     fn rehearse(&self) -> Result<usize, EnvError> {
-        let Task { facts, blueprint, .. } = self;
+        let facts = &self.facts;
         let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
-        let (mut qpos, mut qvel) = (blueprint.spawn.clone(), blueprint.spawn_velocity.clone());
-        self.draw_start(&mut qpos, &mut qvel, &mut EpisodeRng::new(0, 0, 0));
-        if let Some(x) = qpos.iter().chain(&qvel).find(|x| !x.is_finite()) {
+        let mut start = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+        self.draw_start(&mut start, &mut EpisodeRng::new(EpisodeId { seed: 0, agent: 0, episode: 0 }));
+        if let Some(x) = start.qpos.iter().chain(&start.qvel).find(|x| !x.is_finite()) {
             return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
         }
         let Rehearsal { observed, reported, terms } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
@@ -157,12 +158,24 @@ impl<T: Real, A: Agent> Task<T, A> {
         Ok(observed)
     }
 
-    /// Lets the agent draw the start of an episode. Returns whether quaternions are to be normalized.
-    fn draw_start(&self, qpos: &mut [f64], qvel: &mut [f64], random: &mut EpisodeRng) -> bool {
-        let mut start = Start { qpos, qvel, random, normalize: true, blueprint: &self.blueprint };
+    /// Lets the agent draw the start of an episode into `state`.
+    pub fn draw_start(&self, state: &mut AgentState, random: &mut EpisodeRng) -> Drawn {
+        let blueprint = &self.blueprint;
+        state.qpos.clone_from(&blueprint.spawn);
+        state.qvel.clone_from(&blueprint.spawn_velocity);
+        let AgentState { qpos, qvel } = state;
+        let mut start = Start { qpos, qvel, random, normalize: true, free_of_contacts: false, settle: 0, blueprint };
         self.agent.reset(&mut start);
-        start.normalize
+        let Start { normalize, free_of_contacts, settle, .. } = start;
+        Drawn { normalize, free_of_contacts, settle }
     }
+}
+
+/// What is to be done with a start that was drawn, see [`Start`].
+pub(crate) struct Drawn {
+    pub normalize: bool,
+    pub free_of_contacts: bool,
+    pub settle: usize,
 }
 
 impl<T: Real, A: Agent> ShardFactory for AgentFactory<T, A> {
@@ -184,13 +197,22 @@ impl<T: Real, A: Agent> AgentShards for AgentFactory<T, A> {
 /// Whose life it is, and how far it has come: what an agent is besides its physics.
 #[derive(Clone, Copy, Debug)]
 struct Life {
-    seed: u64,
-    /// Number of the agent in the whole environment.
-    agent: u64,
-    /// Episodes begun.
-    episode: u64,
-    /// Decisions made in the present episode.
+    /// The present episode; number 0 before the first.
+    id: EpisodeId,
+    /// Decisions made in it.
     steps: u64,
+}
+
+impl Life {
+    /// Before its first episode.
+    fn new(seed: u64, agent: u64) -> Self {
+        Life { id: EpisodeId { seed, agent, episode: 0 }, steps: 0 }
+    }
+
+    /// The episode after the present one.
+    fn next(&self) -> EpisodeId {
+        EpisodeId { episode: self.id.episode + 1, ..self.id }
+    }
 }
 
 /// Sixteen agents.
@@ -206,39 +228,50 @@ struct LaneShard<T: Real, A> {
     blocks: Vec<Block<T>>,
     /// Decisions after which an episode is truncated.
     max_episode_steps: u64,
-    // scratch of resets
-    qpos: Vec<f64>,
-    qvel: Vec<f64>,
+    /// Starts that took physics.
+    prepared: Prepared<T>,
+    /// Scratch of resets.
+    start: AgentState,
 }
 
 impl<T: Real, A: Agent> LaneShard<T, A> {
     fn new(task: Arc<Task<T, A>>, first: usize, blocks: usize, seed: u64) -> Self {
         let groups = |task| (0..BLOCK / T::LANES).map(|_| LaneGroup::new(task)).collect();
-        let life = |agent: usize| Life { seed, agent: agent as u64, episode: 0, steps: 0 };
+        let prepared = Prepared::new(blocks * BLOCK);
         let blocks = (first..first + blocks)
-            .map(|b| Block { groups: groups(&task), lives: std::array::from_fn(|i| life(b * BLOCK + i)) })
+            .map(|b| Block {
+                groups: groups(&task),
+                lives: std::array::from_fn(|i| Life::new(seed, (b * BLOCK + i) as u64)),
+            })
             .collect();
         let work = Work::new(&task.sim);
         let max_episode_steps = task.spec.max_episode_steps as u64;
-        LaneShard { task, work, blocks, max_episode_steps, qpos: Vec::new(), qvel: Vec::new() }
+        let start = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+        LaneShard { task, work, blocks, max_episode_steps, prepared, start }
     }
 
-    /// Begins an episode of one agent: the spawn pose with noise of the agent's own.
+    /// Puts an agent where its next episode starts: the spawn pose with noise of the agent's own.
     fn begin_episode(&mut self, block: usize, agent: usize) {
-        let task = &*self.task;
-        let block = &mut self.blocks[block];
-        let life = &mut block.lives[agent];
-        life.episode += 1;
-        life.steps = 0;
-        let mut rng = EpisodeRng::new(life.seed, life.agent, life.episode);
-        self.qpos.clone_from(&task.blueprint.spawn);
-        self.qvel.clone_from(&task.blueprint.spawn_velocity);
-        let normalize = task.draw_start(&mut self.qpos, &mut self.qvel, &mut rng);
-        let (group, lane) = (&mut block.groups[agent / T::LANES], agent % T::LANES);
-        group.put(&task.sim, lane, &self.qpos, &self.qvel);
-        if !normalize {
-            group.set_qpos(lane, &self.qpos);
+        let LaneShard { task, work, blocks, prepared, start, .. } = self;
+        let Block { groups, lives } = &mut blocks[block];
+        let (group, lane, number) = (&mut groups[agent / T::LANES], agent % T::LANES, block * BLOCK + agent);
+        let id = lives[agent].next();
+        if prepared.get(number, id).is_none() {
+            let drawn = task.draw_start(start, &mut EpisodeRng::new(id));
+            if drawn.free_of_contacts || drawn.settle > 0 {
+                let ids: Vec<EpisodeId> = lives[agent - lane..][..T::LANES].iter().map(Life::next).collect();
+                prepared.make(task, work, number - lane, &ids);
+            } else {
+                group.put(&task.sim, lane, &start.qpos, &start.qvel);
+                if !drawn.normalize {
+                    group.set_qpos(lane, &start.qpos);
+                }
+            }
         }
+        if let Some(start) = prepared.get(number, id) {
+            group.put(&task.sim, lane, &start.qpos, &start.qvel);
+        }
+        lives[agent] = Life { id, steps: 0 };
     }
 }
 
@@ -277,9 +310,7 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
             out.diverged |= (ended.diverged << first) as u16;
             // a broken state is put away at once: it must not slow its group down until the caller resets it
             for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
-                self.qvel.clear();
-                self.qvel.resize(task.blueprint.model.nv, 0.0);
-                group.put(&task.sim, lane, &task.blueprint.spawn, &self.qvel);
+                group.put(&task.sim, lane, &task.blueprint.spawn, &vec![0.0; task.blueprint.model.nv]);
             }
         }
         for (i, life) in lives.iter_mut().enumerate() {
@@ -294,7 +325,8 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         let Block { groups, lives } = &self.blocks[block];
         for (i, life) in lives.iter().enumerate() {
-            for n in [life.seed, life.agent, life.episode, life.steps] {
+            let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
+            for n in [seed, agent, episode, steps] {
                 bytes.extend(n.to_le_bytes());
             }
             let lane = i % T::LANES;
@@ -311,7 +343,8 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
         let (mine, rest) = bytes.split_at_checked(BLOCK * numbers * 8)?;
         for ((i, life), agent) in lives.iter_mut().enumerate().zip(mine.chunks_exact(numbers * 8)) {
             let mut words = agent.as_chunks::<8>().0.iter();
-            for n in [&mut life.seed, &mut life.agent, &mut life.episode, &mut life.steps] {
+            let EpisodeId { seed, agent, episode } = &mut life.id;
+            for n in [seed, agent, episode, &mut life.steps] {
                 *n = u64::from_le_bytes(*words.next()?);
             }
             let lane = i % T::LANES;
@@ -366,12 +399,12 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
 
     fn reseed(&mut self, seed: u64) {
         for life in self.blocks.iter_mut().flat_map(|b| &mut b.lives) {
-            (life.seed, life.episode, life.steps) = (seed, 0, 0);
+            *life = Life::new(seed, life.id.agent);
         }
     }
 
     fn reseed_agent(&mut self, agent: usize, seed: u64, number: u64) {
-        self.blocks[agent / BLOCK].lives[agent % BLOCK] = Life { seed, agent: number, episode: 0, steps: 0 };
+        self.blocks[agent / BLOCK].lives[agent % BLOCK] = Life::new(seed, number);
     }
 
     fn observe(&mut self, block: usize, mask: u16, obs: &mut [f32]) {

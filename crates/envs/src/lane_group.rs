@@ -10,7 +10,7 @@ use crate::shard::{BLOCK, BlockStep};
 use crate::write::{Obs, Terms};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
-const LARGEST: f64 = 1e6;
+pub(crate) const LARGEST: f64 = 1e6;
 
 /// State of `T::LANES` agents and the results of their last decision.
 pub(crate) struct LaneGroup<T: Real> {
@@ -22,6 +22,8 @@ pub(crate) struct LaneGroup<T: Real> {
     /// Terms of the reward; the termination last, if it has a reward of its own.
     terms: Vec<T>,
     info: Vec<T>,
+    /// What touch sites feel, N.
+    pressed: Vec<T>,
     reward: T,
     forward: T,
 }
@@ -52,6 +54,7 @@ impl<T: Real> LaneGroup<T> {
             obs: vec![T::zero(); task.spec.obs],
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
+            pressed: vec![T::zero(); task.anatomy.touch_sites.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -113,10 +116,14 @@ impl<T: Real> LaneGroup<T> {
     }
 
     /// Brings all readings up to date at the start of an episode.
-    fn look<A: Agent>(&self, task: &Task<T, A>, work: &mut Work<T>) {
-        if task.facts.view.joints {
+    fn look<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>) {
+        let sites = &task.anatomy.touch_sites;
+        if task.facts.view.joints || !sites.is_empty() {
             task.sim.forward(work, &self.physics);
-            task.sim.measure_joints(work);
+            if task.facts.view.joints {
+                task.sim.measure_joints(work);
+            }
+            T::enter(Feel { sim: &task.sim, group: self, work, sites });
         } else {
             task.sim.refresh(work, &self.physics);
         }
@@ -146,6 +153,9 @@ impl<T: Real> LaneGroup<T> {
         }
         if view.bodies {
             task.sim.measure_bodies(work, &self.physics);
+        }
+        if !self.pressed.is_empty() {
+            T::enter(Feel { sim: &task.sim, group: self, work, sites: &task.anatomy.touch_sites });
         }
         if !view.of_last_step {
             task.sim.refresh(work, &self.physics);
@@ -246,6 +256,26 @@ impl<T: Real> Kernel<T> for Act<'_, T> {
     }
 }
 
+/// Reads the touch sites, before the frames move on from where the forces acted.
+struct Feel<'a, T: Real> {
+    sim: &'a Sim<T>,
+    group: &'a mut LaneGroup<T>,
+    work: &'a Work<T>,
+    sites: &'a [usize],
+}
+
+impl<T: Real> Kernel<T> for Feel<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let LaneGroup { physics, pressed, .. } = self.group;
+        let readings = Readings::new(self.sim, physics, self.work);
+        for (force, site) in pressed.iter_mut().zip(self.sites) {
+            *force = readings.site_touch(*site);
+        }
+    }
+}
+
 /// Completes the distance that [`Act`] began.
 struct Move<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
@@ -289,12 +319,13 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
     #[inline(always)]
     fn run(self) -> Perceived {
         let Perceive { task, group, work, fresh, names } = self;
-        let LaneGroup { physics, memory, start, obs, terms, info, .. } = group;
+        let LaneGroup { physics, memory, start, obs, terms, info, pressed, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             anatomy: &task.anatomy,
             action: &physics.ctrl,
             memory: &[],
+            pressed,
             fresh: fresh.is_some(),
             dt: task.spec.dt,
         };

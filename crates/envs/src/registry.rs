@@ -28,7 +28,7 @@ impl Default for Registry {
         for agent in agents::all() {
             registry.agents.push((agent.facts().id, agent));
         }
-        for (alias, id) in agents::ALIASES {
+        for (alias, id) in agents::ALIASES.into_iter().chain(agents::dm_control::ALIASES) {
             registry.aliases.push((alias.into(), id.into()));
         }
         registry

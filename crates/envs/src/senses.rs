@@ -26,6 +26,8 @@ pub struct Senses<'a, T: Real> {
     /// As [`Facts::controls`](crate::Facts::controls) says.
     pub(crate) action: &'a [T],
     pub(crate) memory: &'a [T],
+    /// What touch sites feel.
+    pub(crate) pressed: &'a [T],
     /// An episode has just begun: there has been no physics step whose contacts could be felt.
     pub(crate) fresh: bool,
     /// Seconds between decisions.
@@ -71,6 +73,13 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn touch(&self, i: usize) -> T::Mask {
         if self.fresh { T::none() } else { self.readings.touching(self.anatomy.touch[i]) }
+    }
+
+    /// What touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites) feels, N: the value of MuJoCo's touch sensor
+    /// at the last physics step. At the start of an episode, what it feels there without controls.
+    #[inline(always)]
+    pub fn touch_force(&self, i: usize) -> T {
+        self.pressed[i]
     }
 
     /// Number of actuated pairs of bodies.

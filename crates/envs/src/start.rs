@@ -16,6 +16,11 @@ pub struct Start<'a> {
     pub random: &'a mut EpisodeRng,
     /// Whether quaternions are normalized before anybody observes them; they are unless told otherwise.
     pub normalize: bool,
+    /// Whether the start counts only if nothing touches anything; no unless told otherwise. One that does not count is drawn
+    /// again, from the spawn pose and with the random numbers that follow.
+    pub free_of_contacts: bool,
+    /// Physics steps without controls that lead from here to where the episode begins; none unless told otherwise.
+    pub settle: usize,
     pub(crate) blueprint: &'a Blueprint,
 }
 

@@ -17,16 +17,26 @@ fn names_are_found_by_id_alias_and_base() {
     assert_eq!(id("ANT"), "Ant-v0");
     assert_eq!(id("ant-v5"), "Ant-v5");
     assert_eq!(id("swimmer"), "Swimmer-v5");
+    assert_eq!(id("Walker-Run"), "walker-run-v0");
+    assert_eq!(id("dm_control/hopper-hop-v0"), "hopper-hop-v0");
 }
 
 #[test]
 fn an_unknown_name_gets_the_nearest_and_the_list() {
     let known = "known: Hopper-v0, Hopper-v1, Walker2d-v0, Walker2d-v1, Humanoid-v0, Humanoid-v1, Ant-v0, Ant-v1, \
                  Hopper-v5, Walker2d-v5, HalfCheetah-v5, Ant-v5, Humanoid-v5, HumanoidStandup-v5, Swimmer-v5, \
-                 InvertedPendulum-v5, InvertedDoublePendulum-v5";
+                 InvertedPendulum-v5, InvertedDoublePendulum-v5, hopper-stand-v0, hopper-hop-v0, walker-stand-v0, \
+                 walker-walk-v0, walker-run-v0, humanoid-stand-v0, humanoid-walk-v0, humanoid-run-v0, cheetah-run-v0";
     assert_eq!(id("hoper"), format!("agent 'hoper' does not exist; did you mean 'Hopper-v0'? {known}"));
     assert_eq!(id("Humanoid-v3"), format!("agent 'Humanoid-v3' does not exist; did you mean 'Humanoid-v0'? {known}"));
     assert_eq!(id("elephant"), format!("agent 'elephant' does not exist; {known}"));
+}
+
+#[test]
+fn every_alias_leads_to_an_agent() {
+    for (alias, name) in agents::ALIASES.into_iter().chain(agents::dm_control::ALIASES) {
+        assert_eq!(id(alias), name);
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{isas, make, play};
-use marathon_envs::{Autoreset, Step};
+use marathon_envs::{AgentState, Autoreset, Step, VecEnv};
 use marathon_physics::lanes::Isa;
 
 const DECISIONS: usize = 60;
@@ -79,6 +79,54 @@ fn gymnasiums_humanoid() {
 #[test]
 fn gymnasiums_double_pendulum() {
     check("InvertedDoublePendulum-v5");
+}
+
+/// dm_control's tasks: touch sensors; starts that are drawn again and again; starts that settle.
+#[test]
+fn dm_controls_hopper() {
+    check("hopper-stand-v0");
+}
+
+#[test]
+fn dm_controls_humanoid() {
+    check("humanoid-walk-v0");
+}
+
+#[test]
+fn dm_controls_cheetah() {
+    check("cheetah-run-v0");
+}
+
+/// Where the agents' episodes begin, `[episode][agent]`, if the agents begin theirs one by one in an order of `turns`.
+fn starts(env: &mut VecEnv, episodes: usize, turns: impl Fn(usize, usize) -> usize) -> Vec<Vec<AgentState>> {
+    let n = env.agents();
+    let mut obs = vec![0.0; n * env.spec().obs];
+    env.reset(Some(3), &mut obs).unwrap();
+    let mut starts: Vec<Vec<AgentState>> = vec![(0..n).map(|i| env.state(i).unwrap()).collect()];
+    let mut begun = vec![0; n];
+    starts.resize(episodes, starts[0].clone());
+    for turn in 0..n * (episodes - 1) {
+        let agent = turns(turn, n);
+        let mask: Vec<bool> = (0..n).map(|i| i == agent).collect();
+        env.reset_agents(&mask, &mut obs).unwrap();
+        begun[agent] += 1;
+        starts[begun[agent]][agent] = env.state(agent).unwrap();
+    }
+    starts
+}
+
+/// A start that takes physics is made beside those of other agents, which must not show.
+#[test]
+fn starts_do_not_depend_on_when_they_are_made() {
+    for id in ["humanoid-stand-v0", "cheetah-run-v0"] {
+        let [mut a, mut b] = [Isa::F32, Isa::best()].map(|isa| make(id, 20, 1, Some(isa), Autoreset::Disabled));
+        // episode by episode, and agent by agent
+        let by_episode = starts(&mut a, 4, |turn, n| turn % n);
+        let by_agent = starts(&mut b, 4, |turn, _| turn / 3);
+        assert!(by_episode == by_agent, "{id}");
+        let all: Vec<&AgentState> = by_episode.iter().flatten().collect();
+        assert!((1..all.len()).all(|i| !all[..i].contains(&all[i])), "{id}: two starts are the same");
+    }
 }
 
 /// Agents differ from each other: otherwise the tests above would pass for the wrong reason.

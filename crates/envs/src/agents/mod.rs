@@ -4,6 +4,7 @@
 //! code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
 
 pub mod ant;
+pub mod dm_control;
 pub mod gymnasium;
 pub mod hopper;
 pub mod humanoid;
@@ -26,6 +27,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(ant::AntV1),
     ];
     agents.extend(gymnasium::all());
+    agents.extend(dm_control::all());
     agents
 }
 

@@ -27,13 +27,11 @@ impl<T: Real> Readings<'_, T> {
         }
         // nothing is divided by a subtree without mass, as in MuJoCo
         let inverse = total.max(T::lit(1e-15)).recip();
-        let (mut arm, mut velocity) = ([T::zero(); 3], [T::zero(); 3]);
+        let (mut arm, velocity) = ([T::zero(); 3], self.subtree_velocity(body));
         for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
-            let (r, v, part) =
-                (self.separation(own, &self.sim.coms[b]), self.body_com_velocity(b), self.own_mass(b) * inverse);
+            let (r, part) = (self.separation(own, &self.sim.coms[b]), self.own_mass(b) * inverse);
             for k in 0..3 {
                 arm[k] = r[k].mul_add(part, arm[k]);
-                velocity[k] = v[k].mul_add(part, velocity[k]);
             }
         }
         let mut momentum = [T::zero(); 3];
@@ -45,6 +43,26 @@ impl<T: Real> Readings<'_, T> {
             momentum = cross_add(&r, &p, &add3(&momentum, &self.spin_momentum(b)));
         }
         Subtree { com: add3(&self.mount_pos(own), &arm), velocity, momentum }
+    }
+
+    /// Velocity of the center of mass of a body and all that hang from it, m/s.
+    #[inline(always)]
+    pub fn subtree_velocity(&self, body: usize) -> V3<T> {
+        let bodies = &self.sim.model.bodies;
+        let (mut mass, mut momentum) = (T::zero(), [T::zero(); 3]);
+        for b in body..bodies.len() {
+            // what hangs from a body follows it without a gap
+            if b > body && bodies[b].parent < body {
+                break;
+            }
+            let (m, v) = (self.own_mass(b), self.body_com_velocity(b));
+            mass += m;
+            for k in 0..3 {
+                momentum[k] = v[k].mul_add(m, momentum[k]);
+            }
+        }
+        let inverse = mass.max(T::lit(1e-15)).recip();
+        [momentum[0] * inverse, momentum[1] * inverse, momentum[2] * inverse]
     }
 
     /// Energy of gravity and springs. A spring whose stiffness is a polynomial of its displacement `x` holds

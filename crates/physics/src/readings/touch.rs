@@ -1,8 +1,10 @@
 //! Touch sensors.
 
 use super::Readings;
+use super::forces::ContactForce;
 use super::rays::ray_shape;
 use crate::lanes::Real;
+use crate::solver::block::Source;
 use crate::spatial::into_axes;
 
 impl<T: Real> Readings<'_, T> {
@@ -18,27 +20,45 @@ impl<T: Real> Readings<'_, T> {
         total
     }
 
-    /// Normal forces of the contacts of a site's body that are felt in the site's volume: those from whose point the
-    /// ray against the force on the body meets the volume, which those inside it always do.
+    /// What a touch sensor on a site feels, N: the normal forces of the contacts of the site's body in the site's volume,
+    /// at the last physics step. A contact is felt if the ray from its point against the force on the body meets the
+    /// volume, which one from inside always does. To be called after [`Sim::advance`](crate::Sim::advance) or
+    /// [`Sim::forward`](crate::Sim::forward), before [`Sim::refresh`](crate::Sim::refresh) moves the site on.
     #[inline(always)]
-    pub(super) fn site_touch(&self, site: usize) -> T {
+    pub fn site_touch(&self, site: usize) -> T {
+        let mut total = T::zero();
+        for row in &self.work.contacts {
+            total += self.felt(site, &self.floor_contact(row));
+        }
+        for block in self.work.blocks.iter() {
+            if block.source != Source::Contacts {
+                continue;
+            }
+            for (index, on) in &block.members {
+                if let Some(contact) = self.pair_contact(block, *index, *on) {
+                    total += self.felt(site, &contact);
+                }
+            }
+        }
+        total
+    }
+
+    /// What a site feels of one contact.
+    #[inline(always)]
+    fn felt(&self, site: usize, c: &ContactForce<T>) -> T {
         let s = &self.sim.model.sites[site];
+        let body = |g: usize| self.sim.model.geoms[g].body;
+        let [first, second] = [body(c.geoms[0]) == s.body, body(c.geoms[1]) == s.body];
+        if !first && !second {
+            return T::zero();
+        }
         let mount = &self.sim.sites[site];
         let axes = self.work.axes(mount);
         let size = [T::lit(s.size[0]), T::lit(s.size[1]), T::lit(s.size[2])];
-        let mut total = T::zero();
-        for c in self.contact_forces() {
-            let [first, second] = c.geoms.map(|g| self.sim.model.geoms[g].body == s.body);
-            if !first && !second {
-                continue;
-            }
-            let start = into_axes(&axes, &self.arm_from(mount, Some(c.tree), &c.point));
-            let normal = into_axes(&axes, &c.normal);
-            let ray = if second { [-normal[0], -normal[1], -normal[2]] } else { normal };
-            let hit = ray_shape(s.kind, &size, &start, &ray);
-            let felt = T::and(c.on, T::not(hit.dist.lt(T::zero())));
-            total += T::masked(felt, c.push.max(T::zero()));
-        }
-        total
+        let start = into_axes(&axes, &self.arm_from(mount, Some(c.tree), &c.point));
+        let normal = into_axes(&axes, &c.normal);
+        let ray = if second { [-normal[0], -normal[1], -normal[2]] } else { normal };
+        let hit = ray_shape(s.kind, &size, &start, &ray);
+        T::masked(T::and(c.on, T::not(hit.dist.lt(T::zero()))), c.push.max(T::zero()))
     }
 }

@@ -1,0 +1,119 @@
+//! Starts of episodes that take physics: free of contacts, or settled for a while.
+//!
+//! All lanes of a group are prepared at once, also those whose next episode is not due yet: a physics step costs the same
+//! for one lane as for all, and episodes that end one by one would each pay for a whole group. A start is a function of
+//! seed, agent and episode alone, so it makes no difference when it is made, and it belongs to no snapshot.
+
+use marathon_physics::lanes::{Kernel, Real};
+use marathon_physics::{Group, Readings, Sim, Work};
+
+use crate::agent::Agent;
+use crate::lane_env::{AgentState, Task};
+use crate::lane_group::LARGEST;
+use crate::random::{EpisodeId, EpisodeRng};
+
+/// Most draws of a start that is to be free of contacts; then the last one counts, whatever it touches.
+const DRAWS: usize = 1000;
+
+/// Starts of the next episodes of a shard's agents.
+pub(crate) struct Prepared<T: Real> {
+    /// Where they are made.
+    scratch: Option<Group<T>>,
+    /// By agent.
+    starts: Vec<Option<(EpisodeId, AgentState)>>,
+}
+
+impl<T: Real> Prepared<T> {
+    /// No starts, for a number of agents.
+    pub fn new(agents: usize) -> Self {
+        Prepared { scratch: None, starts: vec![None; agents] }
+    }
+
+    /// The start of an agent's episode, if it has been made.
+    pub fn get(&self, agent: usize, id: EpisodeId) -> Option<&AgentState> {
+        self.starts[agent].as_ref().filter(|(known, _)| *known == id).map(|(_, state)| state)
+    }
+
+    /// Makes the starts of the episodes `ids` of consecutive agents, one per lane, as far as they have not been made.
+    pub fn make<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, first: usize, ids: &[EpisodeId]) {
+        let due: Vec<usize> = (0..T::LANES).filter(|lane| self.get(first + lane, ids[*lane]).is_none()).collect();
+        let group = self.scratch.get_or_insert_with(|| Group::new(&task.sim));
+        // the others must not slow the group down
+        let (spawn, at_rest) = (&task.blueprint.spawn, vec![0.0; task.blueprint.model.nv]);
+        for lane in 0..T::LANES {
+            group.reset_lane(&task.sim, lane, spawn, &at_rest);
+        }
+        let settle = draw(task, work, group, &due, ids);
+        let mut steps = 0;
+        loop {
+            for lane in due.iter().copied().filter(|lane| settle[*lane] == steps) {
+                let mut state = read(group, lane);
+                if !state.qpos.iter().chain(&state.qvel).all(|x| x.abs() < LARGEST) {
+                    state = AgentState { qpos: spawn.clone(), qvel: at_rest.clone() };
+                }
+                self.starts[first + lane] = Some((ids[lane], state));
+            }
+            let Some(next) = due.iter().map(|lane| settle[*lane]).filter(|n| *n > steps).min() else { return };
+            task.sim.advance(work, group, next - steps);
+            steps = next;
+        }
+    }
+}
+
+/// Draws the starts of some lanes until they count. Returns for every lane how many steps it is to settle.
+fn draw<T: Real, A: Agent>(
+    task: &Task<T, A>,
+    work: &mut Work<T>,
+    group: &mut Group<T>,
+    due: &[usize],
+    ids: &[EpisodeId],
+) -> Vec<usize> {
+    let mut randoms: Vec<EpisodeRng> = ids.iter().map(|id| EpisodeRng::new(*id)).collect();
+    let mut settle = vec![0; T::LANES];
+    let mut state = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+    let mut missing = due.to_vec();
+    for _ in 0..DRAWS {
+        let mut doubtful = Vec::new();
+        for lane in missing {
+            let drawn = task.draw_start(&mut state, &mut randoms[lane]);
+            group.reset_lane(&task.sim, lane, &state.qpos, &state.qvel);
+            settle[lane] = drawn.settle;
+            if drawn.free_of_contacts {
+                doubtful.push(lane);
+            }
+        }
+        if doubtful.is_empty() {
+            break;
+        }
+        task.sim.forward(work, group);
+        let touching = T::enter(Touching { sim: &task.sim, group, work });
+        missing = doubtful.into_iter().filter(|lane| touching >> lane & 1 == 1).collect();
+    }
+    settle
+}
+
+/// State of a lane.
+fn read<T: Real>(group: &Group<T>, lane: usize) -> AgentState {
+    let numbers = |v: &[T]| v.iter().map(|x| T::widen(x.get(lane))).collect();
+    AgentState { qpos: numbers(&group.qpos), qvel: numbers(&group.qvel) }
+}
+
+/// Lanes in which something touches something, a bit each, after [`Sim::forward`].
+struct Touching<'a, T: Real> {
+    sim: &'a Sim<T>,
+    group: &'a Group<T>,
+    work: &'a Work<T>,
+}
+
+impl<T: Real> Kernel<T> for Touching<'_, T> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let readings = Readings::new(self.sim, self.group, self.work);
+        let mut any = T::none();
+        for geom in 0..self.sim.model().geoms.len() {
+            any = T::or(any, T::or(readings.touching(geom), readings.touching_bodies(geom)));
+        }
+        T::bits(any)
+    }
+}
