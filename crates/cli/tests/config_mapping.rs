@@ -359,6 +359,9 @@ fn every_agent_has_a_valid_default() {
     // Gymnasium's tasks have settings of their own
     assert_ne!(default_for("hopper").ppo, default_for("Hopper-v5").ppo);
     assert_eq!((default_for("Walker2d-v5").ppo.gamma, default_for("Ant-v5").ppo.total_steps), (0.99, 10_000_000));
+    // and so have dm_control's
+    assert_eq!(default_for("dm_control/walker-walk-v0"), default_for("walker-walk"));
+    assert_ne!(default_for("walker-walk").ppo, default_for("walker").ppo);
     // an agent of somebody else's
     assert_eq!(default_for("MyRobot-v3"), Loaded::default());
 }

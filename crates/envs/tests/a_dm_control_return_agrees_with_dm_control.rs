@@ -290,7 +290,7 @@ fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Ba
 /// Observations and rewards are stored in single precision.
 #[test]
 fn a_hundred_decisions_agree_in_double_precision() {
-    agree(false, play, &Bars { decision: 2e-7, exempt: 0.0, state: 1e-6, least: 0.9 });
+    agree(false, play, &Bars { decision: 2e-7, exempt: 0.0, state: 2e-7, least: 0.9 });
 }
 
 #[test]

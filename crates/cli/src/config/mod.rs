@@ -26,13 +26,25 @@ use std::path::Path;
 /// For Gymnasium's own tasks.
 const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../../assets/configs/gymnasium-fast.yaml"));
 
+/// For dm_control's suite.
+const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../../../assets/configs/dm_control-fast.yaml"));
+
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 9] = [
+const FAST: [(&str, (&str, &str)); 18] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
     ("Ant-v5", GYMNASIUM),
     ("Humanoid-v5", GYMNASIUM),
+    ("hopper-stand", DM_CONTROL),
+    ("hopper-hop", DM_CONTROL),
+    ("walker-stand", DM_CONTROL),
+    ("walker-walk", DM_CONTROL),
+    ("walker-run", DM_CONTROL),
+    ("humanoid-stand", DM_CONTROL),
+    ("humanoid-walk", DM_CONTROL),
+    ("humanoid-run", DM_CONTROL),
+    ("cheetah-run", DM_CONTROL),
     ("Hopper", ("hopper-fast.yaml", include_str!("../../../../assets/configs/hopper-fast.yaml"))),
     ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../../assets/configs/walker2d-fast.yaml"))),
     ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../../assets/configs/humanoid-fast.yaml"))),
