@@ -27,7 +27,8 @@ use std::path::Path;
 const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../../assets/configs/gymnasium-fast.yaml"));
 
 /// For dm_control's suite.
-const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../../../assets/configs/dm_control-fast.yaml"));
+const DM_CONTROL: (&str, &str) =
+    ("dm_control-fast.yaml", include_str!("../../../../assets/configs/dm_control-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
 const FAST: [(&str, (&str, &str)); 18] = [
