@@ -7,6 +7,7 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   marathon train hopper                         learn to hop; results go to runs/hopper-1
+  marathon train hopper --algo acktr            the same by another algorithm: ppo, a2c, acktr
   marathon render runs/hopper-1 --out hop.gif   see it
   marathon eval runs/hopper-1 --episodes 1000   measure it
   marathon train --resume runs/hopper-1 --steps 20000000   let it learn on
@@ -71,6 +72,10 @@ pub struct TrainArgs {
     /// Configuration in the YAML schema of ML-Agents; without it, the agent's own fast one.
     #[arg(long, value_name = "F.yaml", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
+    /// Algorithm, with the settings that it starts from in place of the agent's own; in a configuration file it is
+    /// `trainer_type`.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["resume", "config"], value_parser = marathon_learn::Algorithm::NAMES)]
+    pub algo: Option<String>,
     /// Agents that act side by side, a multiple of 16.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     pub agents: Option<usize>,

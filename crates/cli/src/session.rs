@@ -72,7 +72,10 @@ impl Session {
         let mut loaded = match (loaded, &args.config) {
             (Some(loaded), _) => loaded,
             (None, Some(path)) => config::load(path, &agent)?,
-            (None, None) => config::default_for(&agent),
+            (None, None) => match &args.algo {
+                Some(name) => config::default_of(name),
+                None => config::default_for(&agent),
+            },
         };
         let ppo = &mut loaded.ppo;
         ppo.agents = args.agents.unwrap_or(ppo.agents);

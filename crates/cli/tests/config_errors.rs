@@ -158,6 +158,10 @@ fn values_that_do_not_go_together_are_refused() {
         "behaviors: {Hopper: {marathon: {min_std: 3, max_std: 2}}}",
         "a/test.yaml: behaviors.Hopper: configuration: max_std is 2, expected a number not below the smallest deviation, 3",
     );
+    refuse(
+        "behaviors: {Hopper: {trainer_type: a2c, hyperparameters: {num_epoch: 3}}}",
+        "a/test.yaml: behaviors.Hopper: configuration: epochs is 3, expected 1: a2c makes one step on each rollout",
+    );
     let error = error("behaviors: {Hopper: {marathon: {agents: 16, horizon: 2, minibatches: 5}}}").to_string();
     assert!(error.contains("minibatches is 5, expected at most 2"), "{error}");
 }
@@ -185,7 +189,7 @@ fn features_that_are_not_here_are_refused() {
     let behavior = |text: &str| format!("behaviors:\n  Hopper:\n    {text}\n");
     refuse(
         &behavior("trainer_type: sac"),
-        "a/test.yaml:3: behaviors.Hopper.trainer_type: a trainer other than PPO is not supported; found 'sac', expected ppo",
+        "a/test.yaml:3: behaviors.Hopper.trainer_type: this trainer is not supported; found 'sac', expected one of ppo, a2c, acktr",
     );
     for (text, message) in [
         (
@@ -227,7 +231,7 @@ fn features_that_are_not_here_are_refused() {
     ] {
         refuse_with(&format!("behaviors: {{Hopper: {{}}}}\n{text}\n"), message);
     }
-    refuse_with("Hopper: {trainer: sac, tau: 0.005}", "a trainer other than PPO");
+    refuse_with("Hopper: {trainer: sac, tau: 0.005}", "this trainer is not supported");
     refuse_with(
         "Hopper:\n  use_recurrent: true\n",
         "2: Hopper.use_recurrent: recurrent memory is not supported; found 'true'",
@@ -260,6 +264,20 @@ env_settings: {seed: -1, env_path: null}
     assert_eq!(
         without,
         ["line 3: behaviors.Hopper.reward_signals.curiosity asks for curiosity, which is left out as line 5 allows"]
+    );
+}
+
+#[test]
+fn settings_of_another_trainer_are_noted() {
+    let notes = notes(
+        "behaviors:\n  Hopper:\n    trainer_type: acktr\n    hyperparameters: {epsilon: 0.1}\n    marathon: {rms_decay: 0.9, kl_clip: 0.01}\n",
+    );
+    assert_eq!(
+        notes,
+        [
+            "line 4: behaviors.Hopper.hyperparameters.epsilon has no effect: acktr bounds no ratio",
+            "line 5: behaviors.Hopper.marathon.rms_decay has no effect: acktr has no such setting",
+        ]
     );
 }
 

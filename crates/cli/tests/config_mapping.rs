@@ -5,7 +5,7 @@
 mod config;
 
 use config::{Loaded, default_for, parse};
-use marathon_learn::{Activation, PpoConfig, Schedule};
+use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Schedule};
 use std::path::{Path, PathBuf};
 
 fn read(text: &str, agent: &str) -> Loaded {
@@ -137,6 +137,8 @@ fn every_key_of_marathon_counts() {
 ",
     );
     let expected = PpoConfig {
+        algorithm: Algorithm::Ppo,
+        rollouts: 1,
         agents: 48,
         horizon: 7,
         minibatches: 6,
@@ -364,4 +366,38 @@ fn every_agent_has_a_valid_default() {
     assert_ne!(default_for("walker-walk").ppo, default_for("walker").ppo);
     // an agent of somebody else's
     assert_eq!(default_for("MyRobot-v3"), Loaded::default());
+}
+
+#[test]
+fn other_trainers_start_from_the_settings_of_baselines() {
+    let a2c = read("behaviors: {Hopper: {trainer_type: a2c}}", "hopper").ppo;
+    let defaults = PpoConfig { total_steps: 500_000, ..PpoConfig::a2c() };
+    assert_eq!(a2c, defaults);
+    let text = "
+behaviors:
+  Hopper:
+    trainer_type: acktr
+    hyperparameters: {learning_rate: 0.1, buffer_size: 640, lambd: 0.9}
+    network_settings: {hidden_units: 32}
+    max_steps: 2e6
+    marathon: {kl_clip: 0.002, inverse_every: 5, rollouts: 3}
+";
+    let acktr = read(text, "hopper").ppo;
+    let settings = Acktr { kl_clip: 0.002, inverse_every: 5, ..Acktr::default() };
+    let want = PpoConfig {
+        algorithm: Algorithm::Acktr(settings),
+        horizon: 40,
+        rollouts: 3,
+        lr: 0.1,
+        value_lr: 0.1,
+        gae_lambda: 0.9,
+        actor_hidden: vec![32, 32],
+        critic_hidden: vec![32, 32],
+        total_steps: 2_000_000,
+        ..PpoConfig::acktr()
+    };
+    assert_eq!(acktr, want);
+    // the format of the paper calls it by another name
+    let old = read("Hopper: {trainer: a2c, max_steps: 1e5}", "hopper").ppo;
+    assert_eq!((old.algorithm.name(), old.total_steps, old.horizon), ("a2c", 1_600_000, 5));
 }

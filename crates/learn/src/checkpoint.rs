@@ -5,11 +5,12 @@
 //! or the new checkpoint, never half of one.
 
 use crate::files::{self, TensorReader, TensorWriter, write_atomic};
+use crate::kfac::Kfac;
 use crate::learner::Learner;
 use crate::noise::Noise;
 use crate::normalize::Moments;
-use crate::ppo::{Clocks, Run};
-use crate::{BLOCK, Error, PpoConfig};
+use crate::run::{Clocks, Run};
+use crate::{Algorithm, BLOCK, Error, PpoConfig};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -24,6 +25,8 @@ pub struct Checkpoint {
     params: Vec<f32>,
     adam_m: Vec<f32>,
     adam_v: Vec<f32>,
+    /// Factors of the Fisher matrix and their inverses, of ACKTR.
+    kfac: (Vec<f64>, Vec<f32>),
     obs_mean: Vec<f64>,
     obs_var: Vec<f64>,
     /// Words of the random streams, `[block][64]`.
@@ -109,6 +112,7 @@ impl Checkpoint {
             params: learner.params.clone(),
             adam_m: learner.adam.m.clone(),
             adam_v: learner.adam.v.clone(),
+            kfac: run.kfac.as_ref().map(Kfac::save).unwrap_or_default(),
             obs_mean: learner.observations.mean.clone(),
             obs_var: learner.observations.var.clone(),
             noise,
@@ -143,6 +147,7 @@ impl Checkpoint {
             ("agent", about.agent.clone(), run.spec.id.clone()),
             ("observation length", about.obs.to_string(), run.spec.obs.to_string()),
             ("action length", about.act.to_string(), run.spec.act.to_string()),
+            ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
             ("agents", old.agents.to_string(), new.agents.to_string()),
             ("seed", old.seed.to_string(), new.seed.to_string()),
             ("actor_hidden", format!("{:?}", old.actor_hidden), format!("{:?}", new.actor_hidden)),
@@ -173,6 +178,11 @@ impl Checkpoint {
             if found != expected {
                 return mismatch(what, format!("{found} numbers"), format!("{expected}"));
             }
+        }
+        if let Some(kfac) = &run.kfac
+            && !kfac.load(&self.kfac.0, &self.kfac.1)
+        {
+            return mismatch("kfac", format!("{} numbers", self.kfac.0.len()), "those of the networks".into());
         }
 
         learner.adam.powers = about.adam_powers;
@@ -222,6 +232,10 @@ impl Checkpoint {
         file.list("params", &self.params);
         file.list("adam_m", &self.adam_m);
         file.list("adam_v", &self.adam_v);
+        if !self.kfac.0.is_empty() {
+            file.list("kfac", &self.kfac.0);
+            file.list("kfac_inverse", &self.kfac.1);
+        }
         file.list("obs_mean", &self.obs_mean);
         file.list("obs_var", &self.obs_var);
         file.list("noise", &self.noise);
@@ -277,10 +291,15 @@ impl Checkpoint {
             file.get(name, &[file.list_len(name)])
         }
         let finite = |name| file.finite(name, &[file.list_len(name)]);
+        let kfac = match about.config.algorithm {
+            Algorithm::Acktr(_) => (list(&file, "kfac")?, finite("kfac_inverse")?),
+            _ => Default::default(),
+        };
         Ok(Self {
             params: finite("params")?,
             adam_m: finite("adam_m")?,
             adam_v: finite("adam_v")?,
+            kfac,
             obs_mean: list(&file, "obs_mean")?,
             obs_var: list(&file, "obs_var")?,
             noise: list(&file, "noise")?,

@@ -1,6 +1,6 @@
 //! The trainer's configuration.
 
-use crate::{Activation, BLOCK, Error};
+use crate::{A2c, Acktr, Activation, BLOCK, Error};
 use serde::{Deserialize, Serialize};
 
 /// How the policy's learning rate moves.
@@ -17,14 +17,47 @@ pub enum Schedule {
     Adaptive,
 }
 
-/// Settings of PPO. Every field has a default, so a file names only what it changes.
+/// What learns from the rollouts, with the settings that are its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Algorithm {
+    /// Proximal policy optimization.
+    #[default]
+    Ppo,
+    /// Advantage actor-critic. Of the settings below, `epochs` and `minibatches` are 1, and those of the clip ranges and
+    /// of the adaptive schedule mean nothing.
+    A2c(A2c),
+    /// Actor-critic with the natural gradient and a trust region; as A2C, and `max_grad_norm` means nothing either.
+    Acktr(Acktr),
+}
+
+impl Algorithm {
+    /// Names in configurations and on the command line.
+    pub const NAMES: [&str; 3] = ["ppo", "a2c", "acktr"];
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Algorithm::Ppo => "ppo",
+            Algorithm::A2c(_) => "a2c",
+            Algorithm::Acktr(_) => "acktr",
+        }
+    }
+}
+
+/// Settings of training; those of PPO, and an [`Algorithm`] that may be another. Every field has a default, so a file
+/// names only what it changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PpoConfig {
+    /// What learns from the rollouts.
+    pub algorithm: Algorithm,
     /// Agents that act side by side, a multiple of 16.
     pub agents: usize,
     /// Decisions of each agent per rollout.
     pub horizon: usize,
+    /// Rollouts of one iteration, each learned from by itself: what is reported and saved together.
+    pub rollouts: usize,
     /// Parts that the rollout is split into in every epoch. A part of fewer than 256 samples per thread leaves threads idle.
     pub minibatches: usize,
     /// Passes over each rollout.
@@ -98,8 +131,10 @@ impl Default for PpoConfig {
     /// A setting that solves the small tasks.
     fn default() -> Self {
         Self {
+            algorithm: Algorithm::Ppo,
             agents: 256,
             horizon: 64,
+            rollouts: 1,
             minibatches: 8,
             epochs: 4,
             total_steps: 10_000_000,
@@ -135,6 +170,45 @@ impl Default for PpoConfig {
 }
 
 impl PpoConfig {
+    /// A2C with the settings of the paper's comparison: OpenAI Baselines' with the rate that its authors chose, sixteen
+    /// agents, two networks of 64 and 64 units.
+    pub fn a2c() -> Self {
+        Self {
+            algorithm: Algorithm::A2c(A2c::default()),
+            agents: 16,
+            horizon: 5,
+            rollouts: 50,
+            minibatches: 1,
+            epochs: 1,
+            total_steps: 1_000_000,
+            lr: 3e-4,
+            value_lr: 3e-4,
+            schedule: Schedule::Linear,
+            max_grad_norm: 0.5,
+            gae_lambda: 1.0,
+            entropy_coef: 0.01,
+            init_log_std: 0.0,
+            min_std: 1e-3,
+            max_std: 1e3,
+            ..Self::default()
+        }
+    }
+
+    /// ACKTR with the settings of OpenAI Baselines, sixteen agents, two networks of 64 and 64 units.
+    pub fn acktr() -> Self {
+        Self { algorithm: Algorithm::Acktr(Acktr::default()), horizon: 20, rollouts: 10, lr: 0.25, ..Self::a2c() }
+    }
+
+    /// The settings that an algorithm starts from, by its name.
+    pub fn of(algorithm: &str) -> Option<Self> {
+        match algorithm {
+            "ppo" => Some(Self::default()),
+            "a2c" => Some(Self::a2c()),
+            "acktr" => Some(Self::acktr()),
+            _ => None,
+        }
+    }
+
     /// Number of blocks of sixteen agents.
     pub fn blocks(&self) -> usize {
         self.agents / BLOCK
@@ -165,7 +239,13 @@ impl PpoConfig {
         if items.saturating_mul(BLOCK) > 1 << 31 {
             return Err(Error::config("agents * horizon", items.saturating_mul(BLOCK), "at most 2^31 samples"));
         }
-        let counts = [("horizon", self.horizon), ("minibatches", self.minibatches), ("epochs", self.epochs)];
+        self.validate_algorithm()?;
+        let counts = [
+            ("horizon", self.horizon),
+            ("rollouts", self.rollouts),
+            ("minibatches", self.minibatches),
+            ("epochs", self.epochs),
+        ];
         for (field, n) in counts {
             if n == 0 {
                 return Err(Error::config(field, n, "at least 1"));
@@ -226,6 +306,51 @@ impl PpoConfig {
                 format!("[{low}, {high}]"),
                 "two positive numbers in ascending order",
             ));
+        }
+        Ok(())
+    }
+    /// Checks what is the algorithm's own, and what it demands of the rest.
+    fn validate_algorithm(&self) -> Result<(), Error> {
+        let positive = |field, x: f64| match x.is_finite() && x > 0.0 {
+            true => Ok(()),
+            false => Err(Error::config(field, x, "a positive number")),
+        };
+        let fraction = |field, x: f64| match (0.0..1.0).contains(&x) {
+            true => Ok(()),
+            false => Err(Error::config(field, x, "a number from 0 to below 1")),
+        };
+        match &self.algorithm {
+            Algorithm::Ppo => return Ok(()),
+            Algorithm::A2c(a2c) => {
+                positive("value_coef", a2c.value_coef)?;
+                fraction("rms_decay", a2c.rms_decay)?;
+                positive("rms_epsilon", a2c.rms_epsilon)?;
+            }
+            Algorithm::Acktr(acktr) => {
+                positive("value_coef", acktr.value_coef)?;
+                positive("kl_clip", acktr.kl_clip)?;
+                fraction("momentum", acktr.momentum)?;
+                positive("damping", acktr.damping)?;
+                fraction("stats_decay", acktr.stats_decay)?;
+                if acktr.inverse_every == 0 {
+                    return Err(Error::config("inverse_every", 0, "at least 1"));
+                }
+                // the factors are square
+                for (field, widths) in [("actor_hidden", &self.actor_hidden), ("critic_hidden", &self.critic_hidden)] {
+                    if widths.iter().any(|w| *w > 2048) {
+                        return Err(Error::config(field, format!("{widths:?}"), "widths up to 2048 with ACKTR"));
+                    }
+                }
+            }
+        }
+        let name = self.algorithm.name();
+        for (field, n) in [("epochs", self.epochs), ("minibatches", self.minibatches)] {
+            if n != 1 {
+                return Err(Error::config(field, n, format!("1: {name} makes one step on each rollout")));
+            }
+        }
+        if self.schedule == Schedule::Adaptive {
+            return Err(Error::config("schedule", "adaptive", format!("constant or linear with {name}")));
         }
         Ok(())
     }

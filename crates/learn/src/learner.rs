@@ -9,7 +9,7 @@ use crate::mlp::Mlp;
 use crate::noise::{PARAMETERS, SplitMix};
 use crate::normalize::{Moments, Normalizer};
 use crate::rollout::{BlockSums, Rollout};
-use crate::{BLOCK, PpoConfig, init};
+use crate::{Algorithm, BLOCK, PpoConfig, init};
 use marathon_envs::Spec;
 use std::ops::{Deref, Range};
 
@@ -50,6 +50,10 @@ impl Layout {
     pub fn critic_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
         &params[self.critic_start..self.critic_start + self.critic.len()]
     }
+    /// Which network a piece of the array is in: 0 for the policy, 1 for the value function.
+    pub fn network(&self, piece: &Range<usize>) -> usize {
+        (piece.start >= self.critic_start) as usize
+    }
     /// Pieces of the array whose squares are summed together, none of them in both networks.
     pub fn norm_blocks(&self) -> Vec<Range<usize>> {
         let cut = |r: Range<usize>| r.clone().step_by(NORM_BLOCK).map(move |i| i..(i + NORM_BLOCK).min(r.end));
@@ -86,9 +90,14 @@ impl Learner {
         init::orthogonal(&layout.actor, &mut params, 0.01, &mut random);
         init::orthogonal(&layout.critic, &mut params[layout.critic_start..], 1.0, &mut random);
         params[layout.log_std.clone()].fill(config.init_log_std as f32);
+        let mut adam = Adam::new(layout.len);
+        if let Algorithm::A2c(_) = config.algorithm {
+            // its mean square starts at 1, or the first steps would be ten times the rate
+            adam.v.fill(1.0);
+        }
         Self {
             params,
-            adam: Adam::new(layout.len),
+            adam,
             lr: config.lr,
             observations: Moments::new(spec.obs),
             returns: Moments::new(1),
@@ -145,22 +154,14 @@ impl Totals {
         let mut t = Totals::default();
         for block in rollouts.iter().flat_map(|r| &r.sums) {
             t.samples += (horizon * BLOCK) as f64;
-            let s = &mut t.sums;
-            s.episodes += block.episodes;
-            s.returns += block.returns;
-            s.lengths += block.lengths;
-            s.speeds += block.speeds;
-            s.falls += block.falls;
-            s.diverged += block.diverged;
-            s.terms.resize(block.terms.len(), 0.0);
-            s.terms.iter_mut().zip(&block.terms).for_each(|(a, b)| *a += b);
-            s.observations.resize(block.observations.len(), (0.0, 0.0));
-            s.observations.iter_mut().zip(&block.observations).for_each(|(a, b)| add(a, b));
-            add(&mut s.discounted, &block.discounted);
-            add(&mut s.advantages, &block.advantages);
-            add(&mut s.targets, &block.targets);
+            t.sums.add(block);
         }
         t
+    }
+    /// Takes in those of another rollout.
+    pub fn add(&mut self, other: &Totals) {
+        self.samples += other.samples;
+        self.sums.add(&other.sums);
     }
     /// Mean and variance of the advantages.
     pub fn advantage(&self) -> (f64, f64) {
@@ -175,9 +176,4 @@ impl Totals {
         let mean = sum / self.samples;
         (mean, (square / self.samples - mean * mean).max(0.0))
     }
-}
-
-fn add(a: &mut (f64, f64), b: &(f64, f64)) {
-    a.0 += b.0;
-    a.1 += b.1;
 }

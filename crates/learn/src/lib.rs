@@ -1,10 +1,10 @@
-//! Marathon's trainer: proximal policy optimization on the processor, in the lane layout of the physics.
+//! Marathon's trainer: PPO, A2C and ACKTR on the processor, in the lane layout of the physics.
 //!
 //! A rollout of thousands of agents and the network updates on it run on the same cores, in the same layout: blocks of
 //! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
 //! transposed or copied to a device.
 //!
-//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`PpoConfig`] says how,
+//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`PpoConfig`] says how, its [`Algorithm`] by what,
 //!   an [`Observer`] follows it and may stop it.
 //! * [`Policy`] is the result: it acts, and it is a file. [`evaluate`] tells how good it is.
 //! * [`Checkpoint`] is an interrupted run. Resumed, it gives the bits of a run that was never interrupted.
@@ -22,9 +22,10 @@
 //!
 //! # Reading the code
 //!
-//! [`ppo`](train) is the algorithm from top to bottom. It stands on `rollout` (acting), `advantage` (returns), `loss` (the
-//! objective), [`mlp`] with `tiles` (networks), `adam` (the optimizer) and `normalize` (statistics); `learner` holds what
-//! learning changes.
+//! `ppo`, `a2c` and `acktr` are the algorithms: what each does with a rollout, from top to bottom. `run` is around them:
+//! threads, iterations, reports. They stand on `rollout` (acting), `advantage` (returns), [`loss`] (the objective), [`mlp`]
+//! with `tiles` (networks), `adam` (the optimizer), [`kfac`] (the Fisher matrix) and `normalize` (statistics); `learner`
+//! holds what learning changes.
 //!
 //! # Example
 //!
@@ -44,6 +45,8 @@
 //! }
 //! ```
 
+mod a2c;
+mod acktr;
 mod activation;
 mod adam;
 mod advantage;
@@ -56,6 +59,7 @@ mod eval;
 mod files;
 pub mod gaussian;
 mod init;
+pub mod kfac;
 mod learner;
 pub mod loss;
 pub mod mlp;
@@ -66,12 +70,15 @@ mod onnx;
 mod policy;
 mod ppo;
 mod rollout;
+mod run;
 mod sync;
 mod tiles;
 
+pub use a2c::A2c;
+pub use acktr::Acktr;
 pub use activation::Activation;
 pub use checkpoint::Checkpoint;
-pub use config::{PpoConfig, Schedule};
+pub use config::{Algorithm, PpoConfig, Schedule};
 pub use error::Error;
 pub use eval::{EvalOptions, Evaluation, evaluate};
 pub use files::write_atomic;
@@ -79,7 +86,7 @@ pub use marathon_envs::BLOCK;
 pub use normalize::Normalizer;
 pub use observer::{Control, IterationStats, Observer, Snapshot};
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
-pub use ppo::{TrainOutput, train};
+pub use run::{TrainOutput, train};
 
 /// Runs `$body` with `$T` bound to the single-precision lane type of an `Isa`.
 macro_rules! f32_lanes {

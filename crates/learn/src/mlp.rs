@@ -34,6 +34,27 @@ struct Layer {
     biases: Range<usize>,
 }
 
+/// A layer and its places in what [`Mlp::second_moments`] fills.
+#[derive(Clone, Debug)]
+pub struct LayerMoments {
+    /// Number of inputs.
+    pub inputs: usize,
+    /// Number of outputs.
+    pub outputs: usize,
+    /// Its weights among the parameters.
+    pub weights: Range<usize>,
+    /// Its biases among the parameters.
+    pub biases: Range<usize>,
+    /// Sums of products of inputs, `[input][input]`.
+    pub xx: Range<usize>,
+    /// Sums of inputs.
+    pub x: Range<usize>,
+    /// Sums of products of derivatives with respect to outputs, `[output][output]`.
+    pub dd: Range<usize>,
+    /// Sums of those derivatives.
+    pub d: Range<usize>,
+}
+
 /// What the forward pass leaves for the backward pass, and the backward pass's own work space, for [`CHUNK`] blocks.
 pub struct Tape<S> {
     /// Output of each layer.
@@ -168,6 +189,74 @@ impl Mlp {
             let x = if l == 0 { input } else { &tape.values[l - 1] };
             let (dw, db) = gradient[layer.weights.start..layer.biases.end].split_at_mut(layer.weights.len());
             T::enter(Outer::<T> { x, dy, dw, db, blocks, lanes: PhantomData });
+            if l > 0 {
+                let dx = &mut before[l - 1];
+                T::enter(Transposed::<T> { w: &params[layer.weights.clone()], dy, dx: &mut *dx, blocks });
+                let slope = tape.slopes.get(l - 1);
+                T::enter(Slope::<T> { activation: self.activation, y: x, slope, d: dx, blocks });
+            }
+        }
+    }
+
+    /// The layers and their places among the second moments.
+    pub fn moments(&self) -> impl Iterator<Item = LayerMoments> + '_ {
+        let mut end = 0;
+        self.layers.iter().map(move |layer| {
+            let (inputs, outputs) = (layer.inputs, layer.outputs);
+            let mut next = |n: usize| {
+                end += n;
+                end - n..end
+            };
+            LayerMoments {
+                inputs,
+                outputs,
+                weights: layer.weights.clone(),
+                biases: layer.biases.clone(),
+                xx: next(inputs * inputs),
+                x: next(inputs),
+                dd: next(outputs * outputs),
+                d: next(outputs),
+            }
+        })
+    }
+    /// Numbers that [`Mlp::second_moments`] fills.
+    pub fn moments_len(&self) -> usize {
+        self.moments().last().map_or(0, |m| m.d.end)
+    }
+
+    /// Overwrites `moments` with sums over the first `blocks` blocks of products of each layer's inputs, and of the
+    /// derivatives with respect to its outputs (before the activation), after [`Mlp::forward`] on the same input, given
+    /// [`Tape::output_delta`].
+    pub fn second_moments(
+        &self,
+        isa: Isa,
+        params: &[f32],
+        input: &Blocks<f32>,
+        tape: &mut Tape<f32>,
+        moments: &mut [f32],
+        blocks: usize,
+    ) {
+        f32_lanes!(isa, T => self.second_moments_on::<T>(params, input, tape, moments, blocks))
+    }
+
+    /// [`Mlp::second_moments`] on given lanes.
+    pub fn second_moments_on<T: Real>(
+        &self,
+        params: &[T::Scalar],
+        input: &Blocks<T::Scalar>,
+        tape: &mut Tape<T::Scalar>,
+        moments: &mut [T::Scalar],
+        blocks: usize,
+    ) {
+        let places: Vec<LayerMoments> = self.moments().collect();
+        for (l, (layer, of)) in self.layers.iter().zip(&places).enumerate().rev() {
+            let (before, rest) = tape.deltas.split_at_mut(l);
+            let dy = &rest[0];
+            let x = if l == 0 { input } else { &tape.values[l - 1] };
+            let (dw, db) = moments[of.xx.start..of.x.end].split_at_mut(of.xx.len());
+            T::enter(Outer::<T> { x, dy: x, dw, db, blocks, lanes: PhantomData });
+            let (dw, db) = moments[of.dd.start..of.d.end].split_at_mut(of.dd.len());
+            T::enter(Outer::<T> { x: dy, dy, dw, db, blocks, lanes: PhantomData });
             if l > 0 {
                 let dx = &mut before[l - 1];
                 T::enter(Transposed::<T> { w: &params[layer.weights.clone()], dy, dx: &mut *dx, blocks });

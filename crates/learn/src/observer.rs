@@ -3,7 +3,7 @@
 use crate::checkpoint::Checkpoint;
 use crate::learner::Learner;
 use crate::policy::Policy;
-use crate::ppo::{Clocks, Run};
+use crate::run::{Clocks, Run};
 use serde::{Deserialize, Serialize};
 
 /// Numbers of one iteration.

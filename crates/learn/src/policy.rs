@@ -19,7 +19,7 @@ use crate::gaussian::Gaussian;
 use crate::learner::Learner;
 use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::normalize::{Normalize, Normalizer};
-use crate::ppo::{Clocks, Run};
+use crate::run::{Clocks, Run};
 use crate::{Activation, BLOCK, Error, PpoConfig, f32_lanes};
 use marathon_envs::Spec;
 use marathon_envs::shard::scale_action;

@@ -58,6 +58,29 @@ pub struct BlockSums {
     pub targets: (f64, f64),
 }
 
+impl BlockSums {
+    /// Adds those of another block or rollout.
+    pub fn add(&mut self, other: &BlockSums) {
+        fn pair(a: &mut (f64, f64), b: &(f64, f64)) {
+            a.0 += b.0;
+            a.1 += b.1;
+        }
+        self.episodes += other.episodes;
+        self.returns += other.returns;
+        self.lengths += other.lengths;
+        self.speeds += other.speeds;
+        self.falls += other.falls;
+        self.diverged += other.diverged;
+        self.terms.resize(other.terms.len(), 0.0);
+        self.terms.iter_mut().zip(&other.terms).for_each(|(a, b)| *a += b);
+        self.observations.resize(other.observations.len(), (0.0, 0.0));
+        self.observations.iter_mut().zip(&other.observations).for_each(|(a, b)| pair(a, b));
+        pair(&mut self.discounted, &other.discounted);
+        pair(&mut self.advantages, &other.advantages);
+        pair(&mut self.targets, &other.targets);
+    }
+}
+
 /// What a worker's agents experienced in one horizon; item `t * blocks + b` is block `b` at decision `t`.
 pub struct Rollout {
     blocks: usize,

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{PuckTask, silent, small_config};
+use common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Activation, PpoConfig, Schedule, TrainOutput, train};
 use marathon_physics::lanes::Isa;
 
@@ -23,6 +23,8 @@ fn threads_do_not_change_the_policy() {
         small_config(),
         PpoConfig { minibatches: 1, horizon: 40, value_clip: Some(0.2), ..small_config() },
         PpoConfig { minibatches: 17, schedule: Schedule::Linear, activation: Activation::Elu, ..small_config() },
+        small_of("a2c"),
+        small_of("acktr"),
     ] {
         let one = run(&config, Isa::best());
         for threads in [2, 3, 5, 9] {
@@ -42,6 +44,12 @@ fn vector_width_does_not_change_the_policy() {
         let want = run(&config, Isa::F32);
         for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
             assert_eq!(bits(&want), bits(&run(&config, isa)), "{} {}", activation.name(), isa.name());
+        }
+    }
+    for algorithm in ["a2c", "acktr"] {
+        let want = run(&small_of(algorithm), Isa::F32);
+        for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
+            assert_eq!(bits(&want), bits(&run(&small_of(algorithm), isa)), "{algorithm} {}", isa.name());
         }
     }
 }

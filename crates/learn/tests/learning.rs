@@ -3,7 +3,9 @@
 mod common;
 
 use common::PuckTask;
-use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Schedule, Snapshot, evaluate, train};
+use marathon_learn::{
+    Acktr, Activation, Algorithm, Control, IterationStats, PpoConfig, Schedule, Snapshot, evaluate, train,
+};
 use marathon_physics::lanes::Isa;
 
 fn config() -> PpoConfig {
@@ -59,6 +61,19 @@ fn constant_rate_with_elu_solves_the_task() {
     assert!(learned(&PpoConfig { schedule: Schedule::Constant, activation: Activation::Elu, ..config() }) > 52.0);
 }
 
+/// With a rate ten times that of the paper's comparison, which takes ten times as many steps.
+#[test]
+fn a2c_solves_the_task() {
+    let base = PpoConfig { lr: 3e-3, entropy_coef: 0.0, init_log_std: -0.5, ..PpoConfig::a2c() };
+    assert!(learned(&PpoConfig { total_steps: 400_000, threads: 1, ..base }) > 52.0);
+}
+
+/// With half the steps, and with the settings of OpenAI Baselines as they are.
+#[test]
+fn acktr_solves_the_task_in_half_the_steps() {
+    assert!(learned(&PpoConfig { total_steps: 200_000, threads: 1, ..PpoConfig::acktr() }) > 55.0);
+}
+
 #[test]
 fn observer_can_stop_and_looks_at_every_iteration() {
     let mut seen = Vec::new();
@@ -102,4 +117,11 @@ fn impossible_settings_are_refused_with_the_nearest_possible_one() {
     assert!(refuse(PpoConfig { lr: f64::NAN, ..config() }).contains("lr is NaN"));
     let isa = train(&PuckTask::new(), Isa::F64, &config(), None, &mut common::silent);
     assert!(isa.err().unwrap().to_string().contains("f64"));
+    assert_eq!(
+        refuse(PpoConfig { epochs: 3, ..PpoConfig::a2c() }),
+        "configuration: epochs is 3, expected 1: a2c makes one step on each rollout"
+    );
+    assert!(refuse(PpoConfig { schedule: Schedule::Adaptive, ..PpoConfig::acktr() }).contains("constant or linear"));
+    let acktr = Algorithm::Acktr(Acktr { kl_clip: 0.0, ..Default::default() });
+    assert!(refuse(PpoConfig { algorithm: acktr, ..PpoConfig::acktr() }).contains("kl_clip is 0"));
 }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{PuckTask, silent, small_config};
+use common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Checkpoint, Control, Error, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
 use std::path::Path;
@@ -30,11 +30,22 @@ fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
 
 #[test]
 fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
+    resumed_run_is_whole(&PpoConfig { total_steps: 5 * small_config().rollout_steps(), ..small_config() }, 1);
+}
+
+#[test]
+fn so_have_those_of_the_other_algorithms() {
+    for algorithm in ["a2c", "acktr"] {
+        resumed_run_is_whole(&small_of(algorithm), 4);
+    }
+}
+
+fn resumed_run_is_whole(config: &PpoConfig, rollouts: u64) {
     let dir = tempfile::tempdir().unwrap();
-    let config = PpoConfig { total_steps: 5 * small_config().rollout_steps(), ..small_config() };
     let whole = dir.path().join("whole");
-    run(&config, None).unwrap().save(&whole).unwrap();
-    for stop_at in 1..5 {
+    run(config, None).unwrap().save(&whole).unwrap();
+    let iterations = config.total_steps / (rollouts * config.rollout_steps());
+    for stop_at in (1..iterations.min(5)).map(|i| i * rollouts) {
         // interrupted by the observer, saved, loaded, and resumed with another number of threads
         let folder = dir.path().join(format!("part-{stop_at}"));
         let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| {
@@ -44,10 +55,10 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
             snapshot.checkpoint().save(&folder).unwrap();
             Control::Stop
         };
-        train(&PuckTask::with_limit(LIMIT), Isa::best(), &config, None, &mut observer).unwrap();
+        train(&PuckTask::with_limit(LIMIT), Isa::best(), config, None, &mut observer).unwrap();
         let checkpoint = Checkpoint::load(&folder).unwrap();
         assert_eq!((checkpoint.iteration(), checkpoint.agent()), (stop_at, "Puck-v0"));
-        assert_eq!(checkpoint.config(), &config);
+        assert_eq!(checkpoint.config(), config);
         run(&PpoConfig { threads: 2, ..config.clone() }, Some(checkpoint)).unwrap().save(&folder).unwrap();
         assert_eq!(contents(&folder), contents(&whole), "interrupted after iteration {stop_at}");
         // the old state is gone
@@ -70,6 +81,10 @@ fn checkpoint_of_something_else_is_refused() {
     };
     refuse(PpoConfig { agents: 96, ..small_config() }, "checkpoint: agents is for 80, expected 96");
     refuse(PpoConfig { actor_hidden: vec![7], ..small_config() }, "actor_hidden is for [13, 8], expected [7]");
+    refuse(
+        PpoConfig { agents: 80, horizon: 24, ..small_of("acktr") },
+        "checkpoint: algorithm is for ppo, expected acktr",
+    );
     refuse(PpoConfig { seed: 9, ..small_config() }, "seed is for 1, expected 9");
     let task = PuckTask::new().renamed("Puck-v1");
     let error = train(&task, Isa::best(), &small_config(), Some(checkpoint.clone()), &mut silent).err().unwrap();

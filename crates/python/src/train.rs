@@ -85,7 +85,7 @@ pub fn train(
     resume: Option<PathBuf>,
 ) -> PyResult<TrainResult> {
     let (dry, path) = (out.is_none(), resume.clone());
-    let mut args = TrainArgs { agent: task, config: None, agents, steps, seed, threads, out, resume };
+    let mut args = TrainArgs { agent: task, config: None, algo: None, agents, steps, seed, threads, out, resume };
     let session = match (path, config) {
         (Some(_), Some(_)) => return Err(error::value("config and resume exclude each other: a run keeps its own")),
         (Some(_), None) if seed.is_some() || agents.is_some() || args.out.is_some() => {

@@ -3,6 +3,7 @@
 use super::error::{ConfigError, nearest, shown};
 use super::names;
 use super::section::{Entry, Section};
+use marathon_learn::PpoConfig;
 use std::path::Path;
 
 /// The two formats of ML-Agents.
@@ -17,6 +18,8 @@ pub enum Format {
 /// Settings of one agent, by topic. In the old format the first three are the same section.
 pub struct Behavior<'a> {
     pub format: Format,
+    /// What holds where the file is silent; it knows the trainer.
+    pub base: PpoConfig,
     /// Settings that stand in no section.
     pub top: Section<'a>,
     pub hyperparameters: Section<'a>,

@@ -5,7 +5,7 @@ use super::behavior::{Behavior, Notes};
 use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
-use marathon_learn::{Activation, BLOCK, PpoConfig, Schedule};
+use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, PpoConfig, Schedule};
 use std::path::Path;
 
 /// Agents in a scene of the paper, which a file of its time does not say.
@@ -16,18 +16,12 @@ const MOST_AGENTS: u64 = 1024;
 /// ML-Agents decays to these, not to zero.
 const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
-/// Normalized observations lie within this.
-const OBSERVATION_CLIP: f64 = 5.0;
-/// ML-Agents clips a sample to [-3, 3] and divides it by 3, and its deviation starts at 1.
-const INIT_STD: f64 = 1.0 / 3.0;
-/// ML-Agents bounds neither the deviation nor the gradient: far out.
-const STD_RANGE: [f64; 2] = [1e-3, 1e3];
-const MAX_GRAD_NORM: f64 = 1e9;
 
 /// Keys of the section that only Marathon reads.
-const MARATHON: [&str; 26] = [
+const MARATHON: [&str; 35] = [
     "agents",
     "horizon",
+    "rollouts",
     "minibatches",
     "actor_hidden",
     "critic_hidden",
@@ -52,24 +46,38 @@ const MARATHON: [&str; 26] = [
     "threads",
     "without",
     "steps_per_agent",
+    "value_coef",
+    "rms_decay",
+    "rms_epsilon",
+    "kl_clip",
+    "momentum",
+    "damping",
+    "stats_decay",
+    "inverse_every",
 ];
 
-/// The trainer's configuration, with ML-Agents' values for all that the file leaves out.
+/// The trainer's configuration, with the values of its base for all that the file leaves out.
 ///
 /// # Errors
 /// If a value is wrong, or the values do not go together.
 pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigError> {
     let settings = Settings::read(&behavior)?;
-    let Behavior { top, hyperparameters, marathon, mut notes, seed, .. } = behavior;
+    let Behavior { top, hyperparameters, marathon, mut notes, seed, base, .. } = behavior;
     marathon.only(&MARATHON)?;
 
     let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
-    let agents = agents(&marathon, &settings, steps_per_agent)?;
+    let agents = agents(&marathon, &settings, &base, steps_per_agent)?;
     // an update waits until the buffer is full
     let horizon = marathon.count("horizon", 1..=1 << 31, settings.buffer_size.div_ceil(agents))?;
     if let Some(entry) = hyperparameters.get("buffer_size").filter(|_| horizon != settings.buffer_size.div_ceil(agents))
     {
         notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
+    }
+    let is_ppo = base.algorithm == Algorithm::Ppo;
+    for key in ["epsilon", "epsilon_schedule"] {
+        if let Some(entry) = hyperparameters.get(key).filter(|_| !is_ppo) {
+            notes.ignored(&entry, &format!("{} bounds no ratio", base.algorithm.name()));
+        }
     }
     if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon) {
         let why = "each of the N agents adds M decisions to a rollout and the values of the states reached stand for the rest";
@@ -86,34 +94,39 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let actor_hidden = widths(&marathon, "actor_hidden", hidden)?;
     let last_epsilon = settings.epsilon.min(LAST_EPSILON);
     let last_beta = settings.beta.min(LAST_BETA);
-    let defaults = PpoConfig::default();
+    let [min_std, max_std] = [base.min_std, base.max_std];
     let ppo = PpoConfig {
+        algorithm: algorithm(&marathon, base.algorithm, &mut notes)?,
         agents: agents as usize,
         horizon: horizon as usize,
+        rollouts: marathon.count("rollouts", 1..=1 << 31, base.rollouts as u64)? as usize,
         minibatches: marathon.count("minibatches", 1..=1 << 31, minibatches)? as usize,
         epochs: settings.num_epoch as usize,
         total_steps: settings.max_steps.saturating_mul(scale),
 
         critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
         actor_hidden,
-        activation: activation(&marathon)?,
+        activation: activation(&marathon, base.activation)?,
 
         lr: settings.learning_rate,
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
         schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
-        target_kl: marathon.number("target_kl", Range::Positive, defaults.target_kl)?,
-        final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, defaults.target_kl)?,
-        lr_range: lr_range(&marathon, defaults.lr_range)?,
-        max_grad_norm: marathon.number("max_grad_norm", Range::Positive, MAX_GRAD_NORM)?,
+        target_kl: marathon.number("target_kl", Range::Positive, base.target_kl)?,
+        final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, base.target_kl)?,
+        lr_range: lr_range(&marathon, base.lr_range)?,
+        max_grad_norm: marathon.number("max_grad_norm", Range::Positive, base.max_grad_norm)?,
 
         gamma: settings.gamma,
         gae_lambda: settings.lambd,
         clip: settings.epsilon,
-        final_clip: end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
+        final_clip: match is_ppo {
+            true => end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
+            false => None,
+        },
         value_clip: match marathon.get("value_clip") {
             Some(entry) if entry.node.is_null() => None,
             Some(entry) => Some(entry.number(Range::Positive)?),
-            None => Some(settings.epsilon),
+            None => is_ppo.then_some(settings.epsilon),
         },
         entropy_coef: settings.beta,
         final_entropy_coef: end(
@@ -124,18 +137,18 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
             last_beta,
         )?,
 
-        init_log_std: marathon.number("init_log_std", Range::Finite, INIT_STD.ln())?,
-        min_std: marathon.number("min_std", Range::Positive, STD_RANGE[0])?,
-        final_min_std: end(&marathon, "final_min_std", Range::Positive, Decay::Constant, STD_RANGE[0])?,
-        max_std: marathon.number("max_std", Range::Positive, STD_RANGE[1])?,
+        init_log_std: marathon.number("init_log_std", Range::Finite, base.init_log_std)?,
+        min_std: marathon.number("min_std", Range::Positive, min_std)?,
+        final_min_std: end(&marathon, "final_min_std", Range::Positive, Decay::Constant, min_std)?,
+        max_std: marathon.number("max_std", Range::Positive, max_std)?,
 
         normalize_observations: settings.normalize,
-        observation_clip: marathon.number("observation_clip", Range::Positive, OBSERVATION_CLIP)?,
-        scale_rewards: marathon.flag("scale_rewards", false)?,
-        statistics_cap: marathon.number("statistics_cap", Range::Positive, defaults.statistics_cap)?,
+        observation_clip: marathon.number("observation_clip", Range::Positive, base.observation_clip)?,
+        scale_rewards: marathon.flag("scale_rewards", base.scale_rewards)?,
+        statistics_cap: marathon.number("statistics_cap", Range::Positive, base.statistics_cap)?,
 
-        seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(defaults.seed))?,
-        threads: marathon.count("threads", 0..=65_536, defaults.threads as u64)? as usize,
+        seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(base.seed))?,
+        threads: marathon.count("threads", 0..=65_536, base.threads as u64)? as usize,
     };
     ppo.validate().map_err(|source| ConfigError::Combination {
         path: path.into(),
@@ -152,11 +165,17 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
 }
 
 /// As many agents as fill the buffer with one stretch of `time_horizon` decisions each, where nobody says how many.
-fn agents(marathon: &Section<'_>, settings: &Settings, steps_per_agent: bool) -> Result<u64, ConfigError> {
+fn agents(
+    marathon: &Section<'_>,
+    settings: &Settings,
+    base: &PpoConfig,
+    steps_per_agent: bool,
+) -> Result<u64, ConfigError> {
     let block = BLOCK as u64;
-    let default = match steps_per_agent {
-        true => PAPER_AGENTS,
-        false => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
+    let default = match base.algorithm {
+        Algorithm::A2c(_) | Algorithm::Acktr(_) => base.agents as u64,
+        Algorithm::Ppo if steps_per_agent => PAPER_AGENTS,
+        Algorithm::Ppo => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
     };
     let Some(entry) = marathon.get("agents") else { return Ok(default) };
     let agents = entry.count(block..=1 << 31)?;
@@ -173,8 +192,40 @@ fn widths(marathon: &Section<'_>, key: &str, default: Vec<usize>) -> Result<Vec<
     items.iter().map(|item| Ok(item.count(1..=65_536)? as usize)).collect()
 }
 
-fn activation(marathon: &Section<'_>) -> Result<Activation, ConfigError> {
-    let Some(entry) = marathon.get("activation") else { return Ok(Activation::Swish) };
+/// The algorithm with what the section says of its own settings; those of the others are without effect.
+fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Result<Algorithm, ConfigError> {
+    let own: &[&str] = match base {
+        Algorithm::Ppo => &[],
+        Algorithm::A2c(_) => &["value_coef", "rms_decay", "rms_epsilon"],
+        Algorithm::Acktr(_) => &["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"],
+    };
+    let all =
+        ["value_coef", "rms_decay", "rms_epsilon", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"];
+    for entry in all.into_iter().filter(|key| !own.contains(key)).filter_map(|key| marathon.get(key)) {
+        notes.ignored(&entry, &format!("{} has no such setting", base.name()));
+    }
+    let positive = |key, default| marathon.number(key, Range::Positive, default);
+    let fraction = |key, default| marathon.number(key, Range::Fraction, default);
+    Ok(match base {
+        Algorithm::Ppo => Algorithm::Ppo,
+        Algorithm::A2c(a2c) => Algorithm::A2c(A2c {
+            value_coef: positive("value_coef", a2c.value_coef)?,
+            rms_decay: fraction("rms_decay", a2c.rms_decay)?,
+            rms_epsilon: positive("rms_epsilon", a2c.rms_epsilon)?,
+        }),
+        Algorithm::Acktr(acktr) => Algorithm::Acktr(Acktr {
+            value_coef: positive("value_coef", acktr.value_coef)?,
+            kl_clip: positive("kl_clip", acktr.kl_clip)?,
+            momentum: fraction("momentum", acktr.momentum)?,
+            damping: positive("damping", acktr.damping)?,
+            stats_decay: fraction("stats_decay", acktr.stats_decay)?,
+            inverse_every: marathon.count("inverse_every", 1..=1 << 31, acktr.inverse_every)?,
+        }),
+    })
+}
+
+fn activation(marathon: &Section<'_>, default: Activation) -> Result<Activation, ConfigError> {
+    let Some(entry) = marathon.get("activation") else { return Ok(default) };
     Ok(Activation::ALL[entry.word(&Activation::ALL.map(Activation::name))?])
 }
 

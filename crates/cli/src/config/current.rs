@@ -3,7 +3,7 @@
 use super::behavior::{Behavior, Format, Notes, select};
 use super::document::Map;
 use super::error::ConfigError;
-use super::features::{Without, off, only_ppo, refuse, reward_signals, threaded, visual};
+use super::features::{Without, off, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
 use std::path::Path;
 
@@ -102,7 +102,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     let marathon = top.section("marathon")?;
     let without = Without::read(&marathon)?;
 
-    only_ppo(top.get("trainer_type"))?;
+    let base = trainer(top.get("trainer_type"))?;
     hyperparameters.only(&HYPERPARAMETERS)?;
     off(&hyperparameters, "shared_critic", "one network for policy and value")?;
 
@@ -134,7 +134,18 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         notes.ignored(&entry, "there is one trainer");
     }
     let format = Format::Current;
-    Ok(Behavior { format, top, hyperparameters, network, extrinsic, marathon, steps_per_agent: false, seed, notes })
+    Ok(Behavior {
+        format,
+        base,
+        top,
+        hyperparameters,
+        network,
+        extrinsic,
+        marathon,
+        steps_per_agent: false,
+        seed,
+        notes,
+    })
 }
 
 /// The sections beside the behaviors: what is harmless is noted, what would change the result is refused. Returns the

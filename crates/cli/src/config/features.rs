@@ -4,6 +4,7 @@
 use super::behavior::Notes;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
+use marathon_learn::{Activation, Algorithm, PpoConfig, Schedule};
 
 /// Features that a file asks for and lets go again, under `marathon: without:`.
 pub struct Without<'a> {
@@ -55,19 +56,46 @@ impl<'a> Without<'a> {
     }
 }
 
-/// Refuses trainers other than PPO.
+/// The settings that a trainer starts from: those of ML-Agents for PPO, which is meant where none is named, and those of
+/// OpenAI Baselines for the two that ML-Agents has not.
 ///
 /// # Errors
-/// If the entry names one.
-pub fn only_ppo(trainer: Option<Entry<'_>>) -> Result<(), ConfigError> {
-    match trainer {
-        Some(entry) if entry.word(&["ppo"]).is_err() => Err(ConfigError::Unsupported {
-            feature: "a trainer other than PPO",
+/// If the entry names a trainer that is not here.
+pub fn trainer(entry: Option<Entry<'_>>) -> Result<PpoConfig, ConfigError> {
+    let Some(entry) = entry else { return Ok(ml_agents()) };
+    match entry.word(&Algorithm::NAMES).map(|i| Algorithm::NAMES[i]) {
+        Ok("ppo") => Ok(ml_agents()),
+        Ok(name) => Ok(PpoConfig::of(name).expect("the name of an algorithm")),
+        Err(_) => Err(ConfigError::Unsupported {
+            feature: "this trainer",
             found: entry.node.describe(),
-            expected: "ppo".into(),
+            expected: format!("one of {}", Algorithm::NAMES.join(", ")),
             place: entry.place,
         }),
-        _ => Ok(()),
+    }
+}
+
+/// PPO with ML-Agents' defaults, and with what it does without saying so in a file.
+fn ml_agents() -> PpoConfig {
+    PpoConfig {
+        epochs: 3,
+        actor_hidden: vec![128; 2],
+        critic_hidden: vec![128; 2],
+        activation: Activation::Swish,
+        lr: 3e-4,
+        schedule: Schedule::Linear,
+        entropy_coef: 5e-3,
+        normalize_observations: false,
+        // normalized observations lie within this
+        observation_clip: 5.0,
+        // a sample is clipped to [-3, 3] and divided by 3, and its deviation starts at 1
+        init_log_std: (1.0 / 3.0_f64).ln(),
+        // neither the deviation nor the gradient is bounded: far out
+        min_std: 1e-3,
+        max_std: 1e3,
+        max_grad_norm: 1e9,
+        scale_rewards: false,
+        ..PpoConfig::default()
     }
 }
 

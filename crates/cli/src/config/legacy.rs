@@ -5,7 +5,7 @@ use super::behavior::{Behavior, Format, Notes, select};
 use super::current;
 use super::document::Map;
 use super::error::{ConfigError, Place, nearest};
-use super::features::{Without, only_ppo, refuse, reward_signals, threaded, visual};
+use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
 use std::path::Path;
 
@@ -60,7 +60,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     }
     let top = select(path, agent, &root, root.section("default")?, "default", &mut notes)?;
     // the trainer first: others have other keys
-    only_ppo(top.get("trainer"))?;
+    let base = trainer(top.get("trainer"))?;
     top.only(&BRAIN)?;
     let marathon = top.section("marathon")?;
     let without = Without::read(&marathon)?;
@@ -88,6 +88,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     let extrinsic = reward_signals(&top, &without, &mut notes)?;
     Ok(Behavior {
         format: Format::Legacy,
+        base,
         hyperparameters: top.clone(),
         network: top.clone(),
         // the discount moved into the reward signals in version 0.9, and steps were counted for all agents together

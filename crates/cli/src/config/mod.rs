@@ -104,6 +104,15 @@ pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigErr
     convert::convert(path, behavior)
 }
 
+/// The settings that an algorithm starts from, by its name.
+///
+/// # Panics
+/// If there is no such algorithm, which the command line rules out.
+pub fn default_of(algorithm: &str) -> Loaded {
+    let ppo = PpoConfig::of(algorithm).expect("the name of an algorithm");
+    Loaded { ppo, ..Loaded::default() }
+}
+
 /// The configuration that trains an agent fast; the trainer's own defaults for agents that have none.
 ///
 /// # Panics

@@ -3,6 +3,7 @@
 use super::behavior::{Behavior, Format};
 use super::error::ConfigError;
 use super::section::{Range, Section};
+use marathon_learn::Algorithm;
 
 /// Most of anything that is counted in a file.
 const MOST: u64 = 1 << 31;
@@ -14,7 +15,7 @@ pub enum Decay {
     Linear,
 }
 
-/// ML-Agents' settings of a PPO behavior that mean something here. The names are the file's.
+/// ML-Agents' settings of a behavior that mean something here. The names are the file's.
 #[derive(Clone, Debug)]
 pub struct Settings {
     pub batch_size: u64,
@@ -44,13 +45,25 @@ impl Settings {
     /// # Errors
     /// If a value is of the wrong kind or out of range.
     pub fn read(behavior: &Behavior<'_>) -> Result<Self, ConfigError> {
-        let Behavior { top, hyperparameters, network, extrinsic, format, .. } = behavior;
+        let Behavior { top, hyperparameters, network, extrinsic, format, base, .. } = behavior;
+        // ML-Agents' sizes for PPO; the others learn from each rollout at once
+        let (buffer, horizon) = match &base.algorithm {
+            Algorithm::Ppo => (10_240, 64),
+            _ => (base.rollout_steps(), base.horizon as u64),
+        };
+        let buffer_size = hyperparameters.count("buffer_size", 16..=MOST, buffer)?;
+        let batch = if base.algorithm == Algorithm::Ppo { 1024 } else { buffer_size };
         // defaults that differ: steps in all, steps between summaries and checkpoints
         let (max_steps, summary_freq, checkpoint_interval) = match format {
             Format::Current => (500_000, 50_000, 500_000),
             Format::Legacy => (50_000, 1_000, 50_000),
         };
         let learning_rate_schedule = decay(hyperparameters, "learning_rate_schedule", Decay::Linear)?;
+        // Baselines moves nothing but the rate
+        let beta_schedule = match &base.algorithm {
+            Algorithm::Ppo => learning_rate_schedule,
+            _ => Decay::Constant,
+        };
         let max_steps = top.count("max_steps", 1..=1 << 53, max_steps)?;
         let keep_checkpoints = top.count("keep_checkpoints", 1..=MOST, 5)?;
         let even = *format == Format::Current && top.flag("even_checkpoints", false)?;
@@ -59,22 +72,26 @@ impl Settings {
             false => top.count("checkpoint_interval", 1..=1 << 53, checkpoint_interval)?,
         };
         Ok(Settings {
-            batch_size: hyperparameters.count("batch_size", 16..=MOST, 1024)?,
-            buffer_size: hyperparameters.count("buffer_size", 16..=MOST, 10_240)?,
-            learning_rate: hyperparameters.number("learning_rate", Range::Positive, 3e-4)?,
+            batch_size: hyperparameters.count("batch_size", 16..=MOST, batch)?,
+            buffer_size,
+            learning_rate: hyperparameters.number("learning_rate", Range::Positive, base.lr)?,
             learning_rate_schedule,
-            beta: hyperparameters.number("beta", Range::NotNegative, 5e-3)?,
-            beta_schedule: decay(hyperparameters, "beta_schedule", learning_rate_schedule)?,
-            epsilon: hyperparameters.number("epsilon", Range::Positive, 0.2)?,
+            beta: hyperparameters.number("beta", Range::NotNegative, base.entropy_coef)?,
+            beta_schedule: decay(hyperparameters, "beta_schedule", beta_schedule)?,
+            epsilon: hyperparameters.number("epsilon", Range::Positive, base.clip)?,
             epsilon_schedule: decay(hyperparameters, "epsilon_schedule", learning_rate_schedule)?,
-            lambd: hyperparameters.number("lambd", Range::Fraction, 0.95)?,
-            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, 3)?,
-            normalize: network.flag("normalize", false)?,
-            hidden_units: network.count("hidden_units", 1..=65_536, 128)?,
+            lambd: hyperparameters.number("lambd", Range::Fraction, base.gae_lambda)?,
+            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, base.epochs as u64)?,
+            normalize: network.flag("normalize", base.normalize_observations)?,
+            hidden_units: network.count(
+                "hidden_units",
+                1..=65_536,
+                base.actor_hidden.first().map_or(128, |w| *w as u64),
+            )?,
             num_layers: network.count("num_layers", 1..=64, 2)?,
-            gamma: extrinsic.number("gamma", Range::Fraction, 0.99)?,
+            gamma: extrinsic.number("gamma", Range::Fraction, base.gamma)?,
             max_steps,
-            time_horizon: top.count("time_horizon", 1..=MOST, 64)?,
+            time_horizon: top.count("time_horizon", 1..=MOST, horizon)?,
             summary_freq: top.count("summary_freq", 1..=1 << 53, summary_freq)?,
             checkpoint_interval,
             keep_checkpoints,

@@ -177,6 +177,22 @@ pub fn small_config() -> marathon_learn::PpoConfig {
     }
 }
 
+/// The same with another algorithm, by its name.
+pub fn small_of(algorithm: &str) -> marathon_learn::PpoConfig {
+    let small = small_config();
+    let config = marathon_learn::PpoConfig::of(algorithm).expect("the name of an algorithm");
+    marathon_learn::PpoConfig {
+        agents: small.agents,
+        horizon: 6,
+        rollouts: 4,
+        total_steps: small.total_steps,
+        actor_hidden: small.actor_hidden,
+        critic_hidden: small.critic_hidden,
+        threads: 1,
+        ..config
+    }
+}
+
 /// An observer that never stops.
 pub fn silent(_: &marathon_learn::IterationStats, _: &marathon_learn::Snapshot<'_>) -> marathon_learn::Control {
     marathon_learn::Control::Continue
