@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 __all__ = [
     "Model",
+    "Player",
     "Policy",
     "Renderer",
     "Simulation",
@@ -279,6 +280,7 @@ def train(
     threads: int | None = None,
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
+    players: Any = None,
 ) -> TrainResult:
     """Train a policy with the native trainer, without the GIL, and evaluate it.
 
@@ -297,7 +299,25 @@ def train(
         threads: number of threads; 0 means one per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a task and a configuration.
+        players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
     """
+
+@final
+class Player:
+    """Plays the agents of one slice of a training run, in a process of its own.
+
+    A run's agents are split into slices of consecutive blocks of sixteen. For each rollout, the learner sends every
+    player the same orders and the state of its slice; the player keeps nothing, so any other with the same slice can
+    take its place. Messages are safetensors in arrays of uint8.
+    """
+
+    def __new__(cls, task: str, config: str, slice: int, slices: int) -> Player:
+        """Make the player of slice `slice` of `slices`; `config` is the JSON of the trainer's settings."""
+    def play(self, orders: npt.NDArray[np.uint8], state: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+        """Play one horizon, without the GIL, and return the answer for the learner.
+
+        The same orders and state give the same bits, whatever was played before.
+        """
 
 def load_policy(path: str | PathLike[str], task: str | None = None) -> Policy:
     """Read a policy from a file, ``.safetensors`` or ``.onnx``, or from the folder of a run.

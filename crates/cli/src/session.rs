@@ -17,7 +17,8 @@ use crate::report::{Reporter, curve, save};
 use crate::text;
 use marathon_envs::{ShardFactory, registry};
 use marathon_learn::{
-    Checkpoint, EvalOptions, Evaluation, IterationStats, Policy, Snapshot, TrainOutput, evaluate, train,
+    Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput, evaluate,
+    train_with,
 };
 use marathon_physics::lanes::Isa;
 use std::path::Path;
@@ -146,17 +147,33 @@ impl Session {
     /// # Errors
     /// If files cannot be written; the text says what is left and how to go on.
     pub fn carry_out(self, show: bool, watch: &mut Watch) -> Result<Outcome, CliError> {
+        self.carry_out_with(None, show, watch)
+    }
+
+    /// The same with rollouts that `players` play.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn carry_out_with(
+        self,
+        players: Option<&mut dyn Players>,
+        show: bool,
+        watch: &mut Watch,
+    ) -> Result<Outcome, CliError> {
         let Session { run, folder, factory, checkpoint } = self;
+        let train = |resume, observer: &mut dyn Observer| {
+            train_with(players, &*factory, Isa::best(), &run.config, resume, observer)
+        };
         let mut history = History::default();
         let TrainOutput { mut policy, checkpoint, .. } = match &folder {
             None => {
                 let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
-                train(&*factory, Isa::best(), &run.config, checkpoint, &mut observer)?
+                train(checkpoint, &mut observer)?
             }
             Some(folder) => {
                 let terms = &factory.spec().reward_terms;
                 let mut reporter = Reporter::new(folder, &run, terms, checkpoint.as_ref(), (show, watch))?;
-                let result = train(&*factory, Isa::best(), &run.config, checkpoint, &mut reporter);
+                let result = train(checkpoint, &mut reporter);
                 reporter.finish();
                 let error = reporter.error.take();
                 let output = result?;

@@ -4,13 +4,13 @@
 //! written first and the description last, each under a temporary name, so an interruption at any moment leaves the old
 //! or the new checkpoint, never half of one.
 
+use crate::agents::Agents;
 use crate::files::{self, TensorReader, TensorWriter, write_atomic};
 use crate::kfac::Kfac;
 use crate::learner::Learner;
-use crate::noise::Noise;
 use crate::normalize::Moments;
 use crate::run::{Clocks, Run};
-use crate::{Algorithm, BLOCK, Error, PpoConfig};
+use crate::{Algorithm, Error, PpoConfig};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -29,15 +29,7 @@ pub struct Checkpoint {
     kfac: (Vec<f64>, Vec<f32>),
     obs_mean: Vec<f64>,
     obs_var: Vec<f64>,
-    /// Words of the random streams, `[block][64]`.
-    noise: Vec<u32>,
-    /// Raw observations, `[block][obs][16]`.
-    obs: Vec<f32>,
-    /// Running sums of the agents, `[tally][block][16]`.
-    tallies: Vec<f32>,
-    /// What the environments saved, block after block, and where each block's part ends.
-    env: Vec<u8>,
-    env_ends: Vec<u64>,
+    agents: Agents,
 }
 
 /// The description.
@@ -93,20 +85,7 @@ impl Checkpoint {
             cpu_seconds: clocks.cpu,
             state: StateFile::default(),
         };
-        let (mut noise, mut obs, mut env, mut env_ends) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut tallies = [(); 4].map(|()| Vec::new());
-        for actor in &run.actors {
-            let actor = actor.lock().expect("no worker has panicked");
-            for b in 0..actor.blocks() {
-                noise.extend(actor.noise()[b].words());
-                obs.extend_from_slice(actor.obs(b));
-                for (all, tally) in tallies.iter_mut().zip(&actor.tallies) {
-                    all.extend_from_slice(&tally[b]);
-                }
-                actor.shard().save(b, &mut env);
-                env_ends.push(env.len() as u64);
-            }
-        }
+        let actors = run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
         Self {
             about,
             params: learner.params.clone(),
@@ -115,11 +94,7 @@ impl Checkpoint {
             kfac: run.kfac.as_ref().map(Kfac::save).unwrap_or_default(),
             obs_mean: learner.observations.mean.clone(),
             obs_var: learner.observations.var.clone(),
-            noise,
-            obs,
-            tallies: tallies.concat(),
-            env,
-            env_ends,
+            agents: Agents::of(actors, 0..run.config.blocks()),
         }
     }
 
@@ -169,16 +144,13 @@ impl Checkpoint {
             ("adam_v", self.adam_v.len(), len),
             ("obs_mean", self.obs_mean.len(), run.spec.obs),
             ("obs_var", self.obs_var.len(), run.spec.obs),
-            ("noise", self.noise.len(), blocks * Noise::WORDS),
-            ("obs", self.obs.len(), blocks * run.spec.obs * BLOCK),
-            ("tallies", self.tallies.len(), 4 * blocks * BLOCK),
-            ("env_ends", self.env_ends.len(), blocks),
         ];
         for (what, found, expected) in lengths {
             if found != expected {
                 return mismatch(what, format!("{found} numbers"), format!("{expected}"));
             }
         }
+        self.agents.check("checkpoint", blocks, run.spec.obs)?;
         if let Some(kfac) = &run.kfac
             && !kfac.load(&self.kfac.0, &self.kfac.1)
         {
@@ -198,26 +170,9 @@ impl Checkpoint {
         learner.adam.m = self.adam_m;
         learner.adam.v = self.adam_v;
 
-        let (obs_row, tally) = (run.spec.obs * BLOCK, blocks * BLOCK);
         for actor in &run.actors {
             let actor = &mut *actor.lock().expect("no worker has panicked");
-            for b in 0..actor.blocks() {
-                let block = actor.first_block() + b;
-                let words = self.noise[block * Noise::WORDS..].first_chunk().expect("the length was checked");
-                actor.noise_mut()[b] = Noise::from_words(words);
-                actor.obs_mut(b).copy_from_slice(&self.obs[block * obs_row..(block + 1) * obs_row]);
-                for (k, all) in actor.tallies.iter_mut().enumerate() {
-                    all[b].copy_from_slice(&self.tallies[k * tally + block * BLOCK..][..BLOCK]);
-                }
-                let start = if block == 0 { 0 } else { self.env_ends[block - 1] };
-                let bytes = self.env.get(start as usize..self.env_ends[block] as usize);
-                let rest = bytes.and_then(|bytes| actor.shard_mut().load(b, bytes));
-                if rest.is_none_or(|rest| !rest.is_empty()) {
-                    let size = bytes.map_or("no".into(), |bytes| bytes.len().to_string());
-                    let found = format!("{size} bytes of block {block}'s environment");
-                    return mismatch("environment", found, "what this version of the task saves".into());
-                }
-            }
+            self.agents.put("checkpoint", 0..blocks, actor)?;
         }
         Ok(())
     }
@@ -238,11 +193,7 @@ impl Checkpoint {
         }
         file.list("obs_mean", &self.obs_mean);
         file.list("obs_var", &self.obs_var);
-        file.list("noise", &self.noise);
-        file.list("obs", &self.obs);
-        file.list("tallies", &self.tallies);
-        file.list("env", &self.env);
-        file.list("env_ends", &self.env_ends);
+        self.agents.write(&mut file);
         let bytes = file.bytes(&serde_json::json!({ "format": FORMAT, "version": VERSION }));
         let checksum = files::checksum(&bytes);
         // a name of its own for every state: the old description must keep naming the old state
@@ -302,11 +253,7 @@ impl Checkpoint {
             kfac,
             obs_mean: list(&file, "obs_mean")?,
             obs_var: list(&file, "obs_var")?,
-            noise: list(&file, "noise")?,
-            obs: list(&file, "obs")?,
-            tallies: list(&file, "tallies")?,
-            env: list(&file, "env")?,
-            env_ends: list(&file, "env_ends")?,
+            agents: Agents::read(&file)?,
             about,
         })
     }

@@ -4,13 +4,15 @@
 //! computed; the replicas stay equal bit for bit.
 
 use crate::adam::Adam;
+use crate::advantage::Discounts;
 use crate::gaussian::Gaussian;
 use crate::mlp::Mlp;
 use crate::noise::{PARAMETERS, SplitMix};
 use crate::normalize::{Moments, Normalizer};
-use crate::rollout::{BlockSums, Rollout};
+use crate::rollout::{Acting, BlockSums, Rollout};
 use crate::{Algorithm, BLOCK, PpoConfig, init};
 use marathon_envs::Spec;
+use marathon_physics::lanes::Isa;
 use std::ops::{Deref, Range};
 
 /// Gradient elements whose squares are summed together.
@@ -125,6 +127,20 @@ impl Learner {
     /// Factor of the rewards.
     pub fn reward_scale(&self, config: &PpoConfig) -> f64 {
         if config.scale_rewards { 1.0 / (self.returns.var[0] + 1e-8).sqrt().max(1e-3) } else { 1.0 }
+    }
+
+    /// Lets `f` act with what has been learned.
+    pub fn acting<R>(&self, isa: Isa, layout: &Layout, config: &PpoConfig, f: impl FnOnce(&Acting<'_>) -> R) -> R {
+        f(&Acting {
+            isa,
+            actor: (&layout.actor, layout.actor_params(&self.params)),
+            critic: (&layout.critic, layout.critic_params(&self.params)),
+            gaussian: &self.gaussian(layout),
+            normalizer: &self.normalizer(config),
+            discounts: Discounts { gamma: config.gamma, lambda: config.gae_lambda },
+            reward_scale: self.reward_scale(config),
+            return_center: self.returns.mean[0] as f32,
+        })
     }
 
     /// Takes in the statistics of a rollout.

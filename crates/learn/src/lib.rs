@@ -4,8 +4,9 @@
 //! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
 //! transposed or copied to a device.
 //!
-//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`PpoConfig`] says how, its [`Algorithm`] by what,
-//!   an [`Observer`] follows it and may stop it.
+//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`PpoConfig`] says how,
+//!   its [`Algorithm`] by what, an [`Observer`] follows it and may stop it.
+//! * [`train_with`] does the same with rollouts that others play, such as [`Player`]s on other machines.
 //! * [`Policy`] is the result: it acts, and it is a file. [`evaluate`] tells how good it is.
 //! * [`Checkpoint`] is an interrupted run. Resumed, it gives the bits of a run that was never interrupted.
 //!
@@ -50,6 +51,7 @@ mod acktr;
 mod activation;
 mod adam;
 mod advantage;
+mod agents;
 pub mod buffer;
 mod checkpoint;
 mod clock;
@@ -69,6 +71,7 @@ mod observer;
 mod onnx;
 mod policy;
 mod ppo;
+mod remote;
 mod rollout;
 mod run;
 mod sync;
@@ -86,7 +89,8 @@ pub use marathon_envs::BLOCK;
 pub use normalize::Normalizer;
 pub use observer::{Control, IterationStats, Observer, Snapshot};
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
-pub use run::{TrainOutput, train};
+pub use remote::{Deliver, Player, Players};
+pub use run::{TrainOutput, train, train_with};
 
 /// Runs `$body` with `$T` bound to the single-precision lane type of an `Isa`.
 macro_rules! f32_lanes {

@@ -142,6 +142,40 @@ impl Rollout {
     pub fn obs(&self, item: usize) -> &[f32] {
         &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
     }
+    /// What a learner needs to know, `[item][..][16]`, by name.
+    pub fn rows(&self) -> [(&'static str, &[f32]); 6] {
+        [
+            ("normalized_obs", &self.obs),
+            ("action", &self.action),
+            ("log_prob", &self.log_prob),
+            ("value", &self.value),
+            ("advantage", &self.advantage),
+            ("target", &self.target),
+        ]
+    }
+    /// The same, to be filled.
+    pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 6] {
+        [
+            ("normalized_obs", &mut self.obs),
+            ("action", &mut self.action),
+            ("log_prob", &mut self.log_prob),
+            ("value", &mut self.value),
+            ("advantage", &mut self.advantage),
+            ("target", &mut self.target),
+        ]
+    }
+    /// Copies what a learner needs to know about a block, and adds its sums to the list of sums.
+    pub fn copy_block(&mut self, block: usize, from: &Rollout, its: usize) {
+        let (blocks, items) = (self.blocks, self.items());
+        for ((_, to), (_, rows)) in self.rows_mut().into_iter().zip(from.rows()) {
+            let row = to.len() / items;
+            for t in 0..items / blocks {
+                let (to_item, item) = (t * blocks + block, t * from.blocks + its);
+                to[to_item * row..(to_item + 1) * row].copy_from_slice(&rows[item * row..(item + 1) * row]);
+            }
+        }
+        self.sums.push(from.sums[its].clone());
+    }
     /// What the objective needs to know about an item.
     pub fn samples(&self, item: usize) -> Samples<'_, f32> {
         let row = item * BLOCK..(item + 1) * BLOCK;

@@ -16,7 +16,6 @@
 //! observations and rewards, without which the first updates would see inputs and losses of arbitrary size.
 
 use crate::adam;
-use crate::advantage::Discounts;
 use crate::buffer::Blocks;
 use crate::gaussian::Gaussian;
 use crate::kfac::Kfac;
@@ -24,7 +23,8 @@ use crate::learner::{Layout, Learner, Totals};
 use crate::loss::{Loss, LossSums, Objective, Samples};
 use crate::mlp::{CHUNK, Tape};
 use crate::observer::{Control, IterationStats, Observer, Snapshot};
-use crate::rollout::{Acting, Actor, Rollout};
+use crate::remote::{Players, Remote, Spent};
+use crate::rollout::{Actor, Rollout};
 use crate::sync::Barrier;
 use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, f32_lanes, ppo};
 use marathon_envs::{ShardFactory, Spec};
@@ -65,11 +65,31 @@ pub fn train(
     resume: Option<Checkpoint>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutput, Error> {
+    train_with(None, factory, isa, config, resume, observer)
+}
+
+/// The same with rollouts that `players` play; the policy has the same bits. Its threads only learn.
+///
+/// # Errors
+/// The same, and if what the players deliver does not fit.
+///
+/// # Panics
+/// As [`train`].
+pub fn train_with(
+    players: Option<&mut dyn Players>,
+    factory: &dyn ShardFactory,
+    isa: Isa,
+    config: &PpoConfig,
+    resume: Option<Checkpoint>,
+    observer: &mut dyn Observer,
+) -> Result<TrainOutput, Error> {
     config.validate()?;
     if isa == Isa::F64 || !isa.supported() {
         return Err(Error::Isa(isa.name(), Isa::best().name()));
     }
-    let (run, mut learner) = Run::new(factory, isa, config);
+    let (mut run, mut learner) = Run::new(factory, isa, config);
+    let mut remote = players.map(|players| Remote::new(players, config));
+    run.elsewhere = remote.is_some();
     let mut clocks = Clocks::default();
     if let Some(checkpoint) = resume {
         checkpoint.restore(&run, &mut learner, &mut clocks)?;
@@ -81,11 +101,15 @@ pub fn train(
             let run = &run;
             scope.spawn(move || run.work(id, replica, None));
         }
-        let mut head = Head { observer, clocks: &mut clocks, learner: &mut learner, last: None };
+        let remote = remote.as_mut();
+        let mut head = Head { observer, clocks: &mut clocks, learner: &mut learner, remote, last: None };
         let replica = head.learner.clone();
         run.work(0, replica, Some(&mut head));
         head.last
     });
+    if let Some(error) = remote.and_then(|remote| remote.error) {
+        return Err(error);
+    }
     let snapshot = Snapshot::new(&run, &learner, &clocks);
     Ok(TrainOutput { policy: snapshot.policy(), checkpoint: snapshot.checkpoint(), last })
 }
@@ -100,10 +124,11 @@ pub struct Clocks {
 }
 
 /// What the first worker has besides.
-struct Head<'a> {
+struct Head<'a, 'p> {
     observer: &'a mut dyn Observer,
     clocks: &'a mut Clocks,
     learner: &'a mut Learner,
+    remote: Option<&'a mut Remote<'p>>,
     last: Option<IterationStats>,
 }
 
@@ -125,6 +150,8 @@ pub struct Run<'a> {
     seconds: Vec<Mutex<Seconds>>,
     barrier: Barrier,
     stop: AtomicBool,
+    /// Whether others play in the place of the actors, which then only keep the states of the agents.
+    elsewhere: bool,
     /// What only ACKTR has.
     pub kfac: Option<Kfac>,
 }
@@ -209,6 +236,7 @@ impl<'a> Run<'a> {
             seconds: (0..workers).map(|_| Mutex::default()).collect(),
             barrier: Barrier::new(workers),
             stop: AtomicBool::new(false),
+            elsewhere: false,
             kfac,
             spec,
             layout,
@@ -221,7 +249,7 @@ impl<'a> Run<'a> {
     }
 
     /// The program of worker `id`.
-    fn work(&self, id: usize, mut learner: Learner, mut head: Option<&mut Head<'_>>) {
+    fn work(&self, id: usize, mut learner: Learner, mut head: Option<&mut Head<'_, '_>>) {
         let _guard = self.barrier.guard();
         let Layout { actor, critic, .. } = &self.layout;
         let mut space = Workspace {
@@ -236,19 +264,29 @@ impl<'a> Run<'a> {
         while !done {
             let (cpu, start) = (clock::thread_cpu(), clock::wall());
             let (mut seconds, mut totals, mut means) = (Seconds::default(), Totals::default(), Means::default());
-            for _ in 0..self.config.rollouts {
+            let mut cpu_elsewhere = 0.0;
+            for n in 0..self.config.rollouts {
                 let begin = clock::wall();
-                seconds.env += self.collect(id, &learner);
+                let spent = self.collect(id, &learner, head.as_deref_mut());
+                seconds.env += spent.env;
+                cpu_elsewhere += spent.cpu_elsewhere;
                 seconds.collect += clock::wall() - begin;
                 if id == 0 {
                     self.tickets.iter().for_each(|t| t.store(0, Ordering::Relaxed));
                 }
                 self.barrier.wait();
+                if self.stop.load(Ordering::Acquire) {
+                    // those who play elsewhere have given up
+                    if n == 0 {
+                        return;
+                    }
+                    break;
+                }
 
                 let begin = clock::wall();
                 totals.add(&self.learn(id, &mut learner, &mut space, &mut means));
                 seconds.update += clock::wall() - begin;
-                seconds.cpu = clock::thread_cpu() - cpu;
+                seconds.cpu = clock::thread_cpu() - cpu + cpu_elsewhere;
                 *self.seconds[id].lock().expect("no worker has panicked") = seconds;
                 self.barrier.wait();
             }
@@ -280,22 +318,20 @@ impl<'a> Run<'a> {
         totals
     }
 
-    /// Plays a horizon with the worker's agents.
-    fn collect(&self, id: usize, learner: &Learner) -> f64 {
-        let layout = &self.layout;
-        let acting = Acting {
-            isa: self.isa,
-            actor: (&layout.actor, layout.actor_params(&learner.params)),
-            critic: (&layout.critic, layout.critic_params(&learner.params)),
-            gaussian: &learner.gaussian(layout),
-            normalizer: &learner.normalizer(self.config),
-            discounts: Discounts { gamma: self.config.gamma, lambda: self.config.gae_lambda },
-            reward_scale: learner.reward_scale(self.config),
-            return_center: learner.returns.mean[0] as f32,
-        };
+    /// Plays a horizon with the worker's agents. If others play, the first worker has them play all agents.
+    fn collect(&self, id: usize, learner: &Learner, head: Option<&mut Head<'_, '_>>) -> Spent {
+        if self.elsewhere {
+            let Some(remote) = head.and_then(|head| head.remote.as_mut()) else { return Spent::default() };
+            let spent = remote.collect(learner, &self.spec, &self.actors, &self.rollouts, self.config.horizon);
+            return spent.unwrap_or_else(|| {
+                self.stop.store(true, Ordering::Release);
+                Spent::default()
+            });
+        }
         let mut actor = self.actors[id].lock().expect("no worker has panicked");
         let mut rollout = self.rollouts[id].write().expect("no worker has panicked");
-        actor.collect(&acting, &mut rollout)
+        let env = learner.acting(self.isa, &self.layout, self.config, |acting| actor.collect(acting, &mut rollout));
+        Spent { env, cpu_elsewhere: 0.0 }
     }
 
     /// A setting on its linear way from `first` to `last` over the run; it stays where there is no `last`.
@@ -431,7 +467,7 @@ impl<'a> Run<'a> {
     }
 
     /// Tells the observer about the iteration.
-    fn report(&self, head: &mut Head<'_>, learner: &Learner, totals: &Totals, means: &Means, wall: f64) {
+    fn report(&self, head: &mut Head<'_, '_>, learner: &Learner, totals: &Totals, means: &Means, wall: f64) {
         let mut seconds = Seconds::default();
         for of_worker in &self.seconds {
             let s = of_worker.lock().expect("no worker has panicked");

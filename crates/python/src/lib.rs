@@ -9,6 +9,7 @@ mod crowd;
 mod error;
 mod model;
 mod options;
+mod players;
 mod policy;
 mod renderer;
 mod simulation;
@@ -24,8 +25,9 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        crowd::learn, main, model::Model, policy::Policy, policy::evaluate, policy::load_policy, renderer::Renderer,
-        simulation::Simulation, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        crowd::learn, main, model::Model, players::Player, policy::Policy, policy::evaluate, policy::load_policy,
+        renderer::Renderer, simulation::Simulation, spec::Spec, spec::ids, spec::spec, train::TrainResult,
+        train::train, vec_env::VecEnv,
     };
     use pyo3::prelude::*;
 

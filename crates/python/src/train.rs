@@ -1,9 +1,10 @@
 //! The native trainer, called from Python.
 
 use crate::error;
+use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use marathon_cli::session::{self, Session, TrainArgs};
-use marathon_learn::Control;
+use marathon_learn::{Control, Players};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
@@ -62,14 +63,15 @@ impl TrainResult {
 /// task's own fast configuration. `seed`, `steps` (of all agents together), `agents` (a multiple of 16) and `threads`
 /// change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv` holds; if it
 /// returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes; without,
-/// nothing is written. `resume`: the folder of a run to go on with, in place of a task and a configuration.
+/// nothing is written. `resume`: the folder of a run to go on with, in place of a task and a configuration. `players`: an
+/// object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 #[pyfunction]
 #[pyo3(signature = (
     task = None, config = None, *, callback = None, seed = None, steps = None, agents = None, threads = None, out = None,
-    resume = None
+    resume = None, players = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
@@ -83,6 +85,7 @@ pub fn train(
     threads: Option<usize>,
     out: Option<PathBuf>,
     resume: Option<PathBuf>,
+    players: Option<Py<PyAny>>,
 ) -> PyResult<TrainResult> {
     let (dry, path) = (out.is_none(), resume.clone());
     let mut args = TrainArgs { agent: task, config: None, algo: None, agents, steps, seed, threads, out, resume };
@@ -118,10 +121,13 @@ pub fn train(
     };
 
     let terms = session.factory.spec().reward_terms.clone();
+    let run = &session.run;
+    let mut players = players.map(|object| PyPlayers::begin(py, object, &run.agent, &run.config)).transpose()?;
     let mut failure: Option<PyErr> = None;
     let mut last = (session.steps(), 0.0);
     let result = py.detach(|| {
-        session.carry_out(false, &mut |stats| {
+        let players = players.as_mut().map(|players| players as &mut dyn Players);
+        session.carry_out_with(players, false, &mut |stats| {
             let (steps, wall) = std::mem::replace(&mut last, (stats.steps, stats.wall_seconds));
             let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
             let ask = |py: Python<'_>| {
@@ -146,7 +152,7 @@ pub fn train(
         })
     });
     // what was learned has been written by now
-    if let Some(error) = failure {
+    if let Some(error) = failure.or(players.and_then(|players| players.failure)) {
         return Err(error);
     }
     let outcome = result.map_err(error::cli)?;

@@ -1,0 +1,159 @@
+//! A run whose rollouts are played elsewhere gives the bits of one that plays them itself, however many play and however
+//! often one of them is lost and replaced. A run that is given up keeps what was learned; answers that do not fit are
+//! refused.
+
+mod common;
+
+use common::{PuckTask, silent, small_config};
+use marathon_learn::{
+    Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, TrainOutput, train_with,
+};
+use marathon_physics::lanes::Isa;
+
+const LIMIT: usize = 20;
+
+/// Players in this process, who answer in reverse order.
+struct Team {
+    config: PpoConfig,
+    slices: usize,
+    players: Vec<Option<Player>>,
+    /// Rollouts played.
+    rollouts: usize,
+    /// Player and rollout: it is lost after having played.
+    losses: Vec<(usize, usize)>,
+    /// The rollout before which the team gives up.
+    until: usize,
+}
+
+impl Team {
+    fn new(config: &PpoConfig, slices: usize) -> Self {
+        let players = (0..config.blocks()).map(|_| None).collect();
+        Team { config: config.clone(), slices, players, rollouts: 0, losses: Vec::new(), until: usize::MAX }
+    }
+    fn player(&self, i: usize, slices: usize) -> Player {
+        Player::new(&PuckTask::with_limit(LIMIT), Isa::best(), &self.config, (i, slices)).unwrap()
+    }
+}
+
+impl Players for Team {
+    fn slices(&self) -> usize {
+        self.slices
+    }
+    fn play(&mut self, orders: &[u8], states: &[Vec<u8>], deliver: Deliver<'_>) -> Control {
+        if self.rollouts == self.until {
+            return Control::Stop;
+        }
+        for (i, state) in states.iter().enumerate().rev() {
+            let mut player = self.players[i].take().unwrap_or_else(|| self.player(i, states.len()));
+            let mut answer = player.play(orders, state).unwrap();
+            if self.losses.contains(&(i, self.rollouts)) {
+                player = self.player(i, states.len());
+                answer = player.play(orders, state).unwrap();
+            }
+            self.players[i] = Some(player);
+            deliver(i, &answer).unwrap();
+        }
+        self.rollouts += 1;
+        Control::Continue
+    }
+}
+
+fn run(players: Option<&mut dyn Players>, config: &PpoConfig, resume: Option<Checkpoint>) -> TrainOutput {
+    train_with(players, &PuckTask::with_limit(LIMIT), Isa::best(), config, resume, &mut silent).unwrap()
+}
+
+fn bits(output: &TrainOutput) -> Vec<u32> {
+    let policy = &output.policy;
+    let numbers = policy.params().iter().chain(policy.log_std()).chain(policy.normalizer().mean());
+    numbers.chain(policy.normalizer().std()).map(|x| x.to_bits()).collect()
+}
+
+/// What does not depend on the time that passes.
+fn numbers(stats: Option<&IterationStats>) -> IterationStats {
+    let stats = stats.unwrap().clone();
+    IterationStats { wall_seconds: 0.0, cpu_seconds: 0.0, env_share: 0.0, update_share: 0.0, ..stats }
+}
+
+#[test]
+fn players_do_not_change_the_policy() {
+    let want = run(None, &small_config(), None);
+    // five blocks: more players than blocks are too many
+    for (slices, threads) in [(1, 1), (2, 1), (3, 2), (5, 3), (9, 1)] {
+        let config = PpoConfig { threads, ..small_config() };
+        let got = run(Some(&mut Team::new(&config, slices)), &config, None);
+        assert_eq!(bits(&got), bits(&want), "{slices} players, {threads} threads");
+        assert_eq!(numbers(got.last.as_ref()), numbers(want.last.as_ref()));
+    }
+}
+
+#[test]
+fn lost_players_change_nothing() {
+    let want = run(None, &small_config(), None);
+    let config = small_config();
+    let mut team = Team::new(&config, 2);
+    team.losses = vec![(0, 0), (1, 1), (0, 2), (1, 2), (1, 3)];
+    assert_eq!(bits(&run(Some(&mut team), &config, None)), bits(&want));
+}
+
+#[test]
+fn a_run_that_is_given_up_goes_on_anywhere() {
+    let want = run(None, &small_config(), None);
+    let config = small_config();
+    let mut team = Team::new(&config, 2);
+    team.until = 2;
+    let half = run(Some(&mut team), &config, None);
+    assert_eq!(half.checkpoint.iteration(), 2);
+    assert_eq!(bits(&run(None, &config, Some(half.checkpoint.clone()))), bits(&want));
+    assert_eq!(bits(&run(Some(&mut Team::new(&config, 3)), &config, Some(half.checkpoint))), bits(&want));
+}
+
+/// Players whose answers are spoilt by `spoil`, which gets the answers of all slices.
+struct Spoilt<F>(Team, F);
+
+impl<F: FnMut(&mut Vec<Vec<u8>>)> Players for Spoilt<F> {
+    fn slices(&self) -> usize {
+        2
+    }
+    fn play(&mut self, orders: &[u8], states: &[Vec<u8>], deliver: Deliver<'_>) -> Control {
+        let mut answers: Vec<Vec<u8>> =
+            states.iter().enumerate().map(|(i, s)| self.0.player(i, 2).play(orders, s).unwrap()).collect();
+        (self.1)(&mut answers);
+        for (i, answer) in answers.iter().enumerate() {
+            if let Err(error) = deliver(i, answer) {
+                assert!(error.to_string().contains("marathon-rollout"), "{error}");
+                return Control::Stop;
+            }
+        }
+        Control::Continue
+    }
+}
+
+#[test]
+fn answers_that_do_not_fit_are_refused() {
+    let config = small_config();
+    let task = PuckTask::with_limit(LIMIT);
+    let spoilt = |spoil: &mut dyn FnMut(&mut Vec<Vec<u8>>)| {
+        let mut players = Spoilt(Team::new(&config, 2), spoil);
+        train_with(Some(&mut players), &task, Isa::best(), &config, None, &mut silent)
+    };
+    // refused by `deliver`: the run ends with nothing learned
+    for spoil in [
+        &mut (|a: &mut Vec<Vec<u8>>| a[0].truncate(1000)) as &mut dyn FnMut(&mut Vec<Vec<u8>>),
+        &mut |a| a.swap(0, 1),
+        &mut |a| a[1].clear(),
+    ] {
+        assert_eq!(spoilt(spoil).unwrap().checkpoint.iteration(), 0);
+    }
+    let error = spoilt(&mut |a| a.truncate(1)).err().unwrap().to_string();
+    assert!(error.contains("1 slices, expected those of 2"), "{error}");
+}
+
+#[test]
+fn players_refuse_what_is_not_theirs() {
+    let (task, config) = (PuckTask::with_limit(LIMIT), small_config());
+    let error = Player::new(&task, Isa::best(), &config, (2, 2)).err().unwrap().to_string();
+    assert!(error.contains("slice 2 of 2, expected a slice below their number, and at most 5"), "{error}");
+    let mut player = Player::new(&task, Isa::best(), &config, (0, 2)).unwrap();
+    let error = player.play(b"", b"").unwrap_err().to_string();
+    assert!(error.contains("marathon-orders: header"), "{error}");
+}

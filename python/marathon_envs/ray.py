@@ -1,0 +1,204 @@
+"""Training on many processes or machines with Ray, and the environments for RLlib.
+
+`train` is `marathon_envs.train` with its rollouts played by Ray's workers:
+
+    >>> import marathon_envs.ray
+    >>> result = marathon_envs.ray.train("Humanoid-v5", workers=8)
+
+The policy has the bits of a run on one machine: it depends on the task, the configuration and the seed, not on the
+number of workers, nor on whether some of them were lost on the way.
+
+`register` makes every task known to RLlib:
+
+    >>> marathon_envs.ray.register()
+    >>> config = PPOConfig().environment("marathon_envs/Hopper-v5")
+
+Needs Ray: `pip install marathon-envs[ray]`, for RLlib `pip install marathon-envs[rllib]`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from os import PathLike
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from marathon_envs import registration
+from marathon_envs._native import Player, TrainResult, ids
+from marathon_envs._native import train as native_train
+from marathon_envs.env import MarathonEnv
+from marathon_envs.vector import MarathonVectorEnv
+
+try:
+    import ray
+    from ray.exceptions import RayError, RayTaskError
+except ImportError as error:
+    raise ImportError("marathon_envs.ray needs Ray, which is not here: pip install 'marathon-envs[ray]'") from error
+
+__all__ = ["Workers", "register", "train"]
+
+Bytes = npt.NDArray[np.uint8]
+
+# losses without an answer in between, for each worker, after which there is no hope
+_PATIENCE = 3
+
+
+class Workers:
+    """Ray actors that play the rollouts of a training run, each of them one slice of its agents.
+
+    An actor that is lost, with its process or its machine, is replaced, and the new one plays the lost part again: from
+    the same state, with the same policy and random numbers. An exception in an actor is no loss and ends the run.
+    """
+
+    def __init__(self, count: int, **options: Any) -> None:
+        """Prepare `count` actors.
+
+        Args:
+            count: number of actors; at most one per sixteen agents is used.
+            **options: what `ray.remote` takes for an actor, such as `num_cpus` (default: 1) or `resources`.
+        """
+        if count < 1:
+            raise ValueError(f"count is {count}, expected at least 1")
+        self._count = count
+        self._actor = ray.remote(**{"num_cpus": 1, **options})(_Actor)
+        self._actors: list[Any] = []
+        self._run = ("", "")
+        self.replaced = 0
+        """Actors that were lost and replaced."""
+
+    def begin(self, task: str, config: str) -> int:
+        """Take note of a run; the native trainer calls it."""
+        self.close()
+        self._run = (task, config)
+        return self._count
+
+    def play(self, orders: Bytes, states: list[Bytes]) -> Iterator[tuple[int, Bytes]]:
+        """Have one rollout played: for each state, yield the number of its slice and the answer, as they come in.
+
+        The native trainer calls it.
+        """
+        slices = len(states)
+        self._actors += [self._make(i, slices) for i in range(len(self._actors), slices)]
+        shared = ray.put(orders)
+        pending = {self._actors[i].play.remote(shared, state): i for i, state in enumerate(states)}
+        losses = 0
+        while pending:
+            (done, *_), _ = ray.wait(list(pending), num_returns=1)
+            i = pending.pop(done)
+            try:
+                answer = ray.get(done)
+            except RayTaskError:
+                raise
+            except RayError as error:
+                losses += 1
+                if losses > _PATIENCE * slices:
+                    raise RuntimeError(f"{losses} of {slices} workers were lost one after another") from error
+                self.replaced += 1
+                ray.kill(self._actors[i])
+                self._actors[i] = self._make(i, slices)
+                pending[self._actors[i].play.remote(shared, states[i])] = i
+            else:
+                losses = 0
+                yield i, answer
+
+    def kill(self, i: int) -> None:
+        """Kill an actor, as an accident would: for rehearsals."""
+        ray.kill(self._actors[i])
+
+    def close(self) -> None:
+        """End the actors."""
+        for actor in self._actors:
+            ray.kill(actor)
+        self._actors.clear()
+
+    def _make(self, i: int, slices: int) -> Any:
+        return self._actor.remote(*self._run, i, slices)
+
+
+class _Actor:
+    """What runs in a worker's process."""
+
+    def __init__(self, task: str, config: str, slice: int, slices: int) -> None:
+        self._player = Player(task, config, slice, slices)
+
+    def play(self, orders: Bytes, state: Bytes) -> Bytes:
+        return self._player.play(orders, state)
+
+
+def train(
+    task: str | None = None,
+    config: str | PathLike[str] | dict[str, Any] | None = None,
+    *,
+    workers: int | Workers = 2,
+    callback: Callable[[dict[str, float | None]], bool | None] | None = None,
+    seed: int | None = None,
+    steps: int | None = None,
+    agents: int | None = None,
+    threads: int | None = None,
+    out: str | PathLike[str] | None = None,
+    resume: str | PathLike[str] | None = None,
+) -> TrainResult:
+    """Train as `marathon_envs.train` does, with rollouts played by Ray's workers; the policy has the same bits.
+
+    Connect to a cluster with `ray.init(address=...)` before; otherwise Ray starts one on this machine. The package must
+    be installed on the machines of the cluster, in the same version.
+
+    Args:
+        task: its name.
+        config: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; None means the task's own
+            fast configuration.
+        workers: number of workers, or prepared `Workers`, which are left open.
+        callback: called after every iteration with its numbers, as in `marathon_envs.train`.
+        seed: seed of everything random.
+        steps: steps of all agents together.
+        agents: agents that act side by side, a multiple of 16. Many of them make up for the time that messages take.
+        threads: threads of the learner, which waits while the workers play and plays the final evaluation; 0 means one
+            per processor core.
+        out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
+        resume: the folder of a run to go on with, in place of a task and a configuration. It may have been begun
+            without Ray, and may go on without.
+    """
+    players = workers if isinstance(workers, Workers) else Workers(workers)
+    try:
+        return native_train(
+            task,
+            config,
+            callback=callback,
+            seed=seed,
+            steps=steps,
+            agents=agents,
+            threads=threads,
+            out=out,
+            resume=resume,
+            players=players,
+        )
+    finally:
+        if players is not workers:
+            players.close()
+
+
+def register() -> None:
+    """Make every task known to RLlib as `marathon_envs/<id>`, as to Gymnasium.
+
+    `env_config` has arguments of the environment, such as `{"ctrl_cost_weight": 0.01}` for `Hopper-v5`. With
+    `env_runners(num_envs_per_env_runner=N, gym_env_vectorize_mode="vector_entry_point")`, an env runner steps its N
+    agents at once and natively; RLlib's default steps them one after another.
+    """
+    try:
+        from ray.tune.registry import register_env  # noqa: PLC0415
+    except ImportError as error:
+        raise ImportError("RLlib is not here: pip install 'marathon-envs[rllib]'") from error
+    for task in ids():
+        register_env(f"{registration.NAMESPACE}/{task}", _creator(task))
+
+
+def _creator(task: str) -> Callable[[Mapping[str, Any]], Any]:
+    """What makes environments of a task for RLlib: many agents if `num_envs` is among the arguments."""
+
+    def create(arguments: Mapping[str, Any]) -> gymnasium.Env[Any, Any] | MarathonVectorEnv:
+        options = dict(arguments)
+        num_envs = options.pop("num_envs", None)
+        return MarathonEnv(task, **options) if num_envs is None else MarathonVectorEnv(task, num_envs, **options)
+
+    return create
