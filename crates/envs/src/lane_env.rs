@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use marathon_physics::lanes::Real;
 use marathon_physics::model::Actuator;
-use marathon_physics::{Model, Sim, Work};
+use marathon_physics::{Model, Sim, Variation, Work};
 
 use crate::agent::{Agent, Controls, Facts};
 use crate::anatomy::{Anatomy, Blueprint, sim_options};
@@ -54,6 +54,8 @@ pub trait AgentShard: Shard {
     fn observe(&mut self, block: usize, mask: u16, obs: &mut [f32]);
     /// Sets the number of decisions after which an episode is truncated, in place of the task's own.
     fn limit_episodes(&mut self, max_episode_steps: usize);
+    /// Gives an agent, numbered within this shard, masses, friction, strength and gravity of its own, until changed.
+    fn vary(&mut self, agent: usize, variation: &Variation);
 }
 
 /// A [`ShardFactory`] that can also make [`AgentShard`]s.
@@ -421,5 +423,10 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
 
     fn limit_episodes(&mut self, max_episode_steps: usize) {
         self.max_episode_steps = max_episode_steps as u64;
+    }
+
+    fn vary(&mut self, agent: usize, variation: &Variation) {
+        let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        group.vary(&self.task.sim, agent % T::LANES, variation);
     }
 }

@@ -1,7 +1,7 @@
 //! `L` agents side by side: one decision, from action to observation and reward, inside vector code.
 
 use marathon_physics::lanes::{Kernel, Real};
-use marathon_physics::{Group, Readings, Sim, Work};
+use marathon_physics::{Group, Readings, Sim, Variation, Work};
 
 use crate::agent::{Agent, Controls};
 use crate::lane_env::Task;
@@ -78,6 +78,11 @@ impl<T: Real> LaneGroup<T> {
         for (v, x) in self.physics.qpos.iter_mut().zip(qpos) {
             v.set(lane, T::scalar(*x));
         }
+    }
+
+    /// Gives an agent constants of its own, until changed.
+    pub fn vary(&mut self, sim: &Sim<T>, lane: usize, variation: &Variation) {
+        self.physics.vary(sim, lane, variation);
     }
 
     /// Configuration and velocity of an agent.

@@ -3,6 +3,7 @@
 //! Arrays are row-major, one row per agent, and belong to the caller. Agents live in blocks of sixteen spread over the
 //! threads of a pool; results do not depend on the number of threads, the number of agents or the instruction set.
 
+use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -199,6 +200,8 @@ impl<'a> StepMut<'a> {
 /// Agents of one kind that are stepped together.
 pub struct VecEnv {
     spec: Spec,
+    /// No deviation from the model.
+    unvaried: Variation,
     agents: usize,
     autoreset: Autoreset,
     workers: Vec<Worker>,
@@ -242,7 +245,9 @@ impl VecEnv {
         if options.max_episode_steps == Some(0) {
             return wrong("max_episode_steps", "0".into(), "at least 1");
         }
-        let factory = registry.shards_with(agent, &options.options, options.isa.unwrap_or_else(Isa::best))?;
+        let agent = registry.agent_with(agent, &options.options)?;
+        let unvaried = Variation::none(&agent.model()?);
+        let factory = agent.shards(options.isa.unwrap_or_else(Isa::best))?;
         let mut spec = factory.spec().clone();
         spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);
         let blocks = options.agents.div_ceil(BLOCK);
@@ -274,7 +279,8 @@ impl VecEnv {
         } else {
             None
         };
-        Ok(VecEnv { spec, agents: options.agents, autoreset: options.autoreset, workers, stride: share * BLOCK, pool })
+        let (agents, autoreset, stride) = (options.agents, options.autoreset, share * BLOCK);
+        Ok(VecEnv { spec, unvaried, agents, autoreset, workers, stride, pool })
     }
 
     /// Facts of the task.
@@ -332,6 +338,46 @@ impl VecEnv {
     pub fn reseed_agent(&mut self, agent: usize, seed: u64, number: usize) -> Result<(), EnvError> {
         self.check_agent(agent)?;
         self.workers[agent / self.stride].shard.reseed_agent(agent % self.stride, seed, number as u64);
+        Ok(())
+    }
+
+    /// The model's own constants: what [`VecEnv::vary`] may deviate from.
+    pub fn unvaried(&self) -> &Variation {
+        &self.unvaried
+    }
+
+    /// Gives an agent masses, friction, strength and gravity of its own, for domain randomization. They last until changed,
+    /// over all resets, and do not belong to snapshots.
+    ///
+    /// # Errors
+    /// If there is no such agent, a length is wrong, or a number makes no sense.
+    pub fn vary(&mut self, agent: usize, variation: &Variation) -> Result<(), EnvError> {
+        self.check_agent(agent)?;
+        let Variation { mass, friction, strength, gravity } = variation;
+        let lengths = [
+            ("mass [bodies]", mass.len(), self.unvaried.mass.len()),
+            ("strength [actuators]", strength.len(), self.unvaried.strength.len()),
+        ];
+        for (what, found, expected) in lengths {
+            if found != expected {
+                return Err(EnvError::Shape { what: what.into(), found, expected });
+            }
+        }
+        let wrong =
+            |option, found: &f64, expected| Err(EnvError::Option { option, found: found.to_string(), expected });
+        if let Some(x) = mass.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
+            return wrong("mass", x, "a factor above 0");
+        }
+        if !(friction.is_finite() && *friction >= 0.0) {
+            return wrong("friction", friction, "a factor of 0 or more");
+        }
+        if let Some(x) = strength.iter().find(|x| !x.is_finite()) {
+            return wrong("strength", x, "a finite factor");
+        }
+        if let Some(x) = gravity.iter().find(|x| !x.is_finite()) {
+            return wrong("gravity", x, "finite numbers");
+        }
+        self.workers[agent / self.stride].shard.vary(agent % self.stride, variation);
         Ok(())
     }
 
