@@ -42,6 +42,8 @@ pub enum Command {
     Export(ExportArgs),
     /// Turn an ONNX network of another trainer into a policy.
     Import(ImportArgs),
+    /// Record a policy's decisions for ML-Agents' imitation learning: a .demo file.
+    RecordDemo(RecordDemoArgs),
     /// List the agents.
     List,
     /// Measure the speed of the physics, the environments or the training.
@@ -186,6 +188,25 @@ pub struct ImportArgs {
     /// File to write [default: beside the network, .safetensors].
     #[arg(long, value_name = "F.safetensors")]
     pub out: Option<PathBuf>,
+}
+
+/// Options of `record-demo`.
+#[derive(Debug, clap::Args)]
+pub struct RecordDemoArgs {
+    /// Policy file, or folder of a run.
+    pub policy: PathBuf,
+    /// File to write; its name ends in .demo.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Episodes to record.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub episodes: u64,
+    /// Seed of the environments.
+    #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
+    pub seed: u64,
+    /// Agent that the policy must be for [default: the one it was trained for].
+    #[arg(long, value_name = "AGENT")]
+    pub agent: Option<String>,
 }
 
 /// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.

@@ -55,6 +55,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Render(render) => commands::render::run(render, args.json),
         Command::Export(export) => commands::convert::export(export, args.json),
         Command::Import(import) => commands::convert::import(import, args.json),
+        Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::List => commands::list::run(args.json),
         Command::Bench(bench) => commands::bench::run(bench, args.json),
     }

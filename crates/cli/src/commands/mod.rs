@@ -4,5 +4,6 @@ pub mod bench;
 pub mod convert;
 pub mod eval;
 pub mod list;
+pub mod record_demo;
 pub mod render;
 pub mod train;

@@ -1,0 +1,255 @@
+//! The words of a command line.
+//!
+//! A player is started by Python in the way of Unity's players: the engine's own flags have one dash, and which of them there
+//! are depends on versions, so one that is not known here is skipped with its value. The flags with two dashes are ours; one that
+//! is misspelled is refused with the nearest that exists.
+
+use crate::behavior::BehaviorOptions;
+use crate::error::PlayerError;
+use crate::player::PlayerOptions;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How to use it.
+pub const HELP: &str = "\
+Serves Marathon's environments to ML-Agents, as a player built with Unity does.
+
+  marathon-player --mlagents-port N [flags]
+
+Usually Python starts it:
+  mlagents-learn CONFIG.yaml --env=marathon-player --env-args --spawn-env=Hopper-v0 --num-spawn-envs=16
+or it connects to an mlagents-learn that was started without --env and waits:
+  marathon-player --mlagents-port 5004 --spawn-env=Hopper-v0 --num-spawn-envs=16
+
+  --mlagents-port N        port on which the trainer listens, on this computer
+  --spawn-env ID           agent, such as Hopper-v0 [Hopper-v0]; again for a further behavior, whose flags follow it
+  --num-spawn-envs N       number of its agents in each area [64]
+  --behavior-name NAME     name of the behavior [the agent's]
+  --option NAME=VALUE      argument of the agent
+  --max-episode-steps N    decisions after which an episode is truncated [the task's]
+  --threads N              threads that simulate; 0: one per processor [1]
+  --fresh-agent-ids        a new agent id with every episode, which UnityParallelEnv and UnityAECEnv need
+  --connect-timeout S      seconds to wait for a trainer [60]
+  -logFile FILE            write the log there instead of to the standard error
+  --help, --version
+
+Flags with one dash are Unity's and have no effect here.
+";
+
+/// Flags of ours that take a value.
+const VALUED: [&str; 8] = [
+    "--mlagents-port",
+    "--spawn-env",
+    "--num-spawn-envs",
+    "--behavior-name",
+    "--option",
+    "--max-episode-steps",
+    "--threads",
+    "--connect-timeout",
+];
+/// Those that do not.
+const BARE: [&str; 3] = ["--fresh-agent-ids", "--help", "--version"];
+
+/// What a command line asks for.
+#[derive(Clone, Debug)]
+pub enum Request {
+    /// A text on the standard output: help, or the version.
+    Print(String),
+    /// To play.
+    Play(Args),
+}
+
+/// What a command line says.
+#[derive(Clone, Debug)]
+pub struct Args {
+    /// The player.
+    pub player: PlayerOptions,
+    /// Where to write the log; `None`: to the standard error.
+    pub log: Option<PathBuf>,
+    /// Flags that have no effect here.
+    pub ignored: Vec<String>,
+}
+
+/// Reads the words of a command line, without the program's own name.
+///
+/// # Errors
+/// If a flag of ours is unknown or has no sensible value, or there is no port.
+pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerError> {
+    let mut words = words.into_iter().peekable();
+    let mut options = PlayerOptions { behaviors: Vec::new(), ..Default::default() };
+    let (mut port, mut log, mut ignored) = (None, None, Vec::new());
+    while let Some(word) = words.next() {
+        let Some(_) = word.strip_prefix("--") else {
+            match word.strip_prefix('-') {
+                Some(name) if name.eq_ignore_ascii_case("logfile") => {
+                    let path = words.next().ok_or_else(|| usage("-logFile needs the name of a file".into()))?;
+                    log = Some(PathBuf::from(path));
+                }
+                Some(_) => {
+                    ignored.push(word);
+                    ignored.extend(words.next_if(|next| !next.starts_with('-')));
+                }
+                None => return Err(usage(format!("'{word}' belongs to no flag; see --help"))),
+            }
+            continue;
+        };
+        let (flag, attached) = match word.split_once('=') {
+            Some((flag, value)) => (flag, Some(value.to_string())),
+            None => (&word[..], None),
+        };
+        if flag.starts_with("--mlagents-") && flag != "--mlagents-port" {
+            // ML-Agents' own, of a version that this player has not heard of
+            ignored.push(word);
+            continue;
+        }
+        match flag {
+            "--help" => return Ok(Request::Print(HELP.into())),
+            "--version" => return Ok(Request::Print(format!("marathon-player {}\n", env!("CARGO_PKG_VERSION")))),
+            "--fresh-agent-ids" => {
+                options.fresh_ids = true;
+                continue;
+            }
+            _ if !VALUED.contains(&flag) => return Err(unknown(flag)),
+            _ => {}
+        }
+        let value = match attached.or_else(|| words.next()) {
+            Some(value) => value,
+            None => return Err(usage(format!("{flag} needs a value"))),
+        };
+        match flag {
+            "--mlagents-port" => port = Some(number(flag, &value, 1..=65535)? as u16),
+            "--spawn-env" => options.behaviors.push(BehaviorOptions { env: value, ..Default::default() }),
+            "--threads" => options.threads = number(flag, &value, 0..=4096)? as usize,
+            "--connect-timeout" => options.patience = Duration::from_secs(number(flag, &value, 0..=86400)?),
+            _ => {
+                if options.behaviors.is_empty() {
+                    options.behaviors.push(BehaviorOptions::default());
+                }
+                let behavior = options.behaviors.last_mut().ok_or_else(|| unknown(flag))?;
+                set(behavior, flag, value)?;
+            }
+        }
+    }
+    options.port = port.ok_or_else(|| {
+        usage(
+            "--mlagents-port is missing. This player serves ML-Agents and shows nothing; to see a policy, use `marathon render`. \
+             A waiting mlagents-learn listens on port 5004"
+                .into(),
+        )
+    })?;
+    if options.behaviors.is_empty() {
+        options.behaviors.push(BehaviorOptions::default());
+    }
+    Ok(Request::Play(Args { player: options, log, ignored }))
+}
+
+/// Sets one of a behavior's flags.
+fn set(behavior: &mut BehaviorOptions, flag: &str, value: String) -> Result<(), PlayerError> {
+    match flag {
+        "--num-spawn-envs" => behavior.agents = number(flag, &value, 1..=1_000_000)? as usize,
+        "--max-episode-steps" => behavior.max_episode_steps = Some(number(flag, &value, 1..=u32::MAX.into())? as usize),
+        "--behavior-name" if value.is_empty() || value.contains('?') => {
+            return Err(usage(format!("--behavior-name is '{value}', expected a name without '?'")));
+        }
+        "--behavior-name" => behavior.name = Some(value),
+        _ => {
+            let Some((name, value)) = value.split_once('=') else {
+                return Err(usage(format!("--option is '{value}', expected NAME=VALUE")));
+            };
+            let value: marathon_envs::Value = match value.parse() {
+                Ok(value) => value,
+                Err(never) => match never {},
+            };
+            behavior.options.set(name, value);
+        }
+    }
+    Ok(())
+}
+
+fn usage(text: String) -> PlayerError {
+    PlayerError::Usage(text)
+}
+
+fn unknown(flag: &str) -> PlayerError {
+    let distance = |known: &&str| strsim::damerau_levenshtein(known, flag);
+    let near =
+        VALUED.into_iter().chain(BARE).min_by_key(distance).filter(|known| distance(known) <= 2 + known.len() / 3);
+    let near = near.map(|near| format!("; did you mean {near}?")).unwrap_or_default();
+    usage(format!("there is no flag {flag}{near} See --help for all"))
+}
+
+fn number(flag: &str, value: &str, range: std::ops::RangeInclusive<u64>) -> Result<u64, PlayerError> {
+    match value.parse() {
+        Ok(n) if range.contains(&n) => Ok(n),
+        _ => Err(usage(format!(
+            "{flag} is '{value}', expected a whole number from {} to {}",
+            range.start(),
+            range.end()
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(line: &str) -> Result<Args, String> {
+        match parse(line.split_whitespace().map(str::to_owned)) {
+            Ok(Request::Play(args)) => Ok(args),
+            Ok(Request::Print(text)) => Err(text),
+            Err(e) => Err(e.to_string()),
+        }
+    }
+
+    #[test]
+    fn a_launch_by_python_is_understood() {
+        let args = read(
+            "-nographics -batchmode --mlagents-port 5005 -logFile /tmp/Player-0.log -screen-width 84 --spawn-env=Ant-v0 \
+             --num-spawn-envs=16 --spawn-env Hopper-v5 --option healthy_reward=0.5 --option exclude=(1,2) --mlagents-new=1",
+        )
+        .unwrap();
+        assert_eq!((args.player.port, args.log), (5005, Some("/tmp/Player-0.log".into())));
+        assert_eq!(args.ignored, ["-nographics", "-batchmode", "-screen-width", "84", "--mlagents-new=1"]);
+        let [ant, hopper] = &args.player.behaviors[..] else { panic!("two behaviors") };
+        assert_eq!((ant.env.as_str(), ant.agents), ("Ant-v0", 16));
+        assert_eq!((hopper.env.as_str(), hopper.agents), ("Hopper-v5", 64));
+        assert_eq!(hopper.options.get("healthy_reward"), Some(&0.5.into()));
+        assert_eq!(hopper.options.get("exclude"), Some(&[1.0, 2.0].into()));
+        assert_eq!(read("--mlagents-port=1").unwrap().player.behaviors, [BehaviorOptions::default()]);
+    }
+
+    #[test]
+    fn mistakes_are_told() {
+        for (line, expected) in [
+            ("", "--mlagents-port is missing"),
+            ("--mlagents-port", "needs a value"),
+            ("--mlagents-port 70000", "is '70000', expected a whole number from 1 to 65535"),
+            ("--mlagents-port 1 --spawn-envs=Hopper-v0", "no flag --spawn-envs; did you mean --spawn-env?"),
+            ("--mlagents-port 1 --num-spawn-env 3", "did you mean --num-spawn-envs?"),
+            ("--mlagents-port 1 --num-spawn-envs 0", "expected a whole number from 1 to 1000000"),
+            ("--mlagents-port 1 --option mass", "expected NAME=VALUE"),
+            ("--mlagents-port 1 --behavior-name a?team=1", "expected a name without '?'"),
+            ("--mlagents-port 1 hopper", "'hopper' belongs to no flag"),
+            ("-logFile", "-logFile needs"),
+        ] {
+            let error = read(line).unwrap_err();
+            assert!(error.contains(expected), "{line}: {error}");
+        }
+        assert!(read("--help").unwrap_err().contains("--spawn-env ID"));
+    }
+
+    #[test]
+    fn the_help_names_every_flag() {
+        for flag in VALUED.into_iter().chain(BARE) {
+            assert!(HELP.contains(flag), "{flag}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn words_never_panic(words in proptest::collection::vec("-{0,2}[a-z=-]{0,12}|--mlagents-port=?[0-9]*|.*", 0..6)) {
+            let _ = parse(words);
+        }
+    }
+}

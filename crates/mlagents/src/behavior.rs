@@ -1,0 +1,391 @@
+//! Agents of one kind under one of ML-Agents' behavior names: from actions to infos.
+
+use crate::channels::{Aggregation, write_stat};
+use crate::error::PlayerError;
+use crate::parameters::{Names, Parameters};
+use crate::wire::{ActionSpec, AgentActionList, AgentInfo, BrainParameters, FloatData, Observation};
+use marathon_envs::{Autoreset, Options, Spec, Step, VecEnv, VecEnvOptions, registry};
+
+/// What a [`Behavior`] is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BehaviorOptions {
+    /// Agent, such as `Hopper-v0`.
+    pub env: String,
+    /// Number of agents in one area.
+    pub agents: usize,
+    /// Name for the trainer; `None`: the agent's registry name.
+    pub name: Option<String>,
+    /// Named arguments of the agent.
+    pub options: Options,
+    /// Decisions after which an episode is truncated; `None`: the task's own number.
+    pub max_episode_steps: Option<usize>,
+}
+
+impl Default for BehaviorOptions {
+    /// As many hoppers as the original spawned for training.
+    fn default() -> Self {
+        BehaviorOptions {
+            env: "Hopper-v0".into(),
+            agents: 64,
+            name: None,
+            options: Options::new(),
+            max_episode_steps: None,
+        }
+    }
+}
+
+/// Totals of an agent's present episode, for statistics.
+#[derive(Clone, Default)]
+struct Episode {
+    /// Decisions.
+    steps: u32,
+    /// Along +x, m.
+    distance: f32,
+    /// Per term of the reward.
+    terms: Vec<f32>,
+}
+
+/// Agents of one kind.
+pub struct Behavior {
+    /// With the team, as ML-Agents wants it.
+    name: String,
+    spec: Spec,
+    env: VecEnv,
+    /// What the environment was made with.
+    made: VecEnvOptions,
+    names: Names,
+    out: Step,
+    actions: Vec<f32>,
+    ended: Vec<bool>,
+    episodes: Vec<Episode>,
+    /// Episodes that each agent has begun.
+    begun: Vec<u64>,
+    ids: Vec<i32>,
+    /// An info to write into.
+    info: AgentInfo,
+    /// Times that all episodes were begun anew.
+    resets: u64,
+    /// Whether any agent has ever been varied.
+    varied: bool,
+}
+
+impl Behavior {
+    /// `areas` times as many agents as the options say, whose numbers begin at `first_id`.
+    ///
+    /// # Errors
+    /// If there is no such agent, or it does not take its arguments.
+    pub fn new(options: &BehaviorOptions, areas: usize, threads: usize, first_id: i32) -> Result<Self, PlayerError> {
+        let made = VecEnvOptions {
+            agents: options.agents.saturating_mul(areas),
+            threads,
+            // an agent's own constants are drawn between two episodes
+            autoreset: Autoreset::Disabled,
+            max_episode_steps: options.max_episode_steps,
+            options: options.options.clone(),
+            ..Default::default()
+        };
+        let env = VecEnv::new(&options.env, &made)?;
+        let spec = env.spec().clone();
+        let names = Names::new(&registry::agent(&spec.id)?.model()?, &spec.action_names, &spec.options);
+        let n = env.agents();
+        Ok(Behavior {
+            name: format!("{}?team=0", options.name.as_ref().unwrap_or(&spec.id)),
+            out: env.buffers(),
+            actions: vec![0.0; n * spec.act],
+            ended: vec![false; n],
+            episodes: vec![Episode { terms: vec![0.0; spec.reward_terms.len()], ..Default::default() }; n],
+            begun: vec![0; n],
+            ids: (first_id..).take(n).collect(),
+            info: AgentInfo { observations: vec![observation(&vec![0.0; spec.obs])], ..Default::default() },
+            resets: 0,
+            varied: false,
+            spec,
+            env,
+            made,
+            names,
+        })
+    }
+
+    /// Name for the trainer, such as `Hopper-v0?team=0`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Facts of the task.
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// The agents, to be looked at.
+    pub fn env(&self) -> &VecEnv {
+        &self.env
+    }
+
+    /// Results of the last decision.
+    pub fn last(&self) -> &Step {
+        &self.out
+    }
+
+    /// Names of the environment parameters that mean something here.
+    pub fn parameter_names(&self) -> &Names {
+        &self.names
+    }
+
+    /// Bytes of the longest message part that the agents can need: when all their episodes end at once, there are two infos
+    /// for each.
+    pub fn largest(&self) -> usize {
+        let info = AgentInfo { reward: 1.0, done: true, max_step_reached: true, id: i32::MAX, ..self.info.clone() };
+        let entry = prost::encoding::message::encoded_len(1, &info);
+        self.name.len() + self.env.agents().saturating_mul(2 * entry) + 32
+    }
+
+    /// How many agents there may be if a message may have so many bytes.
+    pub fn most_agents(&self, bytes: usize) -> usize {
+        let each = self.largest().saturating_sub(self.name.len() + 32) / self.env.agents();
+        bytes.saturating_sub(self.name.len() + 32) / each.max(1)
+    }
+
+    /// Begins all episodes anew; the first time under a seed.
+    ///
+    /// # Errors
+    /// If parameters make no sense; the text says so. Episodes have begun nevertheless.
+    pub fn reset(&mut self, seed: Option<u64>, parameters: &Parameters) -> Result<(), PlayerError> {
+        self.resets += 1;
+        let configured = self.configure(parameters);
+        self.ended.fill(true);
+        self.begun.iter_mut().for_each(|n| *n += 1);
+        let varied = self.vary(parameters);
+        self.made.seed = seed.unwrap_or(self.made.seed);
+        self.env.reset(seed, &mut self.out.obs)?;
+        self.out.reward.fill(0.0);
+        self.clear_ended();
+        configured.and(varied)
+    }
+
+    /// Takes in what parameters say of all agents alike, also in the middle of episodes.
+    ///
+    /// # Errors
+    /// If an argument makes no sense, or would change the observations or actions; the old ones stay.
+    pub fn configure(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
+        let mut wanted = self.made.clone();
+        parameters.configure(&self.names, self.resets, &mut wanted);
+        if wanted.options == self.made.options && wanted.max_episode_steps == self.made.max_episode_steps {
+            return Ok(());
+        }
+        let mut env = VecEnv::new(&self.spec.id, &wanted)?;
+        let sizes = |spec: &Spec| (spec.obs, spec.act, spec.reward_terms.len(), spec.info.len());
+        if sizes(env.spec()) != sizes(&self.spec) {
+            let (expected, found) = ((self.spec.obs, self.spec.act), (env.spec().obs, env.spec().act));
+            return Err(PlayerError::Sizes { name: self.name.clone(), expected, found });
+        }
+        env.load(&self.env.save())?;
+        self.env = env;
+        self.made = wanted;
+        if self.varied {
+            // what agents are like is no part of a snapshot
+            self.ended.fill(true);
+            let varied = self.vary(parameters);
+            self.ended.fill(false);
+            return varied;
+        }
+        Ok(())
+    }
+
+    /// Acts, advances to the next decision, and begins new episodes where they ended.
+    ///
+    /// # Errors
+    /// If the actions are not as many as agents or have another length; or parameters make no sense.
+    pub fn step(&mut self, actions: Option<&AgentActionList>, parameters: &Parameters) -> Result<(), PlayerError> {
+        let (n, act) = (self.env.agents(), self.spec.act);
+        match actions {
+            // nobody decided: at rest
+            None => self.actions.fill(0.0),
+            Some(list) => {
+                let lengths = list.value.iter().map(|action| action.continuous_actions.len());
+                if list.value.len() != n || lengths.clone().any(|length| length != act) {
+                    let length = lengths.clone().find(|length| *length != act).unwrap_or(act);
+                    let found = (list.value.len(), length);
+                    return Err(PlayerError::Actions { name: self.name.clone(), found, expected: (n, act) });
+                }
+                for (row, action) in self.actions.chunks_exact_mut(act).zip(&list.value) {
+                    for (i, (to, x)) in row.iter_mut().zip(&action.continuous_actions).enumerate() {
+                        *to = self.spec.action_of(i, *x);
+                    }
+                }
+            }
+        }
+        self.env.step(&self.actions, &mut self.out.as_mut())?;
+        let terms = self.spec.reward_terms.len();
+        for (i, episode) in self.episodes.iter_mut().enumerate() {
+            self.ended[i] = self.out.terminated[i] || self.out.truncated[i];
+            episode.steps += 1;
+            episode.distance += self.out.forward[i];
+            for (sum, x) in episode.terms.iter_mut().zip(&self.out.terms[i * terms..(i + 1) * terms]) {
+                *sum += x;
+            }
+        }
+        if !self.ended.contains(&true) {
+            return Ok(());
+        }
+        for (begun, ended) in self.begun.iter_mut().zip(&self.ended) {
+            *begun += u64::from(*ended);
+        }
+        let varied = self.vary(parameters);
+        self.env.reset_agents(&self.ended, &mut self.out.obs)?;
+        varied
+    }
+
+    /// Draws what the agents whose episodes ended are like in the next.
+    fn vary(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
+        let mut result = Ok(());
+        for i in 0..self.ended.len() {
+            if !self.ended[i] {
+                continue;
+            }
+            let own = parameters.variation(&self.names, self.env.unvaried(), i as u64, self.begun[i]);
+            if own.is_some() || self.varied {
+                self.varied = true;
+                let own = own.unwrap_or_else(|| self.env.unvaried().clone());
+                // the others must not suffer from one impossible draw
+                result = result.and(self.env.vary(i, &own).map_err(PlayerError::from));
+            }
+        }
+        result
+    }
+
+    /// Forgets which episodes ended, and what they amounted to.
+    fn clear_ended(&mut self) {
+        for (ended, episode) in self.ended.iter_mut().zip(&mut self.episodes) {
+            if std::mem::take(ended) {
+                (episode.steps, episode.distance) = (0, 0.0);
+                episode.terms.fill(0.0);
+            }
+        }
+    }
+
+    /// What the trainer has to know of the behavior.
+    pub fn parameters(&self) -> BrainParameters {
+        let action_spec = ActionSpec { num_continuous: self.spec.act as i32 };
+        BrainParameters { brain_name: self.name.clone(), is_training: true, action_spec: Some(action_spec) }
+    }
+
+    /// Appends the infos of all agents, an encoded [`AgentInfoList`](crate::wire::AgentInfoList), and statistics about the
+    /// episodes that ended. Must be called once after every [`Behavior::reset`] and [`Behavior::step`]. With `fresh_ids`, the
+    /// number for the next new episode, agents change their numbers between episodes.
+    pub fn report(&mut self, infos: &mut Vec<u8>, stats: &mut Vec<u8>, mut fresh_ids: Option<&mut i32>) {
+        let mut info = std::mem::take(&mut self.info);
+        for i in 0..self.env.agents() {
+            if self.ended[i] {
+                self.describe(i, Some(self.out.truncated[i]), &mut info);
+                put(infos, &info);
+                self.write_stats(i, stats);
+                if let Some(next) = &mut fresh_ids {
+                    self.ids[i] = **next;
+                    **next = next.wrapping_add(1).max(0);
+                }
+            }
+            self.describe(i, None, &mut info);
+            put(infos, &info);
+        }
+        self.info = info;
+        self.clear_ended();
+    }
+
+    /// Writes an agent's info: of the end of its episode, and whether that was the time limit, or of its present state.
+    fn describe(&self, i: usize, end: Option<bool>, info: &mut AgentInfo) {
+        let row = i * self.spec.obs..(i + 1) * self.spec.obs;
+        let data = if end.is_some() { &self.out.final_obs[row] } else { &self.out.obs[row] };
+        // what was got before the end belongs to the end
+        info.reward = if end.is_none() && self.ended[i] { 0.0 } else { self.out.reward[i] };
+        info.done = end.is_some();
+        info.max_step_reached = end.unwrap_or(false);
+        info.id = self.ids[i];
+        if let Some(numbers) = info.observations.first_mut().and_then(|sensor| sensor.float_data.as_mut()) {
+            numbers.data.copy_from_slice(data);
+        }
+    }
+
+    /// What an episode amounted to, for TensorBoard.
+    fn write_stats(&self, i: usize, stats: &mut Vec<u8>) {
+        let label = self.name.trim_end_matches("?team=0");
+        let episode = &self.episodes[i];
+        let mut average = |name: &str, value: f32| {
+            if value.is_finite() {
+                write_stat(stats, &format!("{label}/{name}"), value, Aggregation::Average);
+            }
+        };
+        average("Distance", episode.distance);
+        average("Speed", episode.distance / (episode.steps as f32 * self.spec.dt as f32));
+        for (name, sum) in self.spec.reward_terms.iter().zip(&episode.terms) {
+            average(&format!("Reward/{name}"), *sum);
+        }
+        if self.out.diverged[i] {
+            write_stat(stats, &format!("{label}/Diverged"), 1.0, Aggregation::Sum);
+        }
+    }
+}
+
+/// Appends an entry of an [`AgentInfoList`](crate::wire::AgentInfoList).
+fn put(list: &mut Vec<u8>, info: &AgentInfo) {
+    prost::encoding::message::encode(1, info, list);
+}
+
+/// A vector of numbers as a sensor gives it.
+pub(crate) fn observation(data: &[f32]) -> Observation {
+    Observation {
+        shape: vec![data.len() as i32],
+        float_data: Some(FloatData { data: data.to_vec() }),
+        dimension_properties: vec![Observation::NO_PROPERTY],
+        name: format!("VectorSensor_size{}", data.len()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::channels::Sampler;
+    use crate::wire::AgentInfoList;
+    use prost::Message;
+
+    fn hoppers(agents: usize, max_episode_steps: usize) -> Behavior {
+        let options = BehaviorOptions { agents, max_episode_steps: Some(max_episode_steps), ..Default::default() };
+        Behavior::new(&options, 1, 1, 0).unwrap()
+    }
+
+    #[test]
+    fn the_longest_list_of_infos_is_foreseen() {
+        let mut behavior = hoppers(300, 1);
+        let none = Parameters::default();
+        behavior.reset(Some(1), &none).unwrap();
+        let (mut infos, mut stats) = (Vec::new(), Vec::new());
+        behavior.report(&mut infos, &mut stats, None);
+        let begun = infos.len();
+        behavior.step(None, &none).unwrap();
+        infos.clear();
+        behavior.report(&mut infos, &mut stats, None);
+        assert_eq!(AgentInfoList::decode(&*infos).unwrap().value.len(), 600);
+        let (length, foreseen) = (infos.len(), behavior.largest());
+        assert!(length > 2 * begun - 600 * 8 && length < foreseen && length > foreseen * 9 / 10);
+        assert!(behavior.most_agents(foreseen) == 300 && behavior.most_agents(foreseen / 2) < 150);
+        assert!(!stats.is_empty());
+    }
+
+    #[test]
+    fn a_changed_task_goes_on_where_it_was() {
+        let none = Parameters::default();
+        let (mut plain, mut changed) = (hoppers(2, 100), hoppers(2, 100));
+        for behavior in [&mut plain, &mut changed] {
+            behavior.reset(Some(5), &none).unwrap();
+            behavior.step(None, &none).unwrap();
+        }
+        let mut longer = Parameters::default();
+        longer.set("max_episode_steps".into(), Sampler::Constant(200.0));
+        changed.configure(&longer).unwrap();
+        for _ in 0..5 {
+            plain.step(None, &none).unwrap();
+            changed.step(None, &longer).unwrap();
+        }
+        assert_eq!(plain.last().obs, changed.last().obs);
+        assert_eq!(changed.env().spec().max_episode_steps, 200);
+    }
+}

@@ -1,0 +1,171 @@
+//! Demonstrations: `.demo` files of recorded decisions, from which ML-Agents learns by imitation.
+//!
+//! A file is the length of a head and the head, padded to 33 bytes; the length of the behavior's description and that; and so
+//! on for each decision: what the agent saw, what it got for the decision before, what it did. Lengths are protocol buffers'
+//! variable integers. The last entry of an episode is the state in which it ended, with an action that nobody took.
+
+use crate::behavior::observation;
+use crate::wire::{ActionSpec, AgentInfo, AgentInfoActionPair, BrainParameters, DemonstrationMeta, RecordedAction};
+use marathon_envs::Spec;
+use prost::Message;
+
+/// Bytes in front of the behavior's description.
+const HEAD: usize = 33;
+/// Version of the format.
+const API_VERSION: i32 = 1;
+
+/// An episode as it was played, from its first observation to its last.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Episode {
+    /// Observations, `[steps + 1][obs]`: the last is that of the state in which the episode ended.
+    pub obs: Vec<f32>,
+    /// Actions in the environment's units, `[steps][act]`.
+    pub actions: Vec<f32>,
+    /// Rewards, `[steps]`.
+    pub rewards: Vec<f32>,
+    /// It ended by its time limit.
+    pub truncated: bool,
+}
+
+/// A demonstration file in the making.
+#[derive(Clone, Debug)]
+pub struct Demonstration {
+    name: String,
+    behavior: String,
+    spec: Spec,
+    pairs: Vec<u8>,
+    steps: usize,
+    episodes: usize,
+    total: f64,
+}
+
+impl Demonstration {
+    /// An empty demonstration of a task.
+    pub fn new(name: &str, spec: &Spec) -> Self {
+        Demonstration {
+            name: name.into(),
+            behavior: format!("{}?team=0", spec.id),
+            spec: spec.clone(),
+            pairs: Vec::new(),
+            steps: 0,
+            episodes: 0,
+            total: 0.0,
+        }
+    }
+
+    /// Adds an episode.
+    ///
+    /// # Panics
+    /// If the episode's lengths do not fit each other and the task.
+    pub fn push(&mut self, episode: &Episode) {
+        let (obs, act, steps) = (self.spec.obs, self.spec.act, episode.rewards.len());
+        assert_eq!(episode.obs.len(), (steps + 1) * obs, "an observation for every decision and the end");
+        assert_eq!(episode.actions.len(), steps * act, "an action for every decision");
+        for i in 0..=steps {
+            let done = i == steps;
+            let info = AgentInfo {
+                reward: if i == 0 { 0.0 } else { episode.rewards[i - 1] },
+                done,
+                max_step_reached: done && episode.truncated,
+                id: self.episodes as i32,
+                observations: vec![observation(&episode.obs[i * obs..(i + 1) * obs])],
+            };
+            let action: Vec<f32> = match episode.actions.get(i * act..(i + 1) * act) {
+                Some(row) => row.iter().enumerate().map(|(i, a)| nominal(self.spec.action_range(i), *a)).collect(),
+                None => vec![0.0; act],
+            };
+            let action = RecordedAction { vector_actions: action.clone(), continuous_actions: action };
+            let pair = AgentInfoActionPair { agent_info: Some(info), action_info: Some(action) };
+            self.pairs.extend(pair.encode_length_delimited_to_vec());
+        }
+        self.steps += steps + 1;
+        self.episodes += 1;
+        self.total += episode.rewards.iter().map(|r| f64::from(*r)).sum::<f64>();
+    }
+
+    /// Number of episodes.
+    pub fn episodes(&self) -> usize {
+        self.episodes
+    }
+
+    /// Mean return.
+    pub fn mean_return(&self) -> f64 {
+        self.total / self.episodes.max(1) as f64
+    }
+
+    /// The file.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut meta = DemonstrationMeta {
+            api_version: API_VERSION,
+            // a word, as Unity's editor makes of it
+            name: self.name.chars().filter(char::is_ascii_alphanumeric).collect(),
+            number_steps: self.steps.try_into().unwrap_or(i32::MAX),
+            number_episodes: self.episodes.try_into().unwrap_or(i32::MAX),
+            mean_reward: self.mean_return() as f32,
+        };
+        // the head has a fixed length, and only the name can give way
+        while meta.encode_length_delimited_to_vec().len() > HEAD && meta.name.pop().is_some() {}
+        let action_spec = ActionSpec { num_continuous: self.spec.act as i32 };
+        let behavior =
+            BrainParameters { brain_name: self.behavior.clone(), is_training: true, action_spec: Some(action_spec) };
+        let mut bytes = meta.encode_length_delimited_to_vec();
+        bytes.resize(HEAD, 0);
+        bytes.extend(behavior.encode_length_delimited_to_vec());
+        bytes.extend(&self.pairs);
+        bytes
+    }
+}
+
+/// The action in [-1, 1] that one in an actuator's own units stands for.
+fn nominal([low, high]: [f32; 2], action: f32) -> f32 {
+    // the same bits where there is nothing to map
+    let x = if low == -1.0 && high == 1.0 { action } else { (action - 0.5 * (low + high)) / (0.5 * (high - low)) };
+    x.clamp(-1.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_head_behavior_and_pairs() {
+        let spec = marathon_envs::factory("Hopper-v5", marathon_physics::lanes::Isa::best()).unwrap().spec().clone();
+        let mut demo = Demonstration::new("a name that is too long for the head", &spec);
+        let episode = Episode {
+            obs: (0..3 * spec.obs).map(|i| i as f32).collect(),
+            actions: vec![0.5; 2 * spec.act],
+            rewards: vec![1.0, 2.0],
+            truncated: true,
+        };
+        demo.push(&episode);
+        demo.push(&episode);
+        let bytes = demo.bytes();
+        let meta = DemonstrationMeta::decode_length_delimited(&bytes[..]).unwrap();
+        assert_eq!((meta.number_steps, meta.number_episodes, meta.mean_reward), (6, 2, 3.0));
+        assert!("anamethatistoolongforthehead".starts_with(&meta.name) && meta.name.len() > 10);
+        let mut rest = &bytes[HEAD..];
+        let behavior = BrainParameters::decode_length_delimited(&mut rest).unwrap();
+        assert_eq!(
+            (behavior.brain_name.as_str(), behavior.action_spec.unwrap().num_continuous),
+            ("Hopper-v5?team=0", 3)
+        );
+        let mut pairs = Vec::new();
+        while !rest.is_empty() {
+            pairs.push(AgentInfoActionPair::decode_length_delimited(&mut rest).unwrap());
+        }
+        let facts = |p: &AgentInfoActionPair| {
+            let info = p.agent_info.as_ref().unwrap();
+            (info.reward, info.done, info.max_step_reached)
+        };
+        let once = [(0.0, false, false), (1.0, false, false), (2.0, true, true)];
+        assert_eq!(pairs.iter().map(facts).collect::<Vec<_>>(), [once, once].concat());
+        assert_eq!(pairs[0].action_info.as_ref().unwrap().continuous_actions, [0.5; 3]);
+    }
+
+    #[test]
+    fn actions_are_nominal() {
+        assert_eq!(nominal([-1.0, 1.0], 0.3), 0.3);
+        assert_eq!(nominal([0.0, 4.0], 3.0), 0.5);
+        assert_eq!(nominal([0.0, 4.0], 30.0), 1.0);
+    }
+}

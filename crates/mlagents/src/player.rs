@@ -1,0 +1,318 @@
+//! A Unity player to Python: [`Player::connect`], then [`Player::advance`] until the trainer closes.
+
+use crate::behavior::{Behavior, BehaviorOptions};
+use crate::channels::{self, Engine};
+use crate::error::PlayerError;
+use crate::log::Log;
+use crate::parameters::Parameters;
+use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
+use crate::wire::{RlInitializationOutput, RlInput, RlOutput, UnityMessage, UnityOutput, command};
+use prost::Message;
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Bytes of a message that are neither infos nor statistics: headers, names, behaviors.
+const ALLOWANCE: usize = 4096;
+/// Longest distance by which a name that means nothing is told the nearest that does.
+const TYPING_ERROR: usize = 3;
+
+/// What a player is made of.
+#[derive(Clone, Debug)]
+pub struct PlayerOptions {
+    /// Port on which the trainer listens.
+    pub port: u16,
+    /// How long to wait for a trainer that is not there yet.
+    pub patience: Duration,
+    /// Its behaviors.
+    pub behaviors: Vec<BehaviorOptions>,
+    /// Threads that simulate; 0: one per processor.
+    pub threads: usize,
+    /// Whether an agent gets a new number with every episode. Unity's do not, but `UnityParallelEnv` 1.1.0 otherwise misses
+    /// the ends of episodes.
+    pub fresh_ids: bool,
+}
+
+impl Default for PlayerOptions {
+    /// A player for `mlagents-learn` as it waits for an editor.
+    fn default() -> Self {
+        PlayerOptions {
+            port: 5004,
+            patience: Duration::from_secs(60),
+            behaviors: vec![BehaviorOptions::default()],
+            threads: 1,
+            fresh_ids: false,
+        }
+    }
+}
+
+/// What [`Player::advance`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// All episodes were begun anew.
+    Reset,
+    /// All agents made a decision.
+    Step,
+    /// The trainer has closed; nothing was done.
+    Closed,
+}
+
+/// How the trainer wants the engine to run, as far as it has said so.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EngineSettings {
+    /// Width and height of the window, pixels.
+    pub resolution: Option<(i32, i32)>,
+    /// Level of quality of the picture, from 0.
+    pub quality: Option<i32>,
+    /// Seconds simulated per second.
+    pub time_scale: Option<f32>,
+    /// Frames per second shown; -1: as many as can be.
+    pub target_frame_rate: Option<i32>,
+    /// Frames per simulated second.
+    pub capture_frame_rate: Option<i32>,
+}
+
+/// A player in conversation with a trainer.
+pub struct Player {
+    trainer: Trainer,
+    setup: Setup,
+    behaviors: Vec<Behavior>,
+    parameters: Parameters,
+    engine: EngineSettings,
+    fresh_ids: bool,
+    next_id: i32,
+    /// What to do next.
+    order: Option<RlInput>,
+    /// The last message, whose memory is used again.
+    message: UnityMessage,
+    begun: bool,
+    told: BTreeSet<String>,
+    log: Log,
+}
+
+impl Player {
+    /// Finds the trainer, makes the agents that it asks for and waits for the first reset.
+    ///
+    /// # Errors
+    /// If there is no trainer, an agent does not exist, or there are more agents than fit into a message.
+    pub fn connect(options: &PlayerOptions, log: Log) -> Result<Self, PlayerError> {
+        // what cannot work with one area is told before anybody is waited for
+        check(&make(options, 1)?.0)?;
+        log.line(format_args!("connecting to a trainer on port {}", options.port));
+        let (mut trainer, setup) = Trainer::connect(options.port, options.patience)?;
+        let (behaviors, next_id) = make(options, setup.areas)?;
+        check(&behaviors)?;
+        let Setup { seed, areas, package_version } = &setup;
+        log.line(format_args!("mlagents-envs {package_version}; seed {seed}; areas: {areas}"));
+        for behavior in &behaviors {
+            let (name, spec) = (behavior.name(), behavior.spec());
+            let n = behavior.env().agents();
+            log.line(format_args!("{name}: agents: {n}; observations: {}; actions: {}", spec.obs, spec.act));
+        }
+        let order = trainer.first()?;
+        Ok(Player {
+            trainer,
+            setup,
+            behaviors,
+            parameters: Parameters::default(),
+            engine: EngineSettings::default(),
+            fresh_ids: options.fresh_ids,
+            next_id,
+            order,
+            message: message(None),
+            begun: false,
+            told: BTreeSet::new(),
+            log,
+        })
+    }
+
+    /// What the trainer asked for at the beginning.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// The behaviors, whose agents may be looked at between two turns.
+    pub fn behaviors(&self) -> &[Behavior] {
+        &self.behaviors
+    }
+
+    /// How the trainer wants the engine to run.
+    pub fn engine(&self) -> EngineSettings {
+        self.engine
+    }
+
+    /// Does what the trainer said, tells it what came of that, and waits for its answer.
+    ///
+    /// # Errors
+    /// If the trainer is gone or says something that makes no sense.
+    pub fn advance(&mut self) -> Result<Turn, PlayerError> {
+        let Some(order) = self.order.take() else { return Ok(Turn::Closed) };
+        let changed = self.listen(&order.side_channel);
+        let turn = match order.command {
+            command::STEP if self.begun => Turn::Step,
+            command::QUIT => return Ok(Turn::Closed),
+            // a trainer that steps first means the first episodes
+            command::STEP | command::RESET => Turn::Reset,
+            _ => return Err(PlayerError::Message("has a command that is none of STEP (0), RESET (1), QUIT (2)")),
+        };
+        let seed = if self.begun { None } else { Some(u64::from(self.setup.seed as u32)) };
+        for behavior in &mut self.behaviors {
+            let done = match turn {
+                Turn::Step => {
+                    let configured = if changed { behavior.configure(&self.parameters) } else { Ok(()) };
+                    let actions = order.agent_actions.get(behavior.name());
+                    behavior.step(actions, &self.parameters).and(configured)
+                }
+                _ => behavior.reset(seed, &self.parameters),
+            };
+            match done {
+                // a parameter that is out of range: training can go on, its author must know
+                Err(e @ (PlayerError::Env(_) | PlayerError::Sizes { .. })) => {
+                    let text = e.to_string();
+                    if self.told.insert(text.clone()) {
+                        self.log.line(format_args!("warning: {}: {text}", behavior.name()));
+                    }
+                }
+                other => other?,
+            }
+        }
+        self.report();
+        self.order = self.trainer.exchange(&self.message)?;
+        self.begun = true;
+        Ok(turn)
+    }
+
+    /// Goes on until the trainer closes.
+    ///
+    /// # Errors
+    /// As [`Player::advance`].
+    pub fn run(&mut self) -> Result<(), PlayerError> {
+        while self.advance()? != Turn::Closed {}
+        Ok(())
+    }
+
+    /// Writes the infos of all behaviors into the message.
+    fn report(&mut self) {
+        let output = self.message.output.get_or_insert_default();
+        // a behavior introduces itself beside its first infos
+        output.initialization = (!self.begun).then(|| RlInitializationOutput {
+            brain_parameters: self.behaviors.iter().map(Behavior::parameters).collect(),
+            ..Default::default()
+        });
+        let RlOutput { agent_infos, side_channel } = output.rl.get_or_insert_default();
+        side_channel.clear();
+        for behavior in &mut self.behaviors {
+            // looked up without making a new key
+            if !agent_infos.contains_key(behavior.name()) {
+                agent_infos.insert(behavior.name().to_string(), Vec::new());
+            }
+            if let Some(infos) = agent_infos.get_mut(behavior.name()) {
+                infos.clear();
+                behavior.report(infos, side_channel, self.fresh_ids.then_some(&mut self.next_id));
+            }
+        }
+        let statistics = side_channel.len();
+        if statistics > 0 && self.message.encoded_len() > MESSAGE_LIMIT {
+            // infos fit in any case; the trainer can do without these
+            if let Some(UnityOutput { rl: Some(rl), .. }) = &mut self.message.output {
+                rl.side_channel.clear();
+            }
+            if self.told.insert("statistics".into()) {
+                self.log
+                    .line(format_args!("{statistics} bytes of statistics left out: the message would be over 4 MiB"));
+            }
+        }
+    }
+
+    /// Takes in what came over the side channels. Returns whether a parameter came.
+    fn listen(&mut self, bytes: &[u8]) -> bool {
+        if bytes.is_empty() {
+            return false;
+        }
+        let mut messages = Vec::new();
+        let read = channels::read(bytes, |message| messages.push(message));
+        let mut changed = false;
+        for message in messages {
+            match message {
+                channels::Message::Engine(engine) => self.set_engine(engine),
+                channels::Message::Parameter(name, sampler) => {
+                    self.log.line(format_args!("environment parameter {name}: {sampler:?}"));
+                    self.warn_if_unknown(&name);
+                    self.parameters.set(name, sampler);
+                    changed = true;
+                }
+                channels::Message::Analytics => {}
+                channels::Message::Unknown(id) => {
+                    if self.told.insert(format!("{id:?}")) {
+                        self.log
+                            .line(format_args!("a side channel that this player does not know is ignored: {id:02x?}"));
+                    }
+                }
+            }
+        }
+        if let Err(e) = read {
+            self.log.line(format_args!("warning: {e}"));
+        }
+        changed
+    }
+
+    fn set_engine(&mut self, engine: Engine) {
+        self.log.line(format_args!("engine: {engine:?}"));
+        let settings = &mut self.engine;
+        match engine {
+            Engine::Resolution(width, height) => settings.resolution = Some((width, height)),
+            Engine::Quality(level) => settings.quality = Some(level),
+            Engine::TimeScale(scale) => settings.time_scale = Some(scale),
+            Engine::TargetFrameRate(rate) => settings.target_frame_rate = Some(rate),
+            Engine::CaptureFrameRate(rate) => settings.capture_frame_rate = Some(rate),
+        }
+    }
+
+    /// A parameter that no behavior knows does nothing, which its author would like to know.
+    fn warn_if_unknown(&mut self, name: &str) {
+        let known: BTreeSet<&str> = self.behaviors.iter().flat_map(|b| b.parameter_names().iter()).collect();
+        if known.contains(name) {
+            return;
+        }
+        let distance = |known: &&&str| strsim::damerau_levenshtein(known, name);
+        let near = known.iter().min_by_key(distance).filter(|known| distance(known) <= TYPING_ERROR);
+        let near = near.map(|near| format!("did you mean '{near}'? ")).unwrap_or_default();
+        let list = known.iter().copied().collect::<Vec<_>>().join(", ");
+        self.log.line(format_args!("warning: environment parameter '{name}' has no effect; {near}known: {list}"));
+    }
+}
+
+/// All behaviors, and the first number that no agent has.
+fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), PlayerError> {
+    let mut behaviors: Vec<Behavior> = Vec::new();
+    let mut next_id = 0;
+    for one in &options.behaviors {
+        let behavior = Behavior::new(one, areas, options.threads, next_id)?;
+        if behaviors.iter().any(|other| other.name() == behavior.name()) {
+            let name = behavior.name().trim_end_matches("?team=0");
+            return Err(PlayerError::Usage(format!(
+                "two behaviors are called '{name}'; give one another name with --behavior-name"
+            )));
+        }
+        next_id += behavior.env().agents() as i32;
+        behaviors.push(behavior);
+    }
+    Ok((behaviors, next_id))
+}
+
+/// Refuses more agents than fit into a message.
+fn check(behaviors: &[Behavior]) -> Result<(), PlayerError> {
+    let bytes: usize = ALLOWANCE + behaviors.iter().map(Behavior::largest).sum::<usize>();
+    match behaviors.iter().max_by_key(|behavior| behavior.largest()) {
+        Some(largest) if bytes > MESSAGE_LIMIT => {
+            let others = bytes - largest.largest();
+            Err(PlayerError::TooManyAgents {
+                agents: largest.env().agents(),
+                name: largest.name().into(),
+                bytes,
+                limit: MESSAGE_LIMIT,
+                most: largest.most_agents(MESSAGE_LIMIT.saturating_sub(others)),
+            })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,454 @@
+//! gRPC's unary call over one blocking HTTP/2 connection, as much of it as one method needs.
+//!
+//! A player makes one call at a time to one server that was started a moment ago on the same machine. Frames are as in
+//! [RFC 9113](https://www.rfc-editor.org/rfc/rfc9113), messages as in
+//! [gRPC over HTTP/2](https://github.com/grpc/grpc/blob/master/doc/PROTOCOL-HTTP2.md). The header of a request is written
+//! with indices of HPACK's static table only, and headers of replies are skipped, so that no table has to be kept.
+
+use std::io::{self, Read, Write};
+use thiserror::Error;
+
+/// The one method of ML-Agents' service.
+const PATH: &[u8] = b"/communicator_objects.UnityToExternalProto/Exchange";
+/// Begins every connection.
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+/// Of a frame, in front of its payload.
+const FRAME_HEAD: usize = 9;
+/// Longest frame that a peer may send to somebody who has not asked for longer ones.
+const MAX_FRAME: usize = 16384;
+/// Window that we grant: as large as can be, since replies are waited for and read at once.
+const WINDOW: u32 = 0x7fff_ffff;
+/// Window of both sides before anybody has said anything.
+const FIRST_WINDOW: u32 = 65535;
+/// Bytes after which the connection's window is filled up again.
+const REFILL: u32 = 1 << 30;
+/// Longest reply that is accepted.
+const MAX_REPLY: usize = 256 << 20;
+/// In front of a message: one byte that says whether it is compressed, and its length.
+const MESSAGE_HEAD: usize = 5;
+
+/// Types of frames.
+mod frame {
+    pub const DATA: u8 = 0;
+    pub const HEADERS: u8 = 1;
+    pub const RST_STREAM: u8 = 3;
+    pub const SETTINGS: u8 = 4;
+    pub const PUSH_PROMISE: u8 = 5;
+    pub const PING: u8 = 6;
+    pub const GOAWAY: u8 = 7;
+    pub const WINDOW_UPDATE: u8 = 8;
+}
+
+/// Flags of frames.
+mod flag {
+    /// Of DATA and HEADERS.
+    pub const END_STREAM: u8 = 1;
+    /// Of SETTINGS and PING.
+    pub const ACK: u8 = 1;
+    /// Of HEADERS.
+    pub const END_HEADERS: u8 = 4;
+    /// Of DATA.
+    pub const PADDED: u8 = 8;
+}
+
+/// Identifiers of settings.
+mod setting {
+    pub const ENABLE_PUSH: u16 = 2;
+    pub const INITIAL_WINDOW_SIZE: u16 = 4;
+    pub const MAX_FRAME_SIZE: u16 = 5;
+}
+
+/// Why a call got no reply.
+#[derive(Debug, Error)]
+pub enum RpcError {
+    /// The connection broke.
+    #[error("the connection broke: {0}")]
+    Io(#[from] io::Error),
+    /// The peer ended the connection.
+    #[error("the trainer ended the connection (code {0})")]
+    GoAway(u32),
+    /// The peer ended the call.
+    #[error("the trainer broke off the exchange of a message of {bytes} bytes (code {code})")]
+    Reset {
+        /// Length of our message.
+        bytes: usize,
+        /// HTTP/2's error code.
+        code: u32,
+    },
+    /// The peer answered without a message.
+    #[error("the trainer refused a message of {0} bytes; it takes at most 4 MiB (4194304)")]
+    Refused(usize),
+    /// What the peer sent is not HTTP/2, or not a gRPC reply.
+    #[error("the peer does not speak ML-Agents' protocol: {0}")]
+    Protocol(&'static str),
+}
+
+/// A connection to a server.
+pub struct Channel<S> {
+    stream: S,
+    /// The header of every request, in HPACK's encoding.
+    request: Vec<u8>,
+    /// Number of the stream of the present call: 1, 3, 5 ...
+    call: u32,
+    /// Bytes that we may send over the connection.
+    window: i64,
+    /// Bytes that we may send over the stream of the present call.
+    call_window: i64,
+    /// The same when a stream begins.
+    initial_window: i64,
+    /// Longest frame that the peer takes.
+    max_frame: usize,
+    /// Bytes received since the connection's window was filled up.
+    taken: u32,
+    /// Room for bytes received; those in `at..end` have not been looked at yet.
+    received: Vec<u8>,
+    at: usize,
+    end: usize,
+    /// Bytes to be sent.
+    sending: Vec<u8>,
+}
+
+impl<S: Read + Write> Channel<S> {
+    /// Greets a server. `authority` is its name, such as `localhost:5005`.
+    ///
+    /// # Errors
+    /// If the stream cannot be written to.
+    pub fn open(mut stream: S, authority: &str) -> Result<Self, RpcError> {
+        let mut hello = PREFACE.to_vec();
+        let mut settings = Vec::new();
+        for (id, value) in [(setting::ENABLE_PUSH, 0), (setting::INITIAL_WINDOW_SIZE, WINDOW)] {
+            settings.extend(id.to_be_bytes());
+            settings.extend(value.to_be_bytes());
+        }
+        put_frame(&mut hello, frame::SETTINGS, 0, 0, &settings);
+        put_frame(&mut hello, frame::WINDOW_UPDATE, 0, 0, &(WINDOW - FIRST_WINDOW).to_be_bytes());
+        stream.write_all(&hello)?;
+        Ok(Channel {
+            stream,
+            request: request_header(authority),
+            call: 0,
+            window: FIRST_WINDOW.into(),
+            call_window: 0,
+            initial_window: FIRST_WINDOW.into(),
+            max_frame: MAX_FRAME,
+            taken: 0,
+            received: vec![0; 4 * MAX_FRAME],
+            at: 0,
+            end: 0,
+            sending: Vec::new(),
+        })
+    }
+
+    /// Sends a message and waits for the reply, which replaces what is in `reply`.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn call(&mut self, message: &[u8], reply: &mut Vec<u8>) -> Result<(), RpcError> {
+        reply.clear();
+        self.call = if self.call == 0 { 1 } else { self.call + 2 };
+        if self.call > WINDOW {
+            return Err(RpcError::Protocol("a connection carries no more than 2^30 calls"));
+        }
+        self.call_window = self.initial_window;
+        let mut sending = std::mem::take(&mut self.sending);
+        sending.clear();
+        put_frame(&mut sending, frame::HEADERS, flag::END_HEADERS, self.call, &self.request);
+        let head = message_head(message);
+        let total = MESSAGE_HEAD + message.len();
+        let mut sent = 0;
+        while sent < total {
+            let room = self.window.min(self.call_window).min(self.max_frame as i64);
+            if room <= 0 {
+                // the peer has to make room first
+                self.stream.write_all(&sending)?;
+                sending.clear();
+                if self.pump(reply, message.len())? {
+                    return Err(RpcError::Refused(message.len()));
+                }
+                continue;
+            }
+            let n = (total - sent).min(room as usize);
+            let last = if sent + n == total { flag::END_STREAM } else { 0 };
+            put_frame_head(&mut sending, n, frame::DATA, last, self.call);
+            let (from_head, from_message) = (sent.min(MESSAGE_HEAD), sent.saturating_sub(MESSAGE_HEAD));
+            sending.extend(&head[from_head..(sent + n).min(MESSAGE_HEAD)]);
+            sending.extend(&message[from_message..(sent + n).saturating_sub(MESSAGE_HEAD)]);
+            sent += n;
+            self.window -= n as i64;
+            self.call_window -= n as i64;
+        }
+        self.stream.write_all(&sending)?;
+        self.sending = sending;
+        while !self.pump(reply, message.len())? {}
+        unpack(reply, message.len())
+    }
+
+    /// Takes in one frame. Returns whether it was the last of the present call.
+    fn pump(&mut self, reply: &mut Vec<u8>, sent: usize) -> Result<bool, RpcError> {
+        self.need(FRAME_HEAD)?;
+        let head = &self.received[self.at..self.at + FRAME_HEAD];
+        let length = u32::from_be_bytes([0, head[0], head[1], head[2]]) as usize;
+        let (kind, flags) = (head[3], head[4]);
+        let stream = u32::from_be_bytes([head[5], head[6], head[7], head[8]]) & WINDOW;
+        if length > MAX_FRAME {
+            return Err(RpcError::Protocol("a frame is longer than was agreed"));
+        }
+        self.need(FRAME_HEAD + length)?;
+        let payload = self.at + FRAME_HEAD..self.at + FRAME_HEAD + length;
+        self.at = payload.end;
+        let payload = &self.received[payload];
+        let ours = stream == self.call;
+        let mut answer = Vec::new();
+        let mut ended = false;
+        match kind {
+            frame::DATA => {
+                self.taken += length as u32;
+                if ours {
+                    let data = if flags & flag::PADDED == 0 { payload } else { unpadded(payload)? };
+                    if reply.len() + data.len() > MAX_REPLY {
+                        return Err(RpcError::Protocol("a reply is longer than 256 MiB"));
+                    }
+                    reply.extend(data);
+                    ended = flags & flag::END_STREAM != 0;
+                }
+                if self.taken > REFILL {
+                    put_frame(&mut answer, frame::WINDOW_UPDATE, 0, 0, &self.taken.to_be_bytes());
+                    self.taken = 0;
+                }
+            }
+            frame::HEADERS => ended = ours && flags & flag::END_STREAM != 0,
+            frame::RST_STREAM if ours => return Err(RpcError::Reset { bytes: sent, code: number(payload)? }),
+            frame::SETTINGS if flags & flag::ACK == 0 => {
+                for entry in payload.chunks(6) {
+                    let [a, b, value @ ..] = entry else { return Err(RpcError::Protocol("a setting is cut short")) };
+                    let value = number(value)?;
+                    match u16::from_be_bytes([*a, *b]) {
+                        setting::INITIAL_WINDOW_SIZE => {
+                            self.call_window += i64::from(value) - self.initial_window;
+                            self.initial_window = value.into();
+                        }
+                        setting::MAX_FRAME_SIZE => self.max_frame = (value as usize).clamp(1, 1 << 24),
+                        _ => {}
+                    }
+                }
+                put_frame(&mut answer, frame::SETTINGS, flag::ACK, 0, &[]);
+            }
+            frame::PING if flags & flag::ACK == 0 => put_frame(&mut answer, frame::PING, flag::ACK, 0, payload),
+            frame::GOAWAY => return Err(RpcError::GoAway(number(payload.get(4..).unwrap_or_default())?)),
+            frame::WINDOW_UPDATE => {
+                let more = i64::from(number(payload)? & WINDOW);
+                if stream == 0 {
+                    self.window += more;
+                } else if ours {
+                    self.call_window += more;
+                }
+            }
+            frame::PUSH_PROMISE => return Err(RpcError::Protocol("it pushes what nobody asked for")),
+            _ => {}
+        }
+        if !answer.is_empty() {
+            self.stream.write_all(&answer)?;
+        }
+        Ok(ended)
+    }
+
+    /// Reads on until there are `n` bytes from `at` on. No frame is longer than the room for them.
+    fn need(&mut self, n: usize) -> Result<(), RpcError> {
+        while self.end - self.at < n {
+            self.received.copy_within(self.at..self.end, 0);
+            (self.at, self.end) = (0, self.end - self.at);
+            match self.stream.read(&mut self.received[self.end..]) {
+                Ok(0) => return Err(RpcError::Io(io::ErrorKind::UnexpectedEof.into())),
+                Ok(read) => self.end += read,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e.into()),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The header of a request. A first byte is an index of the static table, as a whole field (with bit 7) or as the name of
+/// one whose value follows.
+fn request_header(authority: &str) -> Vec<u8> {
+    let mut header = vec![
+        0x83, // :method POST
+        0x86, // :scheme http
+    ];
+    let mut field = |name: &[u8], value: &[u8]| {
+        header.extend(name);
+        // a length of 127 and more takes further bytes; these are shorter
+        header.push(value.len().min(126) as u8);
+        header.extend(&value[..value.len().min(126)]);
+    };
+    field(&[4], PATH); // :path
+    field(&[1], authority.as_bytes()); // :authority
+    field(&[0x0f, 0x10], b"application/grpc"); // content-type
+    field(b"\0\x02te", b"trailers");
+    header
+}
+
+fn put_frame_head(out: &mut Vec<u8>, length: usize, kind: u8, flags: u8, stream: u32) {
+    out.extend(&(length as u32).to_be_bytes()[1..]);
+    out.extend([kind, flags]);
+    out.extend(stream.to_be_bytes());
+}
+
+fn put_frame(out: &mut Vec<u8>, kind: u8, flags: u8, stream: u32, payload: &[u8]) {
+    put_frame_head(out, payload.len(), kind, flags, stream);
+    out.extend(payload);
+}
+
+/// What precedes a message that is not compressed.
+fn message_head(message: &[u8]) -> [u8; MESSAGE_HEAD] {
+    let [a, b, c, d] = (message.len() as u32).to_be_bytes();
+    [0, a, b, c, d]
+}
+
+/// Takes the head off a reply.
+fn unpack(reply: &mut Vec<u8>, sent: usize) -> Result<(), RpcError> {
+    let Some(([compressed, length @ ..], rest)) = reply.split_first_chunk::<MESSAGE_HEAD>() else {
+        // an error is told in headers alone
+        return Err(RpcError::Refused(sent));
+    };
+    if *compressed != 0 {
+        return Err(RpcError::Protocol("a reply is compressed"));
+    }
+    if u32::from_be_bytes(*length) as usize != rest.len() {
+        return Err(RpcError::Protocol("a reply has another length than it says"));
+    }
+    reply.drain(..MESSAGE_HEAD);
+    Ok(())
+}
+
+/// Contents of a padded DATA frame.
+fn unpadded(payload: &[u8]) -> Result<&[u8], RpcError> {
+    let (padding, rest) = payload.split_first().ok_or(RpcError::Protocol("a padded frame is empty"))?;
+    let end = rest.len().checked_sub(usize::from(*padding));
+    end.map(|end| &rest[..end]).ok_or(RpcError::Protocol("a frame is all padding"))
+}
+
+fn number(bytes: &[u8]) -> Result<u32, RpcError> {
+    let first = bytes.first_chunk().ok_or(RpcError::Protocol("a frame is cut short"))?;
+    Ok(u32::from_be_bytes(*first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::UnityMessage;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+    use prost::Message;
+    use std::collections::VecDeque;
+
+    /// A peer that says what was written for it beforehand, and keeps what it is told.
+    #[derive(Default)]
+    struct Script {
+        said: VecDeque<u8>,
+        heard: Vec<u8>,
+    }
+
+    impl Read for Script {
+        fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+            // in small pieces, as a network may
+            let n = out.len().min(7);
+            self.said.read(&mut out[..n])
+        }
+    }
+    impl Write for Script {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.heard.extend(bytes);
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Type, flags, stream and payload of a frame.
+    type Frame<'a> = (u8, u8, u32, &'a [u8]);
+
+    fn answering(frames: &[Frame]) -> Channel<Script> {
+        let mut said = Vec::new();
+        for (kind, flags, stream, payload) in frames {
+            put_frame(&mut said, *kind, *flags, *stream, payload);
+        }
+        Channel::open(Script { said: said.into(), heard: Vec::new() }, "localhost:1").unwrap()
+    }
+
+    /// Frames after the preface: `(kind, flags, stream, payload)`.
+    fn frames(mut bytes: &[u8]) -> Vec<(u8, u8, u32, Vec<u8>)> {
+        bytes = bytes.strip_prefix(PREFACE).unwrap();
+        let mut all = Vec::new();
+        while let Some((head, rest)) = bytes.split_first_chunk::<FRAME_HEAD>() {
+            let n = u32::from_be_bytes([0, head[0], head[1], head[2]]) as usize;
+            let stream = u32::from_be_bytes([head[5], head[6], head[7], head[8]]);
+            all.push((head[3], head[4], stream, rest[..n].to_vec()));
+            bytes = &rest[n..];
+        }
+        all
+    }
+
+    #[test]
+    fn a_reply_is_put_together_whatever_comes_between() {
+        let window = 100_000u32.to_be_bytes();
+        let mut channel = answering(&[
+            (frame::SETTINGS, 0, 0, &[0, 4, 0, 1, 0, 0, 0, 5, 0, 0, 128, 0]),
+            (frame::PING, 0, 0, b"12345678"),
+            (frame::HEADERS, flag::END_HEADERS, 1, b"whatever"),
+            (frame::WINDOW_UPDATE, 0, 0, &window),
+            (frame::WINDOW_UPDATE, 0, 1, &window),
+            (frame::DATA, 0, 1, &[0, 0, 0, 0, 5, b'h', b'e']),
+            (frame::DATA, flag::PADDED, 1, &[2, b'l', 0, 0]),
+            (9, 0, 1, b"a continuation, say"),
+            (frame::DATA, 0, 1, b"lo"),
+            (frame::HEADERS, flag::END_HEADERS | flag::END_STREAM, 1, b"trailers"),
+        ]);
+        let mut reply = b"old".to_vec();
+        channel.call(&vec![7; 70_000], &mut reply).unwrap();
+        assert_eq!(reply, b"hello");
+        let heard = frames(&channel.stream.heard);
+        assert!(heard.contains(&(frame::SETTINGS, flag::ACK, 0, vec![])));
+        assert!(heard.contains(&(frame::PING, flag::ACK, 0, b"12345678".to_vec())));
+        let data: Vec<_> = heard.iter().filter(|f| f.0 == frame::DATA).collect();
+        assert!(data.iter().all(|f| f.2 == 1 && f.3.len() <= 32768) && data.last().unwrap().1 == flag::END_STREAM);
+        let sent = data.iter().flat_map(|f| &f.3).copied().collect::<Vec<u8>>();
+        assert_eq!(sent, [&[0, 0, 1, 17, 112], &[7; 70_000][..]].concat());
+    }
+
+    #[test]
+    fn what_is_no_reply_is_an_error() {
+        let refused = (frame::HEADERS, flag::END_STREAM, 1, &b"grpc-status 8"[..]);
+        let cases: [(&[Frame], &str); 7] = [
+            (&[refused], "refused a message of 3 bytes"),
+            (&[], "the connection broke"),
+            (&[(frame::GOAWAY, 0, 0, &[0, 0, 0, 1, 0, 0, 0, 2])], "ended the connection (code 2)"),
+            (&[(frame::RST_STREAM, 0, 1, &[0, 0, 0, 8])], "broke off the exchange of a message of 3 bytes (code 8)"),
+            (&[(frame::DATA, flag::END_STREAM, 1, &[1, 0, 0, 0, 0])], "compressed"),
+            (&[(frame::DATA, flag::END_STREAM, 1, &[0, 0, 0, 0, 9, 1])], "another length"),
+            (&[(frame::WINDOW_UPDATE, 0, 0, &[1])], "cut short"),
+        ];
+        for (frames, expected) in cases {
+            let error = answering(frames).call(b"abc", &mut Vec::new()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error} / {expected}");
+        }
+    }
+
+    proptest! {
+        /// Whole frames with any contents, and bytes that are none: a call ends with a reply or an error.
+        #[test]
+        fn bytes_never_panic(
+            whole in vec((0u8..10, any::<u8>(), 0u32..4, vec(any::<u8>(), 0..40)), 0..8),
+            rest in vec(any::<u8>(), 0..100),
+        ) {
+            let frames: Vec<Frame> = whole.iter().map(|(kind, flags, stream, x)| (*kind, *flags, *stream, &x[..])).collect();
+            let mut channel = answering(&frames);
+            channel.stream.said.extend(rest);
+            let mut reply = Vec::new();
+            while channel.call(&[1; 20_000], &mut reply).is_ok() {
+                let _ = UnityMessage::decode(&*reply);
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The conversation with a trainer: who speaks when.
+//!
+//! The player is the client. Its first call says who it is, and is answered with a seed; its second says nothing, and is
+//! answered when the trainer resets its environments. From then on every call brings the results of a decision, and its
+//! answer says what to do next.
+
+use crate::error::PlayerError;
+use crate::rpc::Channel;
+use crate::wire::{Capabilities, Header, RlInitializationOutput, RlInput, UnityMessage, UnityOutput};
+use prost::Message;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Version of the protocol. Python compares the first number.
+pub const COMMUNICATION_VERSION: &str = "1.5.0";
+/// The release of Unity's package that a player of this protocol belongs to.
+const PACKAGE_VERSION: &str = "3.0.0";
+/// Longest message that a trainer takes: gRPC's default, which Python does not change.
+pub const MESSAGE_LIMIT: usize = 4 << 20;
+/// Time between two attempts to reach a trainer.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// What the trainer asked for at the beginning.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setup {
+    /// Seed of everything random.
+    pub seed: i32,
+    /// Copies of the scene, at least 1.
+    pub areas: usize,
+    /// Version of the Python package.
+    pub package_version: String,
+}
+
+/// A trainer that has been greeted.
+pub struct Trainer {
+    channel: Channel<TcpStream>,
+    sending: Vec<u8>,
+    reply: Vec<u8>,
+}
+
+impl Trainer {
+    /// Finds the trainer on a port of this computer and greets it. One that is not there yet is waited for.
+    ///
+    /// # Errors
+    /// If nobody listens until `patience` is over, or who listens is no trainer.
+    pub fn connect(port: u16, patience: Duration) -> Result<(Self, Setup), PlayerError> {
+        let stream = reach(port, patience).map_err(|source| PlayerError::Connect { port, source })?;
+        let channel = Channel::open(stream, &format!("localhost:{port}"))?;
+        let mut trainer = Trainer { channel, sending: Vec::new(), reply: Vec::new() };
+        let everything = Capabilities {
+            base_rl: true,
+            concatenated_png: true,
+            compressed_channel_mapping: true,
+            hybrid_actions: true,
+            training_analytics: true,
+            variable_length_observation: true,
+            multi_agent_groups: true,
+        };
+        let hello = RlInitializationOutput {
+            name: "AcademySingleton".into(),
+            communication_version: COMMUNICATION_VERSION.into(),
+            brain_parameters: Vec::new(),
+            package_version: PACKAGE_VERSION.into(),
+            capabilities: Some(everything),
+        };
+        let output = UnityOutput { rl: None, initialization: Some(hello) };
+        let answer = trainer.call(&message(Some(output)))?;
+        let Some(asked) = answer.input.and_then(|input| input.initialization) else {
+            return Err(PlayerError::Message("does not begin with an initialization"));
+        };
+        let major = |version: &str| version.split('.').next().map(str::to_owned);
+        if major(&asked.communication_version) != major(COMMUNICATION_VERSION) {
+            return Err(PlayerError::Version { found: asked.communication_version, expected: COMMUNICATION_VERSION });
+        }
+        let setup = Setup {
+            seed: asked.seed,
+            areas: usize::try_from(asked.num_areas).unwrap_or(1).max(1),
+            package_version: asked.package_version,
+        };
+        Ok((trainer, setup))
+    }
+
+    /// Waits, as long as it takes, for the first thing to do. `None`: the trainer has closed.
+    ///
+    /// # Errors
+    /// If the trainer is gone.
+    pub fn first(&mut self) -> Result<Option<RlInput>, PlayerError> {
+        self.exchange(&message(None))
+    }
+
+    /// Tells what a decision led to; returns what to do next. `None`: the trainer has closed.
+    ///
+    /// # Errors
+    /// If the trainer is gone, or refuses the message.
+    pub fn exchange(&mut self, output: &UnityMessage) -> Result<Option<RlInput>, PlayerError> {
+        let answer = self.call(output)?;
+        if answer.header.is_none_or(|header| header.status != Header::OK) {
+            return Ok(None);
+        }
+        Ok(Some(answer.input.and_then(|input| input.rl).unwrap_or_default()))
+    }
+
+    fn call(&mut self, message: &UnityMessage) -> Result<UnityMessage, PlayerError> {
+        self.sending.clear();
+        message.encode_raw(&mut self.sending);
+        self.channel.call(&self.sending, &mut self.reply)?;
+        Ok(UnityMessage::decode(&*self.reply)?)
+    }
+}
+
+/// A message of the player.
+pub(crate) fn message(output: Option<UnityOutput>) -> UnityMessage {
+    UnityMessage { header: Some(Header { status: Header::OK }), output, input: None }
+}
+
+/// Connects to a port of this computer.
+fn reach(port: u16, patience: Duration) -> std::io::Result<TcpStream> {
+    let addresses = [SocketAddr::from((Ipv4Addr::LOCALHOST, port)), SocketAddr::from((Ipv6Addr::LOCALHOST, port))];
+    let begun = Instant::now();
+    loop {
+        match TcpStream::connect(&addresses[..]) {
+            Ok(stream) => {
+                stream.set_nodelay(true)?;
+                return Ok(stream);
+            }
+            Err(e) if begun.elapsed() >= patience => return Err(e),
+            Err(_) => sleep(PAUSE),
+        }
+    }
+}
