@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Runs every test. Sets up what they need by itself: a Python environment in .venv with the oracles (MuJoCo, Gymnasium,
-# dm_control, PyTorch) and what tests the Python package. Needs a Rust toolchain, Python 3.11 with venv, and a C compiler.
+# dm_control, PyTorch) and what tests the Python package, and one in .venv-mlagents with ML-Agents. Needs a Rust toolchain,
+# Python 3.11 with venv, and a C compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
 if [ -z "${MARATHON_PYTHON:-}" ]; then
@@ -19,3 +20,4 @@ cargo clippy --release --workspace --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 cargo test --release --workspace
 python/tests/run.sh
+tests/mlagents/run.sh

@@ -1,6 +1,6 @@
 """Installs PyTorch for the learner's oracle test into the Python that runs this script.
 
-    python tests/oracle/install_torch.py
+    python tests/oracle/install_torch.py [torch==VERSION]
 
 The package on PyPI is built for CUDA and links to NVIDIA's libraries, which are separate packages of several gigabytes.
 The oracle computes on the processor alone, so this installs PyTorch without them and puts an empty library in the place
@@ -119,7 +119,7 @@ def main():
         print("PyTorch works")
         return
     if importlib.util.find_spec("torch") is None:
-        pip("--no-deps", TORCH)
+        pip("--no-deps", sys.argv[1] if len(sys.argv) > 1 else TORCH)
         importlib.invalidate_caches()
     pip(*DEPENDENCIES)
     folder = pathlib.Path(importlib.util.find_spec("torch").origin).parent / "lib"

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Tests `marathon-player` with the unmodified ML-Agents 1.1.0 of PyPI. Part of ./test.sh. Makes .venv-mlagents for it, unless
+# MARATHON_MLAGENTS_PYTHON names a Python that has it; needs Python 3.11 with venv, gcc and readelf. Arguments go to pytest.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+python="${MARATHON_MLAGENTS_PYTHON:-$PWD/.venv-mlagents/bin/python}"
+if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; then
+  # mlagents 1.1.0 has no version for Python 3.12, and its requirements have no wheels for it
+  base=$(command -v python3.11 || command -v python3)
+  "$base" -c 'import sys; sys.version_info[:2] == (3, 11) or sys.exit(f"ML-Agents needs Python 3.11, found {sys.version}")'
+  rm -rf .venv-mlagents
+  "$base" -m venv .venv-mlagents
+  pip=("$python" -m pip --quiet --disable-pip-version-check)
+  "${pip[@]}" install --no-deps --ignore-requires-python --requirement tests/mlagents/requirements-no-deps.txt
+  # pip notes that mlagents asks for another grpcio; that is meant
+  "${pip[@]}" install --requirement tests/mlagents/requirements.txt
+  "$python" tests/oracle/install_torch.py torch==2.1.2
+  touch .venv-mlagents/complete
+fi
+# `--workspace` keeps the features of dependencies, and with them what is built already
+cargo build --release --workspace --bin marathon-player --bin marathon
+bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
+export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon"
+exec "$python" -m pytest --quiet -c tests/mlagents/pytest.ini tests/mlagents "$@"
