@@ -65,6 +65,8 @@ pub(crate) struct Anatomy<T: Real> {
     pub touch: Vec<usize>,
     /// Sites with touch sensors.
     pub touch_sites: Vec<usize>,
+    /// Geoms that may touch the ground.
+    pub feet: Vec<usize>,
     /// Geoms that must not touch the ground.
     pub not_feet: Vec<usize>,
     pub pairs: Vec<Pair<T::Scalar>>,
@@ -193,7 +195,7 @@ impl<T: Real> Anatomy<T> {
                 _ => {}
             }
         }
-        Ok(Anatomy { parts, bodies, touch, touch_sites, not_feet, pairs, motors, along_x })
+        Ok(Anatomy { parts, bodies, touch, touch_sites, feet, not_feet, pairs, motors, along_x })
     }
 }
 

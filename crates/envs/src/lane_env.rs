@@ -42,6 +42,11 @@ pub trait AgentShard: Shard {
     /// # Errors
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
+    /// Pushes a body of an agent, numbered within this shard, until told otherwise or until its next episode: force, N, and
+    /// torque, N m, in world axes at the body's center of mass. It does not belong to [`Shard::save`].
+    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
+    /// Feet ([`Facts::feet`]) of an agent that touched the ground during its last decision: a bit each, of the first 32.
+    fn feet(&self, agent: usize) -> u32;
     /// Writes what the agents in `mask` report about their present states into `info` (`[info][16]`, see
     /// [`Facts::info`]; lanes outside the mask are left alone).
     fn info(&self, block: usize, mask: u16, info: &mut [f32]);
@@ -390,6 +395,15 @@ impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
         group.put(&self.task.sim, lane, &state.qpos, &state.qvel);
         group.begin(&self.task, &mut self.work, 1 << lane);
         Ok(())
+    }
+
+    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+        let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        group.push(&self.task.sim, agent % T::LANES, body, force, torque);
+    }
+
+    fn feet(&self, agent: usize) -> u32 {
+        self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES].feet(agent % T::LANES)
     }
 
     fn info(&self, block: usize, mask: u16, info: &mut [f32]) {

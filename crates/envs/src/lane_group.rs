@@ -24,6 +24,8 @@ pub(crate) struct LaneGroup<T: Real> {
     info: Vec<T>,
     /// What touch sites feel, N.
     pressed: Vec<T>,
+    /// Per foot, the lanes in which it touched the ground during the last decision.
+    feet: Vec<u32>,
     reward: T,
     forward: T,
 }
@@ -55,6 +57,7 @@ impl<T: Real> LaneGroup<T> {
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
             pressed: vec![T::zero(); task.anatomy.touch_sites.len()],
+            feet: vec![0; task.anatomy.feet.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -71,6 +74,16 @@ impl<T: Real> LaneGroup<T> {
         for m in &mut self.memory {
             m.set(lane, T::scalar(0.0));
         }
+    }
+
+    /// Pushes a body of an agent until told otherwise or put elsewhere.
+    pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+        self.physics.push(sim, lane, body, force, torque);
+    }
+
+    /// Feet of an agent that touched the ground during its last decision, a bit each.
+    pub fn feet(&self, lane: usize) -> u32 {
+        self.feet.iter().take(32).enumerate().fold(0, |bits, (i, lanes)| bits | (lanes >> lane & 1) << i)
     }
 
     /// Changes the configuration of an agent to these numbers, quaternions that are not normalized included.
@@ -324,7 +337,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
     #[inline(always)]
     fn run(self) -> Perceived {
         let Perceive { task, group, work, fresh, names } = self;
-        let LaneGroup { physics, memory, start, obs, terms, info, pressed, .. } = group;
+        let LaneGroup { physics, memory, start, obs, terms, info, pressed, feet, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             anatomy: &task.anatomy,
@@ -353,6 +366,10 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         task.agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
         let mut info = Obs::new(info);
         task.agent.info(&s, &mut info);
+        for (lanes, geom) in feet.iter_mut().zip(&task.anatomy.feet) {
+            let touched = T::bits(s.readings.touched(*geom));
+            *lanes = fresh.map_or(touched, |begun| *lanes & !begun);
+        }
         Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(task.agent.terminated(&s)) }
     }
 }

@@ -484,6 +484,33 @@ impl VecEnv {
         Ok(())
     }
 
+    /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
+    /// the body's center of mass. Snapshots do not hold it.
+    ///
+    /// # Errors
+    /// If there is no such agent, or the numbers are not finite.
+    ///
+    /// # Panics
+    /// If the model has no such body.
+    pub fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) -> Result<(), EnvError> {
+        self.check_agent(agent)?;
+        if let Some(x) = force.iter().chain(&torque).find(|x| !x.is_finite()) {
+            return Err(EnvError::Option { option: "push", found: x.to_string(), expected: "finite numbers" });
+        }
+        self.workers[agent / self.stride].shard.push(agent % self.stride, body, force, torque);
+        Ok(())
+    }
+
+    /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision: a bit each,
+    /// of the first 32.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn feet(&self, agent: usize) -> Result<u32, EnvError> {
+        self.check_agent(agent)?;
+        Ok(self.workers[agent / self.stride].shard.feet(agent % self.stride))
+    }
+
     /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
     /// the same bits, whatever the number of threads.
     pub fn save(&self) -> Vec<u8> {

@@ -241,8 +241,15 @@ impl Policy {
     /// # Errors
     /// If the file cannot be read or is not a whole and finite policy.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(Error::io(path, "read"))?;
-        let file = TensorReader::new(path, &bytes)?;
+        Self::from_bytes(path, &std::fs::read(path).map_err(Error::io(path, "read"))?)
+    }
+
+    /// Reads a policy from the bytes of a file. `path` stands for it in messages.
+    ///
+    /// # Errors
+    /// If the bytes are not a whole and finite policy.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
+        let file = TensorReader::new(path, bytes)?;
         let meta: PolicyMeta = file.document(FORMAT, VERSION)?;
         let positive = |x: f32| x.is_finite() && x > 0.0;
         if !positive(meta.observation_clip) || !positive(meta.action_clip) {

@@ -46,6 +46,19 @@ impl Image {
         Self { width, height, rgb: vec![0; 3 * width * height] }
     }
 
+    /// A picture from pixels that were drawn elsewhere: `height * width * 3` bytes, red, green and blue, row by row.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`] unless both sides are in `1..=MAX_SIDE` and there are as many bytes as pixels need.
+    pub fn from_rgb(width: usize, height: usize, rgb: Vec<u8>) -> Result<Self, RenderError> {
+        let mut image = Self::new(width, height, [0; 3])?;
+        if rgb.len() != image.rgb.len() {
+            return Err(RenderError::Size { width, height: rgb.len() / (3 * width), max: MAX_SIDE });
+        }
+        image.rgb = rgb;
+        Ok(image)
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width

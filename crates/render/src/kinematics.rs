@@ -16,9 +16,20 @@ pub struct GeomPose {
     pub mat: [[f64; 3]; 3],
 }
 
+/// World pose of one body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyPose {
+    /// Origin of the body's frame, m.
+    pub pos: [f64; 3],
+    /// Orientation, `[w, x, y, z]`.
+    pub quat: [f64; 4],
+}
+
 /// World poses of a model at one `qpos`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
+    /// One entry per [`Model::bodies`].
+    pub bodies: Vec<BodyPose>,
     /// One entry per [`Model::geoms`].
     pub geoms: Vec<GeomPose>,
     /// Position of the first moving body, m.
@@ -52,7 +63,9 @@ pub(crate) fn pose(model: &Model, qpos: &[f64], agent: usize) -> Result<Pose, Re
     }
     let root = pos.get(first).copied().unwrap_or(DVec3::ZERO);
     let com = if mass > 0.0 { moment / mass } else { root };
-    Ok(Pose { geoms, root: root.to_array(), com: com.to_array() })
+    let bodies =
+        pos.iter().zip(&quat).map(|(p, q)| BodyPose { pos: p.to_array(), quat: [q.w, q.x, q.y, q.z] }).collect();
+    Ok(Pose { bodies, geoms, root: root.to_array(), com: com.to_array() })
 }
 
 fn check(model: &Model, qpos: &[f64], agent: usize) -> Result<(), RenderError> {

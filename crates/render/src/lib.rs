@@ -42,7 +42,7 @@ pub use animation::GifWriter;
 pub use camera::{Camera, Follow};
 pub use error::RenderError;
 pub use image::{Corner, Image, MAX_SIDE, status_line, strip};
-pub use kinematics::{GeomPose, Pose};
+pub use kinematics::{BodyPose, GeomPose, Pose};
 pub use mp4::Mp4Writer;
 pub use recorder::{Format, Recorder};
 pub use render::{Antialias, Renderer};
