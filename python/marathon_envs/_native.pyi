@@ -8,6 +8,8 @@ from typing import Any, Literal, final
 import numpy as np
 import numpy.typing as npt
 
+from marathon_envs.agents import MarathonAgent
+
 __all__ = [
     "Model",
     "Player",
@@ -270,7 +272,7 @@ class TrainResult:
         """The run in numbers, as in ``summary.json``."""
 
 def train(
-    task: str | None = None,
+    task: str | type[MarathonAgent] | None = None,
     config: str | PathLike[str] | dict[str, Any] | None = None,
     *,
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
@@ -288,7 +290,7 @@ def train(
     `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 
     Args:
-        task: its name.
+        task: its name, or a `MarathonAgent` class, whose functions are called once per decision for all agents.
         config: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; None means the task's own
             fast configuration.
         callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
@@ -298,7 +300,7 @@ def train(
         agents: agents that act side by side, a multiple of 16.
         threads: number of threads; 0 means one per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
-        resume: the folder of a run to go on with, in place of a task and a configuration.
+        resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
     """
 
@@ -319,15 +321,24 @@ class Player:
         The same orders and state give the same bits, whatever was played before.
         """
 
-def load_policy(path: str | PathLike[str], task: str | None = None) -> Policy:
+def load_policy(path: str | PathLike[str], task: str | type[MarathonAgent] | MarathonAgent | None = None) -> Policy:
     """Read a policy from a file, ``.safetensors`` or ``.onnx``, or from the folder of a run.
 
-    Without `task`, it is for the one that the file names. ONNX files that another program has written, multi-layer
-    perceptrons from observations to actions, name none.
+    Without `task`, it is for the one that the file names; with, a policy of another one is an error. ONNX files that
+    another program has written, multi-layer perceptrons from observations to actions, name none.
     """
 
-def evaluate(policy: Policy, episodes: int = 100, *, seed: int = ..., threads: int = 0) -> dict[str, float]:
+def evaluate(
+    policy: Policy,
+    episodes: int = 100,
+    *,
+    task: str | type[MarathonAgent] | MarathonAgent | None = None,
+    seed: int = ...,
+    threads: int = 0,
+) -> dict[str, float]:
     """Play whole episodes with a policy's best actions.
+
+    `task` is needed for a `MarathonAgent` class; without, it is the policy's own.
 
     Returns ``return_mean``, ``return_std``, ``return_min``, ``return_max``, ``length_mean`` (decisions),
     ``distance_mean`` (m), ``speed_mean`` (m/s), ``falls``, ``diverged`` and ``episodes``.
@@ -538,11 +549,13 @@ def learn(
     config: str,
     path: str | PathLike[str],
     callback: Callable[[dict[str, Any]], object] | None = None,
+    checkpoint: str | PathLike[str] | None = None,
 ) -> dict[str, Any] | None:
     """Train a policy for an object with the interface of `VecEnv` and write it to a file.
 
     `config` is the JSON of the trainer's settings. `callback` is called after every iteration with its statistics; if
-    it returns a false value other than None, training ends. Returns the last statistics.
+    it returns a false value other than None, training ends. If the folder `checkpoint` holds a checkpoint, training
+    goes on from there; at its end, it holds the newest. Returns the last statistics.
     """
 
 def ids() -> list[str]:

@@ -374,12 +374,14 @@ class MarathonAgent:
         agents: int = 256,
         threads: int = 0,
         callback: Callable[[dict[str, Any]], object] | None = None,
+        checkpoint: str | PathLike[str] | None = None,
         **settings: Any,
     ) -> dict[str, Any]:
         """Train a policy with the native trainer and write it to a file, `.safetensors`.
 
-        The trainer calls the agents' functions once per decision for all of them. The same seed gives the same policy
-        for any number of threads. An exception of the agents' functions, or of the callback, ends training.
+        `marathon_envs.train` does it with configuration files, a folder of results and an evaluation. The trainer calls
+        the agents' functions once per decision for all of them. The same seed gives the same policy for any number of
+        threads. An exception of the agents' functions, or of the callback, ends training.
 
         Args:
             path: the file.
@@ -387,6 +389,8 @@ class MarathonAgent:
             threads: number of threads; 0 means one per processor core.
             callback: called after every iteration with a dictionary of its numbers, such as `steps` and `return_mean`;
                 if it returns a false value other than None, training ends.
+            checkpoint: a folder. If it holds the checkpoint of an earlier call, training goes on from there, with the
+                bits of a training that was never interrupted; at the end, after Ctrl-C too, it holds the newest.
             settings: the trainer's settings by name, such as `total_steps`, `seed`, `gamma` or `actor_hidden`.
 
         Returns:
@@ -394,7 +398,7 @@ class MarathonAgent:
         """
         env = cls.vec_env(agents, threads=threads, autoreset="same_step")
         config = json.dumps({"threads": threads, **settings})
-        return learn(env, config, path, callback) or {}
+        return learn(env, config, path, callback, checkpoint) or {}
 
 
 def angle(a: FloatArray, b: FloatArray) -> FloatArray:

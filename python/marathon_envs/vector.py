@@ -165,15 +165,15 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             return self._observed(obs), rewards, terminated, truncated, infos
 
         # what is told of the agents whose episode ended belongs to the end, the rest to the next beginning
-        acted, rows = ~ended, ended[:, None]
-        last_x = None if before is None else np.where(ended, before + distance, 0.0)
-        final = self._report(np.where(rows, info, 0), last_x, ended)
-        self._add_step(final, np.where(rows, terms, 0), np.where(ended, distance, 0.0), ended)
+        acted, rows = ~ended, np.flatnonzero(ended)
+        last_x = None if before is None else _only(rows, before + distance)
+        final = self._report(_only(rows, info), last_x, ended)
+        self._add_step(final, _only(rows, terms), _only(rows, distance), ended)
         infos = self._report(env.read_info(), self._x, every)
-        self._add_step(infos, np.where(rows, 0, terms), np.where(acted, distance, 0.0), acted)
+        self._add_step(infos, _without(rows, terms), _without(rows, distance), acted)
         infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(ended):
-            infos["final_obs"][i] = env.final_obs[i].astype(self._dtype)
+        for i, last in zip(rows, env.final_obs[rows].astype(self._dtype), strict=True):
+            infos["final_obs"][i] = last
         infos["final_info"] = final
         infos["_final_obs"] = infos["_final_info"] = ended.copy()
         return self._observed(obs), rewards, terminated, truncated, infos
@@ -240,3 +240,17 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         qpos = self._env.get_state()[0]
         drawn = zip(self._renderers, qpos, elapsed, strict=True)
         return tuple(renderer.render(q[None], float(t)) for renderer, q, t in drawn)
+
+
+def _only(rows: FloatArray, values: FloatArray) -> FloatArray:
+    """Values of some rows, zeros elsewhere."""
+    kept = np.zeros_like(values)
+    kept[rows] = values[rows]
+    return kept
+
+
+def _without(rows: FloatArray, values: FloatArray) -> FloatArray:
+    """Values with zeros in some rows."""
+    kept = values.copy()
+    kept[rows] = 0
+    return kept

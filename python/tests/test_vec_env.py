@@ -192,3 +192,22 @@ def test_an_action_that_is_not_finite_ends_its_own_agent_only() -> None:
     given[1, 2] = np.nan
     _, reward, terminated, _ = env.step(given)
     assert terminated.tolist() == [False, True] and env.diverged.tolist() == [False, True] and reward[1] == 0
+
+
+def test_copies_are_new_while_somebody_keeps_them_and_reused_after() -> None:
+    env = VecEnv("hopper", 20, copy=True)
+    env.reset(seed=1)
+    actions = np.full((20, 4), 0.3, np.float32)
+    # what is kept, a view of one row included, stays as it was
+    kept = [env.step(actions)[0][3] for _ in range(4)]
+    first = [row.copy() for row in kept]
+    addresses = [env.step(actions)[0].ctypes.data for _ in range(40)]
+    assert all(np.array_equal(a, b) for a, b in zip(kept, first, strict=True))
+    assert not np.array_equal(kept[0], kept[1])
+    assert len(set(addresses[10:])) <= 3
+    # an array that was made read-only is not written to again
+    frozen = env.step(actions)[0]
+    frozen.flags.writeable = False
+    del frozen
+    for _ in range(3):
+        env.step(actions)

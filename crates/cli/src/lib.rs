@@ -13,6 +13,7 @@ mod interrupt;
 mod policy_file;
 mod report;
 pub mod session;
+mod task;
 mod text;
 
 use args::{Args, Command};

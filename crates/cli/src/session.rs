@@ -8,6 +8,7 @@ pub use crate::policy_file::{read as read_policy, save as save_policy};
 pub use crate::report::Watch;
 pub use crate::report::csv::columns as metrics;
 pub use crate::report::summary::Summary;
+pub use crate::task::Task;
 
 use crate::config;
 use crate::folder::write_json;
@@ -15,7 +16,7 @@ use crate::report::csv::History;
 use crate::report::summary::EPISODES;
 use crate::report::{Reporter, curve, save};
 use crate::text;
-use marathon_envs::{ShardFactory, registry};
+use marathon_envs::ShardFactory;
 use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput, evaluate,
     train_with,
@@ -24,13 +25,12 @@ use marathon_physics::lanes::Isa;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the text of a configuration file says about an agent; the path is for messages.
+/// What the text of a configuration file says about a task; the path is for messages.
 ///
 /// # Errors
-/// If it is no configuration for the agent; the text names the line and the key.
-pub fn configuration(path: &Path, text: &[u8], agent: &str) -> Result<Loaded, CliError> {
-    let agent = registry::agent(agent)?.facts().id;
-    Ok(config::parse(path, text, &agent)?)
+/// If it is no configuration for the task; the text names the line and the key.
+pub fn configuration(path: &Path, text: &[u8], task: &Task<'_>) -> Result<Loaded, CliError> {
+    Ok(config::parse(path, text, task.id())?)
 }
 
 /// A run about to begin or to go on.
@@ -67,9 +67,20 @@ impl Session {
     /// If there is no such agent, its configuration is not usable, or the folder cannot be made.
     pub fn begin(args: &TrainArgs, loaded: Option<Loaded>, dry: bool) -> Result<(Self, Vec<String>), CliError> {
         // the command line requires it unless resuming
-        let name = args.agent.as_deref().unwrap_or_default();
-        let factory = registry::factory(name, Isa::best())?;
-        let agent = factory.spec().id.clone();
+        Self::begin_with(Task::named(args.agent.as_deref().unwrap_or_default())?, args, loaded, dry)
+    }
+
+    /// The same for a given task.
+    ///
+    /// # Errors
+    /// The same, or if the task cannot be made.
+    pub fn begin_with(
+        task: Task<'_>,
+        args: &TrainArgs,
+        loaded: Option<Loaded>,
+        dry: bool,
+    ) -> Result<(Self, Vec<String>), CliError> {
+        let agent = task.id().to_string();
         let mut loaded = match (loaded, &args.config) {
             (Some(loaded), _) => loaded,
             (None, Some(path)) => config::load(path, &agent)?,
@@ -84,6 +95,7 @@ impl Session {
         ppo.seed = args.seed.unwrap_or(ppo.seed);
         ppo.threads = args.threads.unwrap_or(ppo.threads);
         ppo.validate()?;
+        let factory = task.factory(ppo.agents)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let run = RunFile::new(&agent, &loaded);
@@ -101,14 +113,22 @@ impl Session {
     /// # Errors
     /// If it is complete, or not the run that the command line means, or cannot be read.
     pub fn resume(args: &TrainArgs, path: &Path) -> Result<Self, CliError> {
+        Self::resume_with(args.agent.as_deref().map(Task::named).transpose()?, args, path)
+    }
+
+    /// The same for a given task.
+    ///
+    /// # Errors
+    /// The same, or if the task cannot be made.
+    pub fn resume_with(task: Option<Task<'_>>, args: &TrainArgs, path: &Path) -> Result<Self, CliError> {
         let (folder, mut run) = RunFolder::open(path)?;
-        let factory = registry::factory(&run.agent, Isa::best())?;
-        if let Some(name) = &args.agent {
-            let asked = registry::agent(name)?.facts().id;
-            if asked != run.agent {
-                return Err(CliError::file(path, "agent", &run.agent, asked));
+        let task = match task {
+            Some(task) if task.id() != run.agent => {
+                return Err(CliError::file(path, "agent", &run.agent, task.id()));
             }
-        }
+            Some(task) => task,
+            None => Task::named(&run.agent)?,
+        };
         // a run that ended before its first checkpoint begins again, which gives the same bits
         let has_checkpoint = folder.checkpoint().join("checkpoint.json").exists();
         let checkpoint = if has_checkpoint { Some(Checkpoint::load(&folder.checkpoint())?) } else { None };
@@ -132,6 +152,7 @@ impl Session {
             )));
         }
         run.config.threads = args.threads.unwrap_or(run.config.threads);
+        let factory = task.factory(run.config.agents)?;
         folder.write_run(&run)?;
         Ok(Session { folder: Some(folder), run, factory, checkpoint })
     }

@@ -62,7 +62,8 @@ impl Crowd for VecEnv {
 #[derive(Debug)]
 pub struct CrowdFailed;
 
-/// Makes shards of one [`Crowd`]. Together they must have all of its blocks, and announce all of their decisions.
+/// Makes shards of one [`Crowd`]. Together they must have all of its blocks, and announce all of their decisions. When all
+/// of them are gone, the next ones start it anew.
 pub struct Lockstep {
     spec: Spec,
     agents: usize,
@@ -82,6 +83,8 @@ struct Hall {
     /// `[agents][act]`.
     actions: Vec<f32>,
     out: Step,
+    /// Shards in use.
+    shards: usize,
     /// Agents whose actions are known.
     present: usize,
     /// Decisions made.
@@ -99,7 +102,8 @@ impl Lockstep {
         assert!(agents > 0 && agents.is_multiple_of(BLOCK), "{agents} agents are not whole blocks of {BLOCK}");
         let out = Step::new(agents, &spec);
         let actions = vec![0.0; agents * spec.act];
-        let hall = Hall { crowd, begun: None, actions, out, present: 0, round: 0, error: None, failed: false };
+        let hall =
+            Hall { crowd, begun: None, actions, out, shards: 0, present: 0, round: 0, error: None, failed: false };
         Lockstep { spec, agents, meeting: Arc::new(Meeting { hall: Mutex::new(hall), decided: Condvar::new() }) }
     }
 
@@ -118,6 +122,7 @@ impl ShardFactory for Lockstep {
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
         let agents = first * BLOCK..(first + blocks) * BLOCK;
         assert!(agents.end <= self.agents, "block {} of {}", first + blocks, self.agents / BLOCK);
+        self.meeting.enter().shards += 1;
         Box::new(LockstepShard {
             spec: self.spec.clone(),
             own: Step::new(agents.len(), &self.spec),
@@ -126,6 +131,10 @@ impl ShardFactory for Lockstep {
             seed,
             announced: 0,
         })
+    }
+
+    fn lockstep(&self) -> Option<usize> {
+        Some(self.agents)
     }
 }
 
@@ -173,6 +182,16 @@ impl LockstepShard {
                     out[column * BLOCK + i] = *x;
                 }
             }
+        }
+    }
+}
+
+impl Drop for LockstepShard {
+    fn drop(&mut self) {
+        let mut hall = self.meeting.enter();
+        hall.shards -= 1;
+        if hall.shards == 0 {
+            (hall.begun, hall.present) = (None, 0);
         }
     }
 }

@@ -123,4 +123,9 @@ pub trait ShardFactory: Send + Sync {
     fn spec(&self) -> &Spec;
     /// A shard of blocks `first .. first + blocks`, all agents before their first reset.
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard>;
+    /// Number of agents, if they can only be stepped all at once, as [`Lockstep`](crate::Lockstep)'s: then the shards in use
+    /// must have all of their blocks together. None for a task with as many agents as one likes.
+    fn lockstep(&self) -> Option<usize> {
+        None
+    }
 }

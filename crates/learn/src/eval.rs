@@ -80,11 +80,15 @@ pub fn evaluate(
     if options.episodes == 0 {
         return Err(Error::config("episodes", 0, "at least 1"));
     }
-    let slots = options.episodes.min(MAX_SLOTS);
-    let blocks = slots.div_ceil(BLOCK);
+    // agents that are stepped all at once are all there, needed or not
+    let crowd = factory.lockstep();
+    let slots = options.episodes.min(crowd.unwrap_or(MAX_SLOTS));
+    let blocks = crowd.unwrap_or(slots).div_ceil(BLOCK);
     // slot i plays episodes i, i + slots, ...
     let quota = |slot: usize| if slot < slots { (options.episodes - slot).div_ceil(slots) } else { 0 };
     let threads = match options.threads {
+        // a thread whose agents are done must not leave the others waiting
+        _ if crowd.is_some() => 1,
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
         n => n,
     };
@@ -132,6 +136,7 @@ fn play(
     let mut playing: Vec<usize> = (0..blocks).filter(|b| busy(&done, *b)).collect();
     while !playing.is_empty() {
         pilot.act(&obs, &mut action);
+        shard.announce(&action);
         for b in &playing {
             let obs = &mut obs[b * obs_row..(b + 1) * obs_row];
             shard.step(*b, &action[b * act_row..(b + 1) * act_row], obs, &mut out);

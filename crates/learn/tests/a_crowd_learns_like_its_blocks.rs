@@ -8,7 +8,9 @@ use marathon_envs::{
     AgentShards, Crowd, CrowdError, Lockstep, Shard, ShardFactory, Spec, StepMut, VecEnv, VecEnvOptions, lockstep,
     registry,
 };
-use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, TrainOutput, train};
+use marathon_learn::{
+    Checkpoint, Control, EvalOptions, IterationStats, PpoConfig, Snapshot, TrainOutput, evaluate, train,
+};
 use marathon_physics::lanes::Isa;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -74,6 +76,24 @@ fn the_same_bits_over_an_interruption() {
     let checkpoint = Checkpoint::load(folder.path()).unwrap();
     let got = train(&lockstep(crowd()), Isa::best(), &config(2), Some(checkpoint), &mut silent).unwrap();
     assert_eq!(bits(&want), bits(&got));
+}
+
+#[test]
+fn the_same_evaluation_however_often() {
+    let blocks = Blocks(registry::global().shards(TASK, Isa::best()).unwrap());
+    let factory = lockstep(crowd());
+    // the factory that was trained on evaluates, too
+    let policy = train(&factory, Isa::best(), &config(2), None, &mut silent).unwrap().policy;
+    for episodes in [small_config().agents, 5] {
+        let options = EvalOptions { episodes, seed: 3, threads: 2 };
+        let want = evaluate(&blocks, Isa::best(), &policy, &options).unwrap();
+        assert_eq!(want.episodes, episodes as u64);
+        for _ in 0..2 {
+            assert_eq!(evaluate(&factory, Isa::best(), &policy, &options).unwrap(), want);
+        }
+    }
+    let again = train(&factory, Isa::best(), &config(1), None, &mut silent).unwrap().policy;
+    assert_eq!(again.params(), policy.params());
 }
 
 /// Fails at a decision.

@@ -20,6 +20,8 @@ pub struct Arrays {
     pub terminated: Py<PyArray1<bool>>,
     pub truncated: Py<PyArray1<bool>>,
     pub diverged: Py<PyArray1<bool>>,
+    /// Those of the step before, see [`Arrays::renew`].
+    spare: Option<Box<Arrays>>,
 }
 
 impl Arrays {
@@ -35,19 +37,23 @@ impl Arrays {
             terminated: list(py, agents),
             truncated: list(py, agents),
             diverged: list(py, agents),
+            spare: None,
         }
     }
 
-    /// Puts new arrays in the place of all but `final_obs`, so that those of the last step can be kept.
+    /// Puts other arrays in the place of all but `final_obs`, so that those of the last step can be kept: those of the step
+    /// before, where nobody has kept them, new ones elsewhere.
     pub fn renew(&mut self, py: Python<'_>, agents: usize, spec: &Spec) {
-        self.obs = PyArray2::zeros(py, [agents, spec.obs], false).unbind();
-        self.terms = PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind();
-        self.info = PyArray2::zeros(py, [agents, spec.info.len()], false).unbind();
-        self.reward = list(py, agents);
-        self.forward = list(py, agents);
-        self.terminated = list(py, agents);
-        self.truncated = list(py, agents);
-        self.diverged = list(py, agents);
+        let mut spare = self.spare.take().unwrap_or_else(|| Box::new(Arrays::new(py, agents, spec)));
+        turn(py, &mut self.obs, &mut spare.obs);
+        turn(py, &mut self.terms, &mut spare.terms);
+        turn(py, &mut self.info, &mut spare.info);
+        turn(py, &mut self.reward, &mut spare.reward);
+        turn(py, &mut self.forward, &mut spare.forward);
+        turn(py, &mut self.terminated, &mut spare.terminated);
+        turn(py, &mut self.truncated, &mut spare.truncated);
+        turn(py, &mut self.diverged, &mut spare.diverged);
+        self.spare = Some(spare);
     }
 
     /// Lets `f` write to all arrays without the GIL.
@@ -85,6 +91,18 @@ impl Arrays {
 
 fn list<T: Element>(py: Python<'_>, n: usize) -> Py<PyArray1<T>> {
     PyArray1::zeros(py, n, false).unbind()
+}
+
+/// Exchanges an array for a spare one, or for a new one if that is still used.
+fn turn<T: Element, D: Dimension>(py: Python<'_>, array: &mut Py<PyArray<T, D>>, spare: &mut Py<PyArray<T, D>>) {
+    std::mem::swap(array, spare);
+    let bound = array.bind(py);
+    // SAFETY: it points to a living object, and the GIL is held
+    let owners = unsafe { pyo3::ffi::Py_REFCNT(array.as_ptr()) };
+    if owners > 1 || bound.try_readwrite().is_err() {
+        let fresh = PyArray::zeros(py, bound.dims(), false).unbind();
+        *array = fresh;
+    }
 }
 
 /// Exclusive access to an array. It fails if the array is being written to by another thread, or was made read-only.

@@ -3,7 +3,7 @@
 
 use crate::error;
 use marathon_envs::{Crowd, CrowdError, Lockstep, Options, ShardFactory, Spec, StepMut};
-use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::conversion::FromPyObjectOwned;
@@ -71,10 +71,10 @@ fn copy<T: Element + Copy + for<'a> FromPyObjectOwned<'a>>(
     Ok(())
 }
 
-/// The blocks of a Python object with the interface of `VecEnv`.
-pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
+/// Facts of the task of a Python object with the interface of `VecEnv`.
+pub fn spec(env: &Bound<'_, PyAny>) -> PyResult<Spec> {
     let spec = env.getattr("spec")?;
-    let spec = Spec {
+    Ok(Spec {
         id: spec.getattr("id")?.extract()?,
         obs: spec.getattr("obs_size")?.extract()?,
         act: spec.getattr("act_size")?.extract()?,
@@ -89,7 +89,12 @@ pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
         options: Options::new(),
         nq: spec.getattr("nq")?.extract()?,
         nv: spec.getattr("nv")?.extract()?,
-    };
+    })
+}
+
+/// The blocks of a Python object with the interface of `VecEnv`.
+pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
+    let spec = spec(env)?;
     let (agents, autoreset) = (env.len()?, env.getattr("autoreset")?.extract::<String>()?);
     if agents == 0 || !agents.is_multiple_of(marathon_envs::BLOCK) {
         let block = marathon_envs::BLOCK;
@@ -102,22 +107,37 @@ pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
     Ok(Lockstep::new(Box::new(crowd), spec, agents))
 }
 
+/// Runs `f` without the GIL. If a crowd fails in Python meanwhile, that is the error.
+pub fn run<R: Send>(py: Python<'_>, crowd: Option<&Lockstep>, f: impl FnOnce() -> R + Send) -> PyResult<R> {
+    let result = py.detach(AssertUnwindSafe(|| catch_unwind(AssertUnwindSafe(f))));
+    result.map_err(|panic| match crowd.and_then(Lockstep::take_error).map(|e| e.downcast::<PyErr>()) {
+        Some(Ok(error)) => *error,
+        Some(Err(error)) => error::value(error.to_string()),
+        None => resume_unwind(panic),
+    })
+}
+
 /// Trains a policy for a Python object with the interface of `VecEnv` and writes it to a file.
 ///
 /// `config` is the JSON of the trainer's settings; their number of agents is that of the environment. `callback` is called
-/// after every iteration with its statistics, a dictionary; if it returns False, training ends. Returns the last statistics.
+/// after every iteration with its statistics, a dictionary; if it returns False, training ends. `checkpoint` is a folder: if
+/// it holds a checkpoint, training goes on from there, and at its end, an interruption's too, it holds the newest. Returns
+/// the last statistics.
 #[pyfunction]
-#[pyo3(signature = (env, config, path, callback = None))]
+#[pyo3(signature = (env, config, path, callback = None, checkpoint = None))]
 pub fn learn(
     py: Python<'_>,
     env: &Bound<'_, PyAny>,
     config: &str,
     path: PathBuf,
     callback: Option<Py<PyAny>>,
+    checkpoint: Option<PathBuf>,
 ) -> PyResult<Option<Py<PyAny>>> {
     let config: PpoConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
     let config = PpoConfig { agents: env.len()?, ..config };
     let factory = lockstep(env)?;
+    let begun = checkpoint.as_ref().filter(|folder| folder.join("checkpoint.json").exists());
+    let resume = begun.map(|folder| Checkpoint::load(folder)).transpose().map_err(error::learn)?;
     let mut interrupt = None;
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
         let go_on = Python::attach(|py| -> PyResult<bool> {
@@ -135,20 +155,15 @@ pub fn learn(
             }
         }
     };
-    let run = || train(&factory as &dyn ShardFactory, Isa::best(), &config, None, &mut observer);
-    let output = py.detach(AssertUnwindSafe(|| catch_unwind(AssertUnwindSafe(run))));
+    let learn = || train(&factory as &dyn ShardFactory, Isa::best(), &config, resume, &mut observer);
+    let output = run(py, Some(&factory), learn)?.map_err(error::learn)?;
+    if let Some(folder) = checkpoint {
+        output.checkpoint.save(&folder).map_err(error::learn)?;
+    }
     if let Some(error) = interrupt {
         return Err(error);
     }
-    let output = match output {
-        Ok(output) => output.map_err(|e| error::value(e.to_string()))?,
-        Err(panic) => match factory.take_error().map(|e| e.downcast::<PyErr>()) {
-            Some(Ok(error)) => return Err(*error),
-            Some(Err(error)) => return Err(error::value(error.to_string())),
-            None => resume_unwind(panic),
-        },
-    };
-    output.policy.save(&path).map_err(|e| error::value(e.to_string()))?;
+    output.policy.save(&path).map_err(error::learn)?;
     output.last.map(|stats| dictionary(py, &stats)).transpose()
 }
 

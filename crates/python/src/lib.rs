@@ -14,6 +14,7 @@ mod policy;
 mod renderer;
 mod simulation;
 mod spec;
+mod task;
 mod train;
 mod vec_env;
 

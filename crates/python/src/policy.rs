@@ -1,14 +1,18 @@
 //! Policies as functions of NumPy arrays.
 
-use crate::error;
+use crate::task::{self, Task};
+use crate::{crowd, error};
 use marathon_cli::session;
-use marathon_envs::{ShardFactory, registry};
+use marathon_envs::{BLOCK, registry};
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+
+/// Most agents that play side by side.
+const MOST_AGENTS: usize = 1024;
 
 /// A trained policy: a function from observations to actions.
 #[pyclass(frozen, module = "marathon_envs")]
@@ -86,27 +90,38 @@ impl Policy {
 /// none.
 #[pyfunction]
 #[pyo3(signature = (path, task = None))]
-pub fn load_policy(path: PathBuf, task: Option<&str>) -> PyResult<Policy> {
-    let factory = task.map(|task| registry::factory(task, Isa::best())).transpose().map_err(error::env)?;
-    let policy = session::read_policy(&path, factory.as_deref().map(ShardFactory::spec)).map_err(error::cli)?;
-    Ok(Policy(policy))
+pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResult<Policy> {
+    let spec = task.map(|task| task.spec(py)).transpose()?;
+    Ok(Policy(session::read_policy(&path, spec.as_ref()).map_err(error::cli)?))
 }
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,
-/// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`.
+/// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`. `task` is needed
+/// for agents that are written in Python; without, it is the policy's own.
 #[pyfunction]
-#[pyo3(signature = (policy, episodes = 100, *, seed = EvalOptions::default().seed, threads = 0))]
+#[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0))]
 pub fn evaluate<'py>(
     py: Python<'py>,
     policy: &Policy,
     episodes: usize,
+    task: Option<Task>,
     seed: u64,
     threads: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let factory = registry::factory(policy.task(), Isa::best()).map_err(error::env)?;
     let options = EvalOptions { episodes, seed, threads };
-    let result = py.detach(|| play(&*factory, Isa::best(), &policy.0, &options)).map_err(error::learn)?;
-    Ok(json(py, &result)?.cast_into()?)
+    let result = match &task {
+        Some(Task::Agent(agent)) => {
+            let agents = episodes.clamp(1, MOST_AGENTS).next_multiple_of(BLOCK);
+            let crowd = task::lockstep(agent.bind(py), agents, threads)?;
+            crowd::run(py, Some(&crowd), || play(&crowd, Isa::best(), &policy.0, &options))?
+        }
+        other => {
+            let name = if let Some(Task::Name(name)) = other { name } else { policy.task() };
+            let factory = registry::factory(name, Isa::best()).map_err(error::env)?;
+            py.detach(|| play(&*factory, Isa::best(), &policy.0, &options))
+        }
+    };
+    Ok(json(py, &result.map_err(error::learn)?)?.cast_into()?)
 }
 
 /// `n` standard normal numbers of a generator, or of a new one with the given seed.

@@ -1,12 +1,15 @@
 //! The native trainer, called from Python.
 
-use crate::error;
 use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
+use crate::task::{Made, Task};
+use crate::{crowd, error};
 use marathon_cli::session::{self, Session, TrainArgs};
 use marathon_learn::{Control, Players};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 /// Where the configuration comes from.
@@ -59,12 +62,13 @@ impl TrainResult {
 
 /// Trains a policy with the native trainer, without the GIL, and evaluates it.
 ///
-/// `task`: its name. `config`: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; without, the
-/// task's own fast configuration. `seed`, `steps` (of all agents together), `agents` (a multiple of 16) and `threads`
-/// change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv` holds; if it
-/// returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes; without,
-/// nothing is written. `resume`: the folder of a run to go on with, in place of a task and a configuration. `players`: an
-/// object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
+/// `task`: its name, or a `MarathonAgent` class. `config`: a file in the YAML schema of ML-Agents, or a dictionary in the
+/// same schema; without, the task's own fast configuration. `seed`, `steps` (of all agents together), `agents` (a multiple of
+/// 16) and `threads` change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv`
+/// holds; if it returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes;
+/// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
+/// for a class alone.
+/// `players`: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
@@ -76,7 +80,7 @@ impl TrainResult {
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
     py: Python<'_>,
-    task: Option<String>,
+    task: Option<Task>,
     config: Option<Config>,
     callback: Option<Py<PyAny>>,
     seed: Option<u64>,
@@ -88,16 +92,18 @@ pub fn train(
     players: Option<Py<PyAny>>,
 ) -> PyResult<TrainResult> {
     let (dry, path) = (out.is_none(), resume.clone());
-    let mut args = TrainArgs { agent: task, config: None, algo: None, agents, steps, seed, threads, out, resume };
-    let session = match (path, config) {
+    let mut notes = Vec::new();
+    let mut args = TrainArgs { agent: None, config: None, algo: None, agents, steps, seed, threads, out, resume };
+    let mut made = Made::default();
+    let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), &mut made)).transpose()?;
+    let begun = match (path, config) {
         (Some(_), Some(_)) => return Err(error::value("config and resume exclude each other: a run keeps its own")),
         (Some(_), None) if seed.is_some() || agents.is_some() || args.out.is_some() => {
             return Err(error::value("seed, agents and out belong to a new run, not to one that resume goes on with"));
         }
-        (Some(path), None) => Session::resume(&args, &path).map_err(error::cli)?,
+        (Some(path), None) => Session::resume_with(task, &args, &path),
         (None, config) => {
-            let name =
-                args.agent.as_deref().ok_or_else(|| error::value("task is missing, expected a task or resume"))?;
+            let task = task.ok_or_else(|| error::value("task is missing, expected a task or resume"))?;
             let loaded = match config {
                 None => None,
                 Some(Config::Path(file)) => {
@@ -109,23 +115,26 @@ pub fn train(
                     let options = PyDict::new(py);
                     options.set_item("indent", 1)?;
                     let text: String = py.import("json")?.call_method("dumps", (table,), Some(&options))?.extract()?;
-                    Some(session::configuration(Path::new("config"), text.as_bytes(), name).map_err(error::cli)?)
+                    Some(session::configuration(Path::new("config"), text.as_bytes(), &task).map_err(error::cli)?)
                 }
             };
-            let (session, notes) = Session::begin(&args, loaded, dry).map_err(error::cli)?;
-            for note in notes {
-                PyErr::warn(py, &py.get_type::<pyo3::exceptions::PyUserWarning>(), &std::ffi::CString::new(note)?, 1)?;
-            }
-            session
+            Session::begin_with(task, &args, loaded, dry).map(|(session, told)| {
+                notes = told;
+                session
+            })
         }
     };
+    let session = begun.map_err(|e| made.error.take().unwrap_or_else(|| error::cli(e)))?;
+    for note in notes {
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)?;
+    }
 
     let terms = session.factory.spec().reward_terms.clone();
     let run = &session.run;
     let mut players = players.map(|object| PyPlayers::begin(py, object, &run.agent, &run.config)).transpose()?;
     let mut failure: Option<PyErr> = None;
     let mut last = (session.steps(), 0.0);
-    let result = py.detach(|| {
+    let result = crowd::run(py, made.crowd.as_deref(), || {
         let players = players.as_mut().map(|players| players as &mut dyn Players);
         session.carry_out_with(players, false, &mut |stats| {
             let (steps, wall) = std::mem::replace(&mut last, (stats.steps, stats.wall_seconds));
@@ -150,7 +159,7 @@ pub fn train(
                 }
             }
         })
-    });
+    })?;
     // what was learned has been written by now
     if let Some(error) = failure.or(players.and_then(|players| players.failure)) {
         return Err(error);

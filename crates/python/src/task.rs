@@ -1,0 +1,86 @@
+//! What stands for a task in Python: its name, or an agent that is written in Python.
+
+use crate::{crowd, error};
+use marathon_cli::session::{self, CliError};
+use marathon_envs::{Lockstep, ShardFactory, Spec, registry};
+use marathon_physics::lanes::Isa;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
+
+/// A task as an argument.
+#[derive(FromPyObject)]
+pub enum Task {
+    /// One of the registry.
+    #[pyo3(transparent)]
+    Name(String),
+    /// A `MarathonAgent`, class or object.
+    #[pyo3(transparent)]
+    Agent(Py<PyAny>),
+}
+
+/// What became of an agent that a run was begun with.
+#[derive(Default)]
+pub struct Made {
+    pub crowd: Option<Arc<Lockstep>>,
+    /// Why there is no crowd.
+    pub error: Option<PyErr>,
+}
+
+impl Task {
+    /// Facts of the task.
+    pub fn spec(&self, py: Python<'_>) -> PyResult<Spec> {
+        match self {
+            Task::Name(name) => Ok(registry::factory(name, Isa::best()).map_err(error::env)?.spec().clone()),
+            Task::Agent(agent) => crowd::spec(&vec_env(agent.bind(py), 1, 1)?),
+        }
+    }
+
+    /// The task of a run; `made` learns of a crowd that is made for it.
+    pub fn of_run<'a>(&'a self, py: Python<'a>, threads: usize, made: &'a mut Made) -> PyResult<session::Task<'a>> {
+        let agent = match self {
+            Task::Name(name) => return session::Task::named(name).map_err(error::cli),
+            Task::Agent(agent) => agent.bind(py),
+        };
+        check(agent)?;
+        let id: String = agent.call_method0("task_id")?.extract()?;
+        let text = id.clone();
+        Ok(session::Task::made(id, move |agents| match lockstep(agent, agents, threads) {
+            Ok(crowd) => {
+                let crowd = Arc::new(crowd);
+                made.crowd = Some(crowd.clone());
+                Ok(crowd as Arc<dyn ShardFactory>)
+            }
+            Err(error) => {
+                made.error = Some(error);
+                Err(CliError::Usage(format!("{text} cannot be made")))
+            }
+        }))
+    }
+}
+
+/// So many agents of a kind, for the trainer.
+pub fn lockstep(agent: &Bound<'_, PyAny>, agents: usize, threads: usize) -> PyResult<Lockstep> {
+    crowd::lockstep(&vec_env(agent, agents, threads)?)
+}
+
+fn vec_env<'py>(agent: &Bound<'py, PyAny>, agents: usize, threads: usize) -> PyResult<Bound<'py, PyAny>> {
+    check(agent)?;
+    let options = PyDict::new(agent.py());
+    options.set_item("threads", threads)?;
+    options.set_item("autoreset", "same_step")?;
+    agent.call_method("vec_env", (agents,), Some(&options))
+}
+
+fn check(agent: &Bound<'_, PyAny>) -> PyResult<()> {
+    match agent.hasattr("vec_env")? && agent.hasattr("task_id")? {
+        true => Ok(()),
+        false => {
+            let found = agent.get_type().name()?;
+            Err(PyTypeError::new_err(format!(
+                "task is of type {found}, expected a task's name or a MarathonAgent class"
+            )))
+        }
+    }
+}
