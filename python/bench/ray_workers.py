@@ -2,8 +2,10 @@
 
     $ python python/bench/ray_workers.py
 
-A figure is decisions per second of time passed while rollouts are played, messages included; the time in which the
-learner learns and the workers wait is not counted. The last line is the median of the ratios of the turns.
+A figure is decisions per second while rollouts are played, messages included; the time in which the learner learns and
+the workers wait is not counted. `passed` is by time passed. `free` is what it would be with a free processor for each
+worker, from the processor time that the rollouts took: that of the busiest worker and, one after the other, of the
+learner's process; it is what to look at where others use the machine. The last line has the medians of the ratios.
 
 Needs `marathon-envs[ray]`.
 """
@@ -23,14 +25,21 @@ class Timed(Workers):
 
     def begin(self, task: str, config: str) -> int:
         """Begin without times."""
-        self.seconds: list[float] = []
+        self.seconds: list[tuple[float, float]] = []
         return super().begin(task, config)
 
     def play(self, orders: Bytes, states: list[Bytes]) -> Iterator[tuple[int, Bytes]]:
-        """Play and note the time."""
-        start = time.perf_counter()
+        """Play and note the time passed, and the time that free processors would take."""
+        start, own, theirs = time.perf_counter(), time.process_time(), self.processor_times()
         yield from super().play(orders, states)
-        self.seconds.append(time.perf_counter() - start)
+        passed, own = time.perf_counter() - start, time.process_time() - own
+        # actors are made by the first rollout
+        used = [after - before for before, after in zip(theirs, self.processor_times(), strict=False)]
+        self.seconds.append((passed, own + max(used, default=0)))
+
+    def processor_times(self) -> list[float]:
+        """Seconds that each actor has used."""
+        return ray.get([actor.__ray_call__.remote(lambda _: time.process_time()) for actor in self._actors])
 
 
 def main() -> None:
@@ -43,9 +52,9 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=5)
     args = parser.parse_args()
     ray.init(num_cpus=max(args.workers), include_dashboard=False, log_to_driver=False)
-    ratios = []
+    ratios: list[list[float]] = []
     for _ in range(args.turns):
-        rates = []
+        rates: list[list[float]] = []
         for count in args.workers:
             workers = Timed(count)
             rows: list[float] = []
@@ -56,11 +65,13 @@ def main() -> None:
 
             train(args.task, workers=workers, agents=args.agents, callback=note)
             workers.close()
-            rates.append(rows[0] / statistics.median(workers.seconds[1:]))
-        ratios.append(rates[1] / rates[0])
-        shown = ", ".join(f"{n} workers {rate:,.0f}/s" for n, rate in zip(args.workers, rates, strict=True))
-        print(f"{args.task}: {shown}, ratio {ratios[-1]:.2f}", flush=True)
-    print(f"median ratio {statistics.median(ratios):.2f}")
+            # the first rollout has the making of the actors in it
+            rates.append([rows[0] / statistics.median(s) for s in zip(*workers.seconds[1:], strict=True)])
+        ratios.append([two / one for one, two in zip(*rates, strict=True)])
+        for n, (passed, free) in zip(args.workers, rates, strict=True):
+            print(f"{args.task}, {n} workers: passed {passed:,.0f}/s, free {free:,.0f}/s", flush=True)
+    passed, free = (statistics.median(r) for r in zip(*ratios, strict=True))
+    print(f"ratio {args.workers[1]} to {args.workers[0]}: passed {passed:.2f}, free {free:.2f}")
     ray.shutdown()
 
 
