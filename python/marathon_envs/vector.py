@@ -167,13 +167,14 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         # what is told of the agents whose episode ended belongs to the end, the rest to the next beginning
         acted, rows = ~ended, np.flatnonzero(ended)
         last_x = None if before is None else _only(rows, before + distance)
-        final = self._report(_only(rows, info), last_x, ended)
+        final = self._report(_only(rows, info) if self._info else info, last_x, ended)
         self._add_step(final, _only(rows, terms), _only(rows, distance), ended)
-        infos = self._report(env.read_info(), self._x, every)
+        infos = self._report(env.read_info() if self._info else info, self._x, every)
         self._add_step(infos, _without(rows, terms), _without(rows, distance), acted)
-        infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
-        for i, last in zip(rows, env.final_obs[rows].astype(self._dtype), strict=True):
-            infos["final_obs"][i] = last
+        # None where there is none
+        infos["final_obs"] = last_obs = np.empty(self.num_envs, dtype=object)
+        for i, last in zip(rows.tolist(), env.final_obs[rows].astype(self._dtype), strict=True):
+            last_obs[i] = last
         infos["final_info"] = final
         infos["_final_obs"] = infos["_final_info"] = ended.copy()
         return self._observed(obs), rewards, terminated, truncated, infos
