@@ -2,9 +2,11 @@
 the environments. On a cluster of several processes on this machine."""
 
 import gc
+import importlib
 import os
 import runpy
 import signal
+import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -104,6 +106,13 @@ def test_errors_of_a_worker_end_the_run() -> None:
     assert workers.replaced == 0
     with pytest.raises(ValueError, match="count is 0, expected at least 1"):
         Workers(0)
+
+
+def test_without_ray_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    monkeypatch.delitem(sys.modules, "marathon_envs.ray")
+    with pytest.raises(ImportError, match=r"pip install 'marathon-envs\[ray\]'"):
+        importlib.import_module("marathon_envs.ray")
 
 
 def test_the_example_ends_with_the_same_fingerprint_when_a_worker_is_killed() -> None:
