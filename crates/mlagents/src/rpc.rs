@@ -98,6 +98,8 @@ pub struct Channel<S> {
     initial_window: i64,
     /// Longest frame that the peer takes.
     max_frame: usize,
+    /// The peer has said that it ends the connection.
+    leaving: bool,
     /// Bytes received since the connection's window was filled up.
     taken: u32,
     /// Room for bytes received; those in `at..end` have not been looked at yet.
@@ -131,6 +133,7 @@ impl<S: Read + Write> Channel<S> {
             call_window: 0,
             initial_window: FIRST_WINDOW.into(),
             max_frame: MAX_FRAME,
+            leaving: false,
             taken: 0,
             received: vec![0; 4 * MAX_FRAME],
             at: 0,
@@ -234,7 +237,14 @@ impl<S: Read + Write> Channel<S> {
                 put_frame(&mut answer, frame::SETTINGS, flag::ACK, 0, &[]);
             }
             frame::PING if flags & flag::ACK == 0 => put_frame(&mut answer, frame::PING, flag::ACK, 0, payload),
-            frame::GOAWAY => return Err(RpcError::GoAway(number(payload.get(4..).unwrap_or_default())?)),
+            frame::GOAWAY => {
+                let (last, code) = (number(payload)? & WINDOW, number(payload.get(4..).unwrap_or_default())?);
+                if code != 0 || last < self.call {
+                    return Err(RpcError::GoAway(code));
+                }
+                // a peer that leaves in order answers this call before
+                self.leaving = true;
+            }
             frame::WINDOW_UPDATE => {
                 let more = i64::from(number(payload)? & WINDOW);
                 if stream == 0 {
@@ -258,6 +268,7 @@ impl<S: Read + Write> Channel<S> {
             self.received.copy_within(self.at..self.end, 0);
             (self.at, self.end) = (0, self.end - self.at);
             match self.stream.read(&mut self.received[self.end..]) {
+                Ok(0) if self.leaving => return Err(RpcError::GoAway(0)),
                 Ok(0) => return Err(RpcError::Io(io::ErrorKind::UnexpectedEof.into())),
                 Ok(read) => self.end += read,
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
@@ -396,6 +407,7 @@ mod tests {
         let mut channel = answering(&[
             (frame::SETTINGS, 0, 0, &[0, 4, 0, 1, 0, 0, 0, 5, 0, 0, 128, 0]),
             (frame::PING, 0, 0, b"12345678"),
+            (frame::GOAWAY, 0, 0, &[127, 255, 255, 255, 0, 0, 0, 0]),
             (frame::HEADERS, flag::END_HEADERS, 1, b"whatever"),
             (frame::WINDOW_UPDATE, 0, 0, &window),
             (frame::WINDOW_UPDATE, 0, 1, &window),
@@ -420,10 +432,11 @@ mod tests {
     #[test]
     fn what_is_no_reply_is_an_error() {
         let refused = (frame::HEADERS, flag::END_STREAM, 1, &b"grpc-status 8"[..]);
-        let cases: [(&[Frame], &str); 7] = [
+        let cases: [(&[Frame], &str); 8] = [
             (&[refused], "refused a message of 3 bytes"),
             (&[], "the connection broke"),
             (&[(frame::GOAWAY, 0, 0, &[0, 0, 0, 1, 0, 0, 0, 2])], "ended the connection (code 2)"),
+            (&[(frame::GOAWAY, 0, 0, &[127, 255, 255, 255, 0, 0, 0, 0])], "ended the connection (code 0)"),
             (&[(frame::RST_STREAM, 0, 1, &[0, 0, 0, 8])], "broke off the exchange of a message of 3 bytes (code 8)"),
             (&[(frame::DATA, flag::END_STREAM, 1, &[1, 0, 0, 0, 0])], "compressed"),
             (&[(frame::DATA, flag::END_STREAM, 1, &[0, 0, 0, 0, 9, 1])], "another length"),

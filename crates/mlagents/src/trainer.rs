@@ -5,7 +5,7 @@
 //! answer says what to do next.
 
 use crate::error::PlayerError;
-use crate::rpc::Channel;
+use crate::rpc::{Channel, RpcError};
 use crate::wire::{Capabilities, Header, RlInitializationOutput, RlInput, UnityMessage, UnityOutput};
 use prost::Message;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
@@ -94,7 +94,11 @@ impl Trainer {
     /// # Errors
     /// If the trainer is gone, or refuses the message.
     pub fn exchange(&mut self, output: &UnityMessage) -> Result<Option<RlInput>, PlayerError> {
-        let answer = self.call(output)?;
+        let answer = match self.call(output) {
+            // it has left in order, without waiting for this call
+            Err(PlayerError::Rpc(RpcError::GoAway(0))) => return Ok(None),
+            answer => answer?,
+        };
         if answer.header.is_none_or(|header| header.status != Header::OK) {
             return Ok(None);
         }
