@@ -12,7 +12,7 @@ use crate::Activation;
 type Result<T> = std::result::Result<T, String>;
 
 /// No bound at all, in a format that wants one.
-const UNBOUNDED: f32 = f32::MAX;
+pub const UNBOUNDED: f32 = f32::MAX;
 
 /// What a policy is made of.
 #[derive(Debug)]

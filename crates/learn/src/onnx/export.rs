@@ -4,7 +4,7 @@ use super::proto::{
     ATTRIBUTE_FLOAT, ATTRIBUTE_INT, Attribute, Dimension, FLOAT, Graph, Model, Node, OperatorSet, Property, Shape,
     Size, Tensor, TensorType, Type, ValueInfo,
 };
-use super::{DETERMINISTIC, KEY, OBSERVATION};
+use super::{API_VERSION, DETERMINISTIC, KEY, OBSERVATION, SAMPLED};
 use crate::{Activation, Policy};
 use prost::Message;
 
@@ -12,7 +12,7 @@ use prost::Message;
 const OPSET: i64 = 9;
 const IR_VERSION: i64 = 4;
 /// ML-Agents' `ModelApiVersion` 2.0.
-const API_VERSION: f32 = 3.0;
+const VERSION: f32 = 3.0;
 
 /// The bytes of the file.
 pub fn encode(policy: &Policy) -> Vec<u8> {
@@ -51,18 +51,17 @@ pub fn encode(policy: &Policy) -> Vec<u8> {
     g.attributes([Attribute { name: "dtype".into(), i: FLOAT as i64, kind: ATTRIBUTE_INT, ..Default::default() }]);
     let scaled = g.op("Mul", &[&noise, &std], "noise_scaled");
     let drawn = g.op("Add", &[&x, &scaled], "drawn");
-    g.actions(policy, &drawn, "continuous_actions");
+    g.actions(policy, &drawn, SAMPLED);
 
-    let facts =
-        [("version_number", API_VERSION), ("memory_size", 0.0), ("continuous_action_output_shape", meta.act as f32)];
+    let facts = [(API_VERSION, VERSION), ("memory_size", 0.0), ("continuous_action_output_shape", meta.act as f32)];
     for (name, value) in facts {
         let constant = g.constant(&format!("{name}_value"), &[1], &[value]);
         g.op("Identity", &[&constant], name);
     }
     let output = vec![
-        value_info("version_number", None, 1),
+        value_info(API_VERSION, None, 1),
         value_info("memory_size", None, 1),
-        value_info("continuous_actions", Some("batch"), meta.act),
+        value_info(SAMPLED, Some("batch"), meta.act),
         value_info("continuous_action_output_shape", None, 1),
         value_info(DETERMINISTIC, Some("batch"), meta.act),
     ];

@@ -25,6 +25,10 @@ use std::path::Path;
 const OBSERVATION: &str = "obs_0";
 /// Output with the best actions.
 const DETERMINISTIC: &str = "deterministic_continuous_actions";
+/// Output with actions drawn as in training.
+const SAMPLED: &str = "continuous_actions";
+/// Output that tells the version of ML-Agents' contract.
+const API_VERSION: &str = "version_number";
 /// Key of Marathon's document in a model's metadata.
 const KEY: &str = "marathon";
 

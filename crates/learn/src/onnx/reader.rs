@@ -3,7 +3,7 @@
 use super::graph::{Net, Stage, Value, evaluate};
 use super::proto::{Graph, Model, Size, ValueInfo};
 use super::tensor::{Array, Neighbors};
-use super::{DETERMINISTIC, KEY, chain};
+use super::{API_VERSION, DETERMINISTIC, KEY, SAMPLED, chain};
 use crate::policy::PolicyMeta;
 use crate::{Error, Policy};
 use marathon_envs::{Options, Spec};
@@ -21,6 +21,8 @@ const ACTIONS: [&str; 8] =
     [DETERMINISTIC, "actions", "action", "mean", "mu", "mean_actions", "output", "continuous_actions"];
 /// Names of the logarithm of the actions' standard deviation, as Marathon and ML-Agents write it.
 const LOG_STD: [&str; 2] = ["log_std", "log_sigma"];
+/// Input of ML-Agents' recurrent policies.
+const MEMORY: &str = "recurrent_in";
 /// Logarithm of the standard deviation where the file does not tell it: hardly any.
 const SMALL: f32 = -10.0;
 
@@ -79,6 +81,10 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
         let expected = format!("at most {MOST_NODES}, a multi-layer perceptron");
         return Err(wrong("graph", format!("{} operations", graph.node.len()), &expected));
     }
+    if graph.input.iter().any(|input| input.name == MEMORY) {
+        let expected = "a policy without memory: one trained without `memory` in its `network_settings`";
+        return Err(wrong("inputs", format!("'{MEMORY}'"), expected));
+    }
     let input = observation(&graph, spec.obs).map_err(|found| {
         wrong("inputs", found, &format!("one observation of {} numbers, as {} has", spec.obs, spec.id))
     })?;
@@ -115,11 +121,19 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     let mut meta = PolicyMeta::of(spec, parts.hidden, parts.activation);
     meta.observation_clip = parts.observation_clip;
     meta.action_clip = parts.action_clip;
-    meta.action_range = match parts.action_range.is_empty() {
+    let of_mlagents = noted.is_none() && name == DETERMINISTIC && graph.output.iter().any(|o| o.name == API_VERSION);
+    let nominal = parts.action_range.iter().all(|range| *range == [-1.0, 1.0]);
+    meta.action_range = match nominal {
+        // ML-Agents acts in [-1, 1], which its player maps to what the task has
+        true if of_mlagents => (0..spec.act).map(|i| spec.action_range(i)).collect(),
         true => vec![[-1.0, 1.0]; spec.act],
         false => parts.action_range,
     };
     meta.squash = parts.squash;
+    if of_mlagents && parts.action_clip == chain::UNBOUNDED && is_squashed(&graph, SAMPLED) {
+        // its SAC trains the tangent of this output, but writes the output itself
+        (meta.squash, meta.action_clip) = (true, 1.0);
+    }
     if let Some(noted) = noted.filter(|noted| noted.agent == spec.id) {
         (meta.training, meta.evaluation) = (noted.training, noted.evaluation);
     }
@@ -129,6 +143,22 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     }
     Policy::from_parts(meta, parts.params, (parts.obs_mean, parts.obs_std), log_std)
         .map_err(|e| wrong("network", e.to_string(), "a network of a practical size"))
+}
+
+/// Whether an output is a hyperbolic tangent.
+fn is_squashed(graph: &Graph, output: &str) -> bool {
+    let mut name = output;
+    // a node computes from what is before it, so this ends
+    for node in graph.node.iter().rev() {
+        if node.output.iter().any(|output| output == name) {
+            match (node.op_type.as_str(), node.input.first()) {
+                ("Tanh", _) => return true,
+                ("Identity", Some(input)) => name = input,
+                _ => return false,
+            }
+        }
+    }
+    false
 }
 
 /// Name of the input that the observation goes to.
