@@ -43,7 +43,7 @@ def test_gail_and_behavioral_cloning_train_on_it(demo, tmp_path):
     path, _ = demo
     network = {"hidden_units": 32, "num_layers": 2}
     settings = config(
-        max_steps=2500,
+        hyperparameters={"buffer_size": 1024},
         behavioral_cloning={"demo_path": str(path), "steps": 0, "strength": 0.5},
         reward_signals={
             "extrinsic": {"gamma": 0.99, "strength": 1.0},
@@ -51,7 +51,9 @@ def test_gail_and_behavioral_cloning_train_on_it(demo, tmp_path):
         },
     )
     learn(tmp_path, settings)
-    assert curve(tmp_path, "Policy/GAIL Reward")
+    assert curve(tmp_path, "Policy/Gail Reward")
+    # it tells the recorded policy from the new one
+    assert curve(tmp_path, "Policy/GAIL Expert Estimate")[-1] > curve(tmp_path, "Policy/GAIL Policy Estimate")[-1]
     # cloning has got nearer to the policy
     losses = curve(tmp_path, "Losses/Pretraining Loss")
     assert losses[-1] < losses[0], losses
