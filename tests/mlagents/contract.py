@@ -24,7 +24,7 @@ def check(path, obs, act):
     assert needed <= outputs, outputs
     # as Unity does: run once with zeros; numbers are floats
     runner = ReferenceEvaluator(model)
-    got = dict(zip(runner.output_names, runner.run(None, {"obs_0": np.zeros((1, obs), np.float32)})))
+    got = dict(zip(runner.output_names, runner.run(None, {"obs_0": np.zeros((1, obs), np.float32)}), strict=True))
     assert all(value.dtype == np.float32 for value in got.values()), got
     assert got["version_number"].item() in (2, 3) and got["memory_size"].item() == 0
     assert got["continuous_action_output_shape"].item() == act

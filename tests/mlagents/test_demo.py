@@ -1,5 +1,5 @@
-"""A demonstration that `marathon record-demo` wrote is one to ML-Agents: its loader reads it, and GAIL and behavioral cloning
-train on it."""
+"""A demonstration that `marathon record-demo` wrote is one to ML-Agents: its loader reads it, and GAIL and behavioral
+cloning train on it."""
 
 import json
 import pathlib

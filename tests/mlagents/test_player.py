@@ -1,8 +1,8 @@
 """Unmodified `mlagents_envs` drives `marathon-player`.
 
-Promises: every batch has a decision of every agent, ends of episodes come beside them with their true kind, a reset works at
-any time, side channels work both ways, every environment can be served, and a player that cannot go on says why in its log and
-leaves at once.
+Promises: every batch has a decision of every agent, ends of episodes come beside them with their true kind, a reset
+works at any time, side channels work both ways, every environment can be served, and a player that cannot go on says
+why in its log and leaves at once.
 """
 
 import json
@@ -43,7 +43,13 @@ def sizes(env, name):
 
 @pytest.mark.parametrize(
     ("agent", "expected"),
-    [("Hopper-v0", (31, 4)), ("Walker2d-v0", (41, 6)), ("Humanoid-v0", (88, 21)), ("Ant-v0", (53, 8)), ("Ant-v1", (54, 8))],
+    [
+        ("Hopper-v0", (31, 4)),
+        ("Walker2d-v0", (41, 6)),
+        ("Humanoid-v0", (88, 21)),
+        ("Ant-v0", (53, 8)),
+        ("Ant-v1", (54, 8)),
+    ],
 )
 def test_sizes_are_the_documented_ones(launch, agent, expected):
     env = launch(f"--spawn-env={agent}", "--num-spawn-envs=3")
@@ -262,7 +268,7 @@ os._exit(9)
 """
     trainer = subprocess.Popen([sys.executable, "-c", code])
     words = [PLAYER, "--mlagents-port", str(port), *HOPPERS]
-    player = subprocess.run(words, stderr=subprocess.PIPE, text=True, timeout=60)
+    player = subprocess.run(words, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     assert trainer.wait(timeout=10) == 9
     assert player.returncode == 0 and "the trainer is gone" in player.stderr
 
@@ -278,7 +284,7 @@ def test_messages_over_the_limit_are_refused(launch, log):
 
 def test_what_cannot_be_served_is_told():
     def fails(*words, code=1):
-        done = subprocess.run([PLAYER, *words], capture_output=True, text=True, timeout=20)
+        done = subprocess.run([PLAYER, *words], capture_output=True, text=True, timeout=20, check=False)
         assert done.returncode == code and not done.stdout, done
         return done.stderr
 
