@@ -1,0 +1,473 @@
+//! The simulation behind the ragdolls: pens of sixteen, stepped together in the lanes of the physics.
+//!
+//! A ragdoll sits in a lane of a pen of its kind. Which lane, and who sits beside it, does not touch its bits. Every
+//! kind has its own clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
+
+use crate::asset::RagdollPrefab;
+use crate::ragdoll::{Character, Controls, End, Episode, Restart};
+use bevy::platform::cell::SyncCell;
+use bevy::prelude::*;
+use marathon_envs::{Autoreset, BLOCK, EnvError, Spec, Step, VecEnv, VecEnvOptions, registry};
+use marathon_learn::{BlockPolicy, Policy};
+use marathon_physics::lanes::Isa;
+use marathon_physics::{Batch, BatchOptions, Model, Variation};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+use thiserror::Error;
+
+/// Seconds that a prefab is simulated for at a time, about.
+const PREFAB_DT: f64 = 0.01;
+
+/// Why a character cannot be simulated.
+#[derive(Debug, Error)]
+pub(crate) enum HerdError {
+    #[error(transparent)]
+    Env(#[from] EnvError),
+    #[error(transparent)]
+    Sim(#[from] marathon_physics::SimError),
+}
+
+/// All ragdolls of one kind.
+pub(crate) struct Herd {
+    pub character: Character,
+    pub model: Arc<Model>,
+    pub spec: Option<Arc<Spec>>,
+    pub feet: Vec<Arc<str>>,
+    /// Physics steps per decision.
+    substeps: usize,
+    pub dt: f64,
+    /// Time between decisions.
+    pub period: Duration,
+    /// Time of the newest states.
+    pub time: Duration,
+    pub pens: Vec<Pen>,
+}
+
+impl Herd {
+    /// A herd of an agent of the registry, without ragdolls yet.
+    pub fn of_agent(name: &str, time: Duration) -> Result<Self, HerdError> {
+        let agent = registry::agent(name)?;
+        let factory = registry::factory(name, Isa::best())?;
+        let spec = factory.spec().clone();
+        Ok(Herd {
+            character: Character::Agent(name.into()),
+            model: Arc::new(agent.model()?),
+            feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
+            substeps: spec.frame_skip,
+            dt: spec.dt,
+            period: Duration::from_secs_f64(spec.dt),
+            spec: Some(Arc::new(spec)),
+            time,
+            pens: Vec::new(),
+        })
+    }
+
+    /// A herd of a body, without ragdolls yet.
+    pub fn of_prefab(prefab: &Handle<RagdollPrefab>, model: Arc<Model>, time: Duration) -> Self {
+        let substeps = (PREFAB_DT / model.opt.timestep).round().max(1.0) as usize;
+        let dt = substeps as f64 * model.opt.timestep;
+        Herd {
+            character: Character::Prefab(prefab.clone()),
+            model,
+            feet: Vec::new(),
+            substeps,
+            dt,
+            period: Duration::from_secs_f64(dt),
+            spec: None,
+            time,
+            pens: Vec::new(),
+        }
+    }
+
+    /// Gives a ragdoll a free lane.
+    pub fn admit(&mut self, resident: Resident) -> Result<(usize, usize), HerdError> {
+        let free = |pen: &Pen| pen.lanes.iter().position(Option::is_none);
+        let pen = match self.pens.iter().position(|pen| free(pen).is_some()) {
+            Some(pen) => pen,
+            None => {
+                self.pens.push(Pen::new(self)?);
+                self.pens.len() - 1
+            }
+        };
+        let lane = free(&self.pens[pen]).unwrap_or_default();
+        self.pens[pen].admit(lane, resident, self.time);
+        Ok((pen, lane))
+    }
+}
+
+/// What steps sixteen ragdolls.
+enum Engine {
+    /// With a task.
+    Env(Box<VecEnv>),
+    /// Without.
+    Free(Box<Batch>, usize),
+}
+
+/// Sixteen lanes.
+pub(crate) struct Pen {
+    engine: SyncCell<Engine>,
+    pub lanes: Vec<Option<Resident>>,
+    model: Arc<Model>,
+    n_act: usize,
+    dt: f64,
+    obs: Vec<f32>,
+    action: Vec<f32>,
+    scratch: Vec<f32>,
+    out: Step,
+}
+
+/// A ragdoll in its lane.
+#[derive(Debug)]
+pub(crate) struct Resident {
+    pub seed: u64,
+    pub number: u64,
+    pub policy: Option<Arc<Policy>>,
+    pub controls: Option<Controls>,
+    pub restart: Restart,
+    pub episode: Episode,
+    /// States that frames are drawn from, oldest first.
+    pub trail: VecDeque<Still>,
+    /// What has happened since it was last asked.
+    pub events: Vec<Event>,
+    pushes: Vec<Shove>,
+    /// Decisions that it still lies limp; `None` if it is up.
+    lying: Option<u64>,
+    begin_now: bool,
+}
+
+/// A state at a time.
+#[derive(Clone, Debug)]
+pub(crate) struct Still {
+    pub time: Duration,
+    pub qpos: Vec<f64>,
+    pub qvel: Vec<f64>,
+    /// It did not come out of the one before, but of a reset.
+    pub fresh: bool,
+}
+
+/// A push in the axes of the physics.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shove {
+    pub body: usize,
+    pub force: [f64; 3],
+    pub torque: [f64; 3],
+    /// Decisions that it lasts.
+    pub decisions: u64,
+}
+
+/// What happens to a ragdoll.
+#[derive(Clone, Debug)]
+pub(crate) enum Event {
+    Foot { foot: usize, down: bool },
+    Ended(End, Episode),
+    Began(u64),
+}
+
+impl Resident {
+    pub fn new((seed, number): (u64, u64), restart: Restart) -> Self {
+        Resident {
+            seed,
+            number,
+            restart,
+            policy: None,
+            controls: None,
+            episode: Episode::default(),
+            trail: VecDeque::new(),
+            events: Vec::new(),
+            pushes: Vec::new(),
+            lying: None,
+            begin_now: false,
+        }
+    }
+
+    /// Pushes it at the coming decisions.
+    pub fn push(&mut self, shove: Shove) {
+        self.pushes.push(shove);
+    }
+
+    /// Ends its episode at the next decision.
+    pub fn begin_now(&mut self) {
+        self.begin_now = true;
+    }
+
+    /// Its state at a time: the two between which it lies, and the share of the later one.
+    pub fn between(&self, time: Duration) -> Option<(&Still, &Still, f64)> {
+        let later = self.trail.iter().position(|s| s.time >= time).unwrap_or(self.trail.len().saturating_sub(1));
+        let b = self.trail.get(later)?;
+        let a = if b.fresh { b } else { self.trail.get(later.wrapping_sub(1)).unwrap_or(b) };
+        let span = b.time.saturating_sub(a.time).as_secs_f64();
+        let share = if span > 0.0 { (time.saturating_sub(a.time).as_secs_f64() / span).min(1.0) } else { 1.0 };
+        Some((a, b, share))
+    }
+
+    /// Forgets what no frame from this time on needs.
+    pub fn forget(&mut self, before: Duration) {
+        while self.trail.len() > 2 && self.trail[1].time <= before {
+            self.trail.pop_front();
+        }
+    }
+
+    fn begin(&mut self) {
+        self.episode = Episode { number: self.episode.number + 1, ..default() };
+        self.lying = None;
+        self.begin_now = false;
+        self.pushes.clear();
+        self.events.push(Event::Began(self.episode.number));
+    }
+}
+
+impl Pen {
+    fn new(herd: &Herd) -> Result<Self, HerdError> {
+        let (engine, n_obs, out) = match &herd.character {
+            Character::Agent(name) => {
+                let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, ..default() };
+                let mut env = VecEnv::new(name, &options)?;
+                let (n_obs, out) = (env.spec().obs, env.buffers());
+                env.reset(None, &mut vec![0.0; n_obs * BLOCK])?;
+                (Engine::Env(Box::new(env)), n_obs, out)
+            }
+            Character::Prefab(_) => {
+                let options = BatchOptions { agents: BLOCK, ..default() };
+                (Engine::Free(Box::new(Batch::new(&herd.model, &options)?), herd.substeps), 0, Step::default())
+            }
+        };
+        Ok(Pen {
+            engine: SyncCell::new(engine),
+            lanes: (0..BLOCK).map(|_| None).collect(),
+            model: herd.model.clone(),
+            n_act: herd.model.nu,
+            dt: herd.dt,
+            obs: vec![0.0; n_obs * BLOCK],
+            action: vec![0.0; herd.model.nu * BLOCK],
+            scratch: vec![0.0; herd.model.nu * BLOCK],
+            out,
+        })
+    }
+
+    /// Whether nobody lives here.
+    pub fn is_empty(&self) -> bool {
+        self.lanes.iter().all(Option::is_none)
+    }
+
+    fn admit(&mut self, lane: usize, mut resident: Resident, time: Duration) {
+        if let Engine::Env(env) = self.engine.get() {
+            // the lane exists, and so does its agent
+            let _ = env.reseed_agent(lane, resident.seed, resident.number as usize);
+        }
+        resident.begin();
+        self.lanes[lane] = Some(resident);
+        self.reset(lane);
+        self.record(lane, time, true);
+    }
+
+    /// Frees a lane.
+    pub fn dismiss(&mut self, lane: usize) {
+        self.lanes[lane] = None;
+        self.vary(lane, &Variation::none(&self.model.clone()));
+        self.reset(lane);
+    }
+
+    /// Gives a ragdoll constants of its own.
+    pub fn vary(&mut self, lane: usize, variation: &Variation) {
+        match self.engine.get() {
+            Engine::Env(env) => drop(env.vary(lane, variation)),
+            Engine::Free(batch, _) => batch.vary(lane, variation),
+        }
+    }
+
+    /// Puts a ragdoll into a state.
+    pub fn put(&mut self, lane: usize, qpos: &[f64], qvel: &[f64], time: Duration) {
+        match self.engine.get() {
+            Engine::Env(env) => {
+                let state = marathon_envs::AgentState { qpos: qpos.to_vec(), qvel: qvel.to_vec() };
+                if env.set_state(lane, &state).is_ok() {
+                    let mask: [bool; BLOCK] = std::array::from_fn(|i| i == lane);
+                    let _ = env.observe(&mask, &mut self.obs);
+                }
+            }
+            Engine::Free(batch, _) => batch.reset(lane, qpos, qvel),
+        }
+        // what was before it is not on the way there
+        if let Some(resident) = &mut self.lanes[lane] {
+            resident.trail.clear();
+        }
+        self.record(lane, time, true);
+    }
+
+    /// Starts an episode in a lane.
+    fn reset(&mut self, lane: usize) {
+        match self.engine.get() {
+            Engine::Env(env) => {
+                let mask: [bool; BLOCK] = std::array::from_fn(|i| i == lane);
+                // lengths are right by construction
+                let _ = env.reset_agents(&mask, &mut self.obs);
+            }
+            Engine::Free(batch, _) => match self.model.keyframes.first() {
+                Some(key) => batch.reset(lane, &key.qpos, &key.qvel),
+                None => batch.reset(lane, &self.model.qpos0, &vec![0.0; self.model.nv]),
+            },
+        }
+    }
+
+    /// Appends the state of a lane to its trail.
+    fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
+        let (qpos, qvel) = match self.engine.get() {
+            Engine::Env(env) => env.state(lane).map(|s| (s.qpos, s.qvel)).unwrap_or_default(),
+            Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane)),
+        };
+        if let Some(resident) = &mut self.lanes[lane] {
+            resident.trail.push_back(Still { time, qpos, qvel, fresh });
+        }
+    }
+
+    /// Makes one decision for all sixteen; `time` is that of the state it leads to.
+    pub fn decide(&mut self, time: Duration) {
+        self.choose();
+        self.shove();
+        match self.engine.get() {
+            Engine::Env(env) => {
+                // lengths are right by construction
+                let _ = env.step(&self.action, &mut self.out.as_mut());
+                self.obs.copy_from_slice(&self.out.obs);
+            }
+            Engine::Free(batch, substeps) => {
+                let ctrl: Vec<f64> = self.action.iter().map(|x| f64::from(*x)).collect();
+                batch.step(&ctrl, *substeps);
+            }
+        }
+        for lane in 0..BLOCK {
+            let fresh = self.judge(lane);
+            if fresh {
+                self.reset(lane);
+            }
+            self.record(lane, time, fresh);
+        }
+    }
+
+    /// Fills in the actions.
+    fn choose(&mut self) {
+        self.action.fill(0.0);
+        let n = self.n_act;
+        let mut served = [false; BLOCK];
+        for first in 0..BLOCK {
+            let Some(policy) = self.lanes[first].as_ref().and_then(|r| r.policy.clone()) else { continue };
+            if served[first] {
+                continue;
+            }
+            // all of a pen at once: most often they share one policy
+            BlockPolicy::new(&policy, Isa::best()).act_rows(&self.obs, None, &mut self.scratch);
+            for lane in first..BLOCK {
+                let same = |r: &Resident| r.policy.as_ref().is_some_and(|p| Arc::ptr_eq(p, &policy));
+                if self.lanes[lane].as_ref().is_some_and(same) {
+                    served[lane] = true;
+                    let row = lane * n..(lane + 1) * n;
+                    self.action[row.clone()].copy_from_slice(&self.scratch[row]);
+                }
+            }
+        }
+        for (row, resident) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
+            let Some(resident) = resident else { continue };
+            if let Some(Controls(given)) = &resident.controls {
+                row.fill(0.0);
+                for (a, x) in row.iter_mut().zip(given).filter(|(_, x)| x.is_finite()) {
+                    *a = *x;
+                }
+            }
+            if resident.lying.is_some() {
+                row.fill(0.0);
+            }
+            resident.episode.action.clear();
+            resident.episode.action.extend_from_slice(row);
+        }
+    }
+
+    /// Applies the pushes, or takes away those that are over.
+    fn shove(&mut self) {
+        let engine = self.engine.get();
+        let mut push = |lane, body, force, torque| match engine {
+            Engine::Env(env) => drop(env.push(lane, body, force, torque)),
+            Engine::Free(batch, _) => batch.push(lane, body, force, torque),
+        };
+        for (lane, resident) in self.lanes.iter_mut().enumerate() {
+            let Some(resident) = resident else { continue };
+            let mut bodies: Vec<usize> = resident.pushes.iter().map(|p| p.body).collect();
+            bodies.sort_unstable();
+            bodies.dedup();
+            for body in bodies {
+                let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
+                for p in resident.pushes.iter().filter(|p| p.body == body && p.decisions > 0) {
+                    (0..3).for_each(|k| {
+                        force[k] += p.force[k];
+                        torque[k] += p.torque[k];
+                    });
+                }
+                push(lane, body, force, torque);
+            }
+            resident.pushes.retain_mut(|p| {
+                let lasts = p.decisions > 0;
+                p.decisions = p.decisions.saturating_sub(1);
+                lasts
+            });
+        }
+    }
+
+    /// Takes in what a decision led to. Returns whether a new episode begins.
+    fn judge(&mut self, lane: usize) -> bool {
+        let agent = matches!(self.engine.get(), Engine::Env(_));
+        let feet = match self.engine.get() {
+            Engine::Env(env) => env.feet(lane).unwrap_or_default(),
+            Engine::Free(..) => 0,
+        };
+        let out = &self.out;
+        let (terminated, truncated, diverged) = match agent {
+            true => (out.terminated[lane], out.truncated[lane], out.diverged[lane]),
+            false => (false, false, false),
+        };
+        let Some(resident) = &mut self.lanes[lane] else { return terminated || truncated || diverged };
+        let asked = resident.begin_now;
+        let episode = &mut resident.episode;
+        for foot in 0..32 {
+            if (episode.feet ^ feet) >> foot & 1 == 1 {
+                resident.events.push(Event::Foot { foot, down: feet >> foot & 1 == 1 });
+            }
+        }
+        episode.feet = feet;
+        if let Some(rest) = &mut resident.lying {
+            *rest = rest.saturating_sub(1);
+            let up = *rest == 0 || diverged || asked;
+            if up {
+                resident.begin();
+            }
+            return up;
+        }
+        episode.decisions += 1;
+        episode.seconds = episode.decisions as f64 * self.dt;
+        if agent {
+            let n = out.terms.len() / BLOCK;
+            episode.reward = out.reward[lane];
+            episode.total += f64::from(out.reward[lane]);
+            episode.terms.clear();
+            episode.terms.extend_from_slice(&out.terms[lane * n..(lane + 1) * n]);
+            episode.distance += f64::from(out.forward[lane]);
+            episode.speed = out.forward[lane] / self.dt as f32;
+        }
+        let Restart { after_fall, on_time_up } = resident.restart;
+        let end = match () {
+            () if diverged => End::Broke,
+            () if terminated => End::Fell,
+            () if truncated && on_time_up => End::TimeUp,
+            () if asked => End::Asked,
+            () => return false,
+        };
+        resident.events.push(Event::Ended(end, resident.episode.clone()));
+        if end == End::Fell && after_fall > 0.0 {
+            resident.episode.down = true;
+            // an infinite time is the longest there is
+            resident.lying = Some((after_fall / self.dt).ceil() as u64);
+            return false;
+        }
+        resident.begin();
+        true
+    }
+}

@@ -1,0 +1,83 @@
+//! Frames: the transforms of all parts at the time that a frame shows.
+
+use crate::axes::{to_game, turn_to_game};
+use crate::ragdoll::{Anatomy, Part};
+use crate::simulate::{Marathon, Seat};
+use bevy::prelude::*;
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+use marathon_render::Scene;
+
+/// Writes the transforms of all parts.
+pub(crate) fn show(
+    marathon: Res<Marathon>,
+    time: Res<Time<Fixed>>,
+    ragdolls: Query<(&Seat, &Anatomy)>,
+    mut parts: Query<&mut Transform, With<Part>>,
+) {
+    let now = time.elapsed() + time.overstep();
+    for (seat, anatomy) in &ragdolls {
+        let Some((a, b, share)) = marathon.resident(*seat).and_then(|r| r.between(now)) else { continue };
+        let qpos = mix(&anatomy.model, &a.qpos, &b.qpos, share);
+        let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &qpos) else { continue };
+        for (entity, body) in anatomy.parts.iter().zip(&pose.bodies) {
+            if let Ok(mut transform) = parts.get_mut(*entity) {
+                transform.translation = to_game(body.pos);
+                transform.rotation = turn_to_game(body.quat);
+            }
+        }
+    }
+}
+
+/// Makes the entities of a ragdoll's bodies.
+pub(crate) fn parts(commands: &mut Commands, model: &Model, ragdoll: Entity) -> Vec<Entity> {
+    let name = |body: usize| match (model.bodies[body].name.as_str(), body) {
+        ("", 0) => "world".to_string(),
+        ("", _) => format!("body {body}"),
+        (name, _) => name.to_string(),
+    };
+    (0..model.bodies.len())
+        .map(|body| {
+            let part = (Part { ragdoll, body }, Name::new(name(body)), Transform::default(), ChildOf(ragdoll));
+            commands.spawn(part).id()
+        })
+        .collect()
+}
+
+/// A configuration between two: coordinates linearly, quaternions along the shorter way.
+pub fn mix(model: &Model, a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
+    let mut q: Vec<f64> = a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+    for joint in &model.joints {
+        let at = match joint.kind {
+            JointType::Free => joint.qpos_adr + 3,
+            JointType::Ball => joint.qpos_adr,
+            JointType::Slide | JointType::Hinge => continue,
+        };
+        let range = at..at + 4;
+        let (Some(a), Some(b)) = (a.get(range.clone()), b.get(range.clone())) else { continue };
+        // q and -q are the same orientation
+        let sign = if a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+        for (q, (a, b)) in q[range].iter_mut().zip(a.iter().zip(b)) {
+            *q = a + share * (sign * b - a);
+        }
+    }
+    q
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quaternions_go_the_shorter_way() -> Result<(), Box<dyn std::error::Error>> {
+        let xml = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>";
+        let model = Model::from_xml_str(xml, "ball")?;
+        let mut a = model.qpos0.clone();
+        let mut b = a.clone();
+        (a[0], b[0]) = (1.0, 3.0);
+        b[3..7].iter_mut().for_each(|x| *x = -*x);
+        let q = mix(&model, &a, &b, 0.25);
+        assert_eq!(q, [1.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        Ok(())
+    }
+}
