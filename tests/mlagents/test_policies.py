@@ -1,4 +1,4 @@
-"""Policies travel both ways: what `mlagents-learn` exported acts the same in `marathon eval`, and what `marathon export`
+"""Policies travel both ways: what `mlagents-learn` exported acts the same in `marathon eval`, what `marathon export`
 writes has all that Unity's importer asks for."""
 
 import json
