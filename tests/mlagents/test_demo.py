@@ -52,8 +52,7 @@ def test_gail_and_behavioral_cloning_train_on_it(demo, tmp_path):
     )
     learn(tmp_path, settings)
     assert curve(tmp_path, "Policy/Gail Reward")
-    # it tells the recorded policy from the new one
-    assert curve(tmp_path, "Policy/GAIL Expert Estimate")[-1] > curve(tmp_path, "Policy/GAIL Policy Estimate")[-1]
-    # cloning has got nearer to the policy
-    losses = curve(tmp_path, "Losses/Pretraining Loss")
-    assert losses[-1] < losses[0], losses
+    # the discriminator learns to tell the recorded policy from the new one, and cloning gets nearer to it
+    for tag in ("Losses/GAIL Loss", "Losses/Pretraining Loss"):
+        losses = curve(tmp_path, tag)
+        assert losses[-1] < losses[0], (tag, losses)
