@@ -196,12 +196,7 @@ fn features_that_are_not_here_are_refused() {
             "network_settings: {memory: {memory_size: 128}}",
             "network_settings.memory: recurrent memory is not supported",
         ),
-        (
-            "reward_signals: {extrinsic: {}, curiosity: {strength: 0.1}}",
-            "reward_signals.curiosity: curiosity is not supported",
-        ),
         ("reward_signals: {extrinsic: {}, gail: {demo_path: x}}", "imitation by GAIL is not supported"),
-        ("reward_signals: {extrinsic: {}, rnd: {}}", "random network distillation is not supported"),
         (
             "reward_signals: {curiosity: {strength: 0}}",
             "training without the task's own reward is not supported; found nothing",
@@ -236,7 +231,15 @@ fn features_that_are_not_here_are_refused() {
         "Hopper:\n  use_recurrent: true\n",
         "2: Hopper.use_recurrent: recurrent memory is not supported; found 'true'",
     );
-    refuse_with("Hopper:\n  use_curiosity: true\n", "or 'marathon: {without: [curiosity]}' beside it");
+    refuse_with("Hopper:\n  use_recurrent: true\n", "or 'marathon: {without: [memory]}' beside it");
+    refuse_with(
+        "behaviors: {Hopper: {reward_signals: {extrinsic: {}, rnd: {strenght: 1}}}}",
+        "did you mean 'strength'?",
+    );
+    refuse_with(
+        "behaviors: {Hopper: {trainer_type: acktr, reward_signals: {extrinsic: {}, rnd: {}}}}",
+        "signals is rnd, expected none with acktr; ppo and a2c take them",
+    );
 }
 
 #[test]

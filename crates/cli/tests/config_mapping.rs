@@ -5,7 +5,7 @@
 mod config;
 
 use config::{Loaded, default_for, parse};
-use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Schedule};
+use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Schedule, Signal, SignalKind};
 use std::path::{Path, PathBuf};
 
 fn read(text: &str, agent: &str) -> Loaded {
@@ -139,6 +139,8 @@ fn every_key_of_marathon_counts() {
     let expected = PpoConfig {
         algorithm: Algorithm::Ppo,
         rollouts: 1,
+        reward_strength: 1.0,
+        signals: Vec::new(),
         agents: 48,
         horizon: 7,
         minibatches: 6,
@@ -400,4 +402,28 @@ behaviors:
     // the format of the paper calls it by another name
     let old = read("Hopper: {trainer: a2c, max_steps: 1e5}", "hopper").ppo;
     assert_eq!((old.algorithm.name(), old.total_steps, old.horizon), ("a2c", 1_600_000, 5));
+}
+
+#[test]
+fn rewards_for_novelty_have_streams_of_their_own() {
+    let text = "
+behaviors:
+  Hopper:
+    reward_signals:
+      extrinsic: {gamma: 0.98, strength: 0.5}
+      curiosity: {strength: 0.02, gamma: 0.95, learning_rate: 1e-3, network_settings: {hidden_units: 256, num_layers: 1}}
+      rnd: {encoding_size: 64}
+";
+    let ppo = read(text, "hopper").ppo;
+    let curiosity = Signal { kind: SignalKind::Curiosity, strength: 0.02, gamma: 0.95, hidden: vec![256], lr: 1e-3 };
+    let rnd = Signal { kind: SignalKind::Rnd, strength: 1.0, gamma: 0.99, hidden: vec![64, 64], lr: 3e-4 };
+    assert_eq!(ppo.signals, [curiosity, rnd]);
+    assert_eq!((ppo.gamma, ppo.reward_strength), (0.98, 0.5));
+    // the paper's own way
+    let text = "Hopper: {use_curiosity: true, curiosity_strength: 0.01, curiosity_enc_size: 256, gamma: 0.995}";
+    let old = read(text, "hopper");
+    let curiosity =
+        Signal { strength: 0.01, gamma: 0.995, hidden: vec![256, 256], ..Signal::new(SignalKind::Curiosity) };
+    assert_eq!(old.ppo.signals, [curiosity]);
+    assert!(old.notes[0].contains("a value stream of its own"), "{:?}", old.notes);
 }

@@ -12,7 +12,7 @@
 
 use crate::f32_lanes;
 use crate::loss::{LossSums, Objective};
-use crate::run::Update;
+use crate::run::{NETWORKS, Update};
 use marathon_physics::lanes::{Isa, Kernel, Real};
 use serde::{Deserialize, Serialize};
 
@@ -63,21 +63,24 @@ fn step(update: &mut Update<'_>, settings: &A2c, sums: &LossSums) {
     let (run, learner) = (update.run, &mut *update.learner);
     // the gradient at hand is that of (V - R)^2 / 2
     let weight = [1.0, 2.0 * settings.value_coef];
-    let [policy, value] = run.squares();
+    let [policy, value, ..] = run.squares();
     let norm = (policy + weight[1] * weight[1] * value).sqrt() / sums.samples;
     if !norm.is_finite() {
         learner.skipped += 1;
         return;
     }
     let bound = (run.config.max_grad_norm / norm).min(1.0) / sums.samples;
-    let lr = learner.lr;
+    // each signal has a rate of its own, and its gradient is not bounded
+    let mut lr = [learner.lr; NETWORKS];
+    lr[2..].iter_mut().zip(&run.config.signals).for_each(|(lr, signal)| *lr = signal.lr);
     run.pieces(|range, gradient| {
+        let net = run.layout.network(&range);
         let rms = RmsProp {
             params: &mut learner.params[range.clone()],
             mean_square: &mut learner.adam.v[range.clone()],
             gradient,
-            scale: (bound * weight[run.layout.network(&range)]) as f32,
-            lr: lr as f32,
+            scale: (if net < 2 { bound * weight[net] } else { 1.0 / sums.samples }) as f32,
+            lr: lr[net] as f32,
             decay: settings.rms_decay,
             epsilon: settings.rms_epsilon,
         };

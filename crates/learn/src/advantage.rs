@@ -2,21 +2,23 @@
 //! estimation", 2016), sixteen agents at a time.
 
 use crate::rollout::{Acting, Rewards, Rollout};
+use crate::signal::MAX_SIGNALS;
 use crate::{BLOCK, f32_lanes};
 use marathon_physics::lanes::{Kernel, Real};
 use std::marker::PhantomData;
 
-/// The two discounts.
+/// The discounts.
 #[derive(Clone, Copy, Debug)]
 pub struct Discounts {
-    /// Discount of rewards per decision.
-    pub gamma: f64,
+    /// Discount of rewards per decision, for each stream of rewards.
+    pub gamma: [f64; 1 + MAX_SIGNALS],
     /// Decay of the estimator.
     pub lambda: f64,
 }
 
 /// Fills the advantages `A = sum (gamma lambda)^k delta_{t+k}` with `delta_t = r_t + gamma V_{t+1} - V_t`, broken off
-/// where an episode ends, the value targets `A + V`, and their sums.
+/// where an episode ends, the value targets `A + V`, and their sums. With several streams of rewards, each has its own
+/// values, and the advantages of all are added up.
 pub fn estimate(acting: &Acting<'_>, rollout: &mut Rollout) {
     let mut rows = rollout.rewards();
     f32_lanes!(acting.isa, T => <T as Real>::enter(Estimate::<T> {
@@ -26,19 +28,25 @@ pub fn estimate(acting: &Acting<'_>, rollout: &mut Rollout) {
     }));
     let blocks = rows.sums.len();
     for (b, sums) in rows.sums.iter_mut().enumerate() {
-        let (mut a, mut aa, mut r, mut rr) = (0.0, 0.0, 0.0, 0.0);
+        let (mut a, mut aa, mut r, mut rr, mut e, mut ee) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for item in (b..rows.done.len()).step_by(blocks) {
-            let row = item * BLOCK..(item + 1) * BLOCK;
-            for (advantage, target) in rows.advantage[row.clone()].iter().zip(&rows.target[row]) {
+            let row = item * rows.streams * BLOCK..(item * rows.streams + 1) * BLOCK;
+            let of_task = rows.target[row.clone()].iter().zip(&rows.value[row]);
+            for (advantage, (target, value)) in rows.advantage[item * BLOCK..(item + 1) * BLOCK].iter().zip(of_task) {
                 let (advantage, target) = (*advantage as f64, *target as f64);
                 a += advantage;
                 aa += advantage * advantage;
                 r += target;
                 rr += target * target;
+                // the error of a value is its advantage, which is not known by itself where there are several
+                let error = if rows.streams == 1 { advantage } else { target - *value as f64 };
+                e += error;
+                ee += error * error;
             }
         }
         sums.advantages = (a, aa);
         sums.targets = (r, rr);
+        sums.errors = (e, ee);
     }
 }
 
@@ -54,20 +62,26 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
     #[inline(always)]
     fn run(self) {
         let rows = self.rows;
-        let (gamma, decay) = (T::lit(self.discounts.gamma), T::lit(self.discounts.gamma * self.discounts.lambda));
-        let blocks = rows.sums.len();
-        for b in 0..blocks {
+        let (blocks, streams) = (rows.sums.len(), rows.streams);
+        for (b, stream) in (0..blocks).flat_map(|b| (0..streams).map(move |stream| (b, stream))) {
+            let gamma = self.discounts.gamma[stream];
+            let (gamma, decay) = (T::lit(gamma), T::lit(gamma * self.discounts.lambda));
             for lane in (0..BLOCK).step_by(T::LANES) {
-                let mut next = T::load(&rows.last_value[b * BLOCK + lane..]);
+                let mut next = T::load(&rows.last_value[(b * streams + stream) * BLOCK + lane..]);
                 let mut advantage = T::zero();
                 for item in (b..rows.done.len()).step_by(blocks).rev() {
-                    let at = item * BLOCK + lane;
+                    let at = (item * streams + stream) * BLOCK + lane;
                     // bits above the lanes of this vector are ignored
                     let goes_on = T::not(T::from_bits(rows.done[item] as u32 >> lane));
                     let value = T::load(&rows.value[at..]);
                     let delta = T::masked(goes_on, next).mul_add(gamma, T::load(&rows.reward[at..]) - value);
                     advantage = T::masked(goes_on, advantage).mul_add(decay, delta);
-                    advantage.store(&mut rows.advantage[at..]);
+                    let total = &mut rows.advantage[item * BLOCK + lane..];
+                    if stream == 0 {
+                        advantage.store(total)
+                    } else {
+                        (T::load(total) + advantage).store(total)
+                    }
                     (advantage + value).store(&mut rows.target[at..]);
                     next = value;
                 }
@@ -119,6 +133,7 @@ mod tests {
         for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
             let (mut advantage, mut target) = (vec![0.0; items * BLOCK], vec![0.0; items * BLOCK]);
             let mut rows = Rewards {
+                streams: 1,
                 reward: &reward,
                 value: &value,
                 last_value: &last_value,
@@ -127,7 +142,7 @@ mod tests {
                 target: &mut target,
                 sums: &mut vec![BlockSums::default(); blocks],
             };
-            let discounts = Discounts { gamma, lambda };
+            let discounts = Discounts { gamma: [gamma; 1 + MAX_SIGNALS], lambda };
             f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> { rows: &mut rows, discounts, lanes: PhantomData }));
             for (b, lane) in [(0, 0), (1, 5), (2, 15)] {
                 let pick =

@@ -10,7 +10,7 @@ use crate::kfac::Kfac;
 use crate::learner::Learner;
 use crate::normalize::Moments;
 use crate::run::{Clocks, Run};
-use crate::{Algorithm, Error, PpoConfig};
+use crate::{Algorithm, Error, PpoConfig, Signal};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -61,6 +61,12 @@ struct StateFile {
     name: String,
     bytes: u64,
     checksum: String,
+}
+
+/// The signals of a configuration, as far as a run cannot change them on its way.
+fn signals(config: &PpoConfig) -> String {
+    let of = |s: &Signal| format!("{} {:?}", s.kind.name(), s.hidden);
+    config.signals.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 impl Checkpoint {
@@ -127,6 +133,7 @@ impl Checkpoint {
             ("seed", old.seed.to_string(), new.seed.to_string()),
             ("actor_hidden", format!("{:?}", old.actor_hidden), format!("{:?}", new.actor_hidden)),
             ("critic_hidden", format!("{:?}", old.critic_hidden), format!("{:?}", new.critic_hidden)),
+            ("signals", signals(old), signals(new)),
             ("activation", old.activation.name().into(), new.activation.name().into()),
         ];
         let mismatch = |what: &str, found: String, expected: String| {

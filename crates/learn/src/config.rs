@@ -1,6 +1,6 @@
 //! The trainer's configuration.
 
-use crate::{A2c, Acktr, Activation, BLOCK, Error};
+use crate::{A2c, Acktr, Activation, BLOCK, Error, Signal};
 use serde::{Deserialize, Serialize};
 
 /// How the policy's learning rate moves.
@@ -89,6 +89,10 @@ pub struct PpoConfig {
 
     /// Discount per decision.
     pub gamma: f64,
+    /// Factor of the task's reward, which matters beside those of signals.
+    pub reward_strength: f64,
+    /// Rewards for novelty beside the task's own, each kind at most once; with PPO and A2C.
+    pub signals: Vec<Signal>,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
     /// Clip range of the probability ratio at the start.
@@ -149,6 +153,8 @@ impl Default for PpoConfig {
             lr_range: [1e-5, 3e-3],
             max_grad_norm: 1.0,
             gamma: 0.99,
+            reward_strength: 1.0,
+            signals: Vec::new(),
             gae_lambda: 0.95,
             clip: 0.2,
             final_clip: None,
@@ -240,6 +246,7 @@ impl PpoConfig {
             return Err(Error::config("agents * horizon", items.saturating_mul(BLOCK), "at most 2^31 samples"));
         }
         self.validate_algorithm()?;
+        self.validate_signals()?;
         let counts = [
             ("horizon", self.horizon),
             ("rollouts", self.rollouts),
@@ -263,6 +270,7 @@ impl PpoConfig {
         let positive = [
             ("lr", self.lr),
             ("value_lr", self.value_lr),
+            ("reward_strength", self.reward_strength),
             ("target_kl", self.target_kl),
             ("final_target_kl", self.final_target_kl.unwrap_or(self.target_kl)),
             ("max_grad_norm", self.max_grad_norm),
@@ -309,6 +317,37 @@ impl PpoConfig {
         }
         Ok(())
     }
+    fn validate_signals(&self) -> Result<(), Error> {
+        for (i, signal) in self.signals.iter().enumerate() {
+            let name = signal.kind.name();
+            if self.signals[..i].iter().any(|other| other.kind == signal.kind) {
+                return Err(Error::config("signals", format!("{name} twice"), "each kind once"));
+            }
+            if let Algorithm::Acktr(_) = self.algorithm {
+                return Err(Error::config("signals", name, "none with acktr; ppo and a2c take them"));
+            }
+            for (field, x) in [("signals: strength", signal.strength), ("signals: lr", signal.lr)] {
+                if !(x.is_finite() && x > 0.0) {
+                    return Err(Error::config(field, x, "a positive number"));
+                }
+            }
+            if !(0.0..=1.0).contains(&signal.gamma) {
+                return Err(Error::config("signals: gamma", signal.gamma, "a number between 0 and 1"));
+            }
+            if signal.hidden.is_empty()
+                || signal.hidden.len() > 64
+                || signal.hidden.iter().any(|w| !(1..=4096).contains(w))
+            {
+                return Err(Error::config(
+                    "signals: hidden",
+                    format!("{:?}", signal.hidden),
+                    "1 to 64 widths between 1 and 4096",
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Checks what is the algorithm's own, and what it demands of the rest.
     fn validate_algorithm(&self) -> Result<(), Error> {
         let positive = |field, x: f64| match x.is_finite() && x > 0.0 {

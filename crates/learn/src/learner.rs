@@ -7,9 +7,10 @@ use crate::adam::Adam;
 use crate::advantage::Discounts;
 use crate::gaussian::Gaussian;
 use crate::mlp::Mlp;
-use crate::noise::{PARAMETERS, SplitMix};
+use crate::noise::{PARAMETERS, SIGNALS, SplitMix};
 use crate::normalize::{Moments, Normalizer};
 use crate::rollout::{Acting, BlockSums, Rollout};
+use crate::signal::{MAX_SIGNALS, SignalNets};
 use crate::{Algorithm, BLOCK, PpoConfig, init};
 use marathon_envs::Spec;
 use marathon_physics::lanes::Isa;
@@ -27,8 +28,10 @@ pub struct Layout {
     pub critic: Mlp,
     /// Logarithms of the standard deviations, after the policy network's parameters.
     pub log_std: Range<usize>,
-    /// First parameter of the value network.
+    /// First parameter of the value network, which has an output for each stream of rewards.
     pub critic_start: usize,
+    /// Networks of the reward signals, with the places of their parameters, which follow.
+    pub signals: Vec<(SignalNets, Range<usize>)>,
     /// Length of the array.
     pub len: usize,
 }
@@ -38,11 +41,18 @@ impl Layout {
     pub fn new(spec: &Spec, config: &PpoConfig) -> Self {
         let sizes = |hidden: &[usize], out| [&[spec.obs], hidden, &[out]].concat();
         let actor = Mlp::new(&sizes(&config.actor_hidden, spec.act), config.activation);
-        let critic = Mlp::new(&sizes(&config.critic_hidden, 1), config.activation);
+        let critic = Mlp::new(&sizes(&config.critic_hidden, 1 + config.signals.len()), config.activation);
         let log_std = actor.len()..actor.len() + spec.act;
         let critic_start = log_std.end.next_multiple_of(BLOCK);
-        let len = (critic_start + critic.len()).next_multiple_of(BLOCK);
-        Self { actor, critic, log_std, critic_start, len }
+        let mut len = (critic_start + critic.len()).next_multiple_of(BLOCK);
+        let mut signals = Vec::new();
+        for (i, signal) in config.signals.iter().enumerate() {
+            let nets = SignalNets::new(spec, signal, &mut SplitMix::new(config.seed, SIGNALS + 2 * i as u64));
+            let place = len..len + nets.count();
+            len = place.end.next_multiple_of(BLOCK);
+            signals.push((nets, place));
+        }
+        Self { actor, critic, log_std, critic_start, signals, len }
     }
     /// The policy network's parameters.
     pub fn actor_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
@@ -52,14 +62,23 @@ impl Layout {
     pub fn critic_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
         &params[self.critic_start..self.critic_start + self.critic.len()]
     }
-    /// Which network a piece of the array is in: 0 for the policy, 1 for the value function.
-    pub fn network(&self, piece: &Range<usize>) -> usize {
-        (piece.start >= self.critic_start) as usize
+    /// Streams of rewards: the task's and one for each signal.
+    pub fn streams(&self) -> usize {
+        1 + self.signals.len()
     }
-    /// Pieces of the array whose squares are summed together, none of them in both networks.
+    /// Where each network's parameters begin: the policy's, the value function's, the signals'.
+    fn starts(&self) -> impl Iterator<Item = usize> + '_ {
+        [0, self.critic_start].into_iter().chain(self.signals.iter().map(|(_, place)| place.start))
+    }
+    /// Which network a piece of the array is in: 0 for the policy, 1 for the value function, then the signals.
+    pub fn network(&self, piece: &Range<usize>) -> usize {
+        self.starts().filter(|start| *start <= piece.start).count() - 1
+    }
+    /// Pieces of the array whose squares are summed together, none of them in two networks.
     pub fn norm_blocks(&self) -> Vec<Range<usize>> {
         let cut = |r: Range<usize>| r.clone().step_by(NORM_BLOCK).map(move |i| i..(i + NORM_BLOCK).min(r.end));
-        cut(0..self.critic_start).chain(cut(self.critic_start..self.len)).collect()
+        let ends = self.starts().skip(1).chain([self.len]);
+        self.starts().zip(ends).flat_map(|(start, end)| cut(start..end)).collect()
     }
 }
 
@@ -92,6 +111,9 @@ impl Learner {
         init::orthogonal(&layout.actor, &mut params, 0.01, &mut random);
         init::orthogonal(&layout.critic, &mut params[layout.critic_start..], 1.0, &mut random);
         params[layout.log_std.clone()].fill(config.init_log_std as f32);
+        for (i, (nets, place)) in layout.signals.iter().enumerate() {
+            nets.init(&mut params[place.clone()], &mut SplitMix::new(config.seed, SIGNALS + 2 * i as u64 + 1));
+        }
         let mut adam = Adam::new(layout.len);
         if let Algorithm::A2c(_) = config.algorithm {
             // its mean square starts at 1, or the first steps would be ten times the rate
@@ -131,14 +153,19 @@ impl Learner {
 
     /// Lets `f` act with what has been learned.
     pub fn acting<R>(&self, isa: Isa, layout: &Layout, config: &PpoConfig, f: impl FnOnce(&Acting<'_>) -> R) -> R {
+        let mut gamma = [config.gamma; 1 + MAX_SIGNALS];
+        gamma[1..].iter_mut().zip(&config.signals).for_each(|(gamma, signal)| *gamma = signal.gamma);
+        let signals = layout.signals.iter().zip(&config.signals);
+        let signals = signals.map(|((nets, place), s)| (nets, &self.params[place.clone()], s.strength));
         f(&Acting {
             isa,
             actor: (&layout.actor, layout.actor_params(&self.params)),
             critic: (&layout.critic, layout.critic_params(&self.params)),
             gaussian: &self.gaussian(layout),
             normalizer: &self.normalizer(config),
-            discounts: Discounts { gamma: config.gamma, lambda: config.gae_lambda },
-            reward_scale: self.reward_scale(config),
+            signals: signals.collect(),
+            discounts: Discounts { gamma, lambda: config.gae_lambda },
+            reward_scale: self.reward_scale(config) * config.reward_strength,
             return_center: self.returns.mean[0] as f32,
         })
     }
@@ -183,10 +210,9 @@ impl Totals {
     pub fn advantage(&self) -> (f64, f64) {
         self.moments(self.sums.advantages)
     }
-    /// Part of the variance of the value targets that the value function had foreseen.
+    /// Part of the variance of the value targets of the task's reward that the value function had foreseen.
     pub fn explained_variance(&self) -> f64 {
-        // the error of a value is its advantage
-        1.0 - self.advantage().1 / self.moments(self.sums.targets).1.max(1e-12)
+        1.0 - self.moments(self.sums.errors).1 / self.moments(self.sums.targets).1.max(1e-12)
     }
     fn moments(&self, (sum, square): (f64, f64)) -> (f64, f64) {
         let mean = sum / self.samples;

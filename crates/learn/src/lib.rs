@@ -25,7 +25,7 @@
 //!
 //! `ppo`, `a2c` and `acktr` are the algorithms: what each does with a rollout, from top to bottom. `run` is around them:
 //! threads, iterations, reports. They stand on `rollout` (acting), `advantage` (returns), [`loss`] (the objective), [`mlp`]
-//! with `tiles` (networks), `adam` (the optimizer), [`kfac`] (the Fisher matrix) and `normalize` (statistics); `learner`
+//! with `tiles` (networks), `adam` (the optimizer), [`kfac`] (the Fisher matrix), [`signal`] (rewards for novelty) and `normalize` (statistics); `learner`
 //! holds what learning changes.
 //!
 //! # Example
@@ -56,6 +56,7 @@ pub mod buffer;
 mod checkpoint;
 mod clock;
 mod config;
+pub mod curiosity;
 mod error;
 mod eval;
 mod files;
@@ -72,8 +73,10 @@ mod onnx;
 mod policy;
 mod ppo;
 mod remote;
+pub mod rnd;
 mod rollout;
 mod run;
+pub mod signal;
 mod sync;
 mod tiles;
 
@@ -91,6 +94,7 @@ pub use observer::{Control, IterationStats, Observer, Snapshot};
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
 pub use remote::{Deliver, Player, Players};
 pub use run::{TrainOutput, train, train_with};
+pub use signal::{Signal, SignalKind};
 
 /// Runs `$body` with `$T` bound to the single-precision lane type of an `Isa`.
 macro_rules! f32_lanes {

@@ -38,9 +38,9 @@ pub struct Samples<'a, S> {
     pub log_prob: &'a [S],
     /// Advantages, not normalized.
     pub advantage: &'a [S],
-    /// Values then.
+    /// Values then, `[stream][16]`.
     pub value: &'a [S],
-    /// Returns that the value function learns.
+    /// Returns that the value function learns, `[stream][16]`.
     pub target: &'a [S],
 }
 
@@ -49,7 +49,7 @@ pub struct Samples<'a, S> {
 pub struct LossSums {
     /// Policy objective without the entropy.
     pub policy: f64,
-    /// Value objective.
+    /// Value objective, over all streams.
     pub value: f64,
     /// Estimate of the divergence from the policy that acted, `r - 1 - ln r`.
     pub kl: f64,
@@ -135,22 +135,24 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
                     (d_lp.mul_add(z.mul_add(z, -one), T::load(row)) - entropy_coef).store(row);
                 }
 
-                // value
-                let (v, target) = (T::load(&value[lane..]), T::load(&s.target[lane..]));
-                let mut error = v - target;
-                let mut d = error;
-                if let Some(range) = objective.value_clip {
-                    let (old, range) = (T::load(&s.value[lane..]), T::lit(range));
-                    let moved = v - old;
-                    let held = old + moved.max(-range).min(range);
-                    let held_error = held - target;
-                    let worse = (error * error).lt(held_error * held_error);
-                    // the held value does not move with the network outside the range
-                    d = T::select(worse, T::masked(moved.abs().lt(range), held_error), error);
-                    error = T::select(worse, held_error, error);
+                // values of all streams
+                for at in (lane..value.len()).step_by(BLOCK) {
+                    let (v, target) = (T::load(&value[at..]), T::load(&s.target[at..]));
+                    let mut error = v - target;
+                    let mut d = error;
+                    if let Some(range) = objective.value_clip {
+                        let (old, range) = (T::load(&s.value[at..]), T::lit(range));
+                        let moved = v - old;
+                        let held = old + moved.max(-range).min(range);
+                        let held_error = held - target;
+                        let worse = (error * error).lt(held_error * held_error);
+                        // the held value does not move with the network outside the range
+                        d = T::select(worse, T::masked(moved.abs().lt(range), held_error), error);
+                        error = T::select(worse, held_error, error);
+                    }
+                    value_sum[part] = (error * T::lit(0.5)).mul_add(error, value_sum[part]);
+                    d.store(&mut d_value[at..]);
                 }
-                value_sum[part] = (error * T::lit(0.5)).mul_add(error, value_sum[part]);
-                d.store(&mut d_value[lane..]);
             }
         }
         for (d, row) in d_log_std.iter_mut().zip(rows.iter()) {

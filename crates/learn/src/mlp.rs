@@ -198,6 +198,18 @@ impl Mlp {
         }
     }
 
+    /// Overwrites `dx` with the derivative of the loss with respect to the input, after [`Mlp::backward_on`].
+    pub fn input_delta_on<T: Real>(
+        &self,
+        params: &[T::Scalar],
+        tape: &Tape<T::Scalar>,
+        dx: &mut Blocks<T::Scalar>,
+        blocks: usize,
+    ) {
+        let w = &params[self.layers[0].weights.clone()];
+        T::enter(Transposed::<T> { w, dy: &tape.deltas[0], dx, blocks });
+    }
+
     /// The layers and their places among the second moments.
     pub fn moments(&self) -> impl Iterator<Item = LayerMoments> + '_ {
         let mut end = 0;

@@ -13,6 +13,8 @@ const ACTIONS: u64 = 1 << 62;
 pub const SHUFFLES: u64 = 1 << 63;
 /// Initial parameters.
 pub const PARAMETERS: u64 = 3 << 61;
+/// Initial parameters of reward signals; two streams for each.
+pub const SIGNALS: u64 = PARAMETERS + 1;
 
 /// SplitMix64: a stream of well-mixed words from any seed.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! What a caller sees of a run, and how it takes part.
 
+use crate::SignalKind;
 use crate::checkpoint::Checkpoint;
 use crate::learner::Learner;
 use crate::policy::Policy;
@@ -55,6 +56,9 @@ pub struct IterationStats {
     pub lr: f64,
     /// Minibatches left out in the whole run because their gradient was not finite.
     pub skipped_minibatches: u64,
+    /// Mean reward of each signal per decision, in the order of the configuration.
+    #[serde(default)]
+    pub signal_rewards: Vec<(SignalKind, f64)>,
 }
 
 /// What an observer wants.

@@ -6,7 +6,7 @@
 use crate::Schedule;
 use crate::loss::{LossSums, Objective};
 use crate::noise::{SHUFFLES, SplitMix};
-use crate::run::{Update, share};
+use crate::run::{NETWORKS, Update, share};
 
 /// All epochs over one rollout.
 pub fn update(mut update: Update<'_>) {
@@ -55,7 +55,10 @@ fn step(update: &mut Update<'_>, sums: &LossSums) {
 
     learner.adam.advance();
     let value_lr = if config.schedule == Schedule::Linear { learner.lr / config.lr } else { 1.0 } * config.value_lr;
-    let lr = [learner.lr, value_lr];
+    // each signal has a rate of its own
+    let mut lr = [0.0; NETWORKS];
+    lr[..2].copy_from_slice(&[learner.lr, value_lr]);
+    lr[2..].iter_mut().zip(&config.signals).for_each(|(lr, signal)| *lr = signal.lr);
     run.pieces(|range, gradient| {
         let net = run.layout.network(&range);
         learner.adam.update(isa, &mut learner.params, range, gradient, scale[net], lr[net]);

@@ -110,8 +110,8 @@ impl Player {
         Ok(Self {
             isa,
             learner: Learner::new(&layout, &spec, config),
-            actor: Actor::new(factory, place, config.seed, &layout.actor, &layout.critic),
-            rollout: Rollout::new(blocks.len(), config.horizon, spec.obs, spec.act),
+            actor: Actor::new(factory, place, config.seed, &layout),
+            rollout: Rollout::new(blocks.len(), config.horizon, (spec.obs, spec.act), 1 + config.signals.len()),
             config: config.clone(),
             spec,
             layout,
@@ -183,7 +183,7 @@ impl<'a> Remote<'a> {
         spec: &Spec,
         actors: &[Mutex<Actor>],
         rollouts: &[RwLock<Rollout>],
-        horizon: usize,
+        config: &PpoConfig,
     ) -> Option<Spent> {
         let locked = || actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
         let mut orders = TensorWriter::default();
@@ -208,7 +208,7 @@ impl<'a> Remote<'a> {
                 expected: format!("one below {}", slices.len()),
             };
             let blocks = slices.get(i).ok_or_else(none)?.len();
-            answers[i] = Some(Answer::read(bytes, spec, blocks, horizon)?);
+            answers[i] = Some(Answer::read(bytes, spec, blocks, config)?);
             Ok(())
         });
         if control == Control::Stop {
@@ -254,18 +254,19 @@ struct Answer {
 }
 
 impl Answer {
-    fn read(bytes: &[u8], spec: &Spec, blocks: usize, horizon: usize) -> Result<Self, Error> {
+    fn read(bytes: &[u8], spec: &Spec, blocks: usize, config: &PpoConfig) -> Result<Self, Error> {
+        let signals = config.signals.len();
         let file = Message::Rollout.open(bytes)?;
-        let mut rollout = Rollout::new(blocks, horizon, spec.obs, spec.act);
-        read_rollout(&mut rollout, &file, spec)?;
+        let mut rollout = Rollout::new(blocks, config.horizon, (spec.obs, spec.act), 1 + signals);
+        read_rollout(&mut rollout, &file, spec, signals)?;
         let agents = Agents::read(&file)?;
         agents.check(Message::Rollout.format(), blocks, spec.obs)?;
         Ok(Self { rollout, agents, seconds: file.get("seconds", &[2])? })
     }
 }
 
-/// Numbers of a block's sums, except for its reward terms and observations.
-const SUMS: usize = 12;
+/// Numbers of a block's sums, except for its observations, reward terms and signals.
+const SUMS: usize = 14;
 
 /// What a learner needs of a rollout.
 fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
@@ -274,20 +275,22 @@ fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
     }
     let sums = rollout.sums.iter().flat_map(|s| {
         let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged];
-        let pairs = [s.discounted, s.advantages, s.targets].into_iter().chain(s.observations.iter().copied());
-        scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(s.terms.iter().copied()).collect::<Vec<_>>()
+        let pairs = [s.discounted, s.advantages, s.targets, s.errors].into_iter().chain(s.observations.iter().copied());
+        let rest = s.terms.iter().chain(&s.signals).copied();
+        scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(rest).collect::<Vec<_>>()
     });
     file.list("sums", &sums.collect::<Vec<f64>>());
 }
 
-fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec) -> Result<(), Error> {
+fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, signals: usize) -> Result<(), Error> {
     for (name, rows) in rollout.rows_mut() {
         rows.copy_from_slice(&file.get::<f32>(name, &[rows.len()])?);
     }
-    let row = SUMS + 2 * spec.obs + spec.reward_terms.len();
+    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + signals;
     let sums: Vec<f64> = file.get("sums", &[rollout.blocks() * row])?;
     let read = |row: &[f64]| {
-        let (scalars, terms) = row.split_at(SUMS + 2 * spec.obs);
+        let (scalars, rest) = row.split_at(SUMS + 2 * spec.obs);
+        let (terms, signals) = rest.split_at(spec.reward_terms.len());
         let pair = |i: usize| (scalars[i], scalars[i + 1]);
         BlockSums {
             episodes: scalars[0],
@@ -299,8 +302,10 @@ fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec) -> 
             discounted: pair(6),
             advantages: pair(8),
             targets: pair(10),
+            errors: pair(12),
             observations: (0..spec.obs).map(|i| pair(SUMS + 2 * i)).collect(),
             terms: terms.to_vec(),
+            signals: signals.to_vec(),
         }
     };
     rollout.sums = sums.chunks_exact(row).map(read).collect();

@@ -8,10 +8,12 @@ use crate::advantage::{self, Discounts};
 use crate::buffer::{Aligned, Blocks};
 use crate::clock;
 use crate::gaussian::{Gaussian, Sample};
+use crate::learner::Layout;
 use crate::loss::Samples;
 use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::noise::Noise;
 use crate::normalize::{Normalize, Normalizer};
+use crate::signal::{SignalNets, SignalSpace, Step};
 use crate::{BLOCK, f32_lanes};
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use marathon_physics::lanes::{Isa, Real};
@@ -24,11 +26,20 @@ pub struct Acting<'a> {
     pub critic: (&'a Mlp, &'a [f32]),
     pub gaussian: &'a Gaussian<f32>,
     pub normalizer: &'a Normalizer,
+    /// Networks of the reward signals with their parameters, and the factors of their rewards.
+    pub signals: Vec<(&'a SignalNets, &'a [f32], f64)>,
     pub discounts: Discounts,
     /// Divides the rewards.
     pub reward_scale: f64,
     /// Center of the statistics of discounted returns.
     pub return_center: f32,
+}
+
+impl Acting<'_> {
+    /// Streams of rewards.
+    fn streams(&self) -> usize {
+        1 + self.signals.len()
+    }
 }
 
 /// Sums over the episodes that ended in a block, and over its rewards.
@@ -54,8 +65,12 @@ pub struct BlockSums {
     pub observations: Vec<(f64, f64)>,
     /// Advantages and their squares.
     pub advantages: (f64, f64),
-    /// Value targets and their squares.
+    /// Value targets of the task's reward and their squares.
     pub targets: (f64, f64),
+    /// Errors of the values against them, and their squares.
+    pub errors: (f64, f64),
+    /// Sum of each signal's reward over the rollout.
+    pub signals: Vec<f64>,
 }
 
 impl BlockSums {
@@ -78,6 +93,9 @@ impl BlockSums {
         pair(&mut self.discounted, &other.discounted);
         pair(&mut self.advantages, &other.advantages);
         pair(&mut self.targets, &other.targets);
+        pair(&mut self.errors, &other.errors);
+        self.signals.resize(other.signals.len(), 0.0);
+        self.signals.iter_mut().zip(&other.signals).for_each(|(a, b)| *a += b);
     }
 }
 
@@ -90,18 +108,24 @@ pub struct Rollout {
     obs: Aligned<f32>,
     /// `[item][act][16]`.
     action: Aligned<f32>,
-    /// `[item][16]`, as are the following.
+    /// What was observed next, normalized, where a reward signal asks for it; else nothing.
+    next_obs: Aligned<f32>,
+    /// `[item][16]`.
     log_prob: Aligned<f32>,
+    advantage: Aligned<f32>,
+    /// `[item][stream][16]`.
     reward: Aligned<f32>,
     value: Aligned<f32>,
-    advantage: Aligned<f32>,
     target: Aligned<f32>,
+    /// Streams of rewards.
+    streams: usize,
     /// Agents whose episode ended with the item.
     done: Vec<u16>,
-    /// Truncated episodes: item, agents, and the normalized observation they were cut off at.
-    cut: Vec<(usize, u16)>,
+    /// Ended episodes whose last observation has a value: item, agents that were truncated, agents whose simulation did not
+    /// break, and the observation that they ended at. Without signals, truncated ones alone.
+    cut: Vec<(usize, [u16; 2])>,
     cut_obs: Vec<f32>,
-    /// Value of the observation after the last decision, `[block][16]`.
+    /// Value of the observation after the last decision, `[block][stream][16]`.
     last_value: Aligned<f32>,
     /// Per block.
     pub sums: Vec<BlockSums>,
@@ -109,24 +133,27 @@ pub struct Rollout {
 
 impl Rollout {
     /// Room for `horizon` decisions of `blocks` blocks.
-    pub fn new(blocks: usize, horizon: usize, obs_len: usize, act_len: usize) -> Self {
+    pub fn new(blocks: usize, horizon: usize, (obs_len, act_len): (usize, usize), streams: usize) -> Self {
         let items = blocks * horizon;
-        let row = || Aligned::rows(items);
+        let (row, stream_rows) = (|| Aligned::rows(items), || Aligned::rows(items * streams));
+        let next_items = if streams > 1 { items } else { 0 };
         Self {
             blocks,
             obs_len,
             act_len,
             obs: Aligned::rows(items * obs_len),
             action: Aligned::rows(items * act_len),
+            next_obs: Aligned::rows(next_items * obs_len),
             log_prob: row(),
-            reward: row(),
-            value: row(),
             advantage: row(),
-            target: row(),
+            reward: stream_rows(),
+            value: stream_rows(),
+            target: stream_rows(),
+            streams,
             done: vec![0; items],
             cut: Vec::new(),
             cut_obs: Vec::new(),
-            last_value: Aligned::rows(blocks),
+            last_value: Aligned::rows(blocks * streams),
             sums: Vec::new(),
         }
     }
@@ -143,9 +170,10 @@ impl Rollout {
         &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
     }
     /// What a learner needs to know, `[item][..][16]`, by name.
-    pub fn rows(&self) -> [(&'static str, &[f32]); 6] {
+    pub fn rows(&self) -> [(&'static str, &[f32]); 7] {
         [
             ("normalized_obs", &self.obs),
+            ("next_normalized_obs", &self.next_obs),
             ("action", &self.action),
             ("log_prob", &self.log_prob),
             ("value", &self.value),
@@ -154,9 +182,10 @@ impl Rollout {
         ]
     }
     /// The same, to be filled.
-    pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 6] {
+    pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 7] {
         [
             ("normalized_obs", &mut self.obs),
+            ("next_normalized_obs", &mut self.next_obs),
             ("action", &mut self.action),
             ("log_prob", &mut self.log_prob),
             ("value", &mut self.value),
@@ -179,12 +208,21 @@ impl Rollout {
     /// What the objective needs to know about an item.
     pub fn samples(&self, item: usize) -> Samples<'_, f32> {
         let row = item * BLOCK..(item + 1) * BLOCK;
+        let rows = item * self.streams * BLOCK..(item + 1) * self.streams * BLOCK;
         Samples {
             action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
             log_prob: &self.log_prob[row.clone()],
-            advantage: &self.advantage[row.clone()],
-            value: &self.value[row.clone()],
-            target: &self.target[row],
+            advantage: &self.advantage[row],
+            value: &self.value[rows.clone()],
+            target: &self.target[rows],
+        }
+    }
+    /// What the reward signals need to know about an item.
+    pub fn step(&self, item: usize) -> Step<'_, f32> {
+        Step {
+            obs: self.obs(item),
+            action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
+            next: &self.next_obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK],
         }
     }
 }
@@ -203,6 +241,7 @@ pub struct Actor {
     input: Blocks<f32>,
     tape: Tape<f32>,
     critic_tape: Tape<f32>,
+    signal_spaces: Vec<SignalSpace>,
     eps: Vec<[f32; BLOCK]>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
@@ -211,13 +250,7 @@ pub struct Actor {
 
 impl Actor {
     /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode.
-    pub fn new(
-        factory: &dyn ShardFactory,
-        (first_block, blocks): (usize, usize),
-        seed: u64,
-        actor: &Mlp,
-        critic: &Mlp,
-    ) -> Self {
+    pub fn new(factory: &dyn ShardFactory, (first_block, blocks): (usize, usize), seed: u64, layout: &Layout) -> Self {
         let n = factory.spec().obs * BLOCK;
         let mut shard = factory.shard(first_block, blocks, seed);
         let mut obs = Aligned::new(blocks * n);
@@ -231,9 +264,10 @@ impl Actor {
             obs,
             tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
-            input: actor.input(),
-            tape: actor.inference_tape(),
-            critic_tape: critic.inference_tape(),
+            input: layout.actor.input(),
+            tape: layout.actor.inference_tape(),
+            critic_tape: layout.critic.inference_tape(),
+            signal_spaces: layout.signals.iter().map(|(nets, _)| nets.space()).collect(),
             eps: vec![[0.0; BLOCK]; factory.spec().act],
             action: vec![0.0; blocks * factory.spec().act * BLOCK],
             out: BlockStep::default(),
@@ -279,7 +313,8 @@ impl Actor {
     pub fn collect(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) -> f64 {
         let blocks = self.blocks();
         let terms = self.shard.spec().reward_terms.len();
-        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], ..Default::default() }; blocks];
+        let signals = vec![0.0; acting.signals.len()];
+        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], signals, ..Default::default() }; blocks];
         rollout.cut.clear();
         rollout.cut_obs.clear();
         self.obs_sums.iter_mut().for_each(|s| s.fill(0.0));
@@ -297,6 +332,7 @@ impl Actor {
             env_seconds += clock::wall() - start;
         }
         self.add_up_observations(rollout);
+        self.reward_novelty(acting, rollout);
         self.evaluate(acting, rollout);
         advantage::estimate(acting, rollout);
         env_seconds
@@ -349,9 +385,9 @@ impl Actor {
         let [discounted, returns, lengths, distances] = &mut self.tallies;
         let (discounted, returns) = (&mut discounted[b], &mut returns[b]);
         let (lengths, distances) = (&mut lengths[b], &mut distances[b]);
-        let (gamma, center) = (acting.discounts.gamma as f32, acting.return_center);
+        let (gamma, center) = (acting.discounts.gamma[0] as f32, acting.return_center);
         let scale = acting.reward_scale as f32;
-        let reward = &mut rollout.reward[item * BLOCK..(item + 1) * BLOCK];
+        let reward = &mut rollout.reward[item * rollout.streams * BLOCK..][..BLOCK];
         let (mut first, mut second) = (0.0, 0.0);
         for i in 0..BLOCK {
             discounted[i] = discounted[i] * gamma + out.reward[i];
@@ -369,6 +405,17 @@ impl Actor {
             *sum += term.iter().map(|x| *x as f64).sum::<f64>();
         }
 
+        if !acting.signals.is_empty() {
+            f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
+                normalizer: acting.normalizer,
+                raw: obs,
+                input: &mut self.input,
+                copy: Some(&mut rollout.next_obs[item * obs_row..(item + 1) * obs_row]),
+                sums: None,
+                lanes: PhantomData,
+            }));
+        }
+
         // ended episodes
         let done = out.terminated | out.truncated | out.diverged;
         rollout.done[item] = done;
@@ -376,8 +423,9 @@ impl Actor {
             return;
         }
         let cut = out.truncated & !(out.terminated | out.diverged);
-        if cut != 0 {
-            rollout.cut.push((item, cut));
+        let whole = if acting.signals.is_empty() { cut } else { done & !out.diverged };
+        if whole != 0 {
+            rollout.cut.push((item, [cut, whole]));
             rollout.cut_obs.extend_from_slice(obs);
         }
         for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
@@ -403,22 +451,44 @@ impl Actor {
         }
     }
 
+    /// Rewards of the signals.
+    fn reward_novelty(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
+        let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
+        let mut rows = vec![0.0; CHUNK * BLOCK];
+        for (s, ((nets, params, strength), space)) in acting.signals.iter().zip(&mut self.signal_spaces).enumerate() {
+            // ML-Agents' bound: what a step gives is not worth more than 1
+            let (strength, most) = (*strength as f32, (1.0 / strength) as f32);
+            for first in (0..items).step_by(CHUNK) {
+                let n = CHUNK.min(items - first);
+                let steps: Vec<Step<'_, f32>> = (first..first + n).map(|item| rollout.step(item)).collect();
+                nets.reward(acting.isa, params, &steps, space, &mut rows);
+                for (item, row) in (first..first + n).zip(rows.chunks_exact(BLOCK)) {
+                    let out = &mut rollout.reward[(item * streams + 1 + s) * BLOCK..][..BLOCK];
+                    for (out, x) in out.iter_mut().zip(row) {
+                        *out = strength * Real::min(*x, most);
+                    }
+                    rollout.sums[item % blocks].signals[s] += out.iter().map(|x| *x as f64).sum::<f64>();
+                }
+            }
+        }
+    }
+
     /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
-    /// episodes.
+    /// episodes, and in the streams of signals to those of all.
     fn evaluate(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
         let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, .. } = rollout;
-        let row = *obs_len * BLOCK;
+        let (row, streams) = (*obs_len * BLOCK, acting.streams());
         // values of normalized observations
-        for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * BLOCK)) {
+        for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
             for (b, obs) in obs.chunks_exact(row).enumerate() {
                 self.input.block_mut(b).copy_from_slice(obs);
             }
             value_of_input(acting, &self.input, &mut self.critic_tape, value);
         }
         // values of raw ones
-        let mut cut_value = vec![0.0; cut.len() * BLOCK];
+        let mut cut_value = vec![0.0; cut.len() * streams * BLOCK];
         for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
-            for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * BLOCK)) {
+            for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
                 f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
                     normalizer: acting.normalizer,
                     raw,
@@ -430,26 +500,30 @@ impl Actor {
                 value_of_input(acting, &self.input, &mut self.critic_tape, value);
             }
         }
-        let gamma = acting.discounts.gamma as f32;
-        for ((item, agents), value) in cut.iter().zip(cut_value.chunks_exact(BLOCK)) {
-            for i in (0..BLOCK).filter(|i| agents >> i & 1 == 1) {
-                reward[item * BLOCK + i] += gamma * value[i];
+        for ((item, [truncated, whole]), values) in cut.iter().zip(cut_value.chunks_exact(streams * BLOCK)) {
+            let rewards = reward[item * streams * BLOCK..].chunks_exact_mut(BLOCK);
+            for (s, (reward, value)) in rewards.zip(values.chunks_exact(BLOCK)).enumerate() {
+                let (gamma, agents) = (acting.discounts.gamma[s] as f32, if s == 0 { truncated } else { whole });
+                for i in (0..BLOCK).filter(|i| agents >> i & 1 == 1) {
+                    reward[i] += gamma * value[i];
+                }
             }
         }
     }
 }
 
-/// Values of the first blocks of `input`, as many as `out` has rows.
+/// Values of the first blocks of `input`, as many as `out` has rows for.
 fn value_of_input(acting: &Acting<'_>, input: &Blocks<f32>, tape: &mut Tape<f32>, out: &mut [f32]) {
-    let n = out.len() / BLOCK;
-    acting.critic.0.forward(acting.isa, acting.critic.1, input, tape, n);
-    for (b, out) in out.chunks_exact_mut(BLOCK).enumerate() {
+    let row = acting.streams() * BLOCK;
+    acting.critic.0.forward(acting.isa, acting.critic.1, input, tape, out.len() / row);
+    for (b, out) in out.chunks_exact_mut(row).enumerate() {
         out.copy_from_slice(tape.output().block(b));
     }
 }
 
-/// Rows that the advantage estimator works on.
+/// Rows that the advantage estimator works on, as in [`Rollout`].
 pub struct Rewards<'a> {
+    pub streams: usize,
     pub reward: &'a [f32],
     pub value: &'a [f32],
     pub last_value: &'a [f32],
@@ -463,6 +537,7 @@ impl Rollout {
     /// What the advantage estimator reads and writes.
     pub fn rewards(&mut self) -> Rewards<'_> {
         Rewards {
+            streams: self.streams,
             reward: &self.reward,
             value: &self.value,
             last_value: &self.last_value,

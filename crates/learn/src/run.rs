@@ -25,6 +25,7 @@ use crate::mlp::{CHUNK, Tape};
 use crate::observer::{Control, IterationStats, Observer, Snapshot};
 use crate::remote::{Players, Remote, Spent};
 use crate::rollout::{Actor, Rollout};
+use crate::signal::{MAX_SIGNALS, SignalSpace};
 use crate::sync::Barrier;
 use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, f32_lanes, ppo};
 use marathon_envs::{ShardFactory, Spec};
@@ -36,6 +37,9 @@ use std::sync::{Mutex, RwLock, RwLockReadGuard};
 
 /// Most groups of a minibatch: bounds the memory for partial gradients and the threads that can share a minibatch.
 const MAX_GROUPS: usize = 32;
+
+/// Networks of a run at most: policy, value function, signals.
+pub const NETWORKS: usize = 2 + MAX_SIGNALS;
 
 /// What a finished run returns.
 #[derive(Debug)]
@@ -183,6 +187,7 @@ struct Workspace {
     input: Blocks<f32>,
     actor: Tape<f32>,
     critic: Tape<f32>,
+    signals: Vec<SignalSpace>,
     gradient: Vec<f32>,
     moments: Vec<f32>,
     rows: Vec<[f32; BLOCK]>,
@@ -205,8 +210,13 @@ impl<'a> Run<'a> {
         for id in 0..workers {
             let share = share(blocks, workers, id);
             let place = (share.start, share.len());
-            actors.push(Mutex::new(Actor::new(factory, place, config.seed, &layout.actor, &layout.critic)));
-            rollouts.push(RwLock::new(Rollout::new(share.len(), config.horizon, spec.obs, spec.act)));
+            actors.push(Mutex::new(Actor::new(factory, place, config.seed, &layout)));
+            rollouts.push(RwLock::new(Rollout::new(
+                share.len(),
+                config.horizon,
+                (spec.obs, spec.act),
+                layout.streams(),
+            )));
         }
         let largest = (0..config.minibatches).map(|m| share(item_count(config), config.minibatches, m).len()).max();
         let groups = group_count(largest.unwrap_or(1));
@@ -256,6 +266,7 @@ impl<'a> Run<'a> {
             input: actor.input(),
             actor: actor.tape(),
             critic: critic.tape(),
+            signals: self.layout.signals.iter().map(|(nets, _)| nets.space()).collect(),
             gradient: vec![0.0; self.layout.len],
             moments: vec![0.0; self.kfac.as_ref().map_or(0, Kfac::moments_len)],
             rows: vec![[0.0; BLOCK]; self.spec.act],
@@ -322,7 +333,7 @@ impl<'a> Run<'a> {
     fn collect(&self, id: usize, learner: &Learner, head: Option<&mut Head<'_, '_>>) -> Spent {
         if self.elsewhere {
             let Some(remote) = head.and_then(|head| head.remote.as_mut()) else { return Spent::default() };
-            let spent = remote.collect(learner, &self.spec, &self.actors, &self.rollouts, self.config.horizon);
+            let spent = remote.collect(learner, &self.spec, &self.actors, &self.rollouts, self.config);
             return spent.unwrap_or_else(|| {
                 self.stop.store(true, Ordering::Release);
                 Spent::default()
@@ -361,10 +372,10 @@ impl<'a> Run<'a> {
         learner.params[self.layout.log_std.clone()].iter_mut().for_each(|l| *l = l.clamp(low, high));
     }
 
-    /// Sums of the squares of the gradient that the last [`Update::gradient`] left: of the policy's part and of the
-    /// value function's.
-    pub fn squares(&self) -> [f64; 2] {
-        let mut squares = [0.0; 2];
+    /// Sums of the squares of the gradient that the last [`Update::gradient`] left: of the policy's part, of the value
+    /// function's, and of the signals'.
+    pub fn squares(&self) -> [f64; NETWORKS] {
+        let mut squares = [0.0; NETWORKS];
         let slices = self.slices.iter().map(|s| s.read().expect("no worker has panicked"));
         let all = slices.flat_map(|s| s.squares.clone());
         for (range, square) in self.norm_blocks.iter().zip(all) {
@@ -373,7 +384,7 @@ impl<'a> Run<'a> {
         squares
     }
 
-    /// Shows every piece of that gradient with its place among the parameters; no piece is in both networks.
+    /// Shows every piece of that gradient with its place among the parameters; no piece is in two networks.
     pub fn pieces(&self, mut show: impl FnMut(Range<usize>, &[f32])) {
         let mut ranges = self.norm_blocks.iter();
         for slice in &self.slices {
@@ -404,14 +415,20 @@ impl<'a> Run<'a> {
         partial.sums = LossSums::default();
         for (i, chunk) in chunks.enumerate() {
             let mut samples = [Samples { action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
-            let mut n = 0;
+            let (mut n, mut steps) = (0, Vec::new());
             for (rollout, item) in chunk {
                 space.input.block_mut(n).copy_from_slice(rollout.obs(item));
                 samples[n] = rollout.samples(item);
                 n += 1;
+                if !layout.signals.is_empty() {
+                    steps.push(rollout.step(item));
+                }
             }
             // the first chunk's gradient needs no sum
             let gradient = if i == 0 { &mut partial.gradient } else { &mut space.gradient };
+            for ((nets, place), space) in layout.signals.iter().zip(&mut space.signals) {
+                nets.gradient(isa, &learner.params[place.clone()], &steps, space, &mut gradient[place.clone()]);
+            }
             let (of_actor, of_critic) = gradient.split_at_mut(layout.critic_start);
             let (of_net, of_std) = of_actor.split_at_mut(layout.actor.len());
             layout.actor.forward(isa, actor, &space.input, &mut space.actor, n);
@@ -483,6 +500,7 @@ impl<'a> Run<'a> {
         let (sums, gaussian) = (&totals.sums, learner.gaussian(&self.layout));
         let per_episode = |x: f64| (sums.episodes > 0.0).then(|| x / sums.episodes);
         let per_sample = |x: f64| if means.samples > 0.0 { x / means.samples } else { 0.0 };
+        let signals = self.config.signals.iter().zip(&sums.signals);
         let worked = (seconds.collect + seconds.update).max(1e-12);
         let stats = IterationStats {
             iteration: learner.iteration,
@@ -507,6 +525,7 @@ impl<'a> Run<'a> {
             std_mean: gaussian.mean_std(),
             lr: learner.lr,
             skipped_minibatches: learner.skipped,
+            signal_rewards: signals.map(|(signal, x)| (signal.kind, x / totals.samples)).collect(),
         };
         let snapshot = Snapshot::new(self, head.learner, head.clocks);
         if head.observer.iteration(&stats, &snapshot) == Control::Stop {

@@ -6,7 +6,8 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_learn::{
-    Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, TrainOutput, train_with,
+    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, Signal, SignalKind,
+    TrainOutput, train_with,
 };
 use marathon_physics::lanes::Isa;
 
@@ -84,6 +85,28 @@ fn players_do_not_change_the_policy() {
         assert_eq!(bits(&got), bits(&want), "{slices} players, {threads} threads");
         assert_eq!(numbers(got.last.as_ref()), numbers(want.last.as_ref()));
     }
+}
+
+#[test]
+fn rewards_for_novelty_are_played_elsewhere_too() {
+    let signals = [SignalKind::Curiosity, SignalKind::Rnd];
+    let signals = signals.map(|kind| Signal { strength: 0.1, hidden: vec![11, 7], ..Signal::new(kind) }).to_vec();
+    let config = PpoConfig { signals, ..small_config() };
+    let want = run(None, &config, None);
+    let got = run(Some(&mut Team::new(&config, 3)), &config, None);
+    assert_eq!(bits(&got), bits(&want));
+    assert_eq!(numbers(got.last.as_ref()), numbers(want.last.as_ref()));
+}
+
+#[test]
+fn iterations_of_several_rollouts_can_be_given_up_halfway() {
+    let config = PpoConfig { algorithm: Algorithm::A2c(A2c::default()), rollouts: 2, ..small_config() };
+    let want = run(None, &config, None);
+    let mut team = Team::new(&config, 2);
+    team.until = 3;
+    let half = run(Some(&mut team), &config, None);
+    assert_eq!(half.checkpoint.iteration(), 3);
+    assert_eq!(bits(&run(None, &config, Some(half.checkpoint))), bits(&want));
 }
 
 #[test]

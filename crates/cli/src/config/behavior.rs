@@ -3,7 +3,7 @@
 use super::error::{ConfigError, nearest, shown};
 use super::names;
 use super::section::{Entry, Section};
-use marathon_learn::PpoConfig;
+use marathon_learn::{PpoConfig, Signal};
 use std::path::Path;
 
 /// The two formats of ML-Agents.
@@ -26,6 +26,8 @@ pub struct Behavior<'a> {
     pub network: Section<'a>,
     /// Of the reward that the task gives.
     pub extrinsic: Section<'a>,
+    /// Rewards for novelty.
+    pub signals: Vec<Signal>,
     pub marathon: Section<'a>,
     /// Whether steps are counted for each agent by itself, not for all together.
     pub steps_per_agent: bool,

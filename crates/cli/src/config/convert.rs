@@ -62,7 +62,8 @@ const MARATHON: [&str; 35] = [
 /// If a value is wrong, or the values do not go together.
 pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigError> {
     let settings = Settings::read(&behavior)?;
-    let Behavior { top, hyperparameters, marathon, mut notes, seed, base, .. } = behavior;
+    let Behavior { top, hyperparameters, marathon, mut notes, seed, base, signals, extrinsic, .. } = behavior;
+    let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
     marathon.only(&MARATHON)?;
 
     let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
@@ -117,6 +118,9 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         max_grad_norm: marathon.number("max_grad_norm", Range::Positive, base.max_grad_norm)?,
 
         gamma: settings.gamma,
+        // alone, its scale cancels
+        reward_strength: if signals.is_empty() { 1.0 } else { strength },
+        signals,
         gae_lambda: settings.lambd,
         clip: settings.epsilon,
         final_clip: match is_ppo {

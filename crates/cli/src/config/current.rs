@@ -49,7 +49,8 @@ const HYPERPARAMETERS: [&str; 11] = [
     "num_epoch",
     "shared_critic",
 ];
-const NETWORK: [&str; 8] = [
+/// Keys of a network's section.
+pub const NETWORK: [&str; 8] = [
     "normalize",
     "hidden_units",
     "num_layers",
@@ -123,7 +124,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         notes.ignored(&entry, "it is for agents in groups");
     }
 
-    let extrinsic = reward_signals(&top, &without, &mut notes)?;
+    let (extrinsic, signals) = reward_signals(&top, &without, &mut notes)?;
     refuse(top.set("self_play"), "self-play", "null")?;
     refuse(top.set("init_path"), "starting from another run", "null")?;
     if let Some(entry) = top.set("behavioral_cloning") {
@@ -141,6 +142,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         hyperparameters,
         network,
         extrinsic,
+        signals,
         marathon,
         steps_per_agent: false,
         seed,

@@ -2,9 +2,10 @@
 //! harmless.
 
 use super::behavior::Notes;
+use super::current::NETWORK;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
-use marathon_learn::{Activation, Algorithm, PpoConfig, Schedule};
+use marathon_learn::{Activation, Algorithm, PpoConfig, Schedule, Signal, SignalKind};
 
 /// Features that a file asks for and lets go again, under `marathon: without:`.
 pub struct Without<'a> {
@@ -36,17 +37,25 @@ impl<'a> Without<'a> {
         Ok(Without { names: names?, file_has_list: Some(entry) })
     }
 
+    /// Whether the file says that a feature that an entry asks for may be left out; then it is noted.
+    pub fn leaves_out(&self, name: &str, asks: &Entry<'_>, notes: &mut Notes) -> bool {
+        let Some((_, feature)) = FEATURES.into_iter().find(|(n, _)| *n == name && self.names.contains(n)) else {
+            return false;
+        };
+        let line = self.file_has_list.as_ref().map_or(0, |entry| entry.place.line);
+        notes.about(asks, &format!("asks for {feature}, which is left out as line {line} allows"));
+        true
+    }
+
     /// Refuses a feature that an entry asks for, or notes that it is left out.
     ///
     /// # Errors
     /// Unless the file itself says that the feature may be left out.
     pub fn feature(&self, name: &str, asks: &Entry<'_>, off: &str, notes: &mut Notes) -> Result<(), ConfigError> {
-        let (name, feature) = FEATURES.into_iter().find(|(n, _)| *n == name).expect("a feature of the table");
-        if self.names.contains(&name) {
-            let line = self.file_has_list.as_ref().map_or(0, |entry| entry.place.line);
-            notes.about(asks, &format!("asks for {feature}, which is left out as line {line} allows"));
+        if self.leaves_out(name, asks, notes) {
             return Ok(());
         }
+        let (name, feature) = FEATURES.into_iter().find(|(n, _)| *n == name).expect("a feature of the table");
         Err(ConfigError::Unsupported {
             place: asks.place.clone(),
             feature,
@@ -149,7 +158,7 @@ pub fn threaded(top: &Section<'_>, notes: &mut Notes) -> Result<(), ConfigError>
     Ok(())
 }
 
-/// The rewards: returns the section of the task's own and refuses the others.
+/// The rewards: returns the section of the task's own, and the signals for novelty; refuses imitation.
 ///
 /// # Errors
 /// If there are others, or the task's own is missing or has no strength.
@@ -157,16 +166,23 @@ pub fn reward_signals<'a>(
     top: &Section<'a>,
     without: &Without<'_>,
     notes: &mut Notes,
-) -> Result<Section<'a>, ConfigError> {
+) -> Result<(Section<'a>, Vec<Signal>), ConfigError> {
     let signals = top.section("reward_signals")?;
-    let Some(whole) = top.set("reward_signals") else { return Ok(signals) };
+    let mut novelty = Vec::new();
+    let Some(whole) = top.set("reward_signals") else { return Ok((signals, novelty)) };
     signals.only(&["extrinsic", "curiosity", "rnd", "gail"])?;
     for name in ["curiosity", "rnd", "gail"] {
         let Some(entry) = signals.set(name) else { continue };
         // a reward of strength zero is switched off
         let section = signals.section(name)?;
-        if section.number("strength", Range::NotNegative, 1.0)? > 0.0 {
-            without.feature(name, &entry, "strength 0 or no such section", notes)?;
+        if section.number("strength", Range::NotNegative, 1.0)? == 0.0 {
+            continue;
+        }
+        match name {
+            "gail" => without.feature(name, &entry, "strength 0 or no such section", notes)?,
+            _ if without.leaves_out(name, &entry, notes) => {}
+            "curiosity" => novelty.push(signal(SignalKind::Curiosity, &section, notes)?),
+            _ => novelty.push(signal(SignalKind::Rnd, &section, notes)?),
         }
     }
     if signals.get("extrinsic").is_none() {
@@ -180,11 +196,36 @@ pub fn reward_signals<'a>(
     let extrinsic = signals.section("extrinsic")?;
     extrinsic.only(&["gamma", "strength", "network_settings"])?;
     let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
-    if let Some(entry) = extrinsic.get("strength").filter(|_| strength != 1.0) {
+    if let Some(entry) = extrinsic.get("strength").filter(|_| strength != 1.0 && novelty.is_empty()) {
         notes.ignored(&entry, "with one reward, its scale does not change the policy's gradient; it is taken as 1");
     }
     if let Some(entry) = extrinsic.set("network_settings") {
         notes.ignored(&entry, "the task's own reward needs no network");
     }
-    Ok(extrinsic)
+    Ok((extrinsic, novelty))
+}
+
+/// A reward for novelty.
+fn signal(kind: SignalKind, section: &Section<'_>, notes: &mut Notes) -> Result<Signal, ConfigError> {
+    section.only(&["gamma", "strength", "network_settings", "learning_rate", "encoding_size"])?;
+    let defaults = Signal::new(kind);
+    let network = section.section("network_settings")?;
+    network.only(&NETWORK)?;
+    // the name that the width had before version 0.18
+    let width = section.count("encoding_size", 1..=4096, 128)?;
+    let width = network.count("hidden_units", 1..=4096, width)? as usize;
+    let layers = network.count("num_layers", 1..=64, 2)? as usize;
+    visual(&network, notes)?;
+    for key in ["normalize", "memory", "goal_conditioning_type", "deterministic", "max_num_agents"] {
+        if let Some(entry) = network.set(key) {
+            notes.ignored(&entry, "the network of a signal sees what the policy sees, and is a plain one");
+        }
+    }
+    Ok(Signal {
+        kind,
+        strength: section.number("strength", Range::Positive, defaults.strength)?,
+        gamma: section.number("gamma", Range::Fraction, defaults.gamma)?,
+        hidden: vec![width; layers],
+        lr: section.number("learning_rate", Range::Positive, defaults.lr)?,
+    })
 }

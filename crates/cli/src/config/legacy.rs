@@ -7,6 +7,7 @@ use super::document::Map;
 use super::error::{ConfigError, Place, nearest};
 use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
+use marathon_learn::{Signal, SignalKind};
 use std::path::Path;
 
 /// Keys of a section.
@@ -70,12 +71,6 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     {
         without.feature("memory", &entry, "false", &mut notes)?;
     }
-    if let Some(entry) = top.set("use_curiosity")
-        && entry.flag()?
-        && top.number("curiosity_strength", Range::NotNegative, 0.01)? > 0.0
-    {
-        without.feature("curiosity", &entry, "false", &mut notes)?;
-    }
     for key in ["behavioral_cloning", "pretraining"] {
         if let Some(entry) = top.set(key) {
             without.feature("behavioral_cloning", &entry, "null", &mut notes)?;
@@ -85,7 +80,8 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     threaded(&top, &mut notes)?;
     refuse(top.set("self_play"), "self-play", "null")?;
     refuse(top.set("init_path"), "starting from another run", "null")?;
-    let extrinsic = reward_signals(&top, &without, &mut notes)?;
+    let (extrinsic, mut signals) = reward_signals(&top, &without, &mut notes)?;
+    signals.extend(curiosity(&top, &without, &mut notes)?);
     Ok(Behavior {
         format: Format::Legacy,
         base,
@@ -95,9 +91,23 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         // from 0.14 on; nothing tells the versions in between apart
         steps_per_agent: extrinsic.is_empty(),
         extrinsic: extrinsic.above(top.clone()),
+        signals,
         marathon,
         top,
         seed: None,
         notes,
     })
+}
+
+/// Curiosity as it was asked for before version 0.9.
+fn curiosity(top: &Section<'_>, without: &Without<'_>, notes: &mut Notes) -> Result<Option<Signal>, ConfigError> {
+    let strength = top.number("curiosity_strength", Range::NotNegative, 0.01)?;
+    let size = top.count("curiosity_enc_size", 1..=4096, 128)? as usize;
+    let Some(entry) = top.set("use_curiosity") else { return Ok(None) };
+    if !entry.flag()? || strength == 0.0 || without.leaves_out("curiosity", &entry, notes) {
+        return Ok(None);
+    }
+    notes.about(&entry, "has a value stream of its own; versions before 0.9 added it to the task's reward");
+    let gamma = top.number("gamma", Range::Fraction, 0.99)?;
+    Ok(Some(Signal { strength, gamma, hidden: vec![size; 2], ..Signal::new(SignalKind::Curiosity) }))
 }

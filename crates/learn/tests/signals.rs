@@ -1,0 +1,174 @@
+//! Rewards for novelty: their gradients equal finite differences in double precision, they fade where the networks have
+//! learned, and they leave determinism, resuming and learning whole.
+
+mod common;
+
+use common::{PuckTask, silent, small_config};
+use marathon_learn::curiosity::Curiosity;
+use marathon_learn::rnd::Rnd;
+use marathon_learn::signal::Step;
+use marathon_learn::{
+    BLOCK, Checkpoint, Control, IterationStats, PpoConfig, Signal, SignalKind, Snapshot, evaluate, train,
+};
+use marathon_physics::lanes::Isa;
+
+const BLOCKS: usize = 2;
+
+/// Numbers in [-1, 1) that look random.
+fn noise(n: usize, salt: u64) -> Vec<f64> {
+    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut next = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    (0..n).map(|_| next()).collect()
+}
+
+/// Steps of 5 numbers with 3 actions; some actions are out of bounds.
+fn data() -> Vec<[Vec<f64>; 3]> {
+    let row = |n, salt, scale: f64| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<_>>();
+    (0..BLOCKS as u64).map(|b| [row(5, b, 1.0), row(3, 10 + b, 1.5), row(5, 20 + b, 1.0)]).collect()
+}
+
+fn steps(data: &[[Vec<f64>; 3]]) -> Vec<Step<'_, f64>> {
+    data.iter().map(|[obs, action, next]| Step { obs, action, next }).collect()
+}
+
+/// Largest difference between a gradient and the central differences of a function, relative to the gradient's size.
+fn worst(gradient: &[f64], params: &[f64], mut f: impl FnMut(&[f64]) -> f64) -> f64 {
+    let size = gradient.iter().map(|g| g * g).sum::<f64>().sqrt().max(1e-3);
+    let (mut worst, mut p, h) = (0f64, params.to_vec(), 1e-6);
+    for i in (0..p.len()).step_by(p.len() / 400 + 1) {
+        p[i] = params[i] + h;
+        let up = f(&p);
+        p[i] = params[i] - h;
+        let down = f(&p);
+        p[i] = params[i];
+        worst = worst.max(((up - down) / (2.0 * h) - gradient[i]).abs() / size);
+    }
+    worst
+}
+
+#[test]
+fn gradient_of_curiosity_equals_finite_differences() {
+    let nets = Curiosity::new(5, 3, &[9, 6]);
+    let (data, mut space) = (data(), nets.space::<f64>());
+    let steps = steps(&data);
+    let params: Vec<f64> = noise(nets.count(), 3).iter().map(|x| 0.4 * x).collect();
+    let mut loss = |params: &[f64], gradient: Option<&mut [f64]>| {
+        nets.losses::<f64>(params, &steps, &mut space);
+        let total = (0..BLOCKS * BLOCK).map(|i| nets.loss(&space, i)).sum::<f64>();
+        if let Some(gradient) = gradient {
+            nets.gradient::<f64>(params, BLOCKS, &mut space, gradient);
+        }
+        total
+    };
+    let mut gradient = vec![0.0; nets.count()];
+    loss(&params, Some(&mut gradient));
+    let error = worst(&gradient, &params, |p| loss(p, None));
+    assert!(error < 1e-7, "{error}");
+}
+
+#[test]
+fn gradient_of_distillation_equals_finite_differences() {
+    let nets = Rnd::seeded(5, &[9, 6], 4);
+    let (data, mut space) = (data(), nets.space::<f64>());
+    let steps = steps(&data);
+    let params: Vec<f64> = noise(nets.count(), 3).iter().map(|x| 0.4 * x).collect();
+    let mut loss = |params: &[f64], gradient: Option<&mut [f64]>| {
+        nets.losses::<f64>(params, &steps, &mut space);
+        // half the squared error is kept
+        let total = (0..BLOCKS * BLOCK).map(|i| 2.0 * nets.loss(&space, i)).sum::<f64>();
+        if let Some(gradient) = gradient {
+            nets.gradient::<f64>(params, BLOCKS, &mut space, gradient);
+        }
+        total
+    };
+    let mut gradient = vec![0.0; nets.count()];
+    loss(&params, Some(&mut gradient));
+    let error = worst(&gradient, &params, |p| loss(p, None));
+    assert!(error < 1e-7, "{error}");
+}
+
+fn signals() -> Vec<Signal> {
+    [SignalKind::Curiosity, SignalKind::Rnd]
+        .map(|kind| Signal { strength: 0.1, gamma: 0.95, hidden: vec![11, 7], ..Signal::new(kind) })
+        .into()
+}
+
+fn bits(config: &PpoConfig, isa: Isa) -> Vec<u32> {
+    let output = train(&PuckTask::with_limit(20), isa, config, None, &mut silent).unwrap();
+    output.policy.params().iter().chain(output.policy.log_std()).map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn neither_threads_nor_vector_width_change_the_policy() {
+    let config = PpoConfig { signals: signals(), ..small_config() };
+    let want = bits(&config, Isa::best());
+    assert_ne!(want, bits(&small_config(), Isa::best()), "signals do something");
+    for threads in [2, 5] {
+        assert_eq!(want, bits(&PpoConfig { threads, ..config.clone() }, Isa::best()), "{threads} threads");
+    }
+    for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
+        assert_eq!(want, bits(&config, isa), "{}", isa.name());
+    }
+}
+
+#[test]
+fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
+    let config = PpoConfig { signals: signals(), ..small_config() };
+    let run = |resume: Option<Checkpoint>, stop_at: u64| {
+        let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| match stats.iteration == stop_at {
+            true => Control::Stop,
+            false => Control::Continue,
+        };
+        train(&PuckTask::with_limit(30), Isa::best(), &config, resume, &mut observer).unwrap()
+    };
+    let whole = run(None, 0);
+    let half = run(None, 2).checkpoint;
+    let dir = tempfile::tempdir().unwrap();
+    half.save(dir.path()).unwrap();
+    let resumed = run(Some(Checkpoint::load(dir.path()).unwrap()), 0);
+    assert_eq!(resumed.policy.params(), whole.policy.params());
+    let other = PpoConfig { signals: Vec::new(), ..config.clone() };
+    let error = train(&PuckTask::with_limit(30), Isa::best(), &other, Some(half), &mut silent).err().unwrap();
+    assert!(error.to_string().contains("checkpoint: signals is for curiosity [11, 7], rnd [11, 7]"), "{error}");
+}
+
+/// The rewards of both fade while their networks learn, and the task is learned beside them.
+#[test]
+fn novelty_fades_and_the_task_is_solved() {
+    for kind in [SignalKind::Curiosity, SignalKind::Rnd] {
+        let signal = Signal { strength: 0.01, hidden: vec![32, 32], lr: 1e-3, ..Signal::new(kind) };
+        let config = PpoConfig {
+            agents: 128,
+            horizon: 32,
+            minibatches: 4,
+            total_steps: 400_000,
+            actor_hidden: vec![32, 32],
+            critic_hidden: vec![32, 32],
+            threads: 1,
+            signals: vec![signal],
+            ..Default::default()
+        };
+        let mut rewards = Vec::new();
+        let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+            assert_eq!(stats.signal_rewards[0].0, kind);
+            rewards.push(stats.signal_rewards[0].1);
+            Control::Continue
+        };
+        let output = train(&PuckTask::new(), Isa::best(), &config, None, &mut observer).unwrap();
+        let (first, last) = (rewards[1], rewards[rewards.len() - 1]);
+        let result = evaluate(&PuckTask::new(), Isa::best(), &output.policy, &Default::default()).unwrap();
+        println!("{}: {first} {last} {}", kind.name(), result.return_mean);
+        assert!(first > 0.0 && last < 0.2 * first, "{}: {first} {last}", kind.name());
+        assert!(result.return_mean > 52.0, "{}: {result:?}", kind.name());
+    }
+}
+
+#[test]
+fn a_signal_twice_is_refused() {
+    let twice = vec![Signal::new(SignalKind::Rnd); 2];
+    let config = PpoConfig { signals: twice, ..small_config() };
+    assert!(config.validate().unwrap_err().to_string().contains("rnd twice, expected each kind once"));
+}
