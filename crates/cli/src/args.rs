@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::commands::bench::BenchArgs;
+use crate::commands::study::StudyArgs;
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -48,6 +49,8 @@ pub enum Command {
     List,
     /// Measure the speed of the physics, the environments or the training.
     Bench(BenchArgs),
+    /// Make the paper's experiments again: a table, a picture and a page each.
+    Study(StudyArgs),
 }
 
 const TRAIN_HELP: &str = "\

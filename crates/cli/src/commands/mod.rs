@@ -6,4 +6,5 @@ pub mod eval;
 pub mod list;
 pub mod record_demo;
 pub mod render;
+pub mod study;
 pub mod train;

@@ -12,15 +12,16 @@ use std::path::Path;
 use std::sync::Once;
 
 /// Size of the picture, pixels.
-const SIZE: [u32; 2] = [960, 640];
+pub const SIZE: [u32; 2] = [960, 640];
 /// Drawn this much larger and averaged: plotters' thick lines have no soft edges of their own.
-const SCALE: u32 = 2;
+pub const SCALE: u32 = 2;
 /// Most points of a line; longer runs are averaged in bins.
 const POINTS: usize = 400;
 
-const INK: RGBColor = RGBColor(38, 44, 52);
-const FAINT: RGBColor = RGBColor(112, 120, 130);
-const GRID: RGBColor = RGBColor(228, 232, 237);
+/// Colors: text, lesser text, grid.
+pub const INK: RGBColor = RGBColor(38, 44, 52);
+pub const FAINT: RGBColor = RGBColor(112, 120, 130);
+pub const GRID: RGBColor = RGBColor(228, 232, 237);
 const RETURN: RGBColor = RGBColor(32, 99, 178);
 const SPEED: RGBColor = RGBColor(206, 92, 24);
 
@@ -44,10 +45,12 @@ pub fn draw(folder: &RunFolder, run: &RunFile, history: &History) -> Result<(), 
     write_png(&path, &png)
 }
 
-type DrawError = Box<dyn std::error::Error>;
+/// What can go wrong while drawing.
+pub type DrawError = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 
-fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
+/// Makes the fonts known, once.
+pub fn register_fonts() {
     static FONTS: Once = Once::new();
     FONTS.call_once(|| {
         for (style, font) in [(FontStyle::Normal, REGULAR), (FontStyle::Bold, MEDIUM)] {
@@ -55,6 +58,10 @@ fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
             let _ = register_font(FAMILY, style, font);
         }
     });
+}
+
+fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
+    register_fonts();
     let last = |name| history.column(name).last().copied().flatten().unwrap_or(0.0);
     let (steps, wall, cpu) = (last("steps"), last("wall_seconds"), last("cpu_seconds"));
 
@@ -155,7 +162,7 @@ impl Series {
 }
 
 /// `2500000` as `2.5 M`.
-fn axis_steps(x: f64) -> String {
+pub fn axis_steps(x: f64) -> String {
     if x == 0.0 {
         return "0 steps".into();
     }
@@ -168,7 +175,8 @@ fn axis_steps(x: f64) -> String {
     }
 }
 
-fn axis_number(y: f64) -> String {
+/// A number of an axis.
+pub fn axis_number(y: f64) -> String {
     match y.abs() {
         a if a >= 99_950.0 => short(y),
         a if a < 1e-12 => "0".into(),
@@ -178,16 +186,18 @@ fn axis_number(y: f64) -> String {
     }
 }
 
-fn at(x: u32, y: u32) -> (i32, i32) {
+/// A place in the picture, in its own pixels.
+pub fn at(x: u32, y: u32) -> (i32, i32) {
     ((x * SCALE) as i32, (y * SCALE) as i32)
 }
 
-fn style(size: u32, color: RGBColor, weight: FontStyle) -> TextStyle<'static> {
+/// A text style.
+pub fn style(size: u32, color: RGBColor, weight: FontStyle) -> TextStyle<'static> {
     (FAMILY, size * SCALE, weight).into_font().color(&color)
 }
 
 /// Averages squares of `SCALE` pixels' side.
-fn reduce(rgb: &[u8]) -> Vec<u8> {
+pub fn reduce(rgb: &[u8]) -> Vec<u8> {
     let (side, [width, height]) = (SCALE as usize, SIZE.map(|side| side as usize));
     let mut out = Vec::with_capacity(3 * width * height);
     for y in 0..height {
@@ -204,7 +214,11 @@ fn reduce(rgb: &[u8]) -> Vec<u8> {
     out
 }
 
-fn write_png(path: &Path, rgb: &[u8]) -> Result<(), CliError> {
+/// Writes a picture of [`SIZE`].
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_png(path: &Path, rgb: &[u8]) -> Result<(), CliError> {
     let refused = |e: png::EncodingError| CliError::Draw { path: path.into(), reason: e.to_string() };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, SIZE[0], SIZE[1]);

@@ -1,0 +1,124 @@
+//! The pictures of studies: lines over steps, or bars.
+
+use crate::error::CliError;
+use crate::report::curve::{
+    DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
+};
+use plotters::prelude::*;
+use plotters::style::FontStyle;
+use std::path::Path;
+
+/// Colors of lines and bars, apart for all kinds of sight (Okabe and Ito).
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+];
+
+/// A picture.
+pub enum Chart {
+    /// Lines over agent-steps: what is drawn, and each line's name and points.
+    Lines(&'static str, Vec<(String, Vec<(f64, f64)>)>),
+    /// Bars: what is drawn, and each bar's name and height.
+    Bars(&'static str, Vec<(String, f64)>),
+}
+
+impl Chart {
+    /// Writes the picture.
+    ///
+    /// # Errors
+    /// If it cannot be drawn or written.
+    pub fn draw(&self, path: &Path) -> Result<(), CliError> {
+        let rgb = self.picture().map_err(|e| CliError::Draw { path: path.into(), reason: e.to_string() })?;
+        write_png(path, &rgb)
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, DrawError> {
+        register_fonts();
+        let [width, height] = SIZE.map(|side| side * SCALE);
+        let mut rgb = vec![0; 3 * (width * height) as usize];
+        {
+            let root = BitMapBackend::with_buffer(&mut rgb, (width, height)).into_drawing_area();
+            root.fill(&WHITE)?;
+            let (label, ends, low, high) = match self {
+                Chart::Lines(label, lines) => {
+                    let points = || lines.iter().flat_map(|(_, points)| points);
+                    let end = points().map(|p| p.0).fold(1.0, f64::max);
+                    let low = points().map(|p| p.1).fold(0.0, f64::min);
+                    (label, 0.0..end, low, points().map(|p| p.1).fold(0.0, f64::max))
+                }
+                Chart::Bars(label, bars) => {
+                    (label, 0.0..bars.len() as f64, 0.0, bars.iter().map(|b| b.1).fold(0.0, f64::max))
+                }
+            };
+            root.draw_text(label, &style(18, INK, FontStyle::Bold), at(24, 18))?;
+            let room = 0.08 * (high - low).max(1e-6);
+            let bottom = if low < 0.0 { low - room } else { 0.0 };
+            let mut chart = ChartBuilder::on(&root)
+                .margin_left(14 * SCALE)
+                .margin_right(32 * SCALE)
+                .margin_top(60 * SCALE)
+                .margin_bottom(10 * SCALE)
+                .x_label_area_size(28 * SCALE)
+                .y_label_area_size(64 * SCALE)
+                .build_cartesian_2d(ends, bottom..high + room)?;
+            let (of_y, of_x) = (|y: &f64| axis_number(*y), |x: &f64| axis_steps(*x));
+            let mut mesh = chart.configure_mesh();
+            mesh.disable_x_mesh()
+                .bold_line_style(GRID.stroke_width(SCALE))
+                .light_line_style(TRANSPARENT)
+                .axis_style(FAINT.stroke_width(SCALE))
+                .label_style(style(13, FAINT, FontStyle::Normal))
+                .y_labels(7)
+                .y_label_formatter(&of_y);
+            match self {
+                Chart::Lines(_, lines) => {
+                    mesh.x_labels(9).x_label_formatter(&of_x).draw()?;
+                    for (i, (name, points)) in lines.iter().enumerate() {
+                        let color = COLORS[i % COLORS.len()];
+                        chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2 * SCALE)))?;
+                        // the names in a column at the left
+                        let place = at(110, 66 + 20 * i as u32);
+                        root.draw_text(name, &style(14, color, FontStyle::Bold), place)?;
+                    }
+                }
+                Chart::Bars(_, bars) => {
+                    mesh.x_labels(0).draw()?;
+                    for (i, (name, y)) in bars.iter().enumerate() {
+                        let (left, color) = (i as f64, COLORS[i % COLORS.len()]);
+                        let corners = [(left + 0.2, 0.0), (left + 0.8, *y)];
+                        chart.draw_series(std::iter::once(Rectangle::new(corners, color.filled())))?;
+                        let text = style(14, INK, FontStyle::Normal);
+                        let label = format!("{name}: {}", crate::text::short(*y));
+                        chart.draw_series(std::iter::once(Text::new(label, (left + 0.2, *y + 0.4 * room), text)))?;
+                    }
+                }
+            }
+            root.present()?;
+        }
+        Ok(reduce(&rgb))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn charts_of_little_are_drawn_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let lines = vec![("a".to_string(), vec![(0.0, 1.0), (10.0, -3.0)]), ("b".into(), Vec::new())];
+        for (i, chart) in
+            [Chart::Lines("y", lines), Chart::Lines("y", Vec::new()), Chart::Bars("z", vec![("c".into(), 0.0)])]
+                .iter()
+                .enumerate()
+        {
+            let path = folder.path().join(format!("{i}.png"));
+            chart.draw(&path).unwrap();
+            assert!(std::fs::metadata(path).unwrap().len() > 1000);
+        }
+    }
+}

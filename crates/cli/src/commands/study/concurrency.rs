@@ -1,0 +1,71 @@
+//! How many agents: speed and score at equal steps with 16 to 4096 of them.
+
+use super::Options;
+use super::chart::Chart;
+use super::record::{Record, Run, mean_curve, plus_minus, spread, train_one};
+use crate::config;
+use crate::error::CliError;
+use marathon_learn::PpoConfig;
+
+const AGENT: &str = "Hopper-v0";
+const AGENTS: [usize; 4] = [16, 64, 512, 4096];
+/// Decisions of a rollout of all agents, where there are not more agents than that.
+const ROLLOUT: usize = 8192;
+/// Decisions of each agent per rollout, at least: with fewer, advantages see too little.
+const SHORTEST: usize = 16;
+/// Samples of a minibatch.
+const MINIBATCH: usize = 1024;
+
+/// Trains with each seed of each number of agents.
+///
+/// # Errors
+/// If that fails.
+pub fn run(options: &Options) -> Result<Record, CliError> {
+    let base = config::default_for(AGENT).ppo;
+    let (mut rows, mut lines) = (Vec::new(), Vec::new());
+    for agents in AGENTS {
+        let horizon = (ROLLOUT / agents).max(SHORTEST);
+        let mut config = PpoConfig {
+            agents,
+            horizon,
+            minibatches: agents * horizon / MINIBATCH,
+            total_steps: options.steps,
+            threads: options.threads,
+            ..base.clone()
+        };
+        let runs: Result<Vec<Run>, CliError> = (1..=options.seeds)
+            .map(|seed| {
+                config.seed = seed;
+                train_one(AGENT, &config)
+            })
+            .collect();
+        let runs = runs?;
+        rows.push(vec![
+            agents.to_string(),
+            format!("{horizon}"),
+            plus_minus(spread(runs.iter().map(|r| r.steps as f64 / r.cpu)), 0),
+            plus_minus(spread(runs.iter().map(|r| r.steps as f64 / r.wall)), 0),
+            plus_minus(spread(runs.iter().map(|r| r.eval.return_mean)), 0),
+            plus_minus(spread(runs.iter().map(|r| r.eval.speed_mean)), 2),
+        ]);
+        lines.push((format!("{agents} agents"), mean_curve(&runs, options.steps)));
+    }
+    Ok(Record {
+        name: "concurrency",
+        title: "Agents side by side",
+        about: "Hopper-v0 with its own settings and more or fewer agents, at equal steps. Rollouts hold 8192 decisions in all \
+                (with 4096 agents 65536, 16 of each), minibatches 1024. Agents cost memory, not time: a vector carries sixteen, \
+                and more than that fill the same vectors one after another."
+            .into(),
+        columns: vec![
+            "agents",
+            "decisions of each per rollout",
+            "steps per processor second",
+            "steps per second",
+            "return",
+            "speed, m/s",
+        ],
+        rows,
+        chart: Chart::Lines("return per episode with exploration, mean over the seeds", lines),
+    })
+}

@@ -1,0 +1,67 @@
+//! `marathon study`: the paper's experiments again. Each writes a table (`.csv` and `.md`) and a picture (`.png`), with the
+//! command, the version and the processor, so that somebody else can make it again.
+
+mod chart;
+mod concurrency;
+mod record;
+mod table1;
+mod table3;
+
+use crate::console::print_json;
+use crate::error::CliError;
+use clap::Subcommand;
+use std::path::PathBuf;
+
+/// Options of `study`.
+#[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true)]
+pub struct StudyArgs {
+    /// What to measure.
+    #[command(subcommand)]
+    pub what: What,
+}
+
+/// What to measure.
+#[derive(Debug, Subcommand)]
+pub enum What {
+    /// Table 1 of the paper: speed of training the four agents with its own settings.
+    Table1(Options),
+    /// Table 3 of the paper: PPO, A2C and ACKTR on the hopper, time and score.
+    Table3(Options),
+    /// Speed and score with 16, 64, 512 and 4096 agents.
+    Concurrency(Options),
+}
+
+/// What all studies have.
+#[derive(Debug, clap::Args)]
+pub struct Options {
+    /// Seeds of each row.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// Agent-steps of each run; in table1, of an agent with a network of the paper's usual size.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub steps: u64,
+    /// Threads; 0 means one per processor.
+    #[arg(long, value_name = "T", default_value_t = 1)]
+    pub threads: usize,
+    /// Folder that the three files go to.
+    #[arg(long, value_name = "DIR", default_value = "docs/studies")]
+    pub out: PathBuf,
+}
+
+/// Measures and writes the files.
+///
+/// # Errors
+/// If an agent cannot be trained or a file cannot be written.
+pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
+    let (record, options) = match &args.what {
+        What::Table1(options) => (table1::run(options)?, options),
+        What::Table3(options) => (table3::run(options)?, options),
+        What::Concurrency(options) => (concurrency::run(options)?, options),
+    };
+    record.save(options)?;
+    if json {
+        print_json(&record);
+    }
+    Ok(())
+}

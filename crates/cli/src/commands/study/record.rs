@@ -1,0 +1,175 @@
+//! What a study has found, and its files.
+
+use super::Options;
+use super::chart::Chart;
+use crate::console::{note, say};
+use crate::error::CliError;
+use crate::text;
+use marathon_envs::registry;
+use marathon_learn::{
+    Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train, write_atomic,
+};
+use marathon_physics::lanes::Isa;
+use serde::Serialize;
+
+/// A table with a picture.
+#[derive(Serialize)]
+pub struct Record {
+    /// Name of the files and of the command.
+    pub name: &'static str,
+    /// Heading.
+    pub title: &'static str,
+    /// What was measured and how, a paragraph or more.
+    pub about: String,
+    /// Heads of the columns.
+    pub columns: Vec<&'static str>,
+    /// Cells, as they are written.
+    pub rows: Vec<Vec<String>>,
+    /// The picture.
+    #[serde(skip)]
+    pub chart: Chart,
+}
+
+/// One training.
+pub struct Run {
+    /// Steps and mean returns of the episodes on the way.
+    pub curve: Vec<(f64, f64)>,
+    /// Agent-steps, and seconds of one clock and of all processors.
+    pub steps: u64,
+    pub wall: f64,
+    pub cpu: f64,
+    /// The best actions at the end.
+    pub eval: Evaluation,
+}
+
+/// Trains an agent and evaluates it with a hundred episodes.
+///
+/// # Errors
+/// If it cannot be trained.
+pub fn train_one(agent: &str, config: &PpoConfig) -> Result<Run, CliError> {
+    let isa = Isa::best();
+    let factory = registry::factory(agent, isa)?;
+    let (mut curve, mut clocks) = (Vec::new(), (0, 0.0, 0.0));
+    let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+        clocks = (stats.steps, stats.wall_seconds, stats.cpu_seconds);
+        curve.extend(stats.return_mean.map(|mean| (stats.steps as f64, mean)));
+        Control::Continue
+    };
+    let output = train(&*factory, isa, config, None, &mut observer)?;
+    let options = EvalOptions { episodes: 100, threads: config.threads, ..Default::default() };
+    let eval = evaluate(&*factory, isa, &output.policy, &options)?;
+    let (steps, wall, cpu) = clocks;
+    note(format!(
+        "{agent} {} seed {}: {} steps, {cpu:.1} s of processor time, return {:.0}, {:.2} m/s",
+        config.algorithm.name(),
+        config.seed,
+        text::thousands(steps),
+        eval.return_mean,
+        eval.speed_mean
+    ));
+    Ok(Run { curve, steps, wall, cpu, eval })
+}
+
+/// Mean and standard deviation, of the population.
+pub fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let n = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    (mean, (values.map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt())
+}
+
+/// `mean ± deviation`.
+pub fn plus_minus((mean, deviation): (f64, f64), decimals: usize) -> String {
+    format!("{mean:.decimals$} ± {deviation:.decimals$}")
+}
+
+/// The mean of curves at a number of places along the run, each curve being averaged between two of them.
+pub fn mean_curve(runs: &[Run], total: u64) -> Vec<(f64, f64)> {
+    const PLACES: usize = 100;
+    let width = total as f64 / PLACES as f64;
+    let at = |i: usize| {
+        let (from, to) = (i as f64 * width, (i + 1) as f64 * width);
+        let of_run = |run: &Run| {
+            let near = run.curve.iter().filter(|(x, _)| (from..to).contains(x)).map(|p| p.1);
+            let n = near.clone().count();
+            (n > 0).then(|| near.sum::<f64>() / n as f64)
+        };
+        let known: Vec<f64> = runs.iter().filter_map(of_run).collect();
+        (!known.is_empty()).then(|| (from + width / 2.0, known.iter().sum::<f64>() / known.len() as f64))
+    };
+    (0..PLACES).filter_map(at).collect()
+}
+
+impl Record {
+    /// Writes the three files and says the table.
+    ///
+    /// # Errors
+    /// If one cannot be written.
+    pub fn save(&self, options: &Options) -> Result<(), CliError> {
+        let out = &options.out;
+        std::fs::create_dir_all(out).map_err(CliError::io(out, "create folder"))?;
+        let file = |extension: &str| out.join(format!("{}.{extension}", self.name));
+
+        let mut table = csv::Writer::from_writer(Vec::new());
+        let path = file("csv");
+        let bad = |e: csv::Error| CliError::file(&path, "table", e, "rows of equal length");
+        table.write_record(&self.columns).map_err(bad)?;
+        for row in &self.rows {
+            table.write_record(row).map_err(bad)?;
+        }
+        let bytes = table.into_inner().map_err(|e| CliError::file(&path, "table", e, "a table in memory"))?;
+        write_atomic(&path, &bytes)?;
+        self.chart.draw(&file("png"))?;
+
+        let line = |cells: Vec<&str>| format!("| {} |\n", cells.join(" | "));
+        let mut text = format!("# {}\n\n{}\n\n", self.title, self.about.trim());
+        text += &line(self.columns.clone());
+        text += &line(vec!["---"; self.columns.len()]);
+        for row in &self.rows {
+            text += &line(row.iter().map(String::as_str).collect());
+        }
+        let Options { seeds, steps, threads, .. } = options;
+        text += &format!(
+            "\n![{}]({}.png)\n\n```sh\nmarathon study {} --seeds {seeds} --steps {steps} --threads {threads}\n```\n\n\
+             Marathon {}, {}, {} thread{}, instruction set {}. Seconds are processor time of all threads unless said \
+             otherwise.\n",
+            self.title,
+            self.name,
+            self.name,
+            env!("CARGO_PKG_VERSION"),
+            processor(),
+            if *threads == 0 { "all".to_string() } else { threads.to_string() },
+            if *threads == 1 { "" } else { "s" },
+            Isa::best().name(),
+        );
+        write_atomic(&file("md"), text.as_bytes())?;
+        say(text);
+        Ok(())
+    }
+}
+
+/// Name of the processor, as far as the system tells.
+fn processor() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    model.map_or_else(|| std::env::consts::ARCH.to_string(), |(_, name)| name.trim().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads_and_curves_are_means() {
+        assert_eq!(spread([1.0, 3.0].into_iter()), (2.0, 1.0));
+        assert_eq!(plus_minus((2.0, 1.04), 1), "2.0 ± 1.0");
+        let run = |y: f64| Run {
+            curve: vec![(1.0, y), (5.0, y + 2.0), (150.0, 7.0)],
+            steps: 1000,
+            wall: 1.0,
+            cpu: 1.0,
+            eval: Evaluation::default(),
+        };
+        // ten steps a place: the first two points fall into one
+        assert_eq!(mean_curve(&[run(0.0), run(2.0)], 1000), [(5.0, 2.0), (155.0, 7.0)]);
+    }
+}
