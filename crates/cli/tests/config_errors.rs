@@ -188,8 +188,8 @@ fn agents_that_are_not_in_the_file_are_missed() {
 fn features_that_are_not_here_are_refused() {
     let behavior = |text: &str| format!("behaviors:\n  Hopper:\n    {text}\n");
     refuse(
-        &behavior("trainer_type: sac"),
-        "a/test.yaml:3: behaviors.Hopper.trainer_type: this trainer is not supported; found 'sac', expected one of ppo, a2c, acktr",
+        &behavior("trainer_type: poca"),
+        "a/test.yaml:3: behaviors.Hopper.trainer_type: this trainer is not supported; found 'poca', expected one of ppo, a2c, acktr, sac",
     );
     for (text, message) in [
         (
@@ -226,7 +226,15 @@ fn features_that_are_not_here_are_refused() {
     ] {
         refuse_with(&format!("behaviors: {{Hopper: {{}}}}\n{text}\n"), message);
     }
-    refuse_with("Hopper: {trainer: sac, tau: 0.005}", "this trainer is not supported");
+    refuse_with("Hopper: {trainer: sac, tau: 0.005}", "SAC in a file of this format is not supported");
+    refuse_with(
+        "behaviors: {Hopper: {trainer_type: sac, hyperparameters: {beta: 1}}}",
+        "hyperparameters.beta: unknown key",
+    );
+    refuse_with(
+        "behaviors: {Hopper: {trainer_type: sac, hyperparameters: {batch_size: 100}}}",
+        "batch is 100, expected a multiple of 16",
+    );
     refuse_with(
         "Hopper:\n  use_recurrent: true\n",
         "2: Hopper.use_recurrent: recurrent memory is not supported; found 'true'",

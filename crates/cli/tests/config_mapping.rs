@@ -5,7 +5,7 @@
 mod config;
 
 use config::{Loaded, default_for, parse};
-use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Schedule, Signal, SignalKind};
+use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Sac, Schedule, Signal, SignalKind};
 use std::path::{Path, PathBuf};
 
 fn read(text: &str, agent: &str) -> Loaded {
@@ -426,4 +426,34 @@ behaviors:
         Signal { strength: 0.01, gamma: 0.995, hidden: vec![256, 256], ..Signal::new(SignalKind::Curiosity) };
     assert_eq!(old.ppo.signals, [curiosity]);
     assert!(old.notes[0].contains("a value stream of its own"), "{:?}", old.notes);
+}
+
+#[test]
+fn sac_has_the_keys_of_ml_agents() {
+    let text = "
+behaviors:
+  Hopper:
+    trainer_type: sac
+    hyperparameters:
+      batch_size: 512
+      buffer_size: 200000
+      learning_rate: 1e-3
+      buffer_init_steps: 1000
+      init_entcoef: 0.5
+      tau: 0.01
+      steps_per_update: 8
+    network_settings: {normalize: true, hidden_units: 256}
+    max_steps: 2e5
+    marathon: {agents: 64, n_step: 3}
+";
+    let loaded = read(text, "hopper");
+    let ppo = &loaded.ppo;
+    let sac = Sac { replay: 200_000, warmup: 1000, batch: 512, updates: 32, tau: 0.01, n_step: 3, init_alpha: 0.5 };
+    assert_eq!(ppo.algorithm, Algorithm::Sac(sac));
+    assert_eq!((ppo.agents, ppo.horizon, ppo.minibatches, ppo.total_steps), (64, 4, 1, 200_000));
+    assert_eq!((ppo.lr, ppo.schedule, ppo.normalize_observations), (1e-3, Schedule::Constant, true));
+    assert_eq!((&ppo.actor_hidden[..], &ppo.critic_hidden[..]), (&[256, 256][..], &[256, 256][..]));
+    let defaults = read("behaviors: {Hopper: {trainer_type: sac}}", "hopper").ppo;
+    let sac = Sac { replay: 50_000, warmup: 0, batch: 128, updates: 64, tau: 0.005, n_step: 1, init_alpha: 1.0 };
+    assert_eq!((defaults.algorithm, defaults.agents, defaults.lr), (Algorithm::Sac(sac), 16, 3e-4));
 }

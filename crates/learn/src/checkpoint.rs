@@ -9,6 +9,7 @@ use crate::files::{self, TensorReader, TensorWriter, write_atomic};
 use crate::kfac::Kfac;
 use crate::learner::Learner;
 use crate::normalize::Moments;
+use crate::replay::Saved;
 use crate::run::{Clocks, Run};
 use crate::{Algorithm, Error, PpoConfig, Signal};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,9 @@ use std::path::Path;
 
 const FORMAT: &str = "marathon-checkpoint";
 const VERSION: u32 = 1;
+/// Tensors of a replay, see [`Saved`].
+const REPLAY: [&str; 4] = ["replay_obs", "replay_next", "replay_action", "replay_reward"];
+const REPLAY_FLAGS: [&str; 2] = ["replay_done", "replay_failed"];
 const DESCRIPTION: &str = "checkpoint.json";
 
 /// Everything a run needs to go on.
@@ -27,6 +31,9 @@ pub struct Checkpoint {
     adam_v: Vec<f32>,
     /// Factors of the Fisher matrix and their inverses, of ACKTR.
     kfac: (Vec<f64>, Vec<f32>),
+    /// Slow value networks and replay of SAC.
+    targets: Vec<f32>,
+    replay: Saved,
     obs_mean: Vec<f64>,
     obs_var: Vec<f64>,
     agents: Agents,
@@ -92,12 +99,19 @@ impl Checkpoint {
             state: StateFile::default(),
         };
         let actors = run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
+        let mut replay = Saved::default();
+        for of_worker in run.sac.iter().flat_map(|sac| &sac.replays) {
+            let of_worker = of_worker.read().expect("no worker has panicked");
+            (0..of_worker.blocks()).for_each(|b| of_worker.save(b, &mut replay));
+        }
         Self {
             about,
             params: learner.params.clone(),
             adam_m: learner.adam.m.clone(),
             adam_v: learner.adam.v.clone(),
             kfac: run.kfac.as_ref().map(Kfac::save).unwrap_or_default(),
+            targets: learner.targets.clone(),
+            replay,
             obs_mean: learner.observations.mean.clone(),
             obs_var: learner.observations.var.clone(),
             agents: Agents::of(actors, 0..run.config.blocks()),
@@ -149,6 +163,7 @@ impl Checkpoint {
             ("params", self.params.len(), len),
             ("adam_m", self.adam_m.len(), len),
             ("adam_v", self.adam_v.len(), len),
+            ("targets", self.targets.len(), learner.targets.len()),
             ("obs_mean", self.obs_mean.len(), run.spec.obs),
             ("obs_var", self.obs_var.len(), run.spec.obs),
         ];
@@ -163,6 +178,19 @@ impl Checkpoint {
         {
             return mismatch("kfac", format!("{} numbers", self.kfac.0.len()), "those of the networks".into());
         }
+
+        let mut block = 0;
+        for of_worker in run.sac.iter().flat_map(|sac| &sac.replays) {
+            let mut of_worker = of_worker.write().expect("no worker has panicked");
+            for b in 0..of_worker.blocks() {
+                if !of_worker.load(b, block, &self.replay) {
+                    let found = format!("{} decisions", self.replay.filled);
+                    return mismatch("replay", found, "what the settings make room for".into());
+                }
+                block += 1;
+            }
+        }
+        learner.targets.clone_from(&self.targets);
 
         learner.adam.powers = about.adam_powers;
         learner.lr = about.lr;
@@ -197,6 +225,16 @@ impl Checkpoint {
         if !self.kfac.0.is_empty() {
             file.list("kfac", &self.kfac.0);
             file.list("kfac_inverse", &self.kfac.1);
+        }
+        if !self.targets.is_empty() {
+            file.list("targets", &self.targets);
+            file.list("replay_filled", &[self.replay.filled]);
+            for (name, numbers) in REPLAY.into_iter().zip(&self.replay.numbers) {
+                file.list(name, numbers);
+            }
+            for (name, flags) in REPLAY_FLAGS.into_iter().zip(&self.replay.flags) {
+                file.list(name, flags);
+            }
         }
         file.list("obs_mean", &self.obs_mean);
         file.list("obs_var", &self.obs_var);
@@ -253,7 +291,20 @@ impl Checkpoint {
             Algorithm::Acktr(_) => (list(&file, "kfac")?, finite("kfac_inverse")?),
             _ => Default::default(),
         };
+        let (mut targets, mut replay) = (Vec::new(), Saved::default());
+        if let Algorithm::Sac(_) = about.config.algorithm {
+            targets = finite("targets")?;
+            replay.filled = list(&file, "replay_filled")?.first().copied().unwrap_or(0);
+            for (name, numbers) in REPLAY.into_iter().zip(&mut replay.numbers) {
+                *numbers = list(&file, name)?;
+            }
+            for (name, flags) in REPLAY_FLAGS.into_iter().zip(&mut replay.flags) {
+                *flags = list(&file, name)?;
+            }
+        }
         Ok(Self {
+            targets,
+            replay,
             params: finite("params")?,
             adam_m: finite("adam_m")?,
             adam_v: finite("adam_v")?,

@@ -1,6 +1,6 @@
 //! The trainer's configuration.
 
-use crate::{A2c, Acktr, Activation, BLOCK, Error, Signal};
+use crate::{A2c, Acktr, Activation, BLOCK, Error, Sac, Signal};
 use serde::{Deserialize, Serialize};
 
 /// How the policy's learning rate moves.
@@ -29,11 +29,14 @@ pub enum Algorithm {
     A2c(A2c),
     /// Actor-critic with the natural gradient and a trust region; as A2C, and `max_grad_norm` means nothing either.
     Acktr(Acktr),
+    /// Soft actor-critic, from a replay; the settings of rollouts' epochs, clip ranges, deviations and the adaptive schedule
+    /// mean nothing.
+    Sac(Sac),
 }
 
 impl Algorithm {
     /// Names in configurations and on the command line.
-    pub const NAMES: [&str; 3] = ["ppo", "a2c", "acktr"];
+    pub const NAMES: [&str; 4] = ["ppo", "a2c", "acktr", "sac"];
 
     /// Its name.
     pub fn name(&self) -> &'static str {
@@ -41,6 +44,7 @@ impl Algorithm {
             Algorithm::Ppo => "ppo",
             Algorithm::A2c(_) => "a2c",
             Algorithm::Acktr(_) => "acktr",
+            Algorithm::Sac(_) => "sac",
         }
     }
 }
@@ -205,12 +209,35 @@ impl PpoConfig {
         Self { algorithm: Algorithm::Acktr(Acktr::default()), horizon: 20, rollouts: 10, lr: 0.25, ..Self::a2c() }
     }
 
+    /// SAC for many agents: sixty-four, and an update with 256 samples for every eighth of their steps.
+    pub fn sac() -> Self {
+        Self {
+            algorithm: Algorithm::Sac(Sac::default()),
+            agents: 64,
+            horizon: 4,
+            rollouts: 16,
+            minibatches: 1,
+            epochs: 1,
+            total_steps: 1_000_000,
+            activation: Activation::Relu,
+            lr: 1e-3,
+            value_lr: 1e-3,
+            schedule: Schedule::Constant,
+            init_log_std: 0.0,
+            min_std: 1e-3,
+            max_std: 1e3,
+            scale_rewards: false,
+            ..Self::default()
+        }
+    }
+
     /// The settings that an algorithm starts from, by its name.
     pub fn of(algorithm: &str) -> Option<Self> {
         match algorithm {
             "ppo" => Some(Self::default()),
             "a2c" => Some(Self::a2c()),
             "acktr" => Some(Self::acktr()),
+            "sac" => Some(Self::sac()),
             _ => None,
         }
     }
@@ -323,8 +350,9 @@ impl PpoConfig {
             if self.signals[..i].iter().any(|other| other.kind == signal.kind) {
                 return Err(Error::config("signals", format!("{name} twice"), "each kind once"));
             }
-            if let Algorithm::Acktr(_) = self.algorithm {
-                return Err(Error::config("signals", name, "none with acktr; ppo and a2c take them"));
+            if let Algorithm::Acktr(_) | Algorithm::Sac(_) = self.algorithm {
+                let with = self.algorithm.name();
+                return Err(Error::config("signals", name, format!("none with {with}; ppo and a2c take them")));
             }
             for (field, x) in [("signals: strength", signal.strength), ("signals: lr", signal.lr)] {
                 if !(x.is_finite() && x > 0.0) {
@@ -360,6 +388,7 @@ impl PpoConfig {
         };
         match &self.algorithm {
             Algorithm::Ppo => return Ok(()),
+            Algorithm::Sac(_) => {}
             Algorithm::A2c(a2c) => {
                 positive("value_coef", a2c.value_coef)?;
                 fraction("rms_decay", a2c.rms_decay)?;
@@ -380,6 +409,31 @@ impl PpoConfig {
                         return Err(Error::config(field, format!("{widths:?}"), "widths up to 2048 with ACKTR"));
                     }
                 }
+            }
+        }
+        if let Algorithm::Sac(sac) = &self.algorithm {
+            if sac.batch == 0 || !sac.batch.is_multiple_of(BLOCK) || sac.batch > 1 << 20 {
+                return Err(Error::config("batch", sac.batch, format!("a multiple of {BLOCK} up to {}", 1 << 20)));
+            }
+            if sac.updates == 0 || sac.n_step == 0 {
+                return Err(Error::config("updates, n_step", format!("{}, {}", sac.updates, sac.n_step), "at least 1"));
+            }
+            if sac.replay / self.agents.max(1) < sac.n_step.max(self.horizon) || sac.replay > 1 << 31 {
+                let least = self.agents * sac.n_step.max(self.horizon);
+                return Err(Error::config(
+                    "replay",
+                    sac.replay,
+                    format!("a rollout at least, {least}, and at most 2^31"),
+                ));
+            }
+            positive("tau", sac.tau)?;
+            positive("init_alpha", sac.init_alpha)?;
+            if sac.tau > 1.0 {
+                return Err(Error::config("tau", sac.tau, "at most 1"));
+            }
+            if self.scale_rewards {
+                let why = "false with sac: rewards of another scale would stay in the replay";
+                return Err(Error::config("scale_rewards", true, why));
             }
         }
         let name = self.algorithm.name();

@@ -13,7 +13,7 @@ use crate::rollout::{Acting, BlockSums, Rollout};
 use crate::signal::{MAX_SIGNALS, SignalNets};
 use crate::{Algorithm, BLOCK, PpoConfig, init};
 use marathon_envs::Spec;
-use marathon_physics::lanes::Isa;
+use marathon_physics::lanes::{Isa, Real};
 use std::ops::{Deref, Range};
 
 /// Gradient elements whose squares are summed together.
@@ -30,21 +30,44 @@ pub struct Layout {
     pub log_std: Range<usize>,
     /// First parameter of the value network, which has an output for each stream of rewards.
     pub critic_start: usize,
+    /// The second value network and what else SAC has.
+    pub twin: Option<Twin>,
     /// Networks of the reward signals, with the places of their parameters, which follow.
     pub signals: Vec<(SignalNets, Range<usize>)>,
     /// Length of the array.
     pub len: usize,
 }
 
+/// What only SAC has among the parameters.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    /// First parameter of the second value network.
+    pub second: usize,
+    /// The logarithm of the entropy's weight.
+    pub alpha: usize,
+}
+
 impl Layout {
     /// For a task and a configuration.
     pub fn new(spec: &Spec, config: &PpoConfig) -> Self {
         let sizes = |hidden: &[usize], out| [&[spec.obs], hidden, &[out]].concat();
-        let actor = Mlp::new(&sizes(&config.actor_hidden, spec.act), config.activation);
-        let critic = Mlp::new(&sizes(&config.critic_hidden, 1 + config.signals.len()), config.activation);
+        let sac = matches!(config.algorithm, Algorithm::Sac(_));
+        // SAC's policy gives deviations too, and its value networks see the action
+        let outputs = if sac { 2 * spec.act } else { spec.act };
+        let actor = Mlp::new(&sizes(&config.actor_hidden, outputs), config.activation);
+        let critic = match sac {
+            true => Mlp::new(&[&[spec.obs + spec.act], &config.critic_hidden[..], &[1]].concat(), config.activation),
+            false => Mlp::new(&sizes(&config.critic_hidden, 1 + config.signals.len()), config.activation),
+        };
         let log_std = actor.len()..actor.len() + spec.act;
         let critic_start = log_std.end.next_multiple_of(BLOCK);
         let mut len = (critic_start + critic.len()).next_multiple_of(BLOCK);
+        let twin = sac.then(|| {
+            let second = len;
+            let alpha = (second + critic.len()).next_multiple_of(BLOCK);
+            len = alpha + BLOCK;
+            Twin { second, alpha }
+        });
         let mut signals = Vec::new();
         for (i, signal) in config.signals.iter().enumerate() {
             let nets = SignalNets::new(spec, signal, &mut SplitMix::new(config.seed, SIGNALS + 2 * i as u64));
@@ -52,7 +75,7 @@ impl Layout {
             len = place.end.next_multiple_of(BLOCK);
             signals.push((nets, place));
         }
-        Self { actor, critic, log_std, critic_start, signals, len }
+        Self { actor, critic, log_std, critic_start, twin, signals, len }
     }
     /// The policy network's parameters.
     pub fn actor_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
@@ -62,13 +85,24 @@ impl Layout {
     pub fn critic_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
         &params[self.critic_start..self.critic_start + self.critic.len()]
     }
+    /// The parameters of SAC's two value networks.
+    pub fn critics<'a>(&self, params: &'a [f32]) -> [&'a [f32]; 2] {
+        let second = self.twin.as_ref().map_or(self.critic_start, |twin| twin.second);
+        [self.critic_start, second].map(|start| &params[start..start + self.critic.len()])
+    }
+    /// The same of their slow copies.
+    pub fn critics_of_targets<'a>(&self, targets: &'a [f32]) -> [&'a [f32]; 2] {
+        let second = self.twin.as_ref().map_or(0, |twin| twin.second - self.critic_start);
+        [0, second].map(|start| &targets[start..start + self.critic.len()])
+    }
     /// Streams of rewards: the task's and one for each signal.
     pub fn streams(&self) -> usize {
         1 + self.signals.len()
     }
     /// Where each network's parameters begin: the policy's, the value function's, the signals'.
     fn starts(&self) -> impl Iterator<Item = usize> + '_ {
-        [0, self.critic_start].into_iter().chain(self.signals.iter().map(|(_, place)| place.start))
+        let twin = self.twin.iter().flat_map(|twin| [twin.second, twin.alpha]);
+        [0, self.critic_start].into_iter().chain(twin).chain(self.signals.iter().map(|(_, place)| place.start))
     }
     /// Which network a piece of the array is in: 0 for the policy, 1 for the value function, then the signals.
     pub fn network(&self, piece: &Range<usize>) -> usize {
@@ -87,6 +121,8 @@ impl Layout {
 pub struct Learner {
     /// Parameters of both networks, see [`Layout`].
     pub params: Vec<f32>,
+    /// Slow copies of SAC's value networks.
+    pub targets: Vec<f32>,
     /// Optimizer.
     pub adam: Adam,
     /// Learning rate of the policy.
@@ -114,6 +150,12 @@ impl Learner {
         for (i, (nets, place)) in layout.signals.iter().enumerate() {
             nets.init(&mut params[place.clone()], &mut SplitMix::new(config.seed, SIGNALS + 2 * i as u64 + 1));
         }
+        let mut targets = Vec::new();
+        if let (Some(twin), Algorithm::Sac(sac)) = (&layout.twin, &config.algorithm) {
+            init::orthogonal(&layout.critic, &mut params[twin.second..], 1.0, &mut random);
+            params[twin.alpha] = Real::ln(sac.init_alpha) as f32;
+            targets = params[layout.critic_start..twin.alpha].to_vec();
+        }
         let mut adam = Adam::new(layout.len);
         if let Algorithm::A2c(_) = config.algorithm {
             // its mean square starts at 1, or the first steps would be ten times the rate
@@ -121,6 +163,7 @@ impl Learner {
         }
         Self {
             params,
+            targets,
             adam,
             lr: config.lr,
             observations: Moments::new(spec.obs),
@@ -164,6 +207,7 @@ impl Learner {
             gaussian: &self.gaussian(layout),
             normalizer: &self.normalizer(config),
             signals: signals.collect(),
+            squash: matches!(config.algorithm, Algorithm::Sac(_)),
             discounts: Discounts { gamma, lambda: config.gae_lambda },
             reward_scale: self.reward_scale(config) * config.reward_strength,
             return_center: self.returns.mean[0] as f32,

@@ -1,4 +1,4 @@
-//! Marathon's trainer: PPO, A2C and ACKTR on the processor, in the lane layout of the physics.
+//! Marathon's trainer: PPO, A2C, ACKTR and SAC on the processor, in the lane layout of the physics.
 //!
 //! A rollout of thousands of agents and the network updates on it run on the same cores, in the same layout: blocks of
 //! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
@@ -23,7 +23,7 @@
 //!
 //! # Reading the code
 //!
-//! `ppo`, `a2c` and `acktr` are the algorithms: what each does with a rollout, from top to bottom. `run` is around them:
+//! `ppo`, `a2c`, `acktr` and `sac` are the algorithms: what each does with a rollout, from top to bottom. `run` is around them:
 //! threads, iterations, reports. They stand on `rollout` (acting), `advantage` (returns), [`loss`] (the objective), [`mlp`]
 //! with `tiles` (networks), `adam` (the optimizer), [`kfac`] (the Fisher matrix), [`signal`] (rewards for novelty) and `normalize` (statistics); `learner`
 //! holds what learning changes.
@@ -73,10 +73,13 @@ mod onnx;
 mod policy;
 mod ppo;
 mod remote;
+mod replay;
 pub mod rnd;
 mod rollout;
 mod run;
+mod sac;
 pub mod signal;
+pub mod squash;
 mod sync;
 mod tiles;
 
@@ -94,6 +97,7 @@ pub use observer::{Control, IterationStats, Observer, Snapshot};
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
 pub use remote::{Deliver, Player, Players};
 pub use run::{TrainOutput, train, train_with};
+pub use sac::Sac;
 pub use signal::{Signal, SignalKind};
 
 /// Runs `$body` with `$T` bound to the single-precision lane type of an `Isa`.

@@ -210,6 +210,21 @@ impl Mlp {
         T::enter(Transposed::<T> { w, dy: &tape.deltas[0], dx, blocks });
     }
 
+    /// Overwrites `dx` with the derivative of the loss with respect to the input, after [`Mlp::forward`], given
+    /// [`Tape::output_delta`]; the parameters' gradient is left out.
+    pub fn input_gradient(&self, isa: Isa, params: &[f32], tape: &mut Tape<f32>, dx: &mut Blocks<f32>, blocks: usize) {
+        f32_lanes!(isa, T => {
+            for (l, layer) in self.layers.iter().enumerate().skip(1).rev() {
+                let (before, rest) = tape.deltas.split_at_mut(l);
+                let (dy, dx) = (&rest[0], &mut before[l - 1]);
+                <T as Real>::enter(Transposed::<T> { w: &params[layer.weights.clone()], dy, dx: &mut *dx, blocks });
+                let (y, slope) = (&tape.values[l - 1], tape.slopes.get(l - 1));
+                <T as Real>::enter(Slope::<T> { activation: self.activation, y, slope, d: dx, blocks });
+            }
+            self.input_delta_on::<T>(params, tape, dx, blocks);
+        })
+    }
+
     /// The layers and their places among the second moments.
     pub fn moments(&self) -> impl Iterator<Item = LayerMoments> + '_ {
         let mut end = 0;

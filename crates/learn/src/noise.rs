@@ -13,6 +13,8 @@ const ACTIONS: u64 = 1 << 62;
 pub const SHUFFLES: u64 = 1 << 63;
 /// Initial parameters.
 pub const PARAMETERS: u64 = 3 << 61;
+/// Batches from a replay.
+pub const SAMPLES: u64 = 1 << 61;
 /// Initial parameters of reward signals; two streams for each.
 pub const SIGNALS: u64 = PARAMETERS + 1;
 
@@ -69,6 +71,11 @@ impl Noise {
             state[0][lane] |= 1;
         }
         Self { state }
+    }
+
+    /// Streams for a block of an update's batch.
+    pub fn of(seed: u64, update: u64, block: u64) -> Self {
+        Self::new(SplitMix::new(seed, update | SAMPLES).next(), block as usize)
     }
 
     /// The state as numbers.

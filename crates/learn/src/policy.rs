@@ -130,6 +130,9 @@ impl Policy {
             cpu_seconds: clocks.cpu,
         };
         let mut meta = PolicyMeta::of(spec, config.actor_hidden.clone(), config.activation);
+        if layout.twin.is_some() {
+            return Self::squashed(run, learner, PolicyMeta { training: Some(training), squash: true, ..meta });
+        }
         meta.observation_clip = config.observation_clip as f32;
         meta.training = Some(training);
         Self {
@@ -139,6 +142,22 @@ impl Policy {
             normalizer: learner.normalizer(config),
             log_std: learner.params[layout.log_std.clone()].to_vec(),
         }
+    }
+
+    /// The means of SAC's policy; its deviations depend on the state and are left out.
+    fn squashed(run: &Run<'_>, learner: &Learner, mut meta: PolicyMeta) -> Self {
+        let (spec, layout) = (&run.spec, &run.layout);
+        meta.observation_clip = run.config.observation_clip as f32;
+        let sizes = [&[spec.obs], &meta.hidden[..], &[spec.act]].concat();
+        let net = Mlp::new(&sizes, meta.activation);
+        let all = layout.actor_params(&learner.params);
+        let mut params = Vec::with_capacity(net.len());
+        for ((weights, biases), (own_weights, own_biases)) in layout.actor.layers().zip(net.layers()) {
+            params.extend_from_slice(&all[weights][..own_weights.len()]);
+            params.extend_from_slice(&all[biases][..own_biases.len()]);
+        }
+        let log_std = learner.params[layout.log_std.clone()].to_vec();
+        Self { meta, net, params, normalizer: learner.normalizer(run.config), log_std }
     }
 
     /// A policy from its parts: parameters of the network in the order of [`Mlp`], means and deviations of observations,

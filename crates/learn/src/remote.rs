@@ -13,14 +13,13 @@ use crate::files::{TensorReader, TensorWriter};
 use crate::learner::{Layout, Learner};
 use crate::observer::Control;
 use crate::rollout::{Actor, BlockSums, Rollout};
-use crate::run::share;
-use crate::{Error, PpoConfig, clock};
+use crate::run::{Run, share};
+use crate::{Algorithm, Error, PpoConfig, clock};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, RwLock};
 
 const VERSION: u32 = 1;
 
@@ -95,6 +94,7 @@ impl Player {
         (slice, slices): (usize, usize),
     ) -> Result<Self, Error> {
         config.validate()?;
+        check_algorithm(config)?;
         if slice >= slices || slices > config.blocks() {
             let expected = format!("a slice below their number, and at most {} of them", config.blocks());
             return Err(Error::Mismatch {
@@ -111,7 +111,7 @@ impl Player {
             isa,
             learner: Learner::new(&layout, &spec, config),
             actor: Actor::new(factory, place, config.seed, &layout),
-            rollout: Rollout::new(blocks.len(), config.horizon, (spec.obs, spec.act), 1 + config.signals.len()),
+            rollout: Rollout::new(blocks.len(), config.horizon, (spec.obs, spec.act), &layout),
             config: config.clone(),
             spec,
             layout,
@@ -150,6 +150,21 @@ impl Player {
     }
 }
 
+/// Refuses algorithms that learn from more than the last rollout.
+///
+/// # Errors
+/// If the algorithm is SAC, whose replay stays with the agents.
+pub fn check_algorithm(config: &PpoConfig) -> Result<(), Error> {
+    if matches!(config.algorithm, Algorithm::Sac(_)) {
+        return Err(Error::Mismatch {
+            what: "rollouts played elsewhere".into(),
+            found: "the trainer sac".into(),
+            expected: "ppo, a2c or acktr".into(),
+        });
+    }
+    Ok(())
+}
+
 /// Seconds spent on a rollout.
 #[derive(Clone, Copy, Default)]
 pub struct Spent {
@@ -177,15 +192,8 @@ impl<'a> Remote<'a> {
 
     /// Has one horizon played; fills the rollouts and brings the actors into the states in which their agents are then.
     /// `None` if the run is to end: nothing has changed then, except after an error.
-    pub fn collect(
-        &mut self,
-        learner: &Learner,
-        spec: &Spec,
-        actors: &[Mutex<Actor>],
-        rollouts: &[RwLock<Rollout>],
-        config: &PpoConfig,
-    ) -> Option<Spent> {
-        let locked = || actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
+    pub fn collect(&mut self, run: &Run<'_>, learner: &Learner) -> Option<Spent> {
+        let locked = || run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
         let mut orders = TensorWriter::default();
         orders.list("params", &learner.params);
         orders.list("obs_mean", &learner.observations.mean);
@@ -208,7 +216,7 @@ impl<'a> Remote<'a> {
                 expected: format!("one below {}", slices.len()),
             };
             let blocks = slices.get(i).ok_or_else(none)?.len();
-            answers[i] = Some(Answer::read(bytes, spec, blocks, config)?);
+            answers[i] = Some(Answer::read(bytes, run, blocks)?);
             Ok(())
         });
         if control == Control::Stop {
@@ -234,7 +242,7 @@ impl<'a> Remote<'a> {
             spent.cpu_elsewhere += answer.seconds[1];
         }
         let mut all = answers.iter().flatten().flat_map(|a| (0..a.rollout.blocks()).map(|b| (&a.rollout, b)));
-        for rollout in rollouts {
+        for rollout in &run.rollouts {
             let mut rollout = rollout.write().expect("no worker has panicked");
             rollout.sums.clear();
             for b in 0..rollout.blocks() {
@@ -254,11 +262,11 @@ struct Answer {
 }
 
 impl Answer {
-    fn read(bytes: &[u8], spec: &Spec, blocks: usize, config: &PpoConfig) -> Result<Self, Error> {
-        let signals = config.signals.len();
+    fn read(bytes: &[u8], run: &Run<'_>, blocks: usize) -> Result<Self, Error> {
+        let spec = &run.spec;
         let file = Message::Rollout.open(bytes)?;
-        let mut rollout = Rollout::new(blocks, config.horizon, (spec.obs, spec.act), 1 + signals);
-        read_rollout(&mut rollout, &file, spec, signals)?;
+        let mut rollout = Rollout::new(blocks, run.config.horizon, (spec.obs, spec.act), &run.layout);
+        read_rollout(&mut rollout, &file, spec, run.config.signals.len())?;
         let agents = Agents::read(&file)?;
         agents.check(Message::Rollout.format(), blocks, spec.obs)?;
         Ok(Self { rollout, agents, seconds: file.get("seconds", &[2])? })

@@ -14,6 +14,7 @@ use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::noise::Noise;
 use crate::normalize::{Normalize, Normalizer};
 use crate::signal::{SignalNets, SignalSpace, Step};
+use crate::squash::{Draw, Normals};
 use crate::{BLOCK, f32_lanes};
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use marathon_physics::lanes::{Isa, Real};
@@ -28,6 +29,8 @@ pub struct Acting<'a> {
     pub normalizer: &'a Normalizer,
     /// Networks of the reward signals with their parameters, and the factors of their rewards.
     pub signals: Vec<(&'a SignalNets, &'a [f32], f64)>,
+    /// Whether the policy is SAC's, and observations are kept as they are.
+    pub squash: bool,
     pub discounts: Discounts,
     /// Divides the rewards.
     pub reward_scale: f64,
@@ -119,8 +122,9 @@ pub struct Rollout {
     target: Aligned<f32>,
     /// Streams of rewards.
     streams: usize,
-    /// Agents whose episode ended with the item.
+    /// Agents whose episode ended with the item, and whose episode failed.
     done: Vec<u16>,
+    failed: Vec<u16>,
     /// Ended episodes whose last observation has a value: item, agents that were truncated, agents whose simulation did not
     /// break, and the observation that they ended at. Without signals, truncated ones alone.
     cut: Vec<(usize, [u16; 2])>,
@@ -133,10 +137,11 @@ pub struct Rollout {
 
 impl Rollout {
     /// Room for `horizon` decisions of `blocks` blocks.
-    pub fn new(blocks: usize, horizon: usize, (obs_len, act_len): (usize, usize), streams: usize) -> Self {
+    pub fn new(blocks: usize, horizon: usize, (obs_len, act_len): (usize, usize), layout: &Layout) -> Self {
+        let streams = layout.streams();
         let items = blocks * horizon;
         let (row, stream_rows) = (|| Aligned::rows(items), || Aligned::rows(items * streams));
-        let next_items = if streams > 1 { items } else { 0 };
+        let next_items = if streams > 1 || layout.twin.is_some() { items } else { 0 };
         Self {
             blocks,
             obs_len,
@@ -151,6 +156,7 @@ impl Rollout {
             target: stream_rows(),
             streams,
             done: vec![0; items],
+            failed: vec![0; items],
             cut: Vec::new(),
             cut_obs: Vec::new(),
             last_value: Aligned::rows(blocks * streams),
@@ -217,6 +223,14 @@ impl Rollout {
             target: &self.target[rows],
         }
     }
+    /// Rewards of an item, scaled, of the task alone.
+    pub fn reward(&self, item: usize) -> &[f32] {
+        &self.reward[item * self.streams * BLOCK..][..BLOCK]
+    }
+    /// Agents whose episode ended with each item, and whose episode failed.
+    pub fn ends(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
+        self.done.iter().copied().zip(self.failed.iter().copied())
+    }
     /// What the reward signals need to know about an item.
     pub fn step(&self, item: usize) -> Step<'_, f32> {
         Step {
@@ -243,6 +257,7 @@ pub struct Actor {
     critic_tape: Tape<f32>,
     signal_spaces: Vec<SignalSpace>,
     eps: Vec<[f32; BLOCK]>,
+    z: Vec<f32>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
     out: BlockStep,
@@ -269,6 +284,7 @@ impl Actor {
             critic_tape: layout.critic.inference_tape(),
             signal_spaces: layout.signals.iter().map(|(nets, _)| nets.space()).collect(),
             eps: vec![[0.0; BLOCK]; factory.spec().act],
+            z: vec![0.0; CHUNK * factory.spec().act * BLOCK],
             action: vec![0.0; blocks * factory.spec().act * BLOCK],
             out: BlockStep::default(),
         }
@@ -332,6 +348,9 @@ impl Actor {
             env_seconds += clock::wall() - start;
         }
         self.add_up_observations(rollout);
+        if acting.squash {
+            return env_seconds;
+        }
         self.reward_novelty(acting, rollout);
         self.evaluate(acting, rollout);
         advantage::estimate(acting, rollout);
@@ -348,11 +367,23 @@ impl Actor {
             normalizer: acting.normalizer,
             raw: &self.obs[of(obs_row)],
             input: &mut self.input,
-            copy: Some(&mut rollout.obs[at(obs_row)]),
+            copy: if acting.squash { None } else { Some(&mut rollout.obs[at(obs_row)]) },
             sums: Some((&mut sum[of(obs_row)], &mut square[of(obs_row)])),
             lanes: PhantomData,
         }));
         acting.actor.0.forward(acting.isa, acting.actor.1, &self.input, &mut self.tape, n);
+        if acting.squash {
+            rollout.obs[at(obs_row)].copy_from_slice(&self.obs[of(obs_row)]);
+            let (act, action) = (rollout.act_len, &mut rollout.action[at(act_row)]);
+            let (z, output, log_prob) =
+                (&mut self.z[..n * act_row], self.tape.output(), &mut rollout.log_prob[at(BLOCK)]);
+            let noise = &mut self.noise[first..first + n];
+            f32_lanes!(acting.isa, T => {
+                <T as Real>::enter(Normals::<T> { noise, z: &mut *z, act, lanes: PhantomData });
+                <T as Real>::enter(Draw::<T> { output, z, act, action, log_prob, blocks: n, lanes: PhantomData });
+            });
+            return;
+        }
         f32_lanes!(acting.isa, T => <T as Real>::enter(Sample::<T> {
             gaussian: acting.gaussian,
             mean: self.tape.output(),
@@ -405,7 +436,9 @@ impl Actor {
             *sum += term.iter().map(|x| *x as f64).sum::<f64>();
         }
 
-        if !acting.signals.is_empty() {
+        if acting.squash {
+            rollout.next_obs[item * obs_row..(item + 1) * obs_row].copy_from_slice(obs);
+        } else if !acting.signals.is_empty() {
             f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
                 normalizer: acting.normalizer,
                 raw: obs,
@@ -418,7 +451,7 @@ impl Actor {
 
         // ended episodes
         let done = out.terminated | out.truncated | out.diverged;
-        rollout.done[item] = done;
+        (rollout.done[item], rollout.failed[item]) = (done, out.terminated | out.diverged);
         if done == 0 {
             return;
         }

@@ -23,11 +23,11 @@ use crate::learner::{Layout, Learner, Totals};
 use crate::loss::{Loss, LossSums, Objective, Samples};
 use crate::mlp::{CHUNK, Tape};
 use crate::observer::{Control, IterationStats, Observer, Snapshot};
-use crate::remote::{Players, Remote, Spent};
+use crate::remote::{Players, Remote, Spent, check_algorithm};
 use crate::rollout::{Actor, Rollout};
 use crate::signal::{MAX_SIGNALS, SignalSpace};
 use crate::sync::Barrier;
-use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, f32_lanes, ppo};
+use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, f32_lanes, ppo, sac};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
@@ -91,6 +91,9 @@ pub fn train_with(
     if isa == Isa::F64 || !isa.supported() {
         return Err(Error::Isa(isa.name(), Isa::best().name()));
     }
+    if players.is_some() {
+        check_algorithm(config)?;
+    }
     let (mut run, mut learner) = Run::new(factory, isa, config);
     let mut remote = players.map(|players| Remote::new(players, config));
     run.elsewhere = remote.is_some();
@@ -143,7 +146,7 @@ pub struct Run<'a> {
     pub spec: Spec,
     pub layout: Layout,
     pub actors: Vec<Mutex<Actor>>,
-    rollouts: Vec<RwLock<Rollout>>,
+    pub rollouts: Vec<RwLock<Rollout>>,
     /// Gradients of the groups of the current list of samples.
     partials: Vec<RwLock<Partial>>,
     /// Sums over the groups, a slice per worker.
@@ -158,6 +161,8 @@ pub struct Run<'a> {
     elsewhere: bool,
     /// What only ACKTR has.
     pub kfac: Option<Kfac>,
+    /// What only SAC has.
+    pub sac: Option<sac::Shared>,
 }
 
 /// Seconds that a worker spent in the current iteration.
@@ -171,7 +176,7 @@ struct Seconds {
 
 /// What a group of samples contributes.
 pub struct Partial {
-    gradient: Vec<f32>,
+    pub gradient: Vec<f32>,
     /// Sums for the factors of the Fisher matrix, for ACKTR.
     pub moments: Vec<f32>,
     pub sums: LossSums,
@@ -183,7 +188,7 @@ struct Slice {
 }
 
 /// A worker's space for computing gradients.
-struct Workspace {
+pub struct Workspace {
     input: Blocks<f32>,
     actor: Tape<f32>,
     critic: Tape<f32>,
@@ -191,6 +196,7 @@ struct Workspace {
     gradient: Vec<f32>,
     moments: Vec<f32>,
     rows: Vec<[f32; BLOCK]>,
+    pub sac: Option<Box<sac::Space>>,
 }
 
 /// Sums over an iteration's updates.
@@ -211,18 +217,24 @@ impl<'a> Run<'a> {
             let share = share(blocks, workers, id);
             let place = (share.start, share.len());
             actors.push(Mutex::new(Actor::new(factory, place, config.seed, &layout)));
-            rollouts.push(RwLock::new(Rollout::new(
-                share.len(),
-                config.horizon,
-                (spec.obs, spec.act),
-                layout.streams(),
-            )));
+            rollouts.push(RwLock::new(Rollout::new(share.len(), config.horizon, (spec.obs, spec.act), &layout)));
         }
         let largest = (0..config.minibatches).map(|m| share(item_count(config), config.minibatches, m).len()).max();
         let groups = group_count(largest.unwrap_or(1));
         let kfac = match &config.algorithm {
             Algorithm::Acktr(_) => Some(Kfac::new(&layout)),
             _ => None,
+        };
+        let sac = match &config.algorithm {
+            Algorithm::Sac(settings) => {
+                let of_workers: Vec<usize> = (0..workers).map(|id| share(blocks, workers, id).len()).collect();
+                Some(sac::Shared::new(settings, config.agents, &of_workers, (spec.obs, spec.act)))
+            }
+            _ => None,
+        };
+        let (pieces, groups) = match &config.algorithm {
+            Algorithm::Sac(sac) => (sac.updates, group_count(sac.batch / BLOCK)),
+            _ => (config.epochs * config.minibatches, groups),
         };
         let moments = kfac.as_ref().map_or(0, Kfac::moments_len);
         let partial =
@@ -242,12 +254,13 @@ impl<'a> Run<'a> {
             slices: (0..workers).map(|id| RwLock::new(slice(id))).collect(),
             norm_blocks,
             // one more than minibatches: ACKTR shares the factors of the layers out as well
-            tickets: (0..=config.epochs * config.minibatches).map(|_| AtomicUsize::new(0)).collect(),
+            tickets: (0..=pieces).map(|_| AtomicUsize::new(0)).collect(),
             seconds: (0..workers).map(|_| Mutex::default()).collect(),
             barrier: Barrier::new(workers),
             stop: AtomicBool::new(false),
             elsewhere: false,
             kfac,
+            sac,
             spec,
             layout,
         };
@@ -270,6 +283,7 @@ impl<'a> Run<'a> {
             gradient: vec![0.0; self.layout.len],
             moments: vec![0.0; self.kfac.as_ref().map_or(0, Kfac::moments_len)],
             rows: vec![[0.0; BLOCK]; self.spec.act],
+            sac: self.sac.as_ref().map(|_| Box::new(sac::Space::new(self))),
         };
         let mut done = learner.steps >= self.config.total_steps;
         while !done {
@@ -314,7 +328,8 @@ impl<'a> Run<'a> {
     fn learn(&self, id: usize, learner: &mut Learner, space: &mut Workspace, means: &mut Means) -> Totals {
         let rollouts: Vec<_> = self.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
         let totals = Totals::new(&rollouts, self.config.horizon);
-        if learner.iteration > 0 {
+        // the first rollout only fills the statistics, and a replay
+        if learner.iteration > 0 || self.sac.is_some() {
             let rollouts: Vec<&Rollout> = rollouts.iter().map(|r| &**r).collect();
             // which rollout a block is in, and its place there
             let place = rollouts.iter().enumerate().flat_map(|(r, x)| (0..x.blocks()).map(move |b| (r, b))).collect();
@@ -323,6 +338,7 @@ impl<'a> Run<'a> {
                 Algorithm::Ppo => ppo::update(update),
                 Algorithm::A2c(a2c) => a2c::update(update, a2c),
                 Algorithm::Acktr(acktr) => acktr::update(update, acktr),
+                Algorithm::Sac(sac) => sac::update(update, sac),
             }
         }
         learner.absorb(&totals, self.config);
@@ -333,7 +349,7 @@ impl<'a> Run<'a> {
     fn collect(&self, id: usize, learner: &Learner, head: Option<&mut Head<'_, '_>>) -> Spent {
         if self.elsewhere {
             let Some(remote) = head.and_then(|head| head.remote.as_mut()) else { return Spent::default() };
-            let spent = remote.collect(learner, &self.spec, &self.actors, &self.rollouts, self.config);
+            let spent = remote.collect(self, learner);
             return spent.unwrap_or_else(|| {
                 self.stop.store(true, Ordering::Release);
                 Spent::default()
@@ -516,13 +532,14 @@ impl<'a> Run<'a> {
             fall_fraction: per_episode(sums.falls),
             diverged: sums.diverged as u64,
             reward_terms: sums.terms.iter().map(|x| x / totals.samples).collect(),
-            kl: per_sample(means.sums.kl),
-            clip_fraction: per_sample(means.sums.clipped),
+            kl: if self.sac.is_some() { 0.0 } else { per_sample(means.sums.kl) },
+            clip_fraction: if self.sac.is_some() { 0.0 } else { per_sample(means.sums.clipped) },
             policy_loss: per_sample(means.sums.policy),
             value_loss: per_sample(means.sums.value),
-            explained_variance: totals.explained_variance(),
-            entropy: gaussian.entropy(),
-            std_mean: gaussian.mean_std(),
+            explained_variance: if self.sac.is_some() { 0.0 } else { totals.explained_variance() },
+            // SAC's depend on the state: means over the updates
+            entropy: if self.sac.is_some() { per_sample(means.sums.kl) } else { gaussian.entropy() },
+            std_mean: if self.sac.is_some() { per_sample(means.sums.clipped) } else { gaussian.mean_std() },
             lr: learner.lr,
             skipped_minibatches: learner.skipped,
             signal_rewards: signals.map(|(signal, x)| (signal.kind, x / totals.samples)).collect(),
@@ -574,6 +591,37 @@ impl Update<'_> {
         self.means.samples += sums.samples;
         self.means.sums += sums;
         sums
+    }
+
+    /// As [`Update::gradient`], for a list of so many items of another kind: `work` fills a group's part, for the items of
+    /// a range.
+    pub fn share_out(
+        &mut self,
+        piece: usize,
+        items: usize,
+        mut work: impl FnMut(Range<usize>, &Learner, &mut Partial, &mut Workspace),
+    ) -> LossSums {
+        let (run, groups) = (self.run, group_count(items));
+        while let Some(group) = self.take(piece, groups) {
+            let mut partial = run.partials[group].write().expect("no worker has panicked");
+            work(share(items, groups, group), self.learner, &mut partial, self.space);
+        }
+        run.barrier.wait();
+        let sums = run.reduce(self.id, groups);
+        run.barrier.wait();
+        self.means.samples += sums.samples;
+        self.means.sums += sums;
+        sums
+    }
+
+    /// The worker's own rollout.
+    pub fn own_rollout(&self) -> &Rollout {
+        self.rollouts[self.id]
+    }
+
+    /// Which worker has each block, and its place there.
+    pub fn place(&self) -> &[(usize, usize)] {
+        &self.place
     }
 
     /// The next of `parts` parts of a piece of work that nobody has taken yet.

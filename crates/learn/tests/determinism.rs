@@ -25,6 +25,7 @@ fn threads_do_not_change_the_policy() {
         PpoConfig { minibatches: 17, schedule: Schedule::Linear, activation: Activation::Elu, ..small_config() },
         small_of("a2c"),
         small_of("acktr"),
+        small_of("sac"),
     ] {
         let one = run(&config, Isa::best());
         for threads in [2, 3, 5, 9] {
@@ -46,7 +47,7 @@ fn vector_width_does_not_change_the_policy() {
             assert_eq!(bits(&want), bits(&run(&config, isa)), "{} {}", activation.name(), isa.name());
         }
     }
-    for algorithm in ["a2c", "acktr"] {
+    for algorithm in ["a2c", "acktr", "sac"] {
         let want = run(&small_of(algorithm), Isa::F32);
         for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
             assert_eq!(bits(&want), bits(&run(&small_of(algorithm), isa)), "{algorithm} {}", isa.name());

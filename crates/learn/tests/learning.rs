@@ -4,7 +4,7 @@ mod common;
 
 use common::PuckTask;
 use marathon_learn::{
-    Acktr, Activation, Algorithm, Control, IterationStats, PpoConfig, Schedule, Snapshot, evaluate, train,
+    Acktr, Activation, Algorithm, Control, IterationStats, PpoConfig, Sac, Schedule, Snapshot, evaluate, train,
 };
 use marathon_physics::lanes::Isa;
 
@@ -72,6 +72,25 @@ fn a2c_solves_the_task() {
 #[test]
 fn acktr_solves_the_task_in_half_the_steps() {
     assert!(learned(&PpoConfig { total_steps: 200_000, threads: 1, ..PpoConfig::acktr() }) > 55.0);
+}
+
+/// With a quarter of PPO's steps.
+#[test]
+fn sac_solves_the_task_in_a_quarter_of_the_steps() {
+    let task = PuckTask::new();
+    let sac = Sac { warmup: 2000, ..Sac::default() };
+    let config = PpoConfig {
+        algorithm: Algorithm::Sac(sac),
+        total_steps: 100_000,
+        actor_hidden: vec![32, 32],
+        critic_hidden: vec![64, 64],
+        threads: 1,
+        ..PpoConfig::sac()
+    };
+    let output = train(&task, Isa::best(), &config, None, &mut common::silent).unwrap();
+    let result = evaluate(&task, Isa::best(), &output.policy, &Default::default()).unwrap();
+    println!("{result:?} {:?}", output.last);
+    assert!(output.policy.meta().squash && result.falls == 0 && result.return_mean > 52.0, "{result:?}");
 }
 
 #[test]

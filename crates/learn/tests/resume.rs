@@ -35,7 +35,7 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
 
 #[test]
 fn so_have_those_of_the_other_algorithms() {
-    for algorithm in ["a2c", "acktr"] {
+    for algorithm in ["a2c", "acktr", "sac"] {
         resumed_run_is_whole(&small_of(algorithm), 4);
     }
 }

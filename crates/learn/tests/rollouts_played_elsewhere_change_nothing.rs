@@ -176,6 +176,9 @@ fn players_refuse_what_is_not_theirs() {
     let (task, config) = (PuckTask::with_limit(LIMIT), small_config());
     let error = Player::new(&task, Isa::best(), &config, (2, 2)).err().unwrap().to_string();
     assert!(error.contains("slice 2 of 2, expected a slice below their number, and at most 5"), "{error}");
+    let sac = PpoConfig::sac();
+    let error = Player::new(&task, Isa::best(), &sac, (0, 1)).err().unwrap().to_string();
+    assert!(error.contains("the trainer sac, expected ppo, a2c or acktr"), "{error}");
     let mut player = Player::new(&task, Isa::best(), &config, (0, 2)).unwrap();
     let error = player.play(b"", b"").unwrap_err().to_string();
     assert!(error.contains("marathon-orders: header"), "{error}");

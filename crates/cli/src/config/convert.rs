@@ -5,7 +5,7 @@ use super::behavior::{Behavior, Notes};
 use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
-use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, PpoConfig, Schedule};
+use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, PpoConfig, Sac, Schedule};
 use std::path::Path;
 
 /// Agents in a scene of the paper, which a file of its time does not say.
@@ -18,7 +18,7 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads.
-const MARATHON: [&str; 35] = [
+const MARATHON: [&str; 37] = [
     "agents",
     "horizon",
     "rollouts",
@@ -54,6 +54,8 @@ const MARATHON: [&str; 35] = [
     "damping",
     "stats_decay",
     "inverse_every",
+    "updates",
+    "n_step",
 ];
 
 /// The trainer's configuration, with the values of its base for all that the file leaves out.
@@ -69,9 +71,10 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
     let agents = agents(&marathon, &settings, &base, steps_per_agent)?;
     // an update waits until the buffer is full
-    let horizon = marathon.count("horizon", 1..=1 << 31, settings.buffer_size.div_ceil(agents))?;
-    if let Some(entry) = hyperparameters.get("buffer_size").filter(|_| horizon != settings.buffer_size.div_ceil(agents))
-    {
+    let is_sac = matches!(base.algorithm, Algorithm::Sac(_));
+    let rollout = if is_sac { base.horizon as u64 } else { settings.buffer_size.div_ceil(agents) };
+    let horizon = marathon.count("horizon", 1..=1 << 31, rollout)?;
+    if let Some(entry) = hyperparameters.get("buffer_size").filter(|_| horizon != rollout) {
         notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
     }
     let is_ppo = base.algorithm == Algorithm::Ppo;
@@ -80,11 +83,11 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
             notes.ignored(&entry, &format!("{} bounds no ratio", base.algorithm.name()));
         }
     }
-    if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon) {
+    if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon && !is_sac) {
         let why = "each of the N agents adds M decisions to a rollout and the values of the states reached stand for the rest";
         notes.ignored(&entry, &why.replace("N", &agents.to_string()).replace("M", &horizon.to_string()));
     }
-    let minibatches = (settings.buffer_size / settings.batch_size).max(1);
+    let minibatches = if is_sac { 1 } else { (settings.buffer_size / settings.batch_size).max(1) };
     let scale = if steps_per_agent { agents } else { 1 };
     if let Some(entry) = top.get("max_steps").filter(|_| scale > 1) {
         let all = settings.max_steps.saturating_mul(scale);
@@ -97,7 +100,8 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let last_beta = settings.beta.min(LAST_BETA);
     let [min_std, max_std] = [base.min_std, base.max_std];
     let ppo = PpoConfig {
-        algorithm: algorithm(&marathon, base.algorithm, &mut notes)?,
+        algorithm: algorithm(&marathon, base.algorithm, &mut notes)?
+            .map_or_else(|| sac(&marathon, &hyperparameters, &settings, agents * horizon), Ok)?,
         agents: agents as usize,
         horizon: horizon as usize,
         rollouts: marathon.count("rollouts", 1..=1 << 31, base.rollouts as u64)? as usize,
@@ -177,7 +181,7 @@ fn agents(
 ) -> Result<u64, ConfigError> {
     let block = BLOCK as u64;
     let default = match base.algorithm {
-        Algorithm::A2c(_) | Algorithm::Acktr(_) => base.agents as u64,
+        Algorithm::A2c(_) | Algorithm::Acktr(_) | Algorithm::Sac(_) => base.agents as u64,
         Algorithm::Ppo if steps_per_agent => PAPER_AGENTS,
         Algorithm::Ppo => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
     };
@@ -197,20 +201,36 @@ fn widths(marathon: &Section<'_>, key: &str, default: Vec<usize>) -> Result<Vec<
 }
 
 /// The algorithm with what the section says of its own settings; those of the others are without effect.
-fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Result<Algorithm, ConfigError> {
+///
+/// SAC's are for the most part ML-Agents' own, see [`sac`]: nothing is returned.
+fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Result<Option<Algorithm>, ConfigError> {
     let own: &[&str] = match base {
         Algorithm::Ppo => &[],
         Algorithm::A2c(_) => &["value_coef", "rms_decay", "rms_epsilon"],
         Algorithm::Acktr(_) => &["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"],
+        Algorithm::Sac(_) => &["updates", "n_step"],
     };
-    let all =
-        ["value_coef", "rms_decay", "rms_epsilon", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"];
+    let all = [
+        "value_coef",
+        "rms_decay",
+        "rms_epsilon",
+        "kl_clip",
+        "momentum",
+        "damping",
+        "stats_decay",
+        "inverse_every",
+        "updates",
+        "n_step",
+        "updates",
+        "n_step",
+    ];
     for entry in all.into_iter().filter(|key| !own.contains(key)).filter_map(|key| marathon.get(key)) {
         notes.ignored(&entry, &format!("{} has no such setting", base.name()));
     }
     let positive = |key, default| marathon.number(key, Range::Positive, default);
     let fraction = |key, default| marathon.number(key, Range::Fraction, default);
-    Ok(match base {
+    Ok(Some(match base {
+        Algorithm::Sac(_) => return Ok(None),
         Algorithm::Ppo => Algorithm::Ppo,
         Algorithm::A2c(a2c) => Algorithm::A2c(A2c {
             value_coef: positive("value_coef", a2c.value_coef)?,
@@ -225,7 +245,27 @@ fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Resu
             stats_decay: fraction("stats_decay", acktr.stats_decay)?,
             inverse_every: marathon.count("inverse_every", 1..=1 << 31, acktr.inverse_every)?,
         }),
-    })
+    }))
+}
+
+/// SAC's settings; `rollout` is the number of steps of a rollout.
+fn sac(
+    marathon: &Section<'_>,
+    hyperparameters: &Section<'_>,
+    settings: &Settings,
+    rollout: u64,
+) -> Result<Algorithm, ConfigError> {
+    let steps_per_update = hyperparameters.number("steps_per_update", Range::Positive, 1.0)?;
+    let updates = (rollout as f64 / steps_per_update).round().max(1.0) as u64;
+    Ok(Algorithm::Sac(Sac {
+        replay: settings.buffer_size as usize,
+        warmup: hyperparameters.count("buffer_init_steps", 0..=1 << 53, 0)?,
+        batch: settings.batch_size as usize,
+        updates: marathon.count("updates", 1..=1 << 31, updates)? as usize,
+        tau: hyperparameters.number("tau", Range::Positive, 0.005)?,
+        n_step: marathon.count("n_step", 1..=1 << 16, 1)? as usize,
+        init_alpha: hyperparameters.number("init_entcoef", Range::Positive, 1.0)?,
+    }))
 }
 
 fn activation(marathon: &Section<'_>, default: Activation) -> Result<Activation, ConfigError> {

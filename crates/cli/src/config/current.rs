@@ -5,6 +5,7 @@ use super::document::Map;
 use super::error::ConfigError;
 use super::features::{Without, off, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
+use marathon_learn::Algorithm;
 use std::path::Path;
 
 /// Sections of a file. A file with one of them is in this format.
@@ -48,6 +49,19 @@ const HYPERPARAMETERS: [&str; 11] = [
     "lambd",
     "num_epoch",
     "shared_critic",
+];
+/// The same of SAC.
+const SAC: [&str; 10] = [
+    "batch_size",
+    "buffer_size",
+    "learning_rate",
+    "learning_rate_schedule",
+    "buffer_init_steps",
+    "init_entcoef",
+    "tau",
+    "steps_per_update",
+    "save_replay_buffer",
+    "reward_signal_steps_per_update",
 ];
 /// Keys of a network's section.
 pub const NETWORK: [&str; 8] = [
@@ -104,7 +118,17 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     let without = Without::read(&marathon)?;
 
     let base = trainer(top.get("trainer_type"))?;
-    hyperparameters.only(&HYPERPARAMETERS)?;
+    match &base.algorithm {
+        Algorithm::Sac(_) => {
+            hyperparameters.only(&SAC)?;
+            for key in ["save_replay_buffer", "reward_signal_steps_per_update"] {
+                if let Some(entry) = hyperparameters.set(key) {
+                    notes.ignored(&entry, "checkpoints hold the replay, and there are no signals with SAC");
+                }
+            }
+        }
+        _ => hyperparameters.only(&HYPERPARAMETERS)?,
+    }
     off(&hyperparameters, "shared_critic", "one network for policy and value")?;
 
     network.only(&NETWORK)?;

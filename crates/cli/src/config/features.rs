@@ -74,6 +74,7 @@ pub fn trainer(entry: Option<Entry<'_>>) -> Result<PpoConfig, ConfigError> {
     let Some(entry) = entry else { return Ok(ml_agents()) };
     match entry.word(&Algorithm::NAMES).map(|i| Algorithm::NAMES[i]) {
         Ok("ppo") => Ok(ml_agents()),
+        Ok("sac") => Ok(ml_agents_sac()),
         Ok(name) => Ok(PpoConfig::of(name).expect("the name of an algorithm")),
         Err(_) => Err(ConfigError::Unsupported {
             feature: "this trainer",
@@ -81,6 +82,22 @@ pub fn trainer(entry: Option<Entry<'_>>) -> Result<PpoConfig, ConfigError> {
             expected: format!("one of {}", Algorithm::NAMES.join(", ")),
             place: entry.place,
         }),
+    }
+}
+
+/// SAC with ML-Agents' defaults, which [`convert`](super::convert) completes, and networks as for PPO.
+fn ml_agents_sac() -> PpoConfig {
+    let sac = PpoConfig::sac();
+    PpoConfig {
+        agents: 16,
+        lr: 3e-4,
+        value_lr: 3e-4,
+        actor_hidden: vec![128; 2],
+        critic_hidden: vec![128; 2],
+        activation: Activation::Swish,
+        normalize_observations: false,
+        observation_clip: 5.0,
+        ..sac
     }
 }
 

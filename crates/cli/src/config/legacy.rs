@@ -7,7 +7,7 @@ use super::document::Map;
 use super::error::{ConfigError, Place, nearest};
 use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
-use marathon_learn::{Signal, SignalKind};
+use marathon_learn::{Algorithm, Signal, SignalKind};
 use std::path::Path;
 
 /// Keys of a section.
@@ -62,6 +62,9 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     let top = select(path, agent, &root, root.section("default")?, "default", &mut notes)?;
     // the trainer first: others have other keys
     let base = trainer(top.get("trainer"))?;
+    if let Algorithm::Sac(_) = base.algorithm {
+        refuse(top.get("trainer"), "SAC in a file of this format", "the present format, with 'behaviors:'")?;
+    }
     top.only(&BRAIN)?;
     let marathon = top.section("marathon")?;
     let without = Without::read(&marathon)?;

@@ -49,16 +49,22 @@ impl Settings {
         // ML-Agents' sizes for PPO; the others learn from each rollout at once
         let (buffer, horizon) = match &base.algorithm {
             Algorithm::Ppo => (10_240, 64),
+            Algorithm::Sac(_) => (50_000, 64),
             _ => (base.rollout_steps(), base.horizon as u64),
         };
         let buffer_size = hyperparameters.count("buffer_size", 16..=MOST, buffer)?;
-        let batch = if base.algorithm == Algorithm::Ppo { 1024 } else { buffer_size };
+        let batch = match &base.algorithm {
+            Algorithm::Ppo => 1024,
+            Algorithm::Sac(_) => 128,
+            _ => buffer_size,
+        };
         // defaults that differ: steps in all, steps between summaries and checkpoints
         let (max_steps, summary_freq, checkpoint_interval) = match format {
             Format::Current => (500_000, 50_000, 500_000),
             Format::Legacy => (50_000, 1_000, 50_000),
         };
-        let learning_rate_schedule = decay(hyperparameters, "learning_rate_schedule", Decay::Linear)?;
+        let schedule = if let Algorithm::Sac(_) = base.algorithm { Decay::Constant } else { Decay::Linear };
+        let learning_rate_schedule = decay(hyperparameters, "learning_rate_schedule", schedule)?;
         // Baselines moves nothing but the rate
         let beta_schedule = match &base.algorithm {
             Algorithm::Ppo => learning_rate_schedule,

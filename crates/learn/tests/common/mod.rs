@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "every test file uses a part")]
 
 use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
+use marathon_learn::{Algorithm, Sac};
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
 #[derive(Clone, Copy, Default)]
@@ -181,7 +182,15 @@ pub fn small_config() -> marathon_learn::PpoConfig {
 pub fn small_of(algorithm: &str) -> marathon_learn::PpoConfig {
     let small = small_config();
     let config = marathon_learn::PpoConfig::of(algorithm).expect("the name of an algorithm");
+    // of SAC, an update from the third rollout on, and a replay that is soon full
+    let algorithm = match config.algorithm {
+        Algorithm::Sac(sac) => {
+            Algorithm::Sac(Sac { replay: 80 * 40, warmup: 80 * 18, batch: 528, updates: 2, n_step: 3, ..sac })
+        }
+        other => other,
+    };
     marathon_learn::PpoConfig {
+        algorithm,
         agents: small.agents,
         horizon: 6,
         rollouts: 4,
