@@ -55,7 +55,8 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         title: "Agents side by side",
         about: "Hopper-v0 with its own settings and more or fewer agents, at equal steps. Rollouts hold 8192 decisions in all \
                 (with 4096 agents 65536, 16 of each), minibatches 1024. Agents cost memory, not time: a vector carries sixteen, \
-                and more than that fill the same vectors one after another."
+                and more than that fill the same vectors one after another. Steps per \
+                second, unlike those per processor second, depend on who else uses the computer."
             .into(),
         columns: vec![
             "agents",
