@@ -9,13 +9,15 @@ use plotters::style::FontStyle;
 use std::path::Path;
 
 /// Colors of lines and bars, apart for all kinds of sight (Okabe and Ito).
-const COLORS: [RGBColor; 6] = [
+const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
+    RGBColor(90, 90, 90),
+    RGBColor(178, 160, 0),
 ];
 
 /// A picture.
