@@ -290,7 +290,9 @@ impl<'a> Run<'a> {
             let (cpu, start) = (clock::thread_cpu(), clock::wall());
             let (mut seconds, mut totals, mut means) = (Seconds::default(), Totals::default(), Means::default());
             let mut cpu_elsewhere = 0.0;
-            for n in 0..self.config.rollouts {
+            // a run that was given up halfway goes on there
+            let first = learner.iteration % self.config.rollouts as u64;
+            for n in first..self.config.rollouts as u64 {
                 let begin = clock::wall();
                 let spent = self.collect(id, &learner, head.as_deref_mut());
                 seconds.env += spent.env;
@@ -302,7 +304,7 @@ impl<'a> Run<'a> {
                 self.barrier.wait();
                 if self.stop.load(Ordering::Acquire) {
                     // those who play elsewhere have given up
-                    if n == 0 {
+                    if n == first {
                         return;
                     }
                     break;

@@ -6,8 +6,8 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_learn::{
-    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, Signal, SignalKind,
-    TrainOutput, train_with,
+    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, Schedule, Signal,
+    SignalKind, TrainOutput, train_with,
 };
 use marathon_physics::lanes::Isa;
 
@@ -100,7 +100,14 @@ fn rewards_for_novelty_are_played_elsewhere_too() {
 
 #[test]
 fn iterations_of_several_rollouts_can_be_given_up_halfway() {
-    let config = PpoConfig { algorithm: Algorithm::A2c(A2c::default()), rollouts: 2, ..small_config() };
+    let config = PpoConfig {
+        algorithm: Algorithm::A2c(A2c::default()),
+        rollouts: 2,
+        epochs: 1,
+        minibatches: 1,
+        schedule: Schedule::Constant,
+        ..small_config()
+    };
     let want = run(None, &config, None);
     let mut team = Team::new(&config, 2);
     team.until = 3;
