@@ -100,6 +100,7 @@ class VecEnv:
         autoreset: Literal["next_step", "same_step", "disabled"] | str = "same_step",
         max_episode_steps: int | None = None,
         copy: bool = False,
+        dtype: Literal["float32", "float64"] | str = "float32",
         **options: Any,
     ) -> VecEnv:
         """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
@@ -115,6 +116,7 @@ class VecEnv:
                 and returns the first observation with reward 0. "disabled": nothing; use `reset(mask=...)`.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number.
             copy: whether every step returns new arrays.
+            dtype: type of the observations. They are computed in 32 bits whatever it is.
             **options: arguments of the task, see `Spec.options`.
         """
     @property
@@ -133,10 +135,13 @@ class VecEnv:
     def copy(self) -> bool:
         """Whether every step returns new arrays."""
     @property
-    def obs(self) -> npt.NDArray[np.float32]:
+    def dtype(self) -> Literal["float32", "float64"]:
+        """Type of the observations."""
+    @property
+    def obs(self) -> npt.NDArray[Any]:
         """Observations to act upon next, ``(num_envs, obs_size)``: what the last `reset` or `step` returned."""
     @property
-    def final_obs(self) -> npt.NDArray[np.float32]:
+    def final_obs(self) -> npt.NDArray[Any]:
         """Observations of the states that the last step reached, ``(num_envs, obs_size)``.
 
         With "same_step", they differ from `obs` where an episode ended. Overwritten by the next step, also with `copy`.
@@ -163,7 +168,7 @@ class VecEnv:
         """Position of each agent's root along x, m, ``(num_envs,)``, a new array; None if it cannot move along x."""
     def reset(
         self, seed: int | Sequence[int | None] | None = None, mask: npt.ArrayLike | None = None
-    ) -> npt.NDArray[np.float32]:
+    ) -> npt.NDArray[Any]:
         """Start new episodes and return the observations, ``(num_envs, obs_size)``.
 
         A seed starts the random streams anew: the same seed, the same lives. A sequence has a seed, or None, for each
@@ -172,7 +177,7 @@ class VecEnv:
         """
     def step(
         self, actions: npt.ArrayLike
-    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
         """Advance every agent by one decision. `actions` is ``(num_envs, act_size)``.
 
         Actions are in the units of `Spec.action_low`; the suite's own tasks clip them to [-1, 1].
@@ -188,7 +193,7 @@ class VecEnv:
         """
     def set_state(
         self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None
-    ) -> npt.NDArray[np.float32]:
+    ) -> npt.NDArray[Any]:
         """Put agents, all or those of a mask, into states as if their episodes had begun there.
 
         Shapes are those of `get_state`. Returns the observations, ``(num_envs, obs_size)``.

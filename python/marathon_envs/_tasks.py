@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import gymnasium
+
 from marathon_envs._native import Renderer, VecEnv, spec
 from marathon_envs.agent_env import AgentVecEnv
 from marathon_envs.agents import MarathonAgent
@@ -9,9 +11,16 @@ from marathon_envs.agents import MarathonAgent
 Task = str | type[MarathonAgent]
 
 
-def vec_env(task: Task, num_envs: int, **options: Any) -> VecEnv | AgentVecEnv:
-    """Many agents of a task."""
-    return VecEnv(task, num_envs, **options) if isinstance(task, str) else task.vec_env(num_envs, **options)
+def vec_env(task: Task, num_envs: int, *, dtype: str = "float32", **options: Any) -> VecEnv | AgentVecEnv:
+    """Many agents of a task. `dtype` is about native tasks; observations of classes are float32."""
+    if isinstance(task, str):
+        return VecEnv(task, num_envs, dtype=dtype, **options)
+    return task.vec_env(num_envs, **options)
+
+
+def dtype(task: Task) -> str:
+    """Type of the numbers of observations: that of Gymnasium, which has tasks of the same names, or ours."""
+    return "float64" if isinstance(task, str) and spec(task).id in gymnasium.registry else "float32"
 
 
 def renderer(task: Task, width: int, height: int, agents: int = 1, **options: Any) -> Renderer:

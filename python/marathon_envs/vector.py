@@ -77,6 +77,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             autoreset=self.autoreset_mode.value,
             max_episode_steps=_spaces.steps_limit(max_episode_steps, None),
             copy=copy,
+            dtype=_tasks.dtype(task),
             **options,
         )
         self.task_spec = self._env.spec
@@ -154,7 +155,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
 
         rewards, every = reward.astype(np.float64), np.ones(self.num_envs, np.bool_)
         terms = env.reward_terms if env.copy else env.reward_terms.copy()
-        info = env.info if env.copy else env.info.copy()
+        info = env.info
         # float64 before anything else, as Gymnasium's single environments have it
         distance = env.forward.astype(np.float64)
         if mode is not AutoresetMode.SAME_STEP or not ended.any():
@@ -173,7 +174,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._add_step(infos, _without(rows, terms), _without(rows, distance), acted)
         # None where there is none
         infos["final_obs"] = last_obs = np.empty(self.num_envs, dtype=object)
-        for i, last in zip(rows.tolist(), env.final_obs[rows].astype(self._dtype), strict=True):
+        for i, last in zip(rows.tolist(), env.final_obs[rows].astype(self._dtype, copy=False), strict=True):
             last_obs[i] = last
         infos["final_info"] = final
         infos["_final_obs"] = infos["_final_info"] = ended.copy()
@@ -189,8 +190,9 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     def _report(self, info: FloatArray, x: FloatArray | None, mask: BoolArray) -> Infos:
         """What the agents in `mask` report of a state."""
         infos: Infos = {}
-        for i, name in enumerate(self._info):
-            infos[name], infos[f"_{name}"] = info[:, i].astype(np.float64), mask
+        # all columns at once, as Gymnasium's type of numbers
+        for name, numbers in zip(self._info, np.array(info.T, np.float64, order="C"), strict=True):
+            infos[name], infos[f"_{name}"] = numbers, mask
         if x is not None:
             infos["x_position"], infos["_x_position"] = x.copy(), mask
         return infos
@@ -245,7 +247,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
 
 def _only(rows: FloatArray, values: FloatArray) -> FloatArray:
     """Values of some rows, zeros elsewhere."""
-    kept = np.zeros_like(values)
+    kept = np.zeros(values.shape, values.dtype)
     kept[rows] = values[rows]
     return kept
 

@@ -51,6 +51,30 @@ def test_arrays_are_the_environments_own_unless_copies_are_asked_for() -> None:
     assert all(np.array_equal(x, old) for x, old in kept)
 
 
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_observations_in_64_bits_are_those_in_32(mode: str) -> None:
+    narrow, wide = (
+        VecEnv("hopper", 21, autoreset=mode, copy=c, dtype=d) for c, d in ((False, "float32"), (True, "float64"))
+    )
+    assert (narrow.dtype, wide.dtype) == ("float32", "float64")
+    assert np.array_equal(narrow.reset(seed=2), wide.reset(seed=2))
+    ended = 0
+    for step in range(60):
+        given = actions(narrow, step)
+        (a, *others), (b, *rest) = narrow.step(given), wide.step(given)
+        assert (a.dtype, b.dtype, wide.final_obs.dtype) == (np.float32, np.float64, np.float64)
+        assert np.array_equal(a, b) and np.array_equal(narrow.final_obs, wide.final_obs)
+        assert all(np.array_equal(x, y) for x, y in zip(others, rest, strict=True))
+        ended += others[1].sum()
+    assert ended
+    mask = np.arange(21) % 3 == 0
+    assert np.array_equal(narrow.reset(mask=mask), wide.reset(mask=mask))
+    state = narrow.get_state()
+    assert np.array_equal(narrow.set_state(*state, mask), wide.set_state(*state, mask))
+    with pytest.raises(ValueError, match="dtype is 'float16', expected 'float32' or 'float64'"):
+        VecEnv("hopper", 1, dtype="float16")
+
+
 def test_results_do_not_depend_on_threads_copies_layout_or_type_of_the_actions() -> None:
     a, b = VecEnv("ant", 50, seed=5, threads=1), VecEnv("ant", 50, seed=5, threads=2, copy=True)
     a.reset()

@@ -111,12 +111,16 @@ fn did_you_mean(nearest: &Option<String>) -> String {
 }
 
 /// The known name closest to `name`, ignoring case, if it is close enough to be a typing error.
-pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // comparing takes quadratic time, and nobody mistypes a name that long
+    if name.len() > 200 {
+        return None;
+    }
     let name = name.to_lowercase();
     known
         .into_iter()
         .map(|k| (strsim::damerau_levenshtein(&name, &k.to_lowercase()), k))
-        .filter(|(distance, k)| *distance <= 2.max(k.len() / 3))
+        .filter(|(distance, k)| *distance <= 2.max(k.chars().count() / 3))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, k)| k)
 }

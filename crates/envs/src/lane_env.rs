@@ -67,6 +67,8 @@ pub trait AgentShard: Shard {
 pub trait AgentShards: ShardFactory {
     /// Same as [`ShardFactory::shard`].
     fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard>;
+    /// The model's own constants: what [`AgentShard::vary`] may deviate from.
+    fn unvaried(&self) -> Variation;
 }
 
 /// What all shards of an agent share.
@@ -196,6 +198,10 @@ impl<T: Real, A: Agent> ShardFactory for AgentFactory<T, A> {
 }
 
 impl<T: Real, A: Agent> AgentShards for AgentFactory<T, A> {
+    fn unvaried(&self) -> Variation {
+        Variation::none(&self.task.blueprint.model)
+    }
+
     fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard> {
         Box::new(LaneShard::new(self.task.clone(), first, blocks, seed))
     }

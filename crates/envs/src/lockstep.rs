@@ -5,8 +5,9 @@
 //! decision: each [announces](Shard::announce) its actions, the last one to do so steps the whole [`Crowd`], and all go
 //! on with their own rows of the result.
 
+use crate::rows::{Step, StepMut};
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
-use crate::vec_env::{Step, StepMut, VecEnv};
+use crate::vec_env::VecEnv;
 use std::any::Any;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

@@ -7,12 +7,12 @@ use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::ops::Range;
 
 use crate::error::EnvError;
 use crate::lane_env::{AgentShard, AgentState};
 use crate::options::Options;
 use crate::registry::{self, Registry};
+use crate::rows::{ObsNumber, Step, StepMut, to_rows};
 use crate::shard::{BLOCK, BlockStep, Spec};
 
 /// What happens to an agent whose episode ended.
@@ -58,142 +58,6 @@ impl Default for VecEnvOptions {
             max_episode_steps: None,
             options: Options::new(),
         }
-    }
-}
-
-/// Results of a step, in arrays of their own. Made by [`VecEnv::buffers`].
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Step {
-    /// Observations to act upon next, `[agents][obs]`.
-    pub obs: Vec<f32>,
-    /// Observations of the states reached, `[agents][obs]`: the same as `obs` except where an episode ended.
-    pub final_obs: Vec<f32>,
-    /// Rewards, `[agents]`.
-    pub reward: Vec<f32>,
-    /// Terms that add up to the rewards, `[agents][reward_terms]`.
-    pub terms: Vec<f32>,
-    /// Further numbers about the states reached, `[agents][info]`.
-    pub info: Vec<f32>,
-    /// Distance moved along +x, m, `[agents]`.
-    pub forward: Vec<f32>,
-    /// The agent failed, `[agents]`.
-    pub terminated: Vec<bool>,
-    /// The episode reached its time limit, `[agents]`.
-    pub truncated: Vec<bool>,
-    /// The simulation of the agent broke down; it counts as terminated, with reward 0. `[agents]`.
-    pub diverged: Vec<bool>,
-}
-
-impl Step {
-    /// Zeros for a number of agents.
-    pub(crate) fn new(n: usize, spec: &Spec) -> Self {
-        Step {
-            obs: vec![0.0; n * spec.obs],
-            final_obs: vec![0.0; n * spec.obs],
-            reward: vec![0.0; n],
-            terms: vec![0.0; n * spec.reward_terms.len()],
-            info: vec![0.0; n * spec.info.len()],
-            forward: vec![0.0; n],
-            terminated: vec![false; n],
-            truncated: vec![false; n],
-            diverged: vec![false; n],
-        }
-    }
-
-    /// Copies consecutive agents' rows out of those of more agents.
-    pub(crate) fn copy_rows(&mut self, from: &Step, spec: &Spec, agents: Range<usize>) {
-        let rows = |columns: usize| agents.start * columns..agents.end * columns;
-        self.obs.copy_from_slice(&from.obs[rows(spec.obs)]);
-        self.final_obs.copy_from_slice(&from.final_obs[rows(spec.obs)]);
-        self.reward.copy_from_slice(&from.reward[rows(1)]);
-        self.terms.copy_from_slice(&from.terms[rows(spec.reward_terms.len())]);
-        self.info.copy_from_slice(&from.info[rows(spec.info.len())]);
-        self.forward.copy_from_slice(&from.forward[rows(1)]);
-        self.terminated.copy_from_slice(&from.terminated[rows(1)]);
-        self.truncated.copy_from_slice(&from.truncated[rows(1)]);
-        self.diverged.copy_from_slice(&from.diverged[rows(1)]);
-    }
-
-    /// Borrows all arrays.
-    pub fn as_mut(&mut self) -> StepMut<'_> {
-        StepMut {
-            obs: &mut self.obs,
-            final_obs: &mut self.final_obs,
-            reward: &mut self.reward,
-            terms: &mut self.terms,
-            info: &mut self.info,
-            forward: &mut self.forward,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-            diverged: &mut self.diverged,
-        }
-    }
-}
-
-/// Where a step writes to: the caller's arrays, with the shapes of [`Step`].
-#[derive(Debug)]
-pub struct StepMut<'a> {
-    /// See [`Step::obs`].
-    pub obs: &'a mut [f32],
-    /// See [`Step::final_obs`].
-    pub final_obs: &'a mut [f32],
-    /// See [`Step::reward`].
-    pub reward: &'a mut [f32],
-    /// See [`Step::terms`].
-    pub terms: &'a mut [f32],
-    /// See [`Step::info`].
-    pub info: &'a mut [f32],
-    /// See [`Step::forward`].
-    pub forward: &'a mut [f32],
-    /// See [`Step::terminated`].
-    pub terminated: &'a mut [bool],
-    /// See [`Step::truncated`].
-    pub truncated: &'a mut [bool],
-    /// See [`Step::diverged`].
-    pub diverged: &'a mut [bool],
-}
-
-impl<'a> StepMut<'a> {
-    /// The same arrays for a shorter time.
-    fn borrow(&mut self) -> StepMut<'_> {
-        StepMut {
-            obs: self.obs,
-            final_obs: self.final_obs,
-            reward: self.reward,
-            terms: self.terms,
-            info: self.info,
-            forward: self.forward,
-            terminated: self.terminated,
-            truncated: self.truncated,
-            diverged: self.diverged,
-        }
-    }
-
-    /// The rows of the first `n` agents, and those of the others.
-    fn split_at(self, n: usize, spec: &Spec) -> (StepMut<'a>, StepMut<'a>) {
-        let (obs, obs_rest) = self.obs.split_at_mut(n * spec.obs);
-        let (final_obs, final_obs_rest) = self.final_obs.split_at_mut(n * spec.obs);
-        let (reward, reward_rest) = self.reward.split_at_mut(n);
-        let (terms, terms_rest) = self.terms.split_at_mut(n * spec.reward_terms.len());
-        let (info, info_rest) = self.info.split_at_mut(n * spec.info.len());
-        let (forward, forward_rest) = self.forward.split_at_mut(n);
-        let (terminated, terminated_rest) = self.terminated.split_at_mut(n);
-        let (truncated, truncated_rest) = self.truncated.split_at_mut(n);
-        let (diverged, diverged_rest) = self.diverged.split_at_mut(n);
-        (
-            StepMut { obs, final_obs, reward, terms, info, forward, terminated, truncated, diverged },
-            StepMut {
-                obs: obs_rest,
-                final_obs: final_obs_rest,
-                reward: reward_rest,
-                terms: terms_rest,
-                info: info_rest,
-                forward: forward_rest,
-                terminated: terminated_rest,
-                truncated: truncated_rest,
-                diverged: diverged_rest,
-            },
-        )
     }
 }
 
@@ -246,8 +110,8 @@ impl VecEnv {
             return wrong("max_episode_steps", "0".into(), "at least 1");
         }
         let agent = registry.agent_with(agent, &options.options)?;
-        let unvaried = Variation::none(&agent.model()?);
         let factory = agent.shards(options.isa.unwrap_or_else(Isa::best))?;
+        let unvaried = factory.unvaried();
         let mut spec = factory.spec().clone();
         spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);
         let blocks = options.agents.div_ceil(BLOCK);
@@ -308,7 +172,7 @@ impl VecEnv {
     ///
     /// # Errors
     /// If the array's length is wrong.
-    pub fn reset(&mut self, seed: Option<u64>, obs: &mut [f32]) -> Result<(), EnvError> {
+    pub fn reset<O: ObsNumber>(&mut self, seed: Option<u64>, obs: &mut [O]) -> Result<(), EnvError> {
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
         if let Some(seed) = seed {
             for worker in &mut self.workers {
@@ -323,7 +187,7 @@ impl VecEnv {
     ///
     /// # Errors
     /// If an array's length is wrong.
-    pub fn reset_agents(&mut self, mask: &[bool], obs: &mut [f32]) -> Result<(), EnvError> {
+    pub fn reset_agents<O: ObsNumber>(&mut self, mask: &[bool], obs: &mut [O]) -> Result<(), EnvError> {
         self.check("mask [agents]", mask.len(), 1)?;
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
         self.each_block(&|i| mask[i], obs, Worker::reset);
@@ -386,7 +250,7 @@ impl VecEnv {
     ///
     /// # Errors
     /// If an array's length is wrong.
-    pub fn observe(&mut self, mask: &[bool], obs: &mut [f32]) -> Result<(), EnvError> {
+    pub fn observe<O: ObsNumber>(&mut self, mask: &[bool], obs: &mut [O]) -> Result<(), EnvError> {
         self.check("mask [agents]", mask.len(), 1)?;
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
         self.each_block(&|i| mask[i], obs, Worker::observe);
@@ -415,7 +279,7 @@ impl VecEnv {
     ///
     /// # Errors
     /// If an array's length is wrong; then nothing has been done.
-    pub fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), EnvError> {
+    pub fn step<O: ObsNumber>(&mut self, actions: &[f32], out: &mut StepMut<'_, O>) -> Result<(), EnvError> {
         let (obs, act) = (self.spec.obs, self.spec.act);
         let (terms, infos) = (self.spec.reward_terms.len(), self.spec.info.len());
         self.check("actions [agents][act]", actions.len(), act)?;
@@ -488,12 +352,13 @@ impl VecEnv {
     /// the body's center of mass. Snapshots do not hold it.
     ///
     /// # Errors
-    /// If there is no such agent, or the numbers are not finite.
-    ///
-    /// # Panics
-    /// If the model has no such body.
+    /// If there is no such agent or body, or the numbers are not finite.
     pub fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) -> Result<(), EnvError> {
         self.check_agent(agent)?;
+        if body >= self.unvaried.mass.len() {
+            let expected = "less than the number of the model's bodies";
+            return Err(EnvError::Option { option: "body", found: body.to_string(), expected });
+        }
         if let Some(x) = force.iter().chain(&torque).find(|x| !x.is_finite()) {
             return Err(EnvError::Option { option: "push", found: x.to_string(), expected: "finite numbers" });
         }
@@ -575,9 +440,9 @@ impl VecEnv {
     }
 
     /// Hands the blocks with chosen agents, and the rows of each, to a function.
-    fn each_block(&mut self, chosen: Chosen, obs: &mut [f32], act: fn(&mut Worker, usize, u16)) {
+    fn each_block<O: ObsNumber>(&mut self, chosen: Chosen, obs: &mut [O], act: fn(&mut Worker, usize, u16)) {
         let (columns, n) = (self.spec.obs, self.stride);
-        let run = |(i, (worker, obs)): (usize, (&mut Worker, &mut [f32]))| {
+        let run = |(i, (worker, obs)): (usize, (&mut Worker, &mut [O]))| {
             for (block, rows) in obs.chunks_mut(BLOCK * columns).enumerate() {
                 let first = i * n + block * BLOCK;
                 let mask = (0..rows.len() / columns).fold(0, |mask, k| mask | u16::from(chosen(first + k)) << k);
@@ -612,7 +477,7 @@ impl Worker {
     }
 
     /// Steps all agents of this worker.
-    fn step(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut) {
+    fn step<O: ObsNumber>(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut<'_, O>) {
         let Worker { shard, action, obs, out: o, pending } = self;
         let spec = shard.spec();
         let (n_obs, n_act) = (spec.obs, spec.act);
@@ -650,12 +515,18 @@ impl Worker {
             to_rows(obs, n_obs, real, &mut out.final_obs[rows.clone()]);
             // lanes without an agent live on unseen
             let ended = o.terminated | o.truncated;
-            match autoreset {
-                Autoreset::SameStep if ended != 0 => shard.reset(block, ended, obs),
-                Autoreset::NextStep => pending[block] = ended,
-                Autoreset::SameStep | Autoreset::Disabled => {}
+            let begun = match autoreset {
+                Autoreset::SameStep => ended,
+                Autoreset::NextStep | Autoreset::Disabled => 0,
+            };
+            if autoreset == Autoreset::NextStep {
+                pending[block] = ended;
             }
-            to_rows(obs, n_obs, real, &mut out.obs[rows]);
+            out.obs[rows.clone()].copy_from_slice(&out.final_obs[rows.clone()]);
+            if begun != 0 {
+                shard.reset(block, begun, obs);
+                to_rows(obs, n_obs, real & begun, &mut out.obs[rows]);
+            }
         }
     }
 }
@@ -671,16 +542,4 @@ fn clear(out: &mut BlockStep, mask: u16) {
     out.terminated &= !mask;
     out.truncated &= !mask;
     out.diverged &= !mask;
-}
-
-/// Copies the agents in `mask` from a block's `[column][16]` into rows.
-fn to_rows(block: &[f32], columns: usize, mask: u16, rows: &mut [f32]) {
-    // there may be no columns
-    for (i, row) in rows.chunks_exact_mut(columns.max(1)).enumerate() {
-        if mask >> i & 1 == 1 {
-            for (column, x) in row.iter_mut().enumerate() {
-                *x = block[column * BLOCK + i];
-            }
-        }
-    }
 }

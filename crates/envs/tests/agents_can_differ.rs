@@ -69,3 +69,19 @@ fn nonsense_is_refused() {
     says(0, &|v| v.gravity[0] = f64::NAN, "gravity is NaN");
     says(0, &|v| v.mass.truncate(1), "mass [bodies] has 1 numbers");
 }
+
+#[test]
+fn a_push_is_of_a_body_that_there_is() {
+    let (mut env, _) = hoppers();
+    let bodies = env.unvaried().mass.len();
+    let text = |e: Result<(), marathon_envs::EnvError>| e.unwrap_err().to_string();
+    assert!(text(env.push(0, bodies, [1.0; 3], [0.0; 3])).contains(&format!("body is {bodies}, expected less")));
+    assert!(text(env.push(N, 1, [1.0; 3], [0.0; 3])).contains("agent is 20"));
+    assert!(text(env.push(0, 1, [f64::NAN; 3], [0.0; 3])).contains("push is NaN"));
+    let plain = live(&mut hoppers().0);
+    env.push(5, 1, [200.0, 0.0, 0.0], [0.0; 3]).unwrap();
+    let pushed = live(&mut env);
+    for agent in 0..N {
+        assert_eq!(pushed[agent] == plain[agent], agent != 5, "agent {agent}");
+    }
+}

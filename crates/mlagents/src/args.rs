@@ -7,6 +7,7 @@
 use crate::behavior::BehaviorOptions;
 use crate::error::PlayerError;
 use crate::player::PlayerOptions;
+use marathon_envs::nearest;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -171,10 +172,8 @@ fn usage(text: String) -> PlayerError {
 }
 
 fn unknown(flag: &str) -> PlayerError {
-    let distance = |known: &&str| strsim::damerau_levenshtein(known, flag);
     let near =
-        VALUED.into_iter().chain(BARE).min_by_key(distance).filter(|known| distance(known) <= 2 + known.len() / 3);
-    let near = near.map(|near| format!("; did you mean {near}?")).unwrap_or_default();
+        nearest(flag, VALUED.into_iter().chain(BARE)).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
     usage(format!("there is no flag {flag}{near} See --help for all"))
 }
 

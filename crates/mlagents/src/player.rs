@@ -7,14 +7,13 @@ use crate::log::Log;
 use crate::parameters::Parameters;
 use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
 use crate::wire::{RlInitializationOutput, RlInput, RlOutput, UnityMessage, UnityOutput, command};
+use marathon_envs::nearest;
 use prost::Message;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Bytes of a message that are neither infos nor statistics: headers, names, behaviors.
 const ALLOWANCE: usize = 4096;
-/// Longest distance by which a name that means nothing is told the nearest that does.
-const TYPING_ERROR: usize = 3;
 
 /// What a player is made of.
 #[derive(Clone, Debug)]
@@ -96,10 +95,11 @@ impl Player {
     /// If there is no trainer, an agent does not exist, or there are more agents than fit into a message.
     pub fn connect(options: &PlayerOptions, log: Log) -> Result<Self, PlayerError> {
         // what cannot work with one area is told before anybody is waited for
-        check(&make(options, 1)?.0)?;
+        let one_area = make(options, 1)?;
+        check(&one_area.0)?;
         log.line(format_args!("connecting to a trainer on port {}", options.port));
         let (mut trainer, setup) = Trainer::connect(options.port, options.patience)?;
-        let (behaviors, next_id) = make(options, setup.areas)?;
+        let (behaviors, next_id) = if setup.areas == 1 { one_area } else { make(options, setup.areas)? };
         check(&behaviors)?;
         let Setup { seed, areas, package_version } = &setup;
         log.line(format_args!("mlagents-envs {package_version}; seed {seed}; areas: {areas}"));
@@ -273,9 +273,8 @@ impl Player {
         if known.contains(name) {
             return;
         }
-        let distance = |known: &&&str| strsim::damerau_levenshtein(known, name);
-        let near = known.iter().min_by_key(distance).filter(|known| distance(known) <= TYPING_ERROR);
-        let near = near.map(|near| format!("did you mean '{near}'? ")).unwrap_or_default();
+        let near =
+            nearest(name, known.iter().copied()).map(|near| format!("did you mean '{near}'? ")).unwrap_or_default();
         let list = known.iter().copied().collect::<Vec<_>>().join(", ");
         self.log.line(format_args!("warning: environment parameter '{name}' has no effect; {near}known: {list}"));
     }

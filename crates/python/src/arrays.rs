@@ -1,7 +1,7 @@
 //! The NumPy arrays that a step writes to, and those that it reads.
 
 use crate::error;
-use marathon_envs::{Spec, StepMut};
+use marathon_envs::{EnvError, ObsNumber, Spec, StepMut, VecEnv};
 use numpy::{
     AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike1, PyArrayMethods, PyReadonlyArray2,
     PyReadwriteArray, PyUntypedArrayMethods, ndarray::Dimension,
@@ -11,8 +11,7 @@ use std::borrow::Cow;
 
 /// Results of a step, the fields of [`marathon_envs::Step`].
 pub struct Arrays {
-    pub obs: Py<PyArray2<f32>>,
-    pub final_obs: Py<PyArray2<f32>>,
+    observations: Observations,
     pub reward: Py<PyArray1<f32>>,
     pub terms: Py<PyArray2<f32>>,
     pub info: Py<PyArray2<f32>>,
@@ -24,12 +23,35 @@ pub struct Arrays {
     spare: Option<Box<Arrays>>,
 }
 
+/// Observations in one of two types of numbers.
+enum Observations {
+    Single(Pair<f32>),
+    Double(Pair<f64>),
+}
+
+/// `obs` and `final_obs` of a step.
+struct Pair<O: Element> {
+    next: Py<PyArray2<O>>,
+    last: Py<PyArray2<O>>,
+}
+
+/// Observations to write to.
+pub enum ObsMut<'a> {
+    Single(&'a mut [f32]),
+    Double(&'a mut [f64]),
+}
+
 impl Arrays {
-    /// For a number of agents.
-    pub fn new(py: Python<'_>, agents: usize, spec: &Spec) -> Self {
+    /// For a number of agents; observations are float64 if `double`.
+    pub fn new(py: Python<'_>, agents: usize, spec: &Spec, double: bool) -> Self {
+        let shape = [agents, spec.obs];
+        let observations = if double {
+            Observations::Double(Pair::new(py, shape))
+        } else {
+            Observations::Single(Pair::new(py, shape))
+        };
         Arrays {
-            obs: PyArray2::zeros(py, [agents, spec.obs], false).unbind(),
-            final_obs: PyArray2::zeros(py, [agents, spec.obs], false).unbind(),
+            observations,
             reward: list(py, agents),
             terms: PyArray2::zeros(py, [agents, spec.reward_terms.len()], false).unbind(),
             info: PyArray2::zeros(py, [agents, spec.info.len()], false).unbind(),
@@ -41,11 +63,37 @@ impl Arrays {
         }
     }
 
+    /// Observations to act upon next.
+    pub fn obs(&self, py: Python<'_>) -> Py<PyAny> {
+        match &self.observations {
+            Observations::Single(pair) => pair.next.clone_ref(py).into_any(),
+            Observations::Double(pair) => pair.next.clone_ref(py).into_any(),
+        }
+    }
+
+    /// Observations of the states that the last step reached.
+    pub fn final_obs(&self, py: Python<'_>) -> Py<PyAny> {
+        match &self.observations {
+            Observations::Single(pair) => pair.last.clone_ref(py).into_any(),
+            Observations::Double(pair) => pair.last.clone_ref(py).into_any(),
+        }
+    }
+
+    /// Whether observations are float64.
+    pub fn double(&self) -> bool {
+        matches!(self.observations, Observations::Double(_))
+    }
+
     /// Puts other arrays in the place of all but `final_obs`, so that those of the last step can be kept: those of the step
     /// before, where nobody has kept them, new ones elsewhere.
     pub fn renew(&mut self, py: Python<'_>, agents: usize, spec: &Spec) {
-        let mut spare = self.spare.take().unwrap_or_else(|| Box::new(Arrays::new(py, agents, spec)));
-        turn(py, &mut self.obs, &mut spare.obs);
+        let double = self.double();
+        let mut spare = self.spare.take().unwrap_or_else(|| Box::new(Arrays::new(py, agents, spec, double)));
+        match (&mut self.observations, &mut spare.observations) {
+            (Observations::Single(pair), Observations::Single(spare)) => turn(py, &mut pair.next, &mut spare.next),
+            (Observations::Double(pair), Observations::Double(spare)) => turn(py, &mut pair.next, &mut spare.next),
+            _ => unreachable!("the type of observations never changes"),
+        }
         turn(py, &mut self.terms, &mut spare.terms);
         turn(py, &mut self.info, &mut spare.info);
         turn(py, &mut self.reward, &mut spare.reward);
@@ -56,10 +104,23 @@ impl Arrays {
         self.spare = Some(spare);
     }
 
-    /// Lets `f` write to all arrays without the GIL.
-    pub fn write<R: Send>(&self, py: Python<'_>, f: impl FnOnce(&mut StepMut<'_>) -> R + Send) -> PyResult<R> {
-        let mut obs = writer(py, "obs", &self.obs)?;
-        let mut final_obs = writer(py, "final_obs", &self.final_obs)?;
+    /// Makes a step without the GIL and has it write to all arrays.
+    pub fn step(&self, py: Python<'_>, env: &mut VecEnv, actions: &[f32]) -> PyResult<Result<(), EnvError>> {
+        match &self.observations {
+            Observations::Single(pair) => self.step_into(py, pair, env, actions),
+            Observations::Double(pair) => self.step_into(py, pair, env, actions),
+        }
+    }
+
+    fn step_into<O: Element + ObsNumber>(
+        &self,
+        py: Python<'_>,
+        pair: &Pair<O>,
+        env: &mut VecEnv,
+        actions: &[f32],
+    ) -> PyResult<Result<(), EnvError>> {
+        let mut obs = writer(py, "obs", &pair.next)?;
+        let mut final_obs = writer(py, "final_obs", &pair.last)?;
         let mut reward = writer(py, "reward", &self.reward)?;
         let mut terms = writer(py, "reward_terms", &self.terms)?;
         let mut info = writer(py, "info", &self.info)?;
@@ -78,12 +139,34 @@ impl Arrays {
             truncated: truncated.as_slice_mut()?,
             diverged: diverged.as_slice_mut()?,
         };
-        Ok(py.detach(|| f(&mut out)))
+        Ok(py.detach(|| env.step(actions, &mut out)))
     }
 
-    /// Lets `f` write to the observations without the GIL.
-    pub fn write_obs<R: Send>(&self, py: Python<'_>, f: impl FnOnce(&mut [f32]) -> R + Send) -> PyResult<R> {
-        let mut obs = writer(py, "obs", &self.obs)?;
+    /// Lets `f` write to the observations without the GIL. With `keep`, it is a copy that it writes to.
+    pub fn write_obs<R: Send>(
+        &mut self,
+        py: Python<'_>,
+        keep: bool,
+        f: impl FnOnce(ObsMut<'_>) -> R + Send,
+    ) -> PyResult<R> {
+        match &mut self.observations {
+            Observations::Single(pair) => pair.write(py, keep, |obs| f(ObsMut::Single(obs))),
+            Observations::Double(pair) => pair.write(py, keep, |obs| f(ObsMut::Double(obs))),
+        }
+    }
+}
+
+impl<O: Element> Pair<O> {
+    fn new(py: Python<'_>, shape: [usize; 2]) -> Self {
+        let zeros = || PyArray2::zeros(py, shape, false).unbind();
+        Pair { next: zeros(), last: zeros() }
+    }
+
+    fn write<R: Send>(&mut self, py: Python<'_>, keep: bool, f: impl FnOnce(&mut [O]) -> R + Send) -> PyResult<R> {
+        if keep {
+            self.next = self.next.bind(py).call_method0("copy")?.cast_into()?.unbind();
+        }
+        let mut obs = writer(py, "obs", &self.next)?;
         let obs = obs.as_slice_mut()?;
         Ok(py.detach(|| f(obs)))
     }

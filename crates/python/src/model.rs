@@ -1,6 +1,7 @@
 //! A compiled model file: what is in it, by name and by index.
 
 use crate::error;
+use marathon_envs::nearest;
 use marathon_physics::model::{Joint, JointType};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -248,9 +249,7 @@ fn table<const N: usize>(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f6
 fn find(what: &str, name: &str, known: Vec<&str>) -> PyResult<usize> {
     known.iter().position(|k| *k == name && !name.is_empty()).ok_or_else(|| {
         let named: Vec<&str> = known.into_iter().filter(|k| !k.is_empty()).collect();
-        let distance = |k: &&&str| strsim::damerau_levenshtein(&name.to_lowercase(), &k.to_lowercase());
-        let nearest = named.iter().min_by_key(distance).filter(|k| distance(k) <= 2.max(k.len() / 3));
-        let hint = nearest.map(|k| format!(" did you mean '{k}'?")).unwrap_or_default();
+        let hint = nearest(name, named.iter().copied()).map(|k| format!(" did you mean '{k}'?")).unwrap_or_default();
         error::value(format!("the model has no {what} '{name}';{hint} known: {}", named.join(", ")))
     })
 }

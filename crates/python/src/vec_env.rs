@@ -1,6 +1,6 @@
 //! Many agents of one kind as a Python object.
 
-use crate::arrays::{Arrays, mask, rows};
+use crate::arrays::{Arrays, ObsMut, mask, rows};
 use crate::spec::Spec;
 use crate::{error, options};
 use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
@@ -15,12 +15,13 @@ const AUTORESET: [(&str, Autoreset); 3] =
     [("next_step", Autoreset::NextStep), ("same_step", Autoreset::SameStep), ("disabled", Autoreset::Disabled)];
 
 type State<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
-type StepResult = (Py<PyArray2<f32>>, Py<PyArray1<f32>>, Py<PyArray1<bool>>, Py<PyArray1<bool>>);
+type StepResult = (Py<PyAny>, Py<PyArray1<f32>>, Py<PyArray1<bool>>, Py<PyArray1<bool>>);
 
 /// Agents of one kind that are stepped together on the threads of a pool, without the GIL.
 ///
 /// Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
-/// overwrites them at the next step; with `copy`, every step returns new ones.
+/// overwrites them at the next step; with `copy`, every step returns new ones. Observations are computed in
+/// 32 bits, and written in 64 if `dtype` says so.
 #[pyclass(module = "marathon_envs")]
 pub struct VecEnv {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
@@ -47,7 +48,7 @@ impl VecEnv {
     #[new]
     #[pyo3(signature = (
         id, num_envs = 1, *, seed = 0, threads = 0, isa = None, autoreset = "same_step", max_episode_steps = None,
-        copy = false, **options
+        copy = false, dtype = "float32", **options
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
@@ -60,15 +61,17 @@ impl VecEnv {
         autoreset: &str,
         max_episode_steps: Option<usize>,
         copy: bool,
+        dtype: &str,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
         let autoreset = parse_autoreset(autoreset)?;
+        let double = parse_dtype(dtype)?;
         let agents = num_envs;
         let options = options::read(options)?;
         let options = VecEnvOptions { agents, seed, threads, isa, autoreset, max_episode_steps, options };
         let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
-        let arrays = Arrays::new(py, num_envs, env.spec());
+        let arrays = Arrays::new(py, num_envs, env.spec(), double);
         let spec = Py::new(py, Spec::of(env.spec())?)?;
         Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false })
     }
@@ -97,6 +100,12 @@ impl VecEnv {
         AUTORESET.iter().find(|(_, mode)| *mode == self.autoreset).map_or("", |(name, _)| name)
     }
 
+    /// Type of the observations, "float32" or "float64".
+    #[getter]
+    fn dtype(&self) -> &'static str {
+        if self.arrays.double() { "float64" } else { "float32" }
+    }
+
     /// Whether every step returns new arrays.
     #[getter]
     fn copy(&self) -> bool {
@@ -105,15 +114,15 @@ impl VecEnv {
 
     /// Observations to act upon next, `(num_envs, obs_size)`: what the last `reset` or `step` returned.
     #[getter]
-    fn obs(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
-        self.arrays.obs.clone_ref(py)
+    fn obs(&self, py: Python<'_>) -> Py<PyAny> {
+        self.arrays.obs(py)
     }
 
     /// Observations of the states that the last step reached, `(num_envs, obs_size)`. With "same_step", they differ from
     /// `obs` where an episode ended. Overwritten by the next step, also with `copy`.
     #[getter]
-    fn final_obs(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
-        self.arrays.final_obs.clone_ref(py)
+    fn final_obs(&self, py: Python<'_>) -> Py<PyAny> {
+        self.arrays.final_obs(py)
     }
 
     /// Terms of the last step's rewards, `(num_envs, len(spec.reward_terms))`; they add up to the rewards.
@@ -166,7 +175,7 @@ impl VecEnv {
         py: Python<'_>,
         seed: Option<Seeds>,
         mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
-    ) -> PyResult<Py<PyArray2<f32>>> {
+    ) -> PyResult<Py<PyAny>> {
         let mask = self::mask(mask, self.num_envs)?;
         if !self.ready && mask.contains(&false) {
             return Err(error::value("the first reset must be of all agents; mask has some that are False"));
@@ -188,7 +197,10 @@ impl VecEnv {
                     env.reseed_agent(i, *seed, *number)?;
                 }
             }
-            env.reset_agents(&mask, obs)
+            match obs {
+                ObsMut::Single(obs) => env.reset_agents(&mask, obs),
+                ObsMut::Double(obs) => env.reset_agents(&mask, obs),
+            }
         })
     }
 
@@ -211,9 +223,9 @@ impl VecEnv {
         }
         let actions = rows(&actions);
         let env = self.env.get_mut().expect("no thread panics with the lock");
-        self.arrays.write(py, |out| env.step(&actions, out))?.map_err(error::env)?;
+        self.arrays.step(py, env, &actions)?.map_err(error::env)?;
         let a = &self.arrays;
-        Ok((a.obs.clone_ref(py), a.reward.clone_ref(py), a.terminated.clone_ref(py), a.truncated.clone_ref(py)))
+        Ok((a.obs(py), a.reward.clone_ref(py), a.terminated.clone_ref(py), a.truncated.clone_ref(py)))
     }
 
     /// State of every agent in MuJoCo's layout: `qpos`, `(num_envs, nq)`, and `qvel`, `(num_envs, nv)`, m, rad, m/s and
@@ -239,7 +251,7 @@ impl VecEnv {
         qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
         qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
         mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
-    ) -> PyResult<Py<PyArray2<f32>>> {
+    ) -> PyResult<Py<PyAny>> {
         let mask = self::mask(mask, self.num_envs)?;
         let spec = self.spec.get();
         for (name, array, columns) in [("qpos", &qpos, spec.nq), ("qvel", &qvel, spec.nv)] {
@@ -257,7 +269,10 @@ impl VecEnv {
             let state = AgentState { qpos: qpos.row(i).to_vec(), qvel: qvel.row(i).to_vec() };
             env.set_state(i, &state).map_err(error::env)?;
         }
-        self.begin(py, move |env, obs| env.observe(&mask, obs))
+        self.begin(py, move |env, obs| match obs {
+            ObsMut::Single(obs) => env.observe(&mask, obs),
+            ObsMut::Double(obs) => env.observe(&mask, obs),
+        })
     }
 
     /// Everything that the future depends on. Loaded, the environment continues with the same bits, whatever the number
@@ -289,18 +304,15 @@ impl VecEnv {
     }
 
     /// Lets `f` begin episodes and write their observations.
-    fn begin<F>(&mut self, py: Python<'_>, f: F) -> PyResult<Py<PyArray2<f32>>>
+    fn begin<F>(&mut self, py: Python<'_>, f: F) -> PyResult<Py<PyAny>>
     where
-        F: FnOnce(&mut marathon_envs::VecEnv, &mut [f32]) -> Result<(), marathon_envs::EnvError> + Send,
+        F: FnOnce(&mut marathon_envs::VecEnv, ObsMut<'_>) -> Result<(), marathon_envs::EnvError> + Send,
     {
-        if self.copy {
-            // rows of agents that go on are carried over
-            self.arrays.obs = self.arrays.obs.bind(py).call_method0("copy")?.cast_into()?.unbind();
-        }
         let env = self.env.get_mut().expect("no thread panics with the lock");
-        self.arrays.write_obs(py, |obs| f(env, obs))?.map_err(error::env)?;
+        // rows of agents that go on are carried over into a copy
+        self.arrays.write_obs(py, self.copy, |obs| f(env, obs))?.map_err(error::env)?;
         self.ready = true;
-        Ok(self.arrays.obs.clone_ref(py))
+        Ok(self.arrays.obs(py))
     }
 }
 
@@ -310,6 +322,15 @@ fn parse_autoreset(name: &str) -> PyResult<Autoreset> {
     found.map(|(_, mode)| *mode).ok_or_else(|| {
         error::value(format!("autoreset is '{name}', expected one of 'next_step', 'same_step', 'disabled'"))
     })
+}
+
+/// Whether a NumPy type is float64 rather than float32.
+fn parse_dtype(name: &str) -> PyResult<bool> {
+    match name {
+        "float32" => Ok(false),
+        "float64" => Ok(true),
+        _ => Err(error::value(format!("dtype is '{name}', expected 'float32' or 'float64'"))),
+    }
 }
 
 fn all_finite<'a, const N: usize>(rows: [numpy::ndarray::ArrayView1<'a, f64>; N]) -> bool {

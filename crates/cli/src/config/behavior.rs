@@ -1,8 +1,9 @@
 //! The part of a file that speaks of one agent, the same for both formats.
 
-use super::error::{ConfigError, nearest, shown};
+use super::error::{ConfigError, shown};
 use super::names;
 use super::section::{Entry, Section};
+use marathon_envs::nearest;
 use marathon_learn::{PpoConfig, Signal};
 use std::path::Path;
 

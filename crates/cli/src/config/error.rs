@@ -1,5 +1,6 @@
 //! What can be wrong with a configuration file.
 
+use marathon_envs::nearest;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -125,17 +126,6 @@ impl ConfigError {
         let nearest = nearest(key, known.iter().copied()).map(Into::into);
         ConfigError::UnknownKey { place, nearest, known: known.join(", ") }
     }
-}
-
-/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error.
-pub(super) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let name = shown(name).to_lowercase();
-    known
-        .into_iter()
-        .map(|k| (strsim::damerau_levenshtein(&name, &k.to_lowercase()), k))
-        .filter(|(distance, k)| *distance <= 2.max(k.chars().count() / 3))
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, k)| k)
 }
 
 /// A text of a file as messages show it: on one line, and not too long.

@@ -4,9 +4,10 @@
 use super::behavior::{Behavior, Format, Notes, select};
 use super::current;
 use super::document::Map;
-use super::error::{ConfigError, Place, nearest};
+use super::error::{ConfigError, Place};
 use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
+use marathon_envs::nearest;
 use marathon_learn::{Algorithm, Signal, SignalKind};
 use std::path::Path;
 

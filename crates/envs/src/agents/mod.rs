@@ -12,7 +12,11 @@ pub mod walker2d;
 
 use std::sync::Arc;
 
+use marathon_physics::lanes::Real;
+
 use crate::agent::AnyAgent;
+use crate::senses::Senses;
+use crate::write::Obs;
 
 /// All agents that come with the crate, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
@@ -37,3 +41,19 @@ pub const ALIASES: [(&str, &str); 3] =
 
 /// Speed that the `-v1` rewards call 1, m/s: the track's length over the episode's duration in the original.
 const FASTEST: f64 = 8.0;
+
+/// Coordinates from `skip` on.
+#[inline(always)]
+fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
+    for i in skip..s.readings().sim.model().nq {
+        out.scalar(s.readings().qpos(i));
+    }
+}
+
+/// All velocities.
+#[inline(always)]
+fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    for i in 0..s.readings().sim.model().nv {
+        out.scalar(s.readings().qvel(i));
+    }
+}

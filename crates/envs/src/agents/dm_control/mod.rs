@@ -18,11 +18,12 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::JointType;
 
+use super::{observe_positions, observe_velocities};
 use crate::agent::{AnyAgent, Controls, Facts, ModelSource, names};
 use crate::senses::Senses;
 use crate::start::Start;
 use crate::tolerance::{Sigmoid, Tolerance};
-use crate::write::{Obs, Terms};
+use crate::write::Terms;
 
 /// All of them, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
@@ -125,22 +126,6 @@ fn randomize_joints(start: &mut Start) {
             }
             (JointType::Slide, None) | (JointType::Ball, _) => {}
         }
-    }
-}
-
-/// Coordinates from `skip` on.
-#[inline(always)]
-fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
-    for i in skip..s.readings().sim.model().nq {
-        out.scalar(s.readings().qpos(i));
-    }
-}
-
-/// All velocities.
-#[inline(always)]
-fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-    for i in 0..s.readings().sim.model().nv {
-        out.scalar(s.readings().qvel(i));
     }
 }
 

@@ -23,6 +23,7 @@ use std::sync::Arc;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
+use super::{observe_positions, observe_velocities};
 use crate::agent::{AnyAgent, Controls, Facts, ModelSource, View};
 use crate::senses::{Senses, clamp};
 use crate::start::Start;
@@ -105,22 +106,6 @@ enum Noise {
     Uniform,
     /// Normal with standard deviation `scale`.
     Normal,
-}
-
-/// Coordinates from `skip` on.
-#[inline(always)]
-fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
-    for i in skip..s.readings().sim.model().nq {
-        out.scalar(s.readings().qpos(i));
-    }
-}
-
-/// All velocities.
-#[inline(always)]
-fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-    for i in 0..s.readings().sim.model().nv {
-        out.scalar(s.readings().qvel(i));
-    }
 }
 
 /// All velocities, clipped to [-10, 10].
