@@ -38,7 +38,14 @@ class Sb3VecEnv(VecEnv):
         _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array"]})
         limit = _spaces.steps_limit(max_episode_steps, None)
         self._env = _tasks.vec_env(
-            task, num_envs, threads=threads, autoreset="same_step", max_episode_steps=limit, copy=True, **options
+            task,
+            num_envs,
+            threads=threads,
+            autoreset="same_step",
+            max_episode_steps=limit,
+            copy=True,
+            dtype=_tasks.dtype(task),
+            **options,
         )
         self.task_spec = self._env.spec
         self.render_mode = render_mode
