@@ -387,7 +387,9 @@ impl<A: Agent> AnyAgent for A {
         if !isa.supported() {
             return Err(EnvError::Isa { isa: isa.name(), best: Isa::best().name() });
         }
-        marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T, A>::new(self)?)))
+        let (facts, values) = (Agent::facts(&*self), Agent::options(&*self));
+        let options: Options = values.into_iter().map(|o| (o.name.to_string(), o.value)).collect();
+        marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
     }
 }
 

@@ -9,10 +9,12 @@ use marathon_physics::lanes::Real;
 use marathon_physics::model::Actuator;
 use marathon_physics::{Model, Sim, Variation, Work};
 
-use crate::agent::{Agent, Controls, Facts};
+use crate::agent::{Controls, Facts};
 use crate::anatomy::{Anatomy, Blueprint, sim_options};
 use crate::error::EnvError;
 use crate::lane_group::{LaneGroup, Rehearsal};
+use crate::mind::Mind;
+use crate::options::Options;
 use crate::prepared::Prepared;
 use crate::random::{EpisodeId, EpisodeRng};
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
@@ -72,8 +74,8 @@ pub trait AgentShards: ShardFactory {
 }
 
 /// What all shards of an agent share.
-pub(crate) struct Task<T: Real, A> {
-    pub agent: Arc<A>,
+pub(crate) struct Task<T: Real> {
+    pub mind: Arc<dyn Mind<T>>,
     pub facts: Facts,
     pub spec: Spec,
     pub blueprint: Blueprint,
@@ -82,17 +84,16 @@ pub(crate) struct Task<T: Real, A> {
 }
 
 /// Makes shards of an agent for one lane width.
-pub(crate) struct AgentFactory<T: Real, A> {
-    task: Arc<Task<T, A>>,
+pub(crate) struct AgentFactory<T: Real> {
+    task: Arc<Task<T>>,
 }
 
-impl<T: Real, A: Agent> AgentFactory<T, A> {
-    pub fn new(agent: Arc<A>) -> Result<Self, EnvError> {
-        let facts = agent.facts();
+impl<T: Real> AgentFactory<T> {
+    pub fn new(facts: Facts, options: Options, mind: Arc<dyn Mind<T>>) -> Result<Self, EnvError> {
         let blueprint = Blueprint::new(&facts)?;
         let anatomy = Anatomy::new(&facts, &blueprint)?;
         let id = || facts.id.clone();
-        agent.fits(&blueprint.model).map_err(|problem| EnvError::Agent { id: id(), problem })?;
+        mind.fits(&blueprint.model).map_err(|problem| EnvError::Agent { id: id(), problem })?;
         let sim = Sim::new(&blueprint.model, sim_options()).map_err(|source| EnvError::Sim { id: id(), source })?;
         let mut reward_terms = facts.reward_terms.clone();
         if facts.termination_reward.is_some() {
@@ -113,9 +114,9 @@ impl<T: Real, A: Agent> AgentFactory<T, A> {
             info: facts.info.clone(),
             nq: blueprint.model.nq,
             nv: blueprint.model.nv,
-            options: agent.options().into_iter().map(|o| (o.name.to_string(), o.value)).collect(),
+            options,
         };
-        let mut task = Task { agent, facts, spec, blueprint, anatomy, sim };
+        let mut task = Task { mind, facts, spec, blueprint, anatomy, sim };
         task.spec.obs = task.rehearse()?;
         Ok(AgentFactory { task: Arc::new(task) })
     }
@@ -140,7 +141,7 @@ fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
     [bound(0), bound(1)]
 }
 
-impl<T: Real, A: Agent> Task<T, A> {
+impl<T: Real> Task<T> {
     /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
     /// length of its observation.
     fn rehearse(&self) -> Result<usize, EnvError> {
@@ -174,7 +175,7 @@ impl<T: Real, A: Agent> Task<T, A> {
         state.qvel.clone_from(&blueprint.spawn_velocity);
         let AgentState { qpos, qvel } = state;
         let mut start = Start { qpos, qvel, random, normalize: true, free_of_contacts: false, settle: 0, blueprint };
-        self.agent.reset(&mut start);
+        self.mind.draw(&mut start);
         let Start { normalize, free_of_contacts, settle, .. } = start;
         Drawn { normalize, free_of_contacts, settle }
     }
@@ -187,7 +188,7 @@ pub(crate) struct Drawn {
     pub settle: usize,
 }
 
-impl<T: Real, A: Agent> ShardFactory for AgentFactory<T, A> {
+impl<T: Real> ShardFactory for AgentFactory<T> {
     fn spec(&self) -> &Spec {
         &self.task.spec
     }
@@ -197,7 +198,7 @@ impl<T: Real, A: Agent> ShardFactory for AgentFactory<T, A> {
     }
 }
 
-impl<T: Real, A: Agent> AgentShards for AgentFactory<T, A> {
+impl<T: Real> AgentShards for AgentFactory<T> {
     fn unvaried(&self) -> Variation {
         Variation::none(&self.task.blueprint.model)
     }
@@ -235,8 +236,8 @@ struct Block<T: Real> {
 }
 
 /// A run of blocks of one agent, owned by one thread.
-struct LaneShard<T: Real, A> {
-    task: Arc<Task<T, A>>,
+struct LaneShard<T: Real> {
+    task: Arc<Task<T>>,
     work: Work<T>,
     blocks: Vec<Block<T>>,
     /// Decisions after which an episode is truncated.
@@ -247,8 +248,8 @@ struct LaneShard<T: Real, A> {
     start: AgentState,
 }
 
-impl<T: Real, A: Agent> LaneShard<T, A> {
-    fn new(task: Arc<Task<T, A>>, first: usize, blocks: usize, seed: u64) -> Self {
+impl<T: Real> LaneShard<T> {
+    fn new(task: Arc<Task<T>>, first: usize, blocks: usize, seed: u64) -> Self {
         let groups = |task| (0..BLOCK / T::LANES).map(|_| LaneGroup::new(task)).collect();
         let prepared = Prepared::new(blocks * BLOCK);
         let blocks = (first..first + blocks)
@@ -293,7 +294,7 @@ fn lanes_of<T: Real>(mask: u16, first: usize) -> u32 {
     (u32::from(mask) >> first) & ((1 << T::LANES) - 1)
 }
 
-impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
+impl<T: Real> Shard for LaneShard<T> {
     fn spec(&self) -> &Spec {
         &self.task.spec
     }
@@ -369,7 +370,7 @@ impl<T: Real, A: Agent> Shard for LaneShard<T, A> {
     }
 }
 
-impl<T: Real, A: Agent> AgentShard for LaneShard<T, A> {
+impl<T: Real> AgentShard for LaneShard<T> {
     fn state(&self, agent: usize) -> AgentState {
         let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
         let (qpos, qvel) = group.state(agent % T::LANES);

@@ -3,29 +3,28 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Variation, Work};
 
-use crate::agent::{Agent, Controls};
+use crate::agent::Controls;
 use crate::lane_env::Task;
-use crate::senses::Senses;
+use crate::mind::{Occasion, Perceived};
 use crate::shard::{BLOCK, BlockStep};
-use crate::write::{Obs, Terms};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
 pub(crate) const LARGEST: f64 = 1e6;
 
 /// State of `T::LANES` agents and the results of their last decision.
 pub(crate) struct LaneGroup<T: Real> {
-    physics: Group<T>,
-    memory: Vec<T>,
+    pub physics: Group<T>,
+    pub memory: Vec<T>,
     /// What the memory is at the start of an episode.
-    start: Vec<T>,
-    obs: Vec<T>,
+    pub start: Vec<T>,
+    pub obs: Vec<T>,
     /// Terms of the reward; the termination last, if it has a reward of its own.
-    terms: Vec<T>,
-    info: Vec<T>,
+    pub terms: Vec<T>,
+    pub info: Vec<T>,
     /// What touch sites feel, N.
-    pressed: Vec<T>,
+    pub pressed: Vec<T>,
     /// Per foot, the lanes in which it touched the ground during the last decision.
-    feet: Vec<u32>,
+    pub feet: Vec<u32>,
     reward: T,
     forward: T,
 }
@@ -48,7 +47,7 @@ pub(crate) struct Ended {
 }
 
 impl<T: Real> LaneGroup<T> {
-    pub fn new<A>(task: &Task<T, A>) -> Self {
+    pub fn new(task: &Task<T>) -> Self {
         let mut group = LaneGroup {
             physics: Group::new(&task.sim),
             memory: vec![T::zero(); task.facts.memory],
@@ -127,14 +126,14 @@ impl<T: Real> LaneGroup<T> {
     }
 
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
-    pub fn begin<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, lanes: u32) {
+    pub fn begin(&mut self, task: &Task<T>, work: &mut Work<T>, lanes: u32) {
         self.look(task, work);
-        T::enter(Perceive { task, group: self, work, fresh: Some(lanes), names: None });
+        task.mind.perceive(task, self, work, Occasion::Start(lanes));
         T::enter(Settle { group: self, termination_reward: None, ended: Ended::default() });
     }
 
     /// Brings all readings up to date at the start of an episode.
-    fn look<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>) {
+    fn look(&mut self, task: &Task<T>, work: &mut Work<T>) {
         let sites = &task.anatomy.touch_sites;
         if task.facts.view.joints || !sites.is_empty() {
             task.sim.forward(work, &self.physics);
@@ -161,7 +160,7 @@ impl<T: Real> LaneGroup<T> {
     }
 
     /// Makes one decision. `action` is the block's, `[act][16]`.
-    pub fn decide<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
+    pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
         let (along_x, view) = (&task.anatomy.along_x, task.facts.view);
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(Act { group: self, along_x, action, first, clip });
@@ -182,7 +181,7 @@ impl<T: Real> LaneGroup<T> {
             }
         }
         T::enter(Move { group: self, along_x });
-        let perceived = T::enter(Perceive { task, group: self, work, fresh: None, names: None });
+        let perceived = task.mind.perceive(task, self, work, Occasion::Decision);
         let ended = Ended { terminated: perceived.failed, diverged: unsound };
         T::enter(Settle { group: self, termination_reward: task.facts.termination_reward, ended })
     }
@@ -193,11 +192,11 @@ impl<T: Real> LaneGroup<T> {
     }
 
     /// Lets an agent do everything once.
-    pub fn rehearse<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>) -> Rehearsal {
+    pub fn rehearse(&mut self, task: &Task<T>, work: &mut Work<T>) -> Rehearsal {
         let mut terms = Vec::new();
         self.look(task, work);
         let Perceived { observed, reported, .. } =
-            T::enter(Perceive { task, group: self, work, fresh: Some(!0), names: Some(&mut terms) });
+            task.mind.perceive(task, self, work, Occasion::Rehearsal(&mut terms));
         Rehearsal { observed, reported, terms }
     }
 }
@@ -308,69 +307,6 @@ impl<T: Real> Kernel<T> for Move<'_, T> {
         for (i, axis) in self.along_x {
             *forward = physics.qpos[*i].mul_add(T::splat(*axis), *forward);
         }
-    }
-}
-
-/// Everything that is the agent's own: begin or remember, observe, reward, report, terminate.
-///
-/// It is one kernel for decisions, starts of episodes and the rehearsal, because an agent's code is compiled
-/// into it once per instruction set.
-struct Perceive<'a, T: Real, A> {
-    task: &'a Task<T, A>,
-    group: &'a mut LaneGroup<T>,
-    work: &'a Work<T>,
-    /// Lanes in which an episode begins (a bit each), if this is for the start of episodes; the reward is then not used.
-    fresh: Option<u32>,
-    names: Option<&'a mut Vec<&'static str>>,
-}
-
-/// What an agent perceived.
-struct Perceived {
-    observed: usize,
-    reported: usize,
-    /// Lanes that failed.
-    failed: u32,
-}
-
-impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
-    type Output = Perceived;
-    #[inline(always)]
-    fn run(self) -> Perceived {
-        let Perceive { task, group, work, fresh, names } = self;
-        let LaneGroup { physics, memory, start, obs, terms, info, pressed, feet, .. } = group;
-        let mut s = Senses {
-            readings: Readings::new(&task.sim, physics, work),
-            anatomy: &task.anatomy,
-            action: &physics.ctrl,
-            memory: &[],
-            pressed,
-            fresh: fresh.is_some(),
-            dt: task.spec.dt,
-        };
-        match fresh {
-            None => task.agent.remember(&s, memory),
-            Some(lanes) => {
-                // the others are in the middle of their episodes
-                let on = T::from_bits(lanes & ((1 << T::LANES) - 1));
-                start.fill(T::zero());
-                task.agent.begin(&s, start);
-                for (m, begun) in memory.iter_mut().zip(start) {
-                    *m = T::select(on, *begun, *m);
-                }
-            }
-        }
-        s.memory = memory;
-        let mut obs = Obs::new(obs);
-        task.agent.observe(&s, &mut obs);
-        let own = task.facts.reward_terms.len();
-        task.agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
-        let mut info = Obs::new(info);
-        task.agent.info(&s, &mut info);
-        for (lanes, geom) in feet.iter_mut().zip(&task.anatomy.feet) {
-            let touched = T::bits(s.readings.touched(*geom));
-            *lanes = fresh.map_or(touched, |begun| *lanes & !begun);
-        }
-        Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(task.agent.terminated(&s)) }
     }
 }
 

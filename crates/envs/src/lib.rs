@@ -28,6 +28,7 @@ mod lane_env;
 mod lane_group;
 pub mod lockstep;
 pub mod memory;
+mod mind;
 pub mod options;
 mod prepared;
 mod random;

@@ -7,7 +7,6 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
 
-use crate::agent::Agent;
 use crate::lane_env::{AgentState, Task};
 use crate::lane_group::LARGEST;
 use crate::random::{EpisodeId, EpisodeRng};
@@ -35,7 +34,7 @@ impl<T: Real> Prepared<T> {
     }
 
     /// Makes the starts of the episodes `ids` of consecutive agents, one per lane, as far as they have not been made.
-    pub fn make<A: Agent>(&mut self, task: &Task<T, A>, work: &mut Work<T>, first: usize, ids: &[EpisodeId]) {
+    pub fn make(&mut self, task: &Task<T>, work: &mut Work<T>, first: usize, ids: &[EpisodeId]) {
         let due: Vec<usize> = (0..T::LANES).filter(|lane| self.get(first + lane, ids[*lane]).is_none()).collect();
         let group = self.scratch.get_or_insert_with(|| Group::new(&task.sim));
         // the others must not slow the group down
@@ -61,8 +60,8 @@ impl<T: Real> Prepared<T> {
 }
 
 /// Draws the starts of some lanes until they count. Returns for every lane how many steps it is to settle.
-fn draw<T: Real, A: Agent>(
-    task: &Task<T, A>,
+fn draw<T: Real>(
+    task: &Task<T>,
     work: &mut Work<T>,
     group: &mut Group<T>,
     due: &[usize],

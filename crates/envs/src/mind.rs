@@ -1,0 +1,113 @@
+//! What is an agent's own, behind a call per decision of a group: everything around it is compiled once per instruction set,
+//! not once per agent besides.
+
+use marathon_physics::lanes::{Kernel, Real};
+use marathon_physics::{Model, Readings, Work};
+
+use crate::agent::Agent;
+use crate::lane_env::Task;
+use crate::lane_group::LaneGroup;
+use crate::senses::Senses;
+use crate::start::Start;
+use crate::write::{Obs, Terms};
+
+/// An [`Agent`] for lanes of one kind.
+pub(crate) trait Mind<T: Real>: Send + Sync {
+    /// See [`Agent::fits`].
+    fn fits(&self, model: &Model) -> Result<(), String>;
+    /// Draws the start of an episode, see [`Agent::reset`].
+    fn draw(&self, start: &mut Start);
+    /// Begins or remembers, observes, rewards, reports and terminates, all in one kernel: an agent's code is compiled into it
+    /// once per instruction set.
+    fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived;
+}
+
+/// What an agent perceives for.
+pub(crate) enum Occasion<'a> {
+    /// A decision that has been carried out.
+    Decision,
+    /// The start of episodes in these lanes, a bit each; the reward is then not used.
+    Start(u32),
+    /// A start in all lanes, to see which terms the reward gets.
+    Rehearsal(&'a mut Vec<&'static str>),
+}
+
+/// What an agent perceived.
+pub(crate) struct Perceived {
+    /// How many numbers it observed.
+    pub observed: usize,
+    /// How many numbers it reported.
+    pub reported: usize,
+    /// Lanes that failed, a bit each.
+    pub failed: u32,
+}
+
+impl<T: Real, A: Agent> Mind<T> for A {
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        Agent::fits(self, model)
+    }
+
+    fn draw(&self, start: &mut Start) {
+        self.reset(start);
+    }
+
+    fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived {
+        T::enter(Perceive { agent: self, task, group, work, occasion })
+    }
+}
+
+/// What [`Mind::perceive`] runs.
+struct Perceive<'a, T: Real, A> {
+    agent: &'a A,
+    task: &'a Task<T>,
+    group: &'a mut LaneGroup<T>,
+    work: &'a Work<T>,
+    occasion: Occasion<'a>,
+}
+
+impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
+    type Output = Perceived;
+    #[inline(always)]
+    fn run(self) -> Perceived {
+        let Perceive { agent, task, group, work, occasion } = self;
+        let (fresh, names) = match occasion {
+            Occasion::Decision => (None, None),
+            Occasion::Start(lanes) => (Some(lanes), None),
+            Occasion::Rehearsal(names) => (Some(!0), Some(names)),
+        };
+        let LaneGroup { physics, memory, start, obs, terms, info, pressed, feet, .. } = group;
+        let mut s = Senses {
+            readings: Readings::new(&task.sim, physics, work),
+            anatomy: &task.anatomy,
+            action: &physics.ctrl,
+            memory: &[],
+            pressed,
+            fresh: fresh.is_some(),
+            dt: task.spec.dt,
+        };
+        match fresh {
+            None => agent.remember(&s, memory),
+            Some(lanes) => {
+                // the others are in the middle of their episodes
+                let on = T::from_bits(lanes & ((1 << T::LANES) - 1));
+                start.fill(T::zero());
+                agent.begin(&s, start);
+                for (m, begun) in memory.iter_mut().zip(start) {
+                    *m = T::select(on, *begun, *m);
+                }
+            }
+        }
+        s.memory = memory;
+        let mut obs = Obs::new(obs);
+        agent.observe(&s, &mut obs);
+        let own = task.facts.reward_terms.len();
+        agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
+        let mut info = Obs::new(info);
+        agent.info(&s, &mut info);
+        for (lanes, geom) in feet.iter_mut().zip(&task.anatomy.feet) {
+            let touched = T::bits(s.readings.touched(*geom));
+            *lanes = fresh.map_or(touched, |begun| *lanes & !begun);
+        }
+        Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(agent.terminated(&s)) }
+    }
+}
