@@ -12,7 +12,8 @@
 
 use crate::f32_lanes;
 use crate::loss::{LossSums, Objective};
-use crate::run::{NETWORKS, Update};
+use crate::run::NETWORKS;
+use crate::update::Update;
 use marathon_physics::lanes::{Isa, Kernel, Real};
 use serde::{Deserialize, Serialize};
 

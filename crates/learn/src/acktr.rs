@@ -17,7 +17,7 @@
 //! first rollouts alike instead), and the damping is split between the factors (Martens and Grosse, 2015, section 6.3).
 
 use crate::a2c;
-use crate::run::Update;
+use crate::update::Update;
 use serde::{Deserialize, Serialize};
 
 /// What only ACKTR has; the defaults are those of OpenAI Baselines.

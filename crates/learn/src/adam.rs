@@ -1,7 +1,7 @@
 //! The optimizer: sums of partial gradients, their norm, and Adam (Kingma and Ba, 2015).
 //!
 //! Everything here is element by element, or a sum in a fixed order, so it has the same bits on every vector width and
-//! however many threads share it. Lengths are multiples of sixteen.
+//! however many threads share it. Lengths are multiples of sixteen, but for [`add`].
 
 use crate::{BLOCK, f32_lanes};
 use marathon_physics::lanes::{Isa, Kernel, Real, sum16};
@@ -123,22 +123,31 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Reduce<'_> {
 
 /// `sum += x`.
 pub fn add(isa: Isa, sum: &mut [f32], x: &[f32]) {
-    assert!(sum.len() == x.len() && sum.len().is_multiple_of(BLOCK));
-    f32_lanes!(isa, T => <T as Real>::enter(Add { sum, x }))
+    assert!(sum.len() == x.len());
+    f32_lanes!(isa, T => <T as Real>::enter(Add::<T> { sum, x }))
 }
 
-struct Add<'a> {
-    sum: &'a mut [f32],
-    x: &'a [f32],
+/// `sum += x`, of any length.
+pub struct Add<'a, T: Real> {
+    /// The sum.
+    pub sum: &'a mut [T::Scalar],
+    /// What is added.
+    pub x: &'a [T::Scalar],
 }
 
-impl<T: Real<Scalar = f32>> Kernel<T> for Add<'_> {
+impl<T: Real> Kernel<T> for Add<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (s, x) in self.sum.chunks_exact_mut(T::LANES).zip(self.x.chunks_exact(T::LANES)) {
+        let whole = self.sum.len() / BLOCK * BLOCK;
+        let (sum, sum_rest) = self.sum.split_at_mut(whole);
+        let (x, x_rest) = self.x.split_at(whole);
+        for (s, x) in sum.chunks_exact_mut(T::LANES).zip(x.chunks_exact(T::LANES)) {
             (T::load(s) + T::load(x)).store(s);
+        }
+        for (s, x) in sum_rest.iter_mut().zip(x_rest) {
+            *s = T::scalar(T::widen(*s) + T::widen(*x));
         }
     }
 }

@@ -388,7 +388,6 @@ impl PpoConfig {
         };
         match &self.algorithm {
             Algorithm::Ppo => return Ok(()),
-            Algorithm::Sac(_) => {}
             Algorithm::A2c(a2c) => {
                 positive("value_coef", a2c.value_coef)?;
                 fraction("rms_decay", a2c.rms_decay)?;
@@ -410,30 +409,34 @@ impl PpoConfig {
                     }
                 }
             }
-        }
-        if let Algorithm::Sac(sac) = &self.algorithm {
-            if sac.batch == 0 || !sac.batch.is_multiple_of(BLOCK) || sac.batch > 1 << 20 {
-                return Err(Error::config("batch", sac.batch, format!("a multiple of {BLOCK} up to {}", 1 << 20)));
-            }
-            if sac.updates == 0 || sac.n_step == 0 {
-                return Err(Error::config("updates, n_step", format!("{}, {}", sac.updates, sac.n_step), "at least 1"));
-            }
-            if sac.replay / self.agents.max(1) < sac.n_step.max(self.horizon) || sac.replay > 1 << 31 {
-                let least = self.agents * sac.n_step.max(self.horizon);
-                return Err(Error::config(
-                    "replay",
-                    sac.replay,
-                    format!("a rollout at least, {least}, and at most 2^31"),
-                ));
-            }
-            positive("tau", sac.tau)?;
-            positive("init_alpha", sac.init_alpha)?;
-            if sac.tau > 1.0 {
-                return Err(Error::config("tau", sac.tau, "at most 1"));
-            }
-            if self.scale_rewards {
-                let why = "false with sac: rewards of another scale would stay in the replay";
-                return Err(Error::config("scale_rewards", true, why));
+            Algorithm::Sac(sac) => {
+                if sac.batch == 0 || !sac.batch.is_multiple_of(BLOCK) || sac.batch > 1 << 20 {
+                    return Err(Error::config("batch", sac.batch, format!("a multiple of {BLOCK} up to {}", 1 << 20)));
+                }
+                if sac.updates == 0 || sac.n_step == 0 {
+                    return Err(Error::config(
+                        "updates, n_step",
+                        format!("{}, {}", sac.updates, sac.n_step),
+                        "at least 1",
+                    ));
+                }
+                if sac.replay / self.agents.max(1) < sac.n_step.max(self.horizon) || sac.replay > 1 << 31 {
+                    let least = self.agents * sac.n_step.max(self.horizon);
+                    return Err(Error::config(
+                        "replay",
+                        sac.replay,
+                        format!("a rollout at least, {least}, and at most 2^31"),
+                    ));
+                }
+                positive("tau", sac.tau)?;
+                positive("init_alpha", sac.init_alpha)?;
+                if sac.tau > 1.0 {
+                    return Err(Error::config("tau", sac.tau, "at most 1"));
+                }
+                if self.scale_rewards {
+                    let why = "false with sac: rewards of another scale would stay in the replay";
+                    return Err(Error::config("scale_rewards", true, why));
+                }
             }
         }
         let name = self.algorithm.name();

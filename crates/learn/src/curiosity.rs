@@ -12,6 +12,7 @@
 
 use crate::Activation;
 use crate::BLOCK;
+use crate::adam::Add;
 use crate::buffer::Blocks;
 use crate::init;
 use crate::mlp::{CHUNK, Mlp, Tape};
@@ -193,7 +194,7 @@ impl Curiosity {
         let part = &mut gradient[of_encoder];
         self.encoder.backward_on::<T>(encoder, &s.obs, &mut s.before, part, blocks);
         self.encoder.backward_on::<T>(encoder, &s.next, &mut s.after, &mut s.gradient, blocks);
-        T::enter(Sum::<T> { from: &s.gradient, to: part, lanes: PhantomData });
+        T::enter(Add::<T> { sum: part, x: &s.gradient });
     }
 
     /// The loss of one row after [`Curiosity::losses`], for tests.
@@ -216,30 +217,6 @@ impl<T: Real> Kernel<T> for Bound<'_, T> {
     fn run(self) {
         for (to, from) in self.to.chunks_exact_mut(T::LANES).zip(self.from.chunks_exact(T::LANES)) {
             T::load(from).max(T::lit(-1.0)).min(T::lit(1.0)).store(to);
-        }
-    }
-}
-
-/// `to += from`, of any length.
-struct Sum<'a, T: Real> {
-    from: &'a [T::Scalar],
-    to: &'a mut [T::Scalar],
-    lanes: PhantomData<T>,
-}
-
-impl<T: Real> Kernel<T> for Sum<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let whole = self.to.len() / BLOCK * BLOCK;
-        let (to, to_rest) = self.to.split_at_mut(whole);
-        let (from, from_rest) = self.from.split_at(whole);
-        for (to, from) in to.chunks_exact_mut(T::LANES).zip(from.chunks_exact(T::LANES)) {
-            (T::load(to) + T::load(from)).store(to);
-        }
-        for (to, from) in to_rest.iter_mut().zip(from_rest) {
-            *to = T::scalar(T::widen(*to) + T::widen(*from));
         }
     }
 }

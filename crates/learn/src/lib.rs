@@ -82,6 +82,7 @@ pub mod signal;
 pub mod squash;
 mod sync;
 mod tiles;
+mod update;
 
 pub use a2c::A2c;
 pub use acktr::Acktr;

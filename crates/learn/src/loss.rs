@@ -55,6 +55,10 @@ pub struct LossSums {
     pub kl: f64,
     /// Samples whose ratio left the clip range in the direction of their advantage.
     pub clipped: f64,
+    /// Of SAC, whose deviations depend on the state: minus the log-probabilities of the actions drawn.
+    pub entropy: f64,
+    /// Of SAC: mean standard deviations of the actions.
+    pub std: f64,
     /// Number of samples.
     pub samples: f64,
 }
@@ -65,6 +69,8 @@ impl std::ops::AddAssign for LossSums {
         self.value += o.value;
         self.kl += o.kl;
         self.clipped += o.clipped;
+        self.entropy += o.entropy;
+        self.std += o.std;
         self.samples += o.samples;
     }
 }
@@ -165,6 +171,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
             kl: T::widen(sum16(&kl_sum[..parts])),
             clipped: T::widen(sum16(&clipped_sum[..parts])),
             samples: (samples.len() * BLOCK) as f64,
+            ..LossSums::default()
         }
     }
 }

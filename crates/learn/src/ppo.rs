@@ -6,7 +6,8 @@
 use crate::Schedule;
 use crate::loss::{LossSums, Objective};
 use crate::noise::{SHUFFLES, SplitMix};
-use crate::run::{NETWORKS, Update, share};
+use crate::run::{NETWORKS, share};
+use crate::update::Update;
 
 /// All epochs over one rollout.
 pub fn update(mut update: Update<'_>) {

@@ -78,6 +78,11 @@ impl Replay {
         self.filled
     }
 
+    /// Place of the decision of a block that is `age` decisions old.
+    fn item(&self, block: usize, age: usize) -> usize {
+        (self.next_slot + 2 * self.slots - 1 - age) % self.slots * self.blocks + block
+    }
+
     /// Takes a rollout in.
     pub fn push(&mut self, rollout: &Rollout) {
         let (obs_row, act_row) = (self.obs_len * BLOCK, self.act_len * BLOCK);
@@ -99,7 +104,7 @@ impl Replay {
     /// Appends the decision of a block that is `age` decisions old to a batch, with the rewards of up to `n` decisions from
     /// there on; `age` is at least `n - 1`.
     pub fn sample(&self, block: usize, age: usize, n: usize, gamma: f64, batch: &mut Batch) {
-        let item = |age: usize| (self.next_slot + 2 * self.slots - 1 - age) % self.slots * self.blocks + block;
+        let item = |age: usize| self.item(block, age);
         let (obs_row, act_row, first) = (self.obs_len * BLOCK, self.act_len * BLOCK, item(age));
         batch.obs.extend_from_slice(&self.obs[first * obs_row..][..obs_row]);
         batch.action.extend_from_slice(&self.action[first * act_row..][..act_row]);
@@ -131,7 +136,7 @@ impl Replay {
     pub fn save(&self, block: usize, saved: &mut Saved) {
         saved.filled = self.filled as u64;
         for age in (0..self.filled).rev() {
-            let at = (self.next_slot + 2 * self.slots - 1 - age) % self.slots * self.blocks + block;
+            let at = self.item(block, age);
             let rows = [
                 (&self.obs, self.obs_len),
                 (&self.next, self.obs_len),

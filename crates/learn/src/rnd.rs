@@ -20,6 +20,8 @@ pub struct Rnd {
 
 /// Work space.
 pub struct RndSpace<S> {
+    /// The fixed network's parameters.
+    fixed: Vec<S>,
     input: Blocks<S>,
     target: Tape<S>,
     guess: Tape<S>,
@@ -48,8 +50,9 @@ impl Rnd {
         init::orthogonal(&self.net, params, 1.0, random);
     }
     /// Work space.
-    pub fn space<S: Copy + Default>(&self) -> RndSpace<S> {
+    pub fn space<S: Copy + Default + From<f32>>(&self) -> RndSpace<S> {
         RndSpace {
+            fixed: self.target.iter().map(|x| S::from(*x)).collect(),
             input: self.net.input(),
             target: self.net.inference_tape(),
             guess: self.net.tape(),
@@ -64,13 +67,12 @@ impl Rnd {
         steps: &[Step<'_, T::Scalar>],
         space: &mut RndSpace<T::Scalar>,
     ) {
-        let RndSpace { input, target, guess, half } = space;
+        let RndSpace { fixed, input, target, guess, half } = space;
         let n = steps.len();
         for (b, step) in steps.iter().enumerate() {
             place(input.block_mut(b), 0, step.obs);
         }
-        let fixed: Vec<T::Scalar> = self.target.iter().map(|x| T::scalar(*x as f64)).collect();
-        self.net.forward_on::<T>(&fixed, input, target, n);
+        self.net.forward_on::<T>(fixed, input, target, n);
         self.net.forward_on::<T>(&params[..self.count()], input, guess, n);
         let (output, delta) = guess.output_and_delta();
         T::enter(Distance::<T> {

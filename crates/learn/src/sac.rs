@@ -20,8 +20,9 @@ use crate::mlp::{CHUNK, Tape};
 use crate::noise::{Noise, SAMPLES, SplitMix};
 use crate::normalize::{Normalize, Normalizer};
 use crate::replay::{Batch, Replay};
-use crate::run::{NETWORKS, Run, Update};
+use crate::run::{NETWORKS, Run};
 use crate::squash::{Draw, LOG_STD, Normals, Objective};
+use crate::update::Update;
 use crate::{BLOCK, adam, f32_lanes};
 use marathon_physics::lanes::{Isa, Real};
 use serde::{Deserialize, Serialize};
@@ -121,6 +122,7 @@ pub fn update(mut update: Update<'_>, settings: &Sac) {
     }
     let normalizer = update.learner.normalizer(run.config);
     update.learner.lr = run.config.lr * run.linear(update.learner);
+    let place = update.place.clone();
     for u in 0..settings.updates {
         let draw = update.learner.iteration * settings.updates as u64 + u as u64;
         let mut random = SplitMix::new(run.config.seed, draw | SAMPLES);
@@ -128,7 +130,6 @@ pub fn update(mut update: Update<'_>, settings: &Sac) {
         let pick =
             |random: &mut SplitMix| (random.below(run.config.blocks()), settings.n_step - 1 + random.below(ages));
         let picks: Vec<(usize, usize)> = (0..settings.batch / BLOCK).map(|_| pick(&mut random)).collect();
-        let place = update.place().to_vec();
         let sums = update.share_out(u, picks.len(), |group, learner, partial, space| {
             let space = space.sac.as_mut().expect("a worker of SAC has space for it");
             partial.sums = LossSums::default();
@@ -231,8 +232,7 @@ fn gradient(
             (*d1, *d2) = (if first { -1.0 } else { 0.0 }, if first { 0.0 } else { -1.0 });
             let lp = log_prob[b * BLOCK + lane] as f64;
             sums.policy += alpha * lp - if first { *q1 } else { *q2 } as f64;
-            // the entropy, in place of a divergence
-            sums.kl -= lp;
+            sums.entropy -= lp;
         }
     }
     for ((tape, params), input) in [one, two].into_iter().zip(critics).zip(inputs.iter_mut()) {
@@ -246,12 +246,12 @@ fn gradient(
     layout.actor.backward(isa, actor, obs, tape, part, n);
     rest[..act].fill(0.0);
 
-    // weight of the entropy, and the mean deviation in place of the clipped part
+    // weight of the entropy, and the mean deviation
     gradient[twin.alpha] = log_prob.iter().map(|lp| act as f64 - *lp as f64).sum::<f64>() as f32;
     for b in 0..n {
         let logs = &tape.output().block(b)[act * BLOCK..];
         let std = |l: &f32| Real::exp((*l as f64).clamp(LOG_STD[0], LOG_STD[1]));
-        sums.clipped += logs.iter().map(std).sum::<f64>() / act as f64;
+        sums.std += logs.iter().map(std).sum::<f64>() / act as f64;
     }
     (gradient, sums)
 }

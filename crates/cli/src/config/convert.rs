@@ -6,6 +6,7 @@ use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
 use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, PpoConfig, Sac, Schedule};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Agents in a scene of the paper, which a file of its time does not say.
@@ -17,8 +18,8 @@ const MOST_AGENTS: u64 = 1024;
 const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
-/// Keys of the section that only Marathon reads.
-const MARATHON: [&str; 37] = [
+/// Keys of the section that only Marathon reads, with any algorithm.
+const COMMON: [&str; 27] = [
     "agents",
     "horizon",
     "rollouts",
@@ -46,17 +47,12 @@ const MARATHON: [&str; 37] = [
     "threads",
     "without",
     "steps_per_agent",
-    "value_coef",
-    "rms_decay",
-    "rms_epsilon",
-    "kl_clip",
-    "momentum",
-    "damping",
-    "stats_decay",
-    "inverse_every",
-    "updates",
-    "n_step",
 ];
+
+/// Those of the algorithms' own settings.
+const A2C: [&str; 3] = ["value_coef", "rms_decay", "rms_epsilon"];
+const ACKTR: [&str; 6] = ["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"];
+const SAC: [&str; 2] = ["updates", "n_step"];
 
 /// The trainer's configuration, with the values of its base for all that the file leaves out.
 ///
@@ -66,7 +62,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let settings = Settings::read(&behavior)?;
     let Behavior { top, hyperparameters, marathon, mut notes, seed, base, signals, extrinsic, .. } = behavior;
     let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
-    marathon.only(&MARATHON)?;
+    marathon.only(&[&COMMON[..], &A2C, &ACKTR, &SAC].concat())?;
 
     let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
     let agents = agents(&marathon, &settings, &base, steps_per_agent)?;
@@ -78,6 +74,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
     }
     let is_ppo = base.algorithm == Algorithm::Ppo;
+    note_others(&marathon, base.algorithm, &mut notes);
     for key in ["epsilon", "epsilon_schedule"] {
         if let Some(entry) = hyperparameters.get(key).filter(|_| !is_ppo) {
             notes.ignored(&entry, &format!("{} bounds no ratio", base.algorithm.name()));
@@ -100,8 +97,10 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let last_beta = settings.beta.min(LAST_BETA);
     let [min_std, max_std] = [base.min_std, base.max_std];
     let ppo = PpoConfig {
-        algorithm: algorithm(&marathon, base.algorithm, &mut notes)?
-            .map_or_else(|| sac(&marathon, &hyperparameters, &settings, agents * horizon), Ok)?,
+        algorithm: match base.algorithm {
+            Algorithm::Sac(_) => sac(&marathon, &hyperparameters, &settings, agents * horizon)?,
+            other => on_policy(&marathon, other)?,
+        },
         agents: agents as usize,
         horizon: horizon as usize,
         rollouts: marathon.count("rollouts", 1..=1 << 31, base.rollouts as u64)? as usize,
@@ -200,38 +199,26 @@ fn widths(marathon: &Section<'_>, key: &str, default: Vec<usize>) -> Result<Vec<
     items.iter().map(|item| Ok(item.count(1..=65_536)? as usize)).collect()
 }
 
-/// The algorithm with what the section says of its own settings; those of the others are without effect.
-///
-/// SAC's are for the most part ML-Agents' own, see [`sac`]: nothing is returned.
-fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Result<Option<Algorithm>, ConfigError> {
-    let own: &[&str] = match base {
+/// Notes settings of other algorithms, which are without effect.
+fn note_others(marathon: &Section<'_>, algorithm: Algorithm, notes: &mut Notes) {
+    let own: &[&str] = match algorithm {
         Algorithm::Ppo => &[],
-        Algorithm::A2c(_) => &["value_coef", "rms_decay", "rms_epsilon"],
-        Algorithm::Acktr(_) => &["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"],
-        Algorithm::Sac(_) => &["updates", "n_step"],
+        Algorithm::A2c(_) => &A2C,
+        Algorithm::Acktr(_) => &ACKTR,
+        Algorithm::Sac(_) => &SAC,
     };
-    let all = [
-        "value_coef",
-        "rms_decay",
-        "rms_epsilon",
-        "kl_clip",
-        "momentum",
-        "damping",
-        "stats_decay",
-        "inverse_every",
-        "updates",
-        "n_step",
-        "updates",
-        "n_step",
-    ];
-    for entry in all.into_iter().filter(|key| !own.contains(key)).filter_map(|key| marathon.get(key)) {
-        notes.ignored(&entry, &format!("{} has no such setting", base.name()));
+    let others: BTreeSet<&str> = A2C.into_iter().chain(ACKTR).chain(SAC).filter(|key| !own.contains(key)).collect();
+    for entry in others.into_iter().filter_map(|key| marathon.get(key)) {
+        notes.ignored(&entry, &format!("{} has no such setting", algorithm.name()));
     }
+}
+
+/// An algorithm that learns from its own rollouts, with what the section says of its settings.
+fn on_policy(marathon: &Section<'_>, base: Algorithm) -> Result<Algorithm, ConfigError> {
     let positive = |key, default| marathon.number(key, Range::Positive, default);
     let fraction = |key, default| marathon.number(key, Range::Fraction, default);
-    Ok(Some(match base {
-        Algorithm::Sac(_) => return Ok(None),
-        Algorithm::Ppo => Algorithm::Ppo,
+    Ok(match base {
+        Algorithm::Ppo | Algorithm::Sac(_) => base,
         Algorithm::A2c(a2c) => Algorithm::A2c(A2c {
             value_coef: positive("value_coef", a2c.value_coef)?,
             rms_decay: fraction("rms_decay", a2c.rms_decay)?,
@@ -245,7 +232,7 @@ fn algorithm(marathon: &Section<'_>, base: Algorithm, notes: &mut Notes) -> Resu
             stats_decay: fraction("stats_decay", acktr.stats_decay)?,
             inverse_every: marathon.count("inverse_every", 1..=1 << 31, acktr.inverse_every)?,
         }),
-    }))
+    })
 }
 
 /// SAC's settings; `rollout` is the number of steps of a rollout.
