@@ -90,7 +90,12 @@ impl Session {
             },
         };
         let ppo = &mut loaded.ppo;
-        ppo.agents = args.agents.unwrap_or(ppo.agents);
+        if let Some(agents) = args.agents {
+            ppo.agents = agents;
+            if let Some(buffer) = loaded.buffer {
+                ppo.horizon = (buffer as usize).div_ceil(agents.max(1));
+            }
+        }
         ppo.total_steps = args.steps.unwrap_or(ppo.total_steps);
         ppo.seed = args.seed.unwrap_or(ppo.seed);
         ppo.threads = args.threads.unwrap_or(ppo.threads);

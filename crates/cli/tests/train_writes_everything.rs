@@ -147,3 +147,12 @@ fn tensorboard_reads_the_events() {
         assert_eq!(found, expected, "{tag}");
     }
 }
+
+#[test]
+fn another_number_of_agents_keeps_the_buffer() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/configs/hopper-mlagents.yaml");
+    succeed(folder.path(), &["train", "hopper", "--config", file, "--agents", "16", "--steps", "1", "--out", "x"]);
+    let config = &read_json(&folder.path().join("x/run.json"))["config"];
+    assert_eq!((&config["agents"], &config["horizon"], &config["minibatches"]), (&16.into(), &640.into(), &5.into()));
+}

@@ -74,12 +74,12 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
     }
     let is_ppo = base.algorithm == Algorithm::Ppo;
-    note_others(&marathon, base.algorithm, &mut notes);
     for key in ["epsilon", "epsilon_schedule"] {
         if let Some(entry) = hyperparameters.get(key).filter(|_| !is_ppo) {
             notes.ignored(&entry, &format!("{} bounds no ratio", base.algorithm.name()));
         }
     }
+    note_others(&marathon, base.algorithm, &mut notes);
     if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon && !is_sac) {
         let why = "each of the N agents adds M decisions to a rollout and the values of the states reached stand for the rest";
         notes.ignored(&entry, &why.replace("N", &agents.to_string()).replace("M", &horizon.to_string()));
@@ -164,6 +164,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     })?;
     Ok(Loaded {
         ppo,
+        buffer: (!is_sac && marathon.get("horizon").is_none()).then_some(settings.buffer_size),
         summary_freq: settings.summary_freq.saturating_mul(scale),
         checkpoint_interval: settings.checkpoint_interval.saturating_mul(scale),
         keep_checkpoints: settings.keep_checkpoints as usize,

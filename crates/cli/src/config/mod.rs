@@ -57,6 +57,9 @@ const FAST: [(&str, (&str, &str)); 18] = [
 pub struct Loaded {
     /// The trainer's configuration; it is valid.
     pub ppo: PpoConfig,
+    /// Steps of a rollout of all agents, where the file says that and not `horizon`: with more agents, each makes fewer
+    /// decisions.
+    pub buffer: Option<u64>,
     /// Steps between summaries.
     pub summary_freq: u64,
     /// Steps between checkpoints.
@@ -72,6 +75,7 @@ impl Default for Loaded {
     fn default() -> Self {
         Loaded {
             ppo: PpoConfig::default(),
+            buffer: None,
             summary_freq: 50_000,
             checkpoint_interval: 500_000,
             keep_checkpoints: 5,
@@ -123,7 +127,10 @@ pub fn default_for(agent: &str) -> Loaded {
     let found = names.iter().find_map(|name| FAST.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)));
     match found {
         Some((_, (file, text))) => {
-            parse(file.as_ref(), text.as_bytes(), &id).expect("the program's own configurations are right")
+            let loaded =
+                parse(file.as_ref(), text.as_bytes(), &id).expect("the program's own configurations are right");
+            // their rollouts are made for stretches of a length
+            Loaded { buffer: None, ..loaded }
         }
         None => Loaded::default(),
     }
