@@ -343,6 +343,11 @@ pub trait AnyAgent: Send + Sync {
     /// If names or lengths of the facts do not fit the model, the model cannot be simulated, or the processor lacks the
     /// instruction set.
     fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
+    /// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
+    ///
+    /// # Errors
+    /// As [`AnyAgent::shards`].
+    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
 }
 
 impl<A: Agent> AnyAgent for A {
@@ -384,10 +389,19 @@ impl<A: Agent> AnyAgent for A {
     }
 
     fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        let frame_skip = Agent::facts(&*self).frame_skip;
+        self.shards_every(frame_skip, isa)
+    }
+
+    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
         if !isa.supported() {
             return Err(EnvError::Isa { isa: isa.name(), best: Isa::best().name() });
         }
-        let (facts, values) = (Agent::facts(&*self), Agent::options(&*self));
+        let (mut facts, values) = (Agent::facts(&*self), Agent::options(&*self));
+        if frame_skip != facts.frame_skip {
+            facts.max_episode_steps = (facts.max_episode_steps * facts.frame_skip).div_ceil(frame_skip.max(1));
+            facts.frame_skip = frame_skip;
+        }
         let options: Options = values.into_iter().map(|o| (o.name.to_string(), o.value)).collect();
         marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
     }

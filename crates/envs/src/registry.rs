@@ -165,3 +165,11 @@ pub fn factory(name: &str, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> 
 pub fn factory_with(name: &str, options: &Options, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> {
     Ok(global().shards_with(name, options, isa)?)
 }
+
+/// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
+///
+/// # Errors
+/// As [`Registry::shards`].
+pub fn factory_every(name: &str, frame_skip: usize, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> {
+    Ok(agent(name)?.shards_every(frame_skip, isa)?)
+}
