@@ -51,6 +51,9 @@ pub enum Command {
     Bench(BenchArgs),
     /// Make the paper's experiments again: a table, a picture and a page each.
     Study(StudyArgs),
+    /// Play rollouts for `train --processes`, which starts this.
+    #[command(hide = true)]
+    Play,
 }
 
 const TRAIN_HELP: &str = "\
@@ -93,6 +96,10 @@ pub struct TrainArgs {
     /// Threads; 0 means one per processor. The result does not depend on it.
     #[arg(long, value_name = "T")]
     pub threads: Option<usize>,
+    /// Processes that play, each with a share of the agents, while this one learns; 0: it plays itself, on its threads. The
+    /// result does not depend on it. Not with sac.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub processes: usize,
     /// Folder for the results, new or empty [default: runs/AGENT-N].
     #[arg(long, value_name = "DIR", conflicts_with = "resume")]
     pub out: Option<PathBuf>,

@@ -41,9 +41,12 @@ pub enum CliError {
         /// What is left and how to go on.
         advice: String,
     },
-    /// MuJoCo cannot be asked.
+    /// A Python program cannot be asked.
     #[error("{0}")]
-    Mujoco(String),
+    Python(String),
+    /// A process of this program has failed.
+    #[error("{0}")]
+    Process(String),
     /// The command line makes no sense.
     #[error("{0}")]
     Usage(String),

@@ -11,6 +11,8 @@ mod error;
 mod folder;
 mod interrupt;
 mod policy_file;
+mod processes;
+mod python;
 mod report;
 pub mod session;
 mod task;
@@ -59,6 +61,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::List => commands::list::run(args.json),
         Command::Bench(bench) => commands::bench::run(bench, args.json),
+        Command::Play => processes::serve(),
         Command::Study(study) => commands::study::run(study, args.json),
     }
 }

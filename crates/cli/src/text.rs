@@ -1,10 +1,11 @@
 //! Numbers and commands as people read them.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 static PROGRAM: OnceLock<String> = OnceLock::new();
+static CALLED: OnceLock<PathBuf> = OnceLock::new();
 
 /// `12345678` as `12,345,678`.
 pub fn thousands(n: u64) -> String {
@@ -63,6 +64,9 @@ pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
 
 /// Notes the name that the program was called by.
 pub fn set_program(called: Option<&OsString>) {
+    if let Some(called) = called {
+        CALLED.get_or_init(|| called.into());
+    }
     let called = called.map(|name| name.to_string_lossy()).unwrap_or_default();
     // a bare name was found by the shell and will be found again
     PROGRAM.get_or_init(|| if called.is_empty() { "marathon".into() } else { word(&called) });
@@ -71,6 +75,13 @@ pub fn set_program(called: Option<&OsString>) {
 /// The program as the user called it, so that a printed command can be pasted into the same shell.
 pub fn program() -> String {
     PROGRAM.get().cloned().unwrap_or_else(|| "marathon".into())
+}
+
+/// The program, to be started again: this file, or what the user called where this is a part of another program, as in the
+/// Python package.
+pub fn program_file() -> PathBuf {
+    let own = std::env::current_exe().ok().filter(|file| file.file_stem().is_some_and(|stem| stem == "marathon"));
+    own.or_else(|| CALLED.get().cloned()).unwrap_or_else(|| "marathon".into())
 }
 
 /// A path as a word of a shell command.

@@ -93,7 +93,8 @@ pub fn train(
 ) -> PyResult<TrainResult> {
     let (dry, path) = (out.is_none(), resume.clone());
     let mut notes = Vec::new();
-    let mut args = TrainArgs { agent: None, config: None, algo: None, agents, steps, seed, threads, out, resume };
+    let mut args =
+        TrainArgs { agent: None, config: None, algo: None, agents, steps, seed, threads, processes: 0, out, resume };
     let mut made = Made::default();
     let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), &mut made)).transpose()?;
     let begun = match (path, config) {

@@ -3,11 +3,12 @@
 use crate::args::TrainArgs;
 use crate::console::{self, say};
 use crate::error::CliError;
+use crate::processes::Processes;
 use crate::report::print_json;
 use crate::report::summary::{EPISODES, evaluation_table};
 use crate::session::{Session, resume_command};
 use crate::{interrupt, text};
-use marathon_learn::{Control, IterationStats};
+use marathon_learn::{Control, IterationStats, Players};
 use marathon_physics::lanes::Isa;
 
 /// Trains, evaluates, writes everything.
@@ -29,7 +30,16 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     interrupt::install("finishing this iteration and writing the results")?;
     announce(&session);
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
-    let outcome = session.carry_out(true, &mut { stop })?;
+    let mut processes = match args.processes {
+        0 => None,
+        n => Some(Processes::start(&agent, &session.run.config, n)?),
+    };
+    let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
+    let outcome = session.carry_out_with(players, true, &mut { stop })?;
+    if let Some(cause) = processes.and_then(|mut processes| processes.error.take()) {
+        let advice = format!("what is done is saved; go on by `{}`", resume_command(&outcome.summary.folder));
+        return Err(CliError::Stopped { cause: Box::new(cause), advice });
+    }
     if let Some(line) = text::broken(outcome.summary.diverged) {
         console::note(format!("{line}; see the column `diverged` of progress.csv"));
     }

@@ -31,7 +31,7 @@ pub struct EnvArgs {
 
 /// Columns of this benchmark.
 #[derive(Serialize)]
-struct Env {
+pub struct Env {
     /// Physics steps per decision.
     frame_skip: usize,
     /// Decisions per ended episode.
@@ -68,7 +68,8 @@ pub fn run(args: &EnvArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-fn measure(threads: usize, seconds: f64, factory: &dyn ShardFactory, isa: Isa) -> Row<Env> {
+/// Measures an agent's environments with so many threads, for so many processor seconds of each.
+pub fn measure(threads: usize, seconds: f64, factory: &dyn ShardFactory, isa: Isa) -> Row<Env> {
     let spec = factory.spec();
     let actions = actions(spec.act);
     let player = |thread: usize| Player::new(factory.shard(thread * BLOCKS, BLOCKS, 1), spec, &actions);

@@ -4,7 +4,7 @@
 //! the median of several repetitions; `spread` is the distance between its fastest and slowest repetition.
 
 mod against;
-mod env;
+pub mod env;
 mod gait;
 mod mujoco;
 mod options;

@@ -3,19 +3,17 @@
 use super::physics::{AGENTS, Plan, STEPS, Source, Subject, WARMUP};
 use super::row::Sample;
 use crate::error::CliError;
+use crate::python::{self, VARIABLE};
 use marathon_physics::workload::HOLD;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::env;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread::JoinHandle;
 
 /// What the process runs; its requests and answers are described there.
 const SCRIPT: &str = include_str!("mujoco_side.py");
-/// Names the Python to use.
-const VARIABLE: &str = "MARATHON_PYTHON";
 /// Last characters of the process's complaints that are worth showing.
 const COMPLAINT: usize = 2000;
 
@@ -56,13 +54,13 @@ impl Mujoco {
     /// # Errors
     /// If there is no Python or it has no MuJoCo.
     pub fn start() -> Result<Self, CliError> {
-        let python = find_python();
+        let python = python::find();
         let mut command = Command::new(&python);
         // a folder called mujoco in the working directory is not the package
         command.args(["-c", SCRIPT]).env("PYTHONSAFEPATH", "1");
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|e| {
-            CliError::Mujoco(format!(
+            CliError::Python(format!(
                 "{}: cannot be started: {e}; expected a Python with MuJoCo: install Python 3 and the package by \
                  `python3 -m pip install mujoco`, or let the variable {VARIABLE} name the Python that has it",
                 python.display()
@@ -93,7 +91,7 @@ impl Mujoco {
         }
         let found = hello["missing"].as_str().unwrap_or("no MuJoCo");
         let python = crate::text::path_word(&side.python);
-        Err(CliError::Mujoco(format!(
+        Err(CliError::Python(format!(
             "{python}: found {found}, expected the package mujoco (tests run with 4.0); install it by `{python} -m pip \
              install mujoco`, or let the variable {VARIABLE} name a Python that has it"
         )))
@@ -139,7 +137,7 @@ impl Mujoco {
         }
         let answer = self.answer()?;
         match answer["error"].as_str() {
-            Some(error) => Err(CliError::Mujoco(format!("MuJoCo {}: model '{model}': {error}", self.version))),
+            Some(error) => Err(CliError::Python(format!("MuJoCo {}: model '{model}': {error}", self.version))),
             None => Ok(answer),
         }
     }
@@ -153,7 +151,7 @@ impl Mujoco {
     }
 
     fn nonsense(&self, found: &str) -> CliError {
-        CliError::Mujoco(format!("{}: found {found}, expected an answer of Python's", self.python.display()))
+        CliError::Python(format!("{}: found {found}, expected an answer of Python's", self.python.display()))
     }
 
     /// The error of a process that has ended early.
@@ -164,7 +162,7 @@ impl Mujoco {
         let text = text.trim();
         let from = text.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);
         let complaint = if text.is_empty() { String::new() } else { format!(":\n{}", &text[from..]) };
-        CliError::Mujoco(format!(
+        CliError::Python(format!(
             "{}: ended early ({status}), expected a Python 3 with the package mujoco; let the variable {VARIABLE} name \
              one{complaint}",
             self.python.display()
@@ -178,17 +176,4 @@ impl Drop for Mujoco {
         self.requests = None;
         let _ = self.child.wait();
     }
-}
-
-/// The Python that the user names, else that of the virtual environment at hand, else the system's.
-fn find_python() -> PathBuf {
-    if let Some(named) = env::var_os(VARIABLE).filter(|name| !name.is_empty()) {
-        return named.into();
-    }
-    let inside = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
-    let here = env::current_dir().unwrap_or_default();
-    let root = here.ancestors().find(|folder| folder.join(".git").exists());
-    let venv = [Some(here.as_path()), root].into_iter().flatten().map(|folder: &Path| folder.join(inside));
-    let found = venv.into_iter().find(|python| python.exists());
-    found.unwrap_or_else(|| if cfg!(windows) { "python".into() } else { "python3".into() })
 }

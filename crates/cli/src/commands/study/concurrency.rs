@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::chart::Chart;
-use super::record::{Record, Run, mean_curve, plus_minus, spread, train_one};
+use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_one};
 use crate::config;
 use crate::error::CliError;
 use marathon_learn::PpoConfig;
@@ -33,13 +33,10 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             threads: options.threads,
             ..base.clone()
         };
-        let runs: Result<Vec<Run>, CliError> = (1..=options.seeds)
-            .map(|seed| {
-                config.seed = seed;
-                train_one(AGENT, &config)
-            })
-            .collect();
-        let runs = runs?;
+        let runs = each_seed(options.seeds, |seed| {
+            config.seed = seed;
+            train_one(AGENT, &config)
+        })?;
         rows.push(vec![
             agents.to_string(),
             format!("{horizon}"),
@@ -67,6 +64,8 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             "speed, m/s",
         ],
         rows,
+        words: String::new(),
+        versions: Vec::new(),
         chart: Chart::Lines("return per episode with exploration, mean over the seeds", lines),
     })
 }

@@ -1,10 +1,16 @@
 //! `marathon study`: the paper's experiments again. Each writes a table (`.csv` and `.md`) and a picture (`.png`), with the
 //! command, the version and the processor, so that somebody else can make it again.
 
+mod agreement;
 mod chart;
 mod concurrency;
+mod decision_period;
+mod headless;
+mod multi_env;
+mod peers;
 mod record;
 mod table1;
+mod table2;
 mod table3;
 
 use crate::console::print_json;
@@ -25,11 +31,31 @@ pub struct StudyArgs {
 #[derive(Debug, Subcommand)]
 pub enum What {
     /// Table 1 of the paper: speed of training the four agents with its own settings.
-    Table1(Options),
+    Table1 {
+        #[command(flatten)]
+        options: Options,
+        #[command(flatten)]
+        peers: Peers,
+    },
+    /// Table 2 of the paper: training on the processor and on a GPU, with Stable-Baselines3 and here.
+    Table2(Options),
     /// Table 3 of the paper: PPO, A2C and ACKTR on the hopper, time and score.
-    Table3(Options),
+    Table3 {
+        #[command(flatten)]
+        options: Options,
+        #[command(flatten)]
+        peers: Peers,
+    },
+    /// The paper's configuration in `mlagents-learn` and here: do they learn the same?
+    MlagentsAgreement(Options),
     /// Speed and score with 16, 64, 512 and 4096 agents.
     Concurrency(Options),
+    /// A decision every physics step, or every few of them: cost and learning.
+    DecisionPeriod(Options),
+    /// Speed with and without pictures.
+    Headless(Options),
+    /// One agent, many agents in one process, threads, several processes.
+    MultiEnv(Options),
 }
 
 /// What all studies have.
@@ -49,15 +75,36 @@ pub struct Options {
     pub out: PathBuf,
 }
 
+/// Other people's trainers.
+#[derive(Debug, clap::Args)]
+pub struct Peers {
+    /// Seeds of ML-Agents and Stable-Baselines3, which are slow; 0 leaves them out. MARATHON_PYTHON and
+    /// MARATHON_MLAGENTS_PYTHON name the Pythons that have them.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    pub peer_seeds: u64,
+}
+
+impl Peers {
+    /// As words of the command.
+    fn words(&self) -> String {
+        if self.peer_seeds > 0 { format!(" --peer-seeds {}", self.peer_seeds) } else { String::new() }
+    }
+}
+
 /// Measures and writes the files.
 ///
 /// # Errors
-/// If an agent cannot be trained or a file cannot be written.
+/// If an agent cannot be trained, other people's trainers are missing, or a file cannot be written.
 pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
     let (record, options) = match &args.what {
-        What::Table1(options) => (table1::run(options)?, options),
-        What::Table3(options) => (table3::run(options)?, options),
+        What::Table1 { options, peers } => (table1::run(options, peers)?, options),
+        What::Table2(options) => (table2::run(options)?, options),
+        What::Table3 { options, peers } => (table3::run(options, peers)?, options),
+        What::MlagentsAgreement(options) => (agreement::run(options)?, options),
         What::Concurrency(options) => (concurrency::run(options)?, options),
+        What::DecisionPeriod(options) => (decision_period::run(options)?, options),
+        What::Headless(options) => (headless::run(options)?, options),
+        What::MultiEnv(options) => (multi_env::run(options)?, options),
     };
     record.save(options)?;
     if json {

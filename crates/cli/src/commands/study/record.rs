@@ -5,9 +5,10 @@ use super::chart::Chart;
 use crate::console::{note, say};
 use crate::error::CliError;
 use crate::text;
+use marathon_envs::ShardFactory;
 use marathon_envs::registry;
 use marathon_learn::{
-    Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train, write_atomic,
+    Control, EvalOptions, Evaluation, IterationStats, Players, PpoConfig, Snapshot, evaluate, train_with, write_atomic,
 };
 use marathon_physics::lanes::Isa;
 use serde::Serialize;
@@ -25,49 +26,90 @@ pub struct Record {
     pub columns: Vec<&'static str>,
     /// Cells, as they are written.
     pub rows: Vec<Vec<String>>,
+    /// Words of the command beside seeds, steps and threads.
+    pub words: String,
+    /// Versions of other people's programs that took part.
+    pub versions: Vec<String>,
     /// The picture.
     #[serde(skip)]
     pub chart: Chart,
 }
 
+/// Episodes that a policy is judged by.
+pub const EPISODES: usize = 100;
+
 /// One training.
 pub struct Run {
     /// Steps and mean returns of the episodes on the way.
     pub curve: Vec<(f64, f64)>,
-    /// Agent-steps, and seconds of one clock and of all processors.
+    /// Agent-steps, and seconds that passed and of all processors.
     pub steps: u64,
     pub wall: f64,
     pub cpu: f64,
+    /// Agent-steps per second of time passed, without start and end of a program.
+    pub rate: f64,
     /// The best actions at the end.
     pub eval: Evaluation,
 }
 
-/// Trains an agent and evaluates it with a hundred episodes.
+impl Run {
+    /// Mean return of the episodes that ended in the last tenth of the steps, with exploration.
+    pub fn last_tenth(&self) -> f64 {
+        let late = self.curve.iter().filter(|(x, _)| *x > 0.9 * self.steps as f64).map(|p| p.1);
+        spread(late).0
+    }
+
+    /// Tells that it is done.
+    pub fn note(&self, who: &str) {
+        let Run { steps, wall, cpu, eval, .. } = self;
+        note(format!(
+            "{who}: {} steps, {wall:.1} s, {cpu:.1} s of processor time, return {:.0}, {:.2} m/s",
+            text::thousands(*steps),
+            eval.return_mean,
+            eval.speed_mean
+        ));
+    }
+}
+
+/// Trains an agent and evaluates it.
 ///
 /// # Errors
 /// If it cannot be trained.
 pub fn train_one(agent: &str, config: &PpoConfig) -> Result<Run, CliError> {
+    train_on(&*registry::factory(agent, Isa::best())?, config, None)
+}
+
+/// Trains on environments, whose rollouts others may play, and evaluates the policy.
+///
+/// # Errors
+/// If that fails.
+pub fn train_on(
+    factory: &dyn ShardFactory,
+    config: &PpoConfig,
+    players: Option<&mut dyn Players>,
+) -> Result<Run, CliError> {
     let isa = Isa::best();
-    let factory = registry::factory(agent, isa)?;
     let (mut curve, mut clocks) = (Vec::new(), (0, 0.0, 0.0));
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
         clocks = (stats.steps, stats.wall_seconds, stats.cpu_seconds);
         curve.extend(stats.return_mean.map(|mean| (stats.steps as f64, mean)));
         Control::Continue
     };
-    let output = train(&*factory, isa, config, None, &mut observer)?;
-    let options = EvalOptions { episodes: 100, threads: config.threads, ..Default::default() };
-    let eval = evaluate(&*factory, isa, &output.policy, &options)?;
+    let output = train_with(players, factory, isa, config, None, &mut observer)?;
+    let options = EvalOptions { episodes: EPISODES, threads: config.threads, ..Default::default() };
+    let eval = evaluate(factory, isa, &output.policy, &options)?;
     let (steps, wall, cpu) = clocks;
-    note(format!(
-        "{agent} {} seed {}: {} steps, {cpu:.1} s of processor time, return {:.0}, {:.2} m/s",
-        config.algorithm.name(),
-        config.seed,
-        text::thousands(steps),
-        eval.return_mean,
-        eval.speed_mean
-    ));
-    Ok(Run { curve, steps, wall, cpu, eval })
+    let run = Run { curve, steps, wall, cpu, rate: steps as f64 / wall, eval };
+    run.note(&format!("{} {} seed {}", factory.spec().id, config.algorithm.name(), config.seed));
+    Ok(run)
+}
+
+/// One training for each seed.
+///
+/// # Errors
+/// If one fails.
+pub fn each_seed(seeds: u64, one: impl FnMut(u64) -> Result<Run, CliError>) -> Result<Vec<Run>, CliError> {
+    (1..=seeds).map(one).collect()
 }
 
 /// Mean and standard deviation, of the population.
@@ -129,17 +171,19 @@ impl Record {
         }
         let Options { seeds, steps, threads, .. } = options;
         text += &format!(
-            "\n![{}]({}.png)\n\n```sh\nmarathon study {} --seeds {seeds} --steps {steps} --threads {threads}\n```\n\n\
-             Marathon {}, {}, {} thread{}, instruction set {}. Seconds are processor time of all threads unless said \
+            "\n![{}]({}.png)\n\n```sh\nmarathon study {} --seeds {seeds} --steps {steps} --threads {threads}{}\n```\n\n\
+             Marathon {}, {}, {} thread{}, instruction set {}{}. Seconds are processor time of all threads unless said \
              otherwise.\n",
             self.title,
             self.name,
             self.name,
+            self.words,
             env!("CARGO_PKG_VERSION"),
             processor(),
             if *threads == 0 { "all".to_string() } else { threads.to_string() },
             if *threads == 1 { "" } else { "s" },
             Isa::best().name(),
+            self.versions.iter().map(|v| format!("; {v}")).collect::<String>(),
         );
         write_atomic(&file("md"), text.as_bytes())?;
         say(text);
@@ -167,6 +211,7 @@ mod tests {
             steps: 1000,
             wall: 1.0,
             cpu: 1.0,
+            rate: 1000.0,
             eval: Evaluation::default(),
         };
         // ten steps a place: the first two points fall into one

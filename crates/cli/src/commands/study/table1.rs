@@ -1,8 +1,8 @@
 //! Table 1: how fast the four agents train with the paper's own settings, sixteen agents each.
 
-use super::Options;
 use super::chart::Chart;
-use super::record::{Record, Run, plus_minus, spread, train_one};
+use super::record::{Record, each_seed, plus_minus, spread, train_one};
+use super::{Options, Peers, peers};
 use crate::config;
 use crate::error::CliError;
 use crate::text::thousands;
@@ -12,6 +12,11 @@ use std::path::Path;
 const PAPER: &[u8] = include_bytes!("../../../../../assets/configs/paper-appendix-b.yaml");
 const AGENTS: [(&str, f64); 4] =
     [("Hopper-v0", 2190.0), ("Walker2d-v0", 2149.0), ("Ant-v0", 2359.0), ("Humanoid-v0", 1229.0)];
+/// Steps of ML-Agents, and updates in them at least.
+const PEER_STEPS: u64 = 40_000;
+const PEER_UPDATES: u64 = 3;
+/// Decisions of a stretch there; it makes no difference to the speed.
+const TIME_HORIZON: u64 = 128;
 /// The humanoid's network is 2 x 512: a twentieth of the steps tells its speed as well.
 const HUMANOID: u64 = 20;
 
@@ -19,24 +24,31 @@ const HUMANOID: u64 = 20;
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
-    let (mut rows, mut bars) = (Vec::new(), Vec::new());
+pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
+    let (mut rows, mut bars, mut versions) = (Vec::new(), Vec::new(), Vec::new());
     for (agent, paper) in AGENTS {
         let mut config = config::parse(Path::new("paper-appendix-b.yaml"), PAPER, agent)?.ppo;
         let least = 2 * config.rollout_steps();
         let steps = if agent.starts_with("Humanoid") { options.steps / HUMANOID } else { options.steps };
         config.total_steps = steps.max(least);
         config.threads = options.threads;
-        let runs: Result<Vec<Run>, CliError> = (1..=options.seeds)
-            .map(|seed| {
-                config.seed = seed;
-                train_one(agent, &config)
-            })
-            .collect();
-        let runs = runs?;
+        let runs = each_seed(options.seeds, |seed| {
+            config.seed = seed;
+            train_one(agent, &config)
+        })?;
         let cpu = spread(runs.iter().map(|r| r.steps as f64 / r.cpu));
         let wall = spread(runs.iter().map(|r| r.steps as f64 / r.wall));
-        rows.push(vec![
+        // the same settings, trained by ML-Agents, right after
+        config.total_steps = (PEER_UPDATES * config.rollout_steps()).max(PEER_STEPS);
+        let mut of_peers = Vec::new();
+        for seed in 1..=peers.peer_seeds {
+            config.seed = seed;
+            let (run, version) = peers::mlagents(agent, &config, TIME_HORIZON)?;
+            of_peers.push(run.rate);
+            versions = vec![version];
+        }
+        let of_peers = spread(of_peers.iter().copied());
+        let mut row = vec![
             agent.to_string(),
             format!("{:?}", config.actor_hidden),
             thousands(config.total_steps),
@@ -44,8 +56,24 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             plus_minus(wall, 0),
             thousands(paper as u64),
             format!("{:.0}", cpu.0 / paper),
-        ]);
+        ];
+        if peers.peer_seeds > 0 {
+            row.extend([plus_minus(of_peers, 0), format!("{:.0}", wall.0 / of_peers.0)]);
+        }
+        rows.push(row);
         bars.push((agent.to_string(), cpu.0));
+    }
+    let mut columns = vec![
+        "agent",
+        "network",
+        "steps",
+        "steps per processor second",
+        "steps per second",
+        "paper, steps per second",
+        "times the paper",
+    ];
+    if peers.peer_seeds > 0 {
+        columns.extend(["ML-Agents with our player, steps per second", "times ML-Agents, per second"]);
     }
     Ok(Record {
         name: "table1",
@@ -53,18 +81,13 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         about: "Agent-steps per second with the settings of the paper's supplement B (`assets/configs/paper-appendix-b.yaml`: \
                 sixteen agents, its networks, three epochs; without curiosity), everything included. The paper's are those of \
                 ML-Agents with Unity on a desktop computer of 2018. Steps per processor second do not depend on who else uses \
-                the computer; steps per second do."
+                the computer; steps per second do. ML-Agents, where it is in the table, trains the same agents with the same \
+                settings through `marathon-player`; its rate is taken between its first and its last summary."
             .into(),
-        columns: vec![
-            "agent",
-            "network",
-            "steps",
-            "steps per processor second",
-            "steps per second",
-            "paper, steps per second",
-            "times the paper",
-        ],
+        columns,
         rows,
+        words: peers.words(),
+        versions,
         chart: Chart::Bars("agent-steps per processor second", bars),
     })
 }

@@ -1,0 +1,101 @@
+//! The paper's three ways: one agent, many agents in one world, several processes.
+
+use super::Options;
+use super::chart::Chart;
+use super::record::{Record, Run, each_seed, plus_minus, spread, train_on};
+use crate::config;
+use crate::error::CliError;
+use crate::processes::Processes;
+use marathon_envs::{VecEnv, VecEnvOptions, registry};
+use marathon_learn::{Players, PpoConfig};
+use marathon_physics::lanes::Isa;
+use std::time::Instant;
+
+const AGENT: &str = "Hopper-v0";
+/// Decisions of a measurement without learning.
+const DECISIONS: usize = 20_000;
+
+/// Steps one agent and more, and trains with threads and processes.
+///
+/// # Errors
+/// If that fails.
+pub fn run(options: &Options) -> Result<Record, CliError> {
+    let (mut rows, mut bars) = (Vec::new(), Vec::new());
+    let mut add = |way: &str, agents: usize, learns: &str, speeds: (f64, f64), eval: String| {
+        rows.push(vec![
+            way.to_string(),
+            agents.to_string(),
+            learns.to_string(),
+            plus_minus(speeds, 0),
+            format!("{:.1}", speeds.0 / agents as f64 / 1000.0),
+            eval,
+        ]);
+        bars.push((format!("{way}, {agents}"), speeds.0));
+    };
+    for (way, agents) in [("solo", 1), ("one world", 16), ("one world", 128)] {
+        let speeds: Vec<f64> = (1..=options.seeds).map(|seed| play(agents, seed)).collect::<Result<_, _>>()?;
+        add(way, agents, "no", spread(speeds.iter().copied()), String::new());
+    }
+
+    let factory = registry::factory(AGENT, Isa::best())?;
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let base = PpoConfig { total_steps: options.steps, ..config::default_for(AGENT).ppo };
+    let ways = [
+        ("one world, one thread".to_string(), 1, 0),
+        (format!("one world, {cores} threads"), cores, 0),
+        (format!("{cores} processes that play, one thread that learns"), 1, cores),
+        (format!("{cores} processes that play, {cores} threads that learn"), cores, cores),
+    ];
+    for (way, threads, processes) in ways {
+        let runs = each_seed(options.seeds, |seed| {
+            let config = PpoConfig { seed, threads, ..base.clone() };
+            match processes {
+                0 => train_on(&*factory, &config, None),
+                n => {
+                    let mut players = Processes::start(AGENT, &config, n)?;
+                    let run = train_on(&*factory, &config, Some(&mut players as &mut dyn Players))?;
+                    players.error.take().map_or(Ok(run), Err)
+                }
+            }
+        })?;
+        let speed = |r: &Run| r.rate;
+        let eval = plus_minus(spread(runs.iter().map(|r| r.eval.return_mean)), 1);
+        add(&way, base.agents, "yes", spread(runs.iter().map(speed)), eval);
+    }
+    Ok(Record {
+        name: "multi-env",
+        title: "One agent, many agents, many processes",
+        about: format!(
+            "Hopper-v0 in the paper's three ways, on {cores} processors: alone, with others in one world, in several \
+             processes (`--agents`, `--threads`, `--processes` of `marathon train`). Without learning, actions are held. A \
+             vector carries sixteen agents, so one alone leaves fifteen lanes empty, at the same cost. Processes copy \
+             rollouts and states between each other, threads share them; what is learned is the same to the bit, as the \
+             returns show."
+        ),
+        columns: vec![
+            "way",
+            "agents",
+            "learns",
+            "agent-steps per second",
+            "thousand steps per second and agent",
+            "return",
+        ],
+        rows,
+        words: String::new(),
+        versions: Vec::new(),
+        chart: Chart::Bars("agent-steps per second", bars),
+    })
+}
+
+/// Agent-steps per second of so many agents on one thread.
+fn play(agents: usize, seed: u64) -> Result<f64, CliError> {
+    let mut env = VecEnv::new(AGENT, &VecEnvOptions { agents, seed, threads: 1, ..Default::default() })?;
+    let mut step = env.buffers();
+    env.reset(None, &mut step.obs)?;
+    let actions = vec![0.3f32; agents * env.spec().act];
+    let start = Instant::now();
+    for _ in 0..DECISIONS {
+        env.step(&actions, &mut step.as_mut())?;
+    }
+    Ok((DECISIONS * agents) as f64 / start.elapsed().as_secs_f64())
+}

@@ -1,0 +1,240 @@
+//! Other people's trainers: Stable-Baselines3 and ML-Agents, each in a Python of its own.
+
+use super::record::{EPISODES, Run};
+use crate::error::CliError;
+use crate::python::{self, VARIABLE};
+use crate::{policy_file, text};
+use marathon_envs::registry;
+use marathon_learn::{EvalOptions, Evaluation, PpoConfig, Schedule, evaluate};
+use marathon_physics::lanes::Isa;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What the Python processes run; requests and answers are described there.
+const SCRIPT: &str = include_str!("peers.py");
+/// Names the Python that has ML-Agents, which asks for versions of its own.
+const MLAGENTS_VARIABLE: &str = "MARATHON_MLAGENTS_PYTHON";
+/// Port of ML-Agents' server, and of the next seeds' ones.
+const PORT: u64 = 6905;
+/// Agents of the paper's scenes.
+const AGENTS: usize = 16;
+/// Last characters of a process's complaints that are worth showing.
+const COMPLAINT: usize = 2000;
+
+/// What a process answers.
+#[derive(Deserialize)]
+struct Answer {
+    steps: u64,
+    wall: f64,
+    cpu: f64,
+    curve: Vec<(f64, f64)>,
+    #[serde(default, rename = "return")]
+    return_mean: f64,
+    #[serde(default)]
+    length: f64,
+    #[serde(default)]
+    speed: f64,
+    policy: Option<PathBuf>,
+    versions: String,
+    rate: Option<f64>,
+}
+
+/// An algorithm of Stable-Baselines3 with the settings of OpenAI Baselines, which the paper used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sb3 {
+    /// PPO with those of PPO2 for MuJoCo.
+    Ppo,
+    /// A2C, with the rate of the paper's authors.
+    A2c,
+}
+
+impl Sb3 {
+    /// Its name there.
+    pub fn name(self) -> &'static str {
+        match self {
+            Sb3::Ppo => "PPO",
+            Sb3::A2c => "A2C",
+        }
+    }
+
+    fn settings(self) -> Value {
+        match self {
+            Sb3::Ppo => json!({
+                "learning_rate": 3e-4, "n_steps": 128, "batch_size": 64, "n_epochs": 10, "clip_range": 0.2,
+                "clip_range_vf": 0.2, "ent_coef": 0.0, "max_grad_norm": 0.5, "gae_lambda": 0.95,
+            }),
+            Sb3::A2c => json!({
+                "learning_rate": 3e-4, "n_steps": 5, "ent_coef": 0.01, "vf_coef": 0.25, "max_grad_norm": 0.5,
+                "gae_lambda": 1.0, "rms_prop_eps": 1e-5, "use_rms_prop": true,
+            }),
+        }
+    }
+}
+
+/// Trains with Stable-Baselines3, sixteen agents, on a device of PyTorch's (`cpu`, `cuda`). Deviations of the actions start
+/// at `exp(log_std)`. Returns the versions too.
+///
+/// # Errors
+/// If the packages are missing, or training fails.
+pub fn sb3(
+    (agent, algorithm): (&str, Sb3),
+    device: &str,
+    log_std: f64,
+    (seed, steps): (u64, u64),
+) -> Result<(Run, String), CliError> {
+    let job = json!({
+        "trainer": "sb3", "agent": agent, "algorithm": algorithm.name(), "settings": algorithm.settings(),
+        "device": device, "log_std": log_std, "agents": AGENTS, "seed": seed, "steps": steps, "threads": 1,
+        "episodes": EPISODES,
+    });
+    let advice = "pip install stable-baselines3 torch marathon-envs";
+    let answer = trained(ask(&python::find(), VARIABLE, advice, &job)?)?;
+    let eval = Evaluation {
+        episodes: EPISODES as u64,
+        return_mean: answer.return_mean,
+        length_mean: answer.length,
+        speed_mean: answer.speed,
+        ..Default::default()
+    };
+    Ok((
+        finish(answer.steps, &answer, eval, (&format!("Stable-Baselines3's {}", algorithm.name()), seed)),
+        answer.versions,
+    ))
+}
+
+/// Trains with `mlagents-learn` and our player with the settings of a PPO configuration that came from a file of ML-Agents,
+/// and evaluates its policy as our own. Returns the versions too.
+///
+/// # Errors
+/// If ML-Agents or the player is missing, or training fails.
+pub fn mlagents(agent: &str, config: &PpoConfig, time_horizon: u64) -> Result<(Run, String), CliError> {
+    let factory = registry::factory(agent, Isa::best())?;
+    let id = &factory.spec().id;
+    let folder = std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.seed));
+    std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
+    let job = json!({
+        "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.agents,
+        "seed": config.seed, "threads": 1, "player": player()?, "folder": folder, "port": PORT + 10 * config.seed,
+    });
+    let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
+    let python = named.map_or_else(|| ".venv-mlagents/bin/python".into(), PathBuf::from);
+    let answer = trained(ask(&python, MLAGENTS_VARIABLE, "tests/mlagents/run.sh, which makes .venv-mlagents", &job)?)?;
+    let path = answer.policy.as_deref().unwrap_or(&folder);
+    let policy = policy_file::read(path, Some(factory.spec()))?;
+    let options = EvalOptions { episodes: EPISODES, threads: 1, ..Default::default() };
+    let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
+    let _ = std::fs::remove_dir_all(&folder);
+    Ok((finish(answer.steps, &answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
+}
+
+/// Name of the GPU that PyTorch can use, if there is one.
+///
+/// # Errors
+/// If there is no Python with PyTorch.
+pub fn gpu() -> Result<Option<String>, CliError> {
+    let answer = ask(&python::find(), VARIABLE, "pip install torch", &json!({ "trainer": "gpu" }))?;
+    Ok(answer["gpu"].as_str().map(Into::into))
+}
+
+fn finish(steps: u64, answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
+    let Answer { wall, cpu, rate, .. } = *answer;
+    let run = Run { curve: answer.curve.clone(), steps, wall, cpu, rate: rate.unwrap_or(steps as f64 / wall), eval };
+    run.note(&format!("{who} seed {seed}"));
+    run
+}
+
+/// The settings as ML-Agents reads them (JSON is YAML).
+fn file(behavior: &str, config: &PpoConfig, time_horizon: u64) -> Value {
+    let schedule = if config.schedule == Schedule::Linear { "linear" } else { "constant" };
+    let rollout = config.rollout_steps();
+    json!({ "behaviors": { behavior: {
+        "trainer_type": "ppo",
+        "hyperparameters": {
+            "batch_size": rollout / config.minibatches as u64,
+            "buffer_size": rollout,
+            "learning_rate": config.lr,
+            "learning_rate_schedule": schedule,
+            "beta": config.entropy_coef,
+            "epsilon": config.clip,
+            "lambd": config.gae_lambda,
+            "num_epoch": config.epochs,
+        },
+        "network_settings": {
+            "normalize": config.normalize_observations,
+            "hidden_units": config.actor_hidden.first(),
+            "num_layers": config.actor_hidden.len(),
+        },
+        "reward_signals": { "extrinsic": { "gamma": config.gamma, "strength": 1.0 } },
+        "max_steps": config.total_steps,
+        "time_horizon": time_horizon,
+        "summary_freq": (config.total_steps / 60).max(1000),
+    }}})
+}
+
+/// Our player, which is built beside this program.
+fn player() -> Result<PathBuf, CliError> {
+    let name = if cfg!(windows) { "marathon-player.exe" } else { "marathon-player" };
+    let own = std::env::current_exe().map_err(CliError::io(Path::new("marathon"), "find"))?;
+    let player = own.with_file_name(name);
+    if player.exists() {
+        return Ok(player);
+    }
+    Err(CliError::Python(format!(
+        "{}: no such file, expected ML-Agents' player; build it by `cargo build --release --bin marathon-player`",
+        player.display()
+    )))
+}
+
+/// Lets a Python carry a job out.
+fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value, CliError> {
+    let place = text::path_word(python);
+    let advice = format!("install it by `{advice}`, or let the variable {variable} name a Python that has it");
+    let failed = |e: &dyn std::fmt::Display| CliError::Python(format!("{place}: cannot be started: {e}; {advice}"));
+    let mut command = Command::new(python);
+    // a folder called like a package in the working directory is not the package
+    command.args(["-c", SCRIPT]).env("PYTHONSAFEPATH", "1");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(|e| failed(&e))?;
+    let mut requests = child.stdin.take().ok_or_else(|| failed(&"no pipe"))?;
+    // a process that has ended already tells why below
+    let _ = writeln!(requests, "{job}");
+    drop(requests);
+    let output = child.wait_with_output().map_err(|e| failed(&e))?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    let answer: Value = said.lines().next_back().and_then(|line| serde_json::from_str(line).ok()).unwrap_or_default();
+    if let Some(missing) = answer["missing"].as_str() {
+        return Err(CliError::Python(format!("{place}: found no {missing}; {advice}")));
+    }
+    if answer.is_object() && answer["error"].is_null() {
+        return Ok(answer);
+    }
+    let complaint: String =
+        answer["error"].as_str().map_or_else(|| String::from_utf8_lossy(&output.stderr).into(), Into::into);
+    let from = complaint.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);
+    Err(CliError::Python(format!("{place}: failed ({}):\n{}", output.status, complaint[from..].trim())))
+}
+
+/// The answer of a trainer.
+fn trained(answer: Value) -> Result<Answer, CliError> {
+    serde_json::from_value(answer).map_err(|e| CliError::Python(format!("an answer of Python's makes no sense: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+
+    #[test]
+    fn a_configuration_survives_the_way_to_mlagents_and_back() {
+        let text = include_bytes!("../../../../../assets/configs/hopper-mlagents.yaml");
+        let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().ppo;
+        let written = file("Hopper-v0", &ppo, 128).to_string();
+        let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().ppo;
+        ppo.agents = read.agents;
+        ppo.horizon = read.horizon;
+        assert_eq!(read, ppo);
+    }
+}

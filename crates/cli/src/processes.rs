@@ -1,0 +1,176 @@
+//! Rollouts played by processes of this program, a slice of the agents each: `marathon train --processes N`.
+//!
+//! A process is `marathon play`. It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
+//! messages of the learner ([`Players::play`]), and answers with one; before each stands its length, 8 bytes, little-endian. It
+//! leaves when its input ends. The policy has the same bits as without processes.
+
+use crate::error::CliError;
+use crate::text;
+use marathon_envs::registry;
+use marathon_learn::{Algorithm, Control, Deliver, Player, Players, PpoConfig};
+use marathon_physics::lanes::Isa;
+use serde::{Deserialize, Serialize};
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+/// What a process plays.
+#[derive(Serialize, Deserialize)]
+struct Part {
+    agent: String,
+    config: PpoConfig,
+    slice: usize,
+    slices: usize,
+}
+
+/// Processes that play.
+pub struct Processes {
+    workers: Vec<Worker>,
+    /// Why the run could not go on.
+    pub error: Option<CliError>,
+}
+
+struct Worker {
+    child: Child,
+    requests: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Processes {
+    /// Starts so many processes for a run, at most one for every sixteen agents.
+    ///
+    /// # Errors
+    /// If one cannot be started.
+    pub fn start(agent: &str, config: &PpoConfig, count: usize) -> Result<Self, CliError> {
+        if let Algorithm::Sac(_) = config.algorithm {
+            return Err(CliError::Usage(format!(
+                "--processes is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
+            )));
+        }
+        let slices = count.clamp(1, config.blocks());
+        let failed = |e: &dyn std::fmt::Display| CliError::Process(format!("a process cannot be started: {e}"));
+        let program = text::program_file();
+        let start = |slice| {
+            let mut child = Command::new(&program)
+                .arg("play")
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped())
+                .spawn()
+                .map_err(|e| failed(&e))?;
+            let (Some(mut requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
+                unreachable!("both are piped")
+            };
+            let part = Part { agent: agent.into(), config: config.clone(), slice, slices };
+            let part = serde_json::to_string(&part).map_err(|e| failed(&e))?;
+            writeln!(requests, "{part}").map_err(|e| failed(&e))?;
+            Ok(Worker { child, requests: Some(requests), answers: BufReader::new(answers) })
+        };
+        Ok(Processes { workers: (0..slices).map(start).collect::<Result<_, CliError>>()?, error: None })
+    }
+}
+
+impl Players for Processes {
+    fn slices(&self) -> usize {
+        self.workers.len()
+    }
+
+    fn play(&mut self, orders: &[u8], states: &[Vec<u8>], deliver: Deliver<'_>) -> Control {
+        let count = self.workers.len();
+        let mut exchange = || -> Result<(), (usize, String)> {
+            // a process reads all before it answers, so none waits for another
+            for (i, (worker, state)) in self.workers.iter_mut().zip(states).enumerate() {
+                let Some(requests) = &mut worker.requests else { continue };
+                send(requests, &[orders, state]).map_err(|e| (i, e.to_string()))?;
+            }
+            for (i, worker) in self.workers.iter_mut().enumerate() {
+                let answer = receive(&mut worker.answers).and_then(|a| a.ok_or(io::ErrorKind::UnexpectedEof.into()));
+                let answer = answer.map_err(|e| (i, e.to_string()))?;
+                deliver(i, &answer).map_err(|e| (i, e.to_string()))?;
+            }
+            Ok(())
+        };
+        match exchange() {
+            Ok(()) => Control::Continue,
+            Err((i, why)) => {
+                let which = i + 1;
+                self.error =
+                    Some(CliError::Process(format!("process {which} of {count}, which plays, has ended: {why}")));
+                Control::Stop
+            }
+        }
+    }
+}
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        for worker in &mut self.workers {
+            // it ends with its input
+            worker.requests = None;
+        }
+        for worker in &mut self.workers {
+            let _ = worker.child.wait();
+        }
+    }
+}
+
+/// Plays what the learner on the other side of stdin and stdout asks for, until stdin ends.
+///
+/// # Errors
+/// If what is asked for makes no sense.
+pub fn serve() -> Result<(), CliError> {
+    // Ctrl-C is for the learner, which finishes its iteration
+    ctrlc::set_handler(|| {}).map_err(|e| CliError::Process(e.to_string()))?;
+    let broken = |e: io::Error| CliError::Process(format!("the learner cannot be talked to: {e}"));
+    let (mut requests, mut answers) = (io::stdin().lock(), io::stdout().lock());
+    let mut line = String::new();
+    requests.read_line(&mut line).map_err(broken)?;
+    let part: Part = serde_json::from_str(&line)
+        .map_err(|e| CliError::Usage(format!("stdin: {e}; expected what `marathon train --processes` sends")))?;
+    let factory = registry::factory(&part.agent, Isa::best())?;
+    let mut player = Player::new(&*factory, Isa::best(), &part.config, (part.slice, part.slices))?;
+    while let Some(orders) = receive(&mut requests).map_err(broken)? {
+        let state = receive(&mut requests).map_err(broken)?.unwrap_or_default();
+        let answer = player.play(&orders, &state)?;
+        send(&mut answers, &[&answer]).map_err(broken)?;
+    }
+    Ok(())
+}
+
+fn send(pipe: &mut impl Write, messages: &[&[u8]]) -> io::Result<()> {
+    for message in messages {
+        pipe.write_all(&(message.len() as u64).to_le_bytes())?;
+        pipe.write_all(message)?;
+    }
+    pipe.flush()
+}
+
+/// The next message; none at the end.
+fn receive(pipe: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
+    let mut length = [0; 8];
+    match pipe.read_exact(&mut length) {
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
+        other => other?,
+    }
+    let length = u64::from_le_bytes(length);
+    let mut message = Vec::new();
+    // what is not there is not made room for
+    pipe.take(length).read_to_end(&mut message)?;
+    if (message.len() as u64) < length { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(Some(message)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_arrive_whole_or_not_at_all() {
+        let mut pipe = Vec::new();
+        send(&mut pipe, &[b"orders", b""]).unwrap();
+        let mut all = &pipe[..];
+        assert_eq!(receive(&mut all).unwrap().as_deref(), Some(&b"orders"[..]));
+        assert_eq!(receive(&mut all).unwrap().as_deref(), Some(&b""[..]));
+        assert_eq!(receive(&mut all).unwrap(), None);
+        assert!(receive(&mut &pipe[..10]).is_err());
+        // a length out of nowhere takes no memory
+        assert!(receive(&mut &u64::MAX.to_le_bytes()[..]).is_err());
+    }
+}

@@ -1,0 +1,42 @@
+//! A study writes a table, a picture and a page that holds its command; one that needs other people's programs says which are
+//! missing and how to get them, before it trains anything.
+
+mod common;
+
+use common::*;
+
+#[test]
+fn a_page_has_its_command_and_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    for study in ["multi-env", "concurrency"] {
+        let text = succeed(folder.path(), &["study", study, "--seeds", "1", "--steps", "2000", "--out", "pages"]);
+        let file = |extension: &str| folder.path().join("pages").join(format!("{study}.{extension}"));
+        let page = std::fs::read_to_string(file("md")).unwrap();
+        assert!(text.starts_with(page.trim_end()), "what is said is what is written: {text}");
+        assert!(page.contains(&format!("marathon study {study} --seeds 1 --steps 2000 --threads 1")), "{page}");
+        assert!(page.contains(&format!("({study}.png)")) && std::fs::metadata(file("png")).unwrap().len() > 1000);
+        let rows = std::fs::read_to_string(file("csv")).unwrap();
+        let table = page.lines().filter(|line| line.starts_with('|')).count();
+        assert_eq!(rows.lines().count() + 1, table, "{page}\n{rows}");
+    }
+}
+
+#[test]
+fn missing_programs_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = |study: &str, variable: &str| {
+        let args = ["study", study, "--seeds", "1", "--steps", "100"];
+        let output = marathon(folder.path(), &args).env(variable, "no-such-python").output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        let error = stderr(&output);
+        assert!(error.contains("no-such-python: cannot be started") && error.contains(variable), "{error}");
+    };
+    asked("table2", "MARATHON_PYTHON");
+    if cfg!(unix) {
+        // the player has to be there first
+        let player = std::path::Path::new(env!("CARGO_BIN_EXE_marathon")).with_file_name("marathon-player");
+        if player.exists() {
+            asked("mlagents-agreement", "MARATHON_MLAGENTS_PYTHON");
+        }
+    }
+}
