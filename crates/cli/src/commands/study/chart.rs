@@ -20,6 +20,10 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(178, 160, 0),
 ];
 
+/// Height of the names of bars, and mean width of a letter of theirs, pixels.
+const NAMES: u32 = 76;
+const LETTER: f64 = 6.4;
+
 /// A picture.
 pub enum Chart {
     /// Lines over agent-steps: what is drawn, and each line's name and points.
@@ -64,7 +68,7 @@ impl Chart {
                 .margin_right(32 * SCALE)
                 .margin_top(60 * SCALE)
                 .margin_bottom(10 * SCALE)
-                .x_label_area_size(28 * SCALE)
+                .x_label_area_size(if let Chart::Bars(..) = self { NAMES } else { 28 } * SCALE)
                 .y_label_area_size(64 * SCALE)
                 .build_cartesian_2d(ends, bottom..high + room)?;
             let (of_y, of_x) = (|y: &f64| axis_number(*y), |x: &f64| axis_steps(*x));
@@ -93,9 +97,15 @@ impl Chart {
                         let (left, color) = (i as f64, COLORS[i % COLORS.len()]);
                         let corners = [(left + 0.2, 0.0), (left + 0.8, *y)];
                         chart.draw_series(std::iter::once(Rectangle::new(corners, color.filled())))?;
-                        let text = style(14, INK, FontStyle::Normal);
-                        let label = format!("{name}: {}", crate::text::short(*y));
+                        let (text, label) = (style(14, INK, FontStyle::Normal), crate::text::short(*y));
                         chart.draw_series(std::iter::once(Text::new(label, (left + 0.2, *y + 0.4 * room), text)))?;
+                        // the name below, as wide as there is room
+                        let (x, y) = chart.backend_coord(&(left + 0.06, bottom));
+                        let letters = (0.9 * (SIZE[0] - 110) as f64 / (LETTER * bars.len() as f64)) as usize;
+                        for (n, line) in wrapped(name, letters).into_iter().enumerate() {
+                            let place = (x, y + ((6 + 15 * n as u32) * SCALE) as i32);
+                            root.draw_text(&line, &style(12, INK, FontStyle::Normal), place)?;
+                        }
                     }
                 }
             }
@@ -105,9 +115,27 @@ impl Chart {
     }
 }
 
+/// A text in lines of so many letters, as far as its words allow.
+fn wrapped(text: &str, letters: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut().filter(|line| line.len() + 1 + word.len() <= letters) {
+            Some(line) => *line += &format!(" {word}"),
+            None => lines.push(word.into()),
+        }
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_wrapped_at_words() {
+        assert_eq!(wrapped("two processes that play", 13), ["two processes", "that play"]);
+        assert_eq!(wrapped("unbreakable", 3), ["unbreakable"]);
+    }
 
     #[test]
     fn charts_of_little_are_drawn_too() {
