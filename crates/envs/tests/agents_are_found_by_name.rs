@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use marathon_envs::{Registry, agents};
+use marathon_envs::{Registry, Spec, agents, registry};
+use marathon_physics::lanes::Isa;
 
 fn id(name: &str) -> String {
     Registry::default().agent(name).map_or_else(|e| e.to_string(), |a| a.facts().id.to_string())
@@ -162,4 +163,15 @@ mod with_arguments {
         let error = registry().shards_with("cart", &Options::new().with("frame_skip", 0.0), Isa::F32).map(|_| ());
         assert!(matches!(error, Err(EnvError::Agent { .. })));
     }
+}
+
+#[test]
+fn an_agent_at_another_pace_has_episodes_of_as_many_seconds() {
+    let own = registry::factory("hopper", Isa::F32).unwrap();
+    let (spec, every) = (own.spec(), registry::factory_every("hopper", 1, Isa::F32).unwrap());
+    let seconds = |spec: &Spec| spec.dt * spec.max_episode_steps as f64;
+    assert_eq!((every.spec().frame_skip, every.spec().max_episode_steps), (1, 4000));
+    assert!((every.spec().dt * 4.0 - spec.dt).abs() < 1e-15 && (seconds(every.spec()) - seconds(spec)).abs() < 1e-9);
+    let refused = registry::factory_every("hopper", 0, Isa::F32).err().unwrap().to_string();
+    assert!(refused.contains("frame_skip is 0, expected at least 1"), "{refused}");
 }
