@@ -43,7 +43,9 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
                 by `mlagents-learn` through `marathon-player` and by `marathon train`, for as many steps with the same \
                 schedules. Policies are judged alike: the best actions of ML-Agents' `.onnx` and of our policy file over a \
                 hundred episodes here. `while training` is the mean return of the episodes that ended in the last tenth of \
-                the steps, with exploration."
+                the steps, with exploration. On the way ML-Agents is ahead for a while: here the first rollout only fills the \
+                statistics, weights start elsewhere, and the probability ratio that is clipped is that of all actions \
+                together, there that of each by itself."
             .into(),
         columns: vec![
             "seed",
