@@ -4,9 +4,10 @@ use super::options::{Common, Head, for_networks, seconds};
 use super::row::{Figures, Row, Sample, Table};
 use crate::config;
 use crate::error::CliError;
+use crate::processes::Processes;
 use crate::text::short;
 use marathon_envs::registry;
-use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Control, IterationStats, Players, PpoConfig, Snapshot, train_with};
 use marathon_physics::lanes::Isa;
 use serde::Serialize;
 
@@ -29,6 +30,12 @@ pub struct TrainArgs {
     /// Widths of both hidden layers, instead of the configuration's.
     #[arg(long, value_name = "WIDTH", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub hidden: Option<u32>,
+    /// Agents that act side by side, a multiple of 16, instead of the configuration's.
+    #[arg(long, value_name = "N")]
+    pub agents: Option<usize>,
+    /// Processes that play; 0: the one that learns plays, on its threads. Their processor time counts.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub processes: usize,
 }
 
 /// Columns of this benchmark.
@@ -77,6 +84,7 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
     if let Some(width) = args.hidden.map(|width| width as usize) {
         (base.actor_hidden, base.critic_hidden) = (vec![width; 2], vec![width; 2]);
     }
+    base.agents = args.agents.unwrap_or(base.agents);
     let mut samples = Vec::new();
     let (mut shares, mut weight, mut diverged) = ([0.0; 2], 0.0, 0);
     for seed in 0..REPETITIONS as u64 {
@@ -98,7 +106,15 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
             let enough = stats.iteration > ITERATIONS && stats.cpu_seconds - first.cpu_seconds >= each;
             if enough || seconds > 10.0 * args.seconds.max(1.0) { Control::Stop } else { Control::Continue }
         };
-        let last = train(&*factory, isa, &config, None, &mut observer)?.last;
+        let mut processes = match args.processes {
+            0 => None,
+            n => Some(Processes::start(id, &config, n)?),
+        };
+        let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
+        let last = train_with(players, &*factory, isa, &config, None, &mut observer)?.last;
+        if let Some(error) = processes.and_then(|mut processes| processes.error.take()) {
+            return Err(error);
+        }
         if let (Some(first), Some(last)) = (first, last) {
             samples.push(Sample {
                 steps: last.steps - first.steps,

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import resource
+import socket
 import subprocess
 import sys
 import time
@@ -91,6 +92,12 @@ def sb3(job):
     }
 
 
+def free_port():
+    with socket.socket() as one:
+        one.bind(("localhost", 0))
+        return one.getsockname()[1]
+
+
 def mlagents(job):
     import mlagents.trainers  # noqa: F401
 
@@ -98,7 +105,7 @@ def mlagents(job):
     config = folder / "config.yaml"
     config.write_text(json.dumps(job["config"]))
     words = [sys.executable, "-m", "mlagents.trainers.learn", config, f"--env={job['player']}", "--run-id=run", "--force"]
-    words += [f"--seed={job['seed']}", "--no-graphics", f"--base-port={job['port']}", f"--results-dir={folder}"]
+    words += [f"--seed={job['seed']}", "--no-graphics", f"--base-port={free_port()}", f"--results-dir={folder}"]
     words += ["--torch-device=cpu", "--env-args", f"--spawn-env={job['agent']}", f"--num-spawn-envs={job['agents']}"]
     start = time.perf_counter()
     environment = {**os.environ, "OMP_NUM_THREADS": str(job["threads"])}

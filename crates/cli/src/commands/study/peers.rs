@@ -17,8 +17,6 @@ use std::process::{Command, Stdio};
 const SCRIPT: &str = include_str!("peers.py");
 /// Names the Python that has ML-Agents, which asks for versions of its own.
 const MLAGENTS_VARIABLE: &str = "MARATHON_MLAGENTS_PYTHON";
-/// Port of ML-Agents' server, and of the next seeds' ones.
-const PORT: u64 = 6905;
 /// Agents of the paper's scenes.
 const AGENTS: usize = 16;
 /// Last characters of a process's complaints that are worth showing.
@@ -117,7 +115,7 @@ pub fn mlagents(agent: &str, config: &PpoConfig, time_horizon: u64) -> Result<(R
     std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
     let job = json!({
         "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.agents,
-        "seed": config.seed, "threads": 1, "player": player()?, "folder": folder, "port": PORT + 10 * config.seed,
+        "seed": config.seed, "threads": 1, "player": player()?, "folder": folder,
     });
     let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
     let python = named.map_or_else(|| ".venv-mlagents/bin/python".into(), PathBuf::from);
