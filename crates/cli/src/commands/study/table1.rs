@@ -38,6 +38,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         })?;
         let cpu = spread(runs.iter().map(|r| r.steps as f64 / r.cpu));
         let wall = spread(runs.iter().map(|r| r.steps as f64 / r.wall));
+        let steps = config.total_steps;
         // the same settings, trained by ML-Agents, right after
         config.total_steps = (PEER_UPDATES * config.rollout_steps()).max(PEER_STEPS);
         let mut of_peers = Vec::new();
@@ -51,7 +52,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         let mut row = vec![
             agent.to_string(),
             format!("{:?}", config.actor_hidden),
-            thousands(config.total_steps),
+            thousands(steps),
             plus_minus(cpu, 0),
             plus_minus(wall, 0),
             thousands(paper as u64),
