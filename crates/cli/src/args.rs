@@ -53,7 +53,7 @@ pub enum Command {
     Study(StudyArgs),
     /// Play rollouts for `train --processes`, which starts this.
     #[command(hide = true)]
-    Play,
+    RolloutWorker,
 }
 
 const TRAIN_HELP: &str = "\

@@ -61,7 +61,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::List => commands::list::run(args.json),
         Command::Bench(bench) => commands::bench::run(bench, args.json),
-        Command::Play => processes::serve(),
+        Command::RolloutWorker => processes::serve(),
         Command::Study(study) => commands::study::run(study, args.json),
     }
 }

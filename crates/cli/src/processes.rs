@@ -1,6 +1,6 @@
 //! Rollouts played by processes of this program, a slice of the agents each: `marathon train --processes N`.
 //!
-//! A process is `marathon play`. It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
+//! A process is `marathon rollout-worker`. It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
 //! messages of the learner ([`Players::play`]), and answers with one; before each stands its length, 8 bytes, little-endian. It
 //! leaves when its input ends. The policy has the same bits as without processes.
 
@@ -51,7 +51,7 @@ impl Processes {
         let program = text::program_file();
         let start = |slice| {
             let mut child = Command::new(&program)
-                .arg("play")
+                .arg("rollout-worker")
                 .stdin(Stdio::piped())
                 .stdout(Stdio::piped())
                 .spawn()
