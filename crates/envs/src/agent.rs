@@ -342,12 +342,63 @@ pub trait AnyAgent: Send + Sync {
     /// # Errors
     /// If names or lengths of the facts do not fit the model, the model cannot be simulated, or the processor lacks the
     /// instruction set.
-    fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
+    fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        let facts = self.facts();
+        self.shards_as(facts, isa)
+    }
     /// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
     ///
     /// # Errors
     /// As [`AnyAgent::shards`].
-    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
+    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        let mut facts = self.facts();
+        if frame_skip != facts.frame_skip {
+            facts.max_episode_steps = (facts.max_episode_steps * facts.frame_skip).div_ceil(frame_skip.max(1));
+            facts.frame_skip = frame_skip;
+        }
+        self.shards_as(facts, isa)
+    }
+    /// The same with other facts than its own, such as another model; see [`Elsewhere`].
+    ///
+    /// # Errors
+    /// As [`AnyAgent::shards`].
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
+}
+
+/// An agent on another model: its own body and task, on another ground.
+pub struct Elsewhere {
+    agent: Arc<dyn AnyAgent>,
+    model: ModelSource,
+}
+
+impl Elsewhere {
+    /// Puts an agent on a model.
+    pub fn new(agent: Arc<dyn AnyAgent>, model: ModelSource) -> Self {
+        Elsewhere { agent, model }
+    }
+}
+
+impl AnyAgent for Elsewhere {
+    fn facts(&self) -> Facts {
+        Facts { model: self.model.clone(), ..self.agent.facts() }
+    }
+
+    fn model(&self) -> Result<Model, EnvError> {
+        Blueprint::model(&self.facts())
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.agent.options()
+    }
+
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        let agent = self.agent.clone().with_options(options)?;
+        Ok(Arc::new(Elsewhere { agent, model: self.model.clone() }))
+    }
+
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        self.agent.clone().shards_as(facts, isa)
+    }
 }
 
 impl<A: Agent> AnyAgent for A {
@@ -388,21 +439,11 @@ impl<A: Agent> AnyAgent for A {
         })
     }
 
-    fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
-        let frame_skip = Agent::facts(&*self).frame_skip;
-        self.shards_every(frame_skip, isa)
-    }
-
-    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
         if !isa.supported() {
             return Err(EnvError::Isa { isa: isa.name(), best: Isa::best().name() });
         }
-        let (mut facts, values) = (Agent::facts(&*self), Agent::options(&*self));
-        if frame_skip != facts.frame_skip {
-            facts.max_episode_steps = (facts.max_episode_steps * facts.frame_skip).div_ceil(frame_skip.max(1));
-            facts.frame_skip = frame_skip;
-        }
-        let options: Options = values.into_iter().map(|o| (o.name.to_string(), o.value)).collect();
+        let options = Agent::options(&*self).into_iter().map(|o| (o.name.to_string(), o.value)).collect();
         marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
     }
 }

@@ -89,7 +89,7 @@ pub(crate) struct AgentFactory<T: Real> {
 }
 
 impl<T: Real> AgentFactory<T> {
-    /// With facts that are the agent's but for its pace.
+    /// With facts that are the agent's but for its pace or its model.
     pub fn new(facts: Facts, options: Options, mind: Arc<dyn Mind<T>>) -> Result<Self, EnvError> {
         let blueprint = Blueprint::new(&facts)?;
         let anatomy = Anatomy::new(&facts, &blueprint)?;

@@ -41,7 +41,9 @@ pub mod tolerance;
 pub mod vec_env;
 mod write;
 
-pub use agent::{Agent, AnyAgent, Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
+pub use agent::{
+    Agent, AnyAgent, Body, Controls, Elsewhere, Facts, ModelSource, Motors, Part, ResetNoise, View, names,
+};
 pub use error::{EnvError, nearest};
 pub use lane_env::{AgentShard, AgentShards, AgentState, TERMINATION_TERM};
 pub use lockstep::{Crowd, CrowdError, Lockstep};
