@@ -1,9 +1,16 @@
 #!/usr/bin/env bash
 # Runs every test. Sets up what they need by itself: a Python environment in .venv with the oracles (MuJoCo, Gymnasium,
-# dm_control, PyTorch) and what tests the Python package, and one in .venv-mlagents with ML-Agents. Needs a Rust toolchain,
-# Python 3.11 with venv, and a C compiler.
+# dm_control, PyTorch) and what tests the Python package, one in .venv-mlagents with ML-Agents, and as root the Debian packages
+# of the game. Needs a Rust toolchain, Python 3.11 with venv, and a C compiler. MARATHON_NO_GAME=1 leaves the game and with it
+# Bevy out.
 set -euo pipefail
 cd "$(dirname "$0")"
+crates=(--workspace)
+if [ -n "${MARATHON_NO_GAME:-}" ]; then
+  crates+=(--exclude marathon-game)
+else
+  crates/game/tests/packages.sh
+fi
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
@@ -16,8 +23,9 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
 cargo fmt --all --check
-cargo clippy --release --workspace --all-targets -- -D warnings
-RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
-cargo test --release --workspace
+# one pass over everything: a second one with other features compiles the physics again
+cargo clippy --release "${crates[@]}" --all-targets -- -D warnings
+RUSTDOCFLAGS="-D warnings" cargo doc --release "${crates[@]}" --no-deps --quiet
+cargo test --release "${crates[@]}"
 python/tests/run.sh
 tests/mlagents/run.sh

@@ -13,6 +13,7 @@ Examples:
   marathon eval runs/hopper-1 --episodes 1000   measure it
   marathon train --resume runs/hopper-1 --steps 20000000   let it learn on
   marathon export runs/hopper-1                 for Unity, ONNX Runtime and others
+  marathon play runs/hopper-1                   watch it in a window, push it
   marathon list                                 all agents
   marathon bench physics                        how fast this computer is
 
@@ -45,6 +46,8 @@ pub enum Command {
     Import(ImportArgs),
     /// Record a policy's decisions for ML-Agents' imitation learning: a .demo file.
     RecordDemo(RecordDemoArgs),
+    /// Open the game: watch, push and teach characters in a window.
+    Play(PlayArgs),
     /// List the agents.
     List,
     /// Measure the speed of the physics, the environments or the training.
@@ -217,6 +220,15 @@ pub struct RecordDemoArgs {
     /// Agent that the policy must be for [default: the one it was trained for].
     #[arg(long, value_name = "AGENT")]
     pub agent: Option<String>,
+}
+
+/// Options of `play`.
+#[derive(Debug, clap::Args)]
+#[command(disable_help_flag = true)]
+pub struct PlayArgs {
+    /// What the game is told, such as `humanoid --agents 16`; `marathon play --help` is the game's own help.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "WORDS")]
+    pub words: Vec<std::ffi::OsString>,
 }
 
 /// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.

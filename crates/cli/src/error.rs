@@ -47,6 +47,9 @@ pub enum CliError {
     /// A process of this program has failed.
     #[error("{0}")]
     Process(String),
+    /// The game cannot be started, or failed.
+    #[error("{0}")]
+    Game(String),
     /// The command line makes no sense.
     #[error("{0}")]
     Usage(String),

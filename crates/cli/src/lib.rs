@@ -59,6 +59,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Export(export) => commands::convert::export(export, args.json),
         Command::Import(import) => commands::convert::import(import, args.json),
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
+        Command::Play(play) => commands::play::run(play),
         Command::List => commands::list::run(args.json),
         Command::Bench(bench) => commands::bench::run(bench, args.json),
         Command::RolloutWorker => processes::serve(),

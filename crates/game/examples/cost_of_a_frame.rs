@@ -1,6 +1,6 @@
 //! What the simulation costs: processor time per frame at 60 frames per second, for any agent and number.
 //!
-//! `cargo run --release -p marathon-game --example cost_of_a_frame -- humanoid 64`
+//! `cargo run --release -p marathon-game --no-default-features --example cost_of_a_frame -- humanoid 64`
 
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;

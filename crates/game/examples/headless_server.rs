@@ -1,6 +1,6 @@
 //! A server: thirty-two hoppers that nobody draws. No window, no graphics card, no renderer in the build:
 //!
-//! `cargo run --release -p marathon-game --example headless_server`
+//! `cargo run --release -p marathon-game --no-default-features --example headless_server`
 //!
 //! What a server needs of a ragdoll are its messages and its state; frames are as long as the server likes.
 

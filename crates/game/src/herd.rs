@@ -4,6 +4,7 @@
 //! kind has its own clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
 
 use crate::asset::RagdollPrefab;
+use crate::ground::Ground;
 use crate::ragdoll::{Character, Controls, End, Episode, Restart};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
@@ -31,6 +32,7 @@ pub(crate) enum HerdError {
 /// All ragdolls of one kind.
 pub(crate) struct Herd {
     pub character: Character,
+    pub ground: Ground,
     pub model: Arc<Model>,
     pub spec: Option<Arc<Spec>>,
     pub feet: Vec<Arc<str>>,
@@ -45,13 +47,15 @@ pub(crate) struct Herd {
 }
 
 impl Herd {
-    /// A herd of an agent of the registry, without ragdolls yet.
-    pub fn of_agent(name: &str, time: Duration) -> Result<Self, HerdError> {
-        let agent = registry::agent(name)?;
-        let factory = registry::factory(name, Isa::best())?;
-        let spec = factory.spec().clone();
+    /// A herd of an agent of the registry on a ground, without ragdolls yet.
+    pub fn of_agent(name: &str, ground: Ground, time: Duration) -> Result<Self, HerdError> {
+        let registry = ground.registry(name)?;
+        // the registry of another ground knows its agent by the full name alone
+        let agent = registry.agent(&registry::agent(name)?.facts().id)?;
+        let spec = agent.clone().shards(Isa::best())?.spec().clone();
         Ok(Herd {
             character: Character::Agent(name.into()),
+            ground,
             model: Arc::new(agent.model()?),
             feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
             substeps: spec.frame_skip,
@@ -69,6 +73,7 @@ impl Herd {
         let dt = substeps as f64 * model.opt.timestep;
         Herd {
             character: Character::Prefab(prefab.clone()),
+            ground: Ground::Level,
             model,
             feet: Vec::new(),
             substeps,
@@ -222,7 +227,8 @@ impl Pen {
         let (engine, n_obs, out) = match &herd.character {
             Character::Agent(name) => {
                 let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, ..default() };
-                let mut env = VecEnv::new(name, &options)?;
+                let id = herd.spec.as_ref().map_or(name, |spec| &spec.id);
+                let mut env = VecEnv::from_registry(&herd.ground.registry(id)?, id, &options)?;
                 let (n_obs, out) = (env.spec().obs, env.buffers());
                 env.reset(None, &mut vec![0.0; n_obs * BLOCK])?;
                 (Engine::Env(Box::new(env)), n_obs, out)

@@ -29,25 +29,36 @@
 //! The simulation is that of `marathon train` and `marathon eval`: the same seed gives the same bits here and there,
 //! whatever the frame rate.
 //!
-//! Nothing here draws, and no renderer is compiled: a server needs no more, and a game has its own.
+//! Without the feature `render` nothing draws and no renderer is compiled: what a server needs. With it (the default),
+//! `look` has plugins that make ragdolls visible, and `marathon-game` is an app around them.
 
+#[cfg(feature = "render")]
+pub mod app;
 pub mod asset;
 pub mod axes;
+mod ground;
 mod herd;
+#[cfg(feature = "render")]
+pub mod look;
 pub mod plugin;
 pub mod ragdoll;
 mod simulate;
 pub mod stage;
 
 pub use asset::{PolicyAsset, RagdollPrefab};
+pub use ground::Ground;
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
 pub use simulate::{Marathon, RagdollState};
 
 /// What an app wants to have at hand.
 pub mod prelude {
+    #[cfg(feature = "render")]
+    pub use crate::look::{
+        FollowCamera, FollowCameraPlugin, LookPlugin, Marks, MarksPlugin, Quality, SceneryPlugin, Tint,
+    };
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
-    pub use crate::{Marathon, PolicyAsset, RagdollPrefab, RagdollState};
+    pub use crate::{Ground, Marathon, PolicyAsset, RagdollPrefab, RagdollState};
     pub use marathon_physics::Variation;
 }

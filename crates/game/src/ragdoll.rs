@@ -1,6 +1,7 @@
 //! What a game says of its characters, and what it learns of them: components and messages.
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
+use crate::ground::Ground;
 use bevy::prelude::*;
 use marathon_envs::Spec;
 use marathon_physics::{Model, Variation};
@@ -20,6 +21,8 @@ pub struct Ragdoll {
     pub seed: u64,
     /// Which of the seed's agents it is: `marathon eval --seed S` plays the agents 0, 1, 2 ... of seed S.
     pub number: u64,
+    /// What an agent runs on; a prefab brings its own.
+    pub ground: Ground,
 }
 
 /// Kind of a [`Ragdoll`].
@@ -33,19 +36,29 @@ pub enum Character {
 }
 
 impl Ragdoll {
+    fn new(character: Character) -> Self {
+        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level }
+    }
+
     /// An agent of the registry; to add one's own, see [`marathon_envs::register`].
     pub fn agent(name: impl Into<String>) -> Self {
-        Ragdoll { character: Character::Agent(name.into()), seed: 0, number: 0 }
+        Self::new(Character::Agent(name.into()))
     }
 
     /// A body loaded from MJCF.
     pub fn prefab(prefab: Handle<RagdollPrefab>) -> Self {
-        Ragdoll { character: Character::Prefab(prefab), seed: 0, number: 0 }
+        Self::new(Character::Prefab(prefab))
     }
 
     /// The same as agent `number` of another seed.
     pub fn with_seed(mut self, seed: u64, number: u64) -> Self {
         (self.seed, self.number) = (seed, number);
+        self
+    }
+
+    /// The same on another ground.
+    pub fn on(mut self, ground: Ground) -> Self {
+        self.ground = ground;
         self
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::axes::to_physics;
+use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
@@ -122,11 +123,15 @@ fn enter(
     restart: Restart,
 ) -> Result<Option<Seat>, String> {
     let now = marathon.now;
-    let herd = match marathon.herds.iter().position(|h| h.character == ragdoll.character) {
+    let ground = match ragdoll.character {
+        Character::Agent(_) => ragdoll.ground,
+        Character::Prefab(_) => Ground::Level,
+    };
+    let herd = match marathon.herds.iter().position(|h| h.character == ragdoll.character && h.ground == ground) {
         Some(herd) => herd,
         None => {
             let herd = match &ragdoll.character {
-                Character::Agent(name) => Herd::of_agent(name, now).map_err(|e| e.to_string())?,
+                Character::Agent(name) => Herd::of_agent(name, ground, now).map_err(|e| e.to_string())?,
                 Character::Prefab(handle) => match prefabs.get(handle) {
                     Some(prefab) => Herd::of_prefab(handle, prefab.model.clone(), now),
                     None => return Ok(None),

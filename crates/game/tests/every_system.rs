@@ -188,3 +188,34 @@ fn lanes_are_used_again() {
     let mut parts = app.world_mut().query::<&Part>();
     assert_eq!(parts.iter(app.world()).count(), 0, "the parts go with their ragdoll");
 }
+
+#[test]
+fn hills_carry_and_the_level_start_is_as_in_training() -> Result<(), Box<dyn std::error::Error>> {
+    let mut app = app(FRAME);
+    let policy = with_policy(&mut app, "ant");
+    let mut spawn = |ground| app.world_mut().spawn((Ragdoll::agent("ant").on(ground), policy.clone())).id();
+    let [level, hills] = [Ground::Level, Ground::Hills].map(&mut spawn);
+    frames(&mut app, 0.05);
+    assert_eq!(app.world().get::<Unfit>(hills), None);
+    let (mut highest, mut same) = ([0.0_f64; 2], 0);
+    for _ in 0..800 {
+        app.update();
+        let mut states = Vec::new();
+        for ragdoll in [level, hills] {
+            let key = app.world().get::<RagdollState>(ragdoll).ok_or("it is simulated")?;
+            states.push(app.world().resource::<Marathon>().state(key).ok_or("it has a state")?);
+        }
+        let [a, b] = [&states[0], &states[1]];
+        if a.qpos[0] < 2.0 && b.qpos[0] < 2.0 {
+            same += usize::from(a == b);
+        }
+        for (most, state) in highest.iter_mut().zip(&states) {
+            *most = most.max(state.qpos[2]);
+        }
+        let above = b.qpos[2] - Ground::Hills.height(b.qpos[0]);
+        assert!(above > 0.1, "{above} m above the hill at {} m", b.qpos[0]);
+    }
+    assert!(same > 20, "the same bits before the hills begin, {same} times");
+    assert!(highest[1] > highest[0] + 0.1, "it has been uphill: {highest:?}");
+    Ok(())
+}

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod convert;
 pub mod eval;
 pub mod list;
+pub mod play;
 pub mod record_demo;
 pub mod render;
 pub mod study;

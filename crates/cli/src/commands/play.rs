@@ -1,0 +1,61 @@
+//! `marathon play`: starts the game, a program of its own because of its size.
+
+use crate::args::PlayArgs;
+use crate::error::CliError;
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Name of the game's program.
+const GAME: &str = "marathon-game";
+
+/// Starts the game and waits for its end.
+///
+/// # Errors
+/// If it is not there, or ends with an error, about which it has said what there is to say.
+pub fn run(args: &PlayArgs) -> Result<(), CliError> {
+    let own = env::current_exe().ok();
+    let path = env::var_os("PATH").unwrap_or_default();
+    let folders = own.iter().filter_map(|exe| exe.parent().map(Path::to_path_buf)).chain(env::split_paths(&path));
+    let Some(game) = find(folders) else {
+        return Err(CliError::Game(format!(
+            "the game is not built: '{GAME}' is neither beside this program nor on the search path.\n\
+             In the project's folder: cargo build --release -p {GAME}   (about 15 minutes on two cores, once)\n\
+             Debian and Ubuntu need beforehand: apt install pkg-config libudev-dev\n\
+             and to show a window: libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 \
+             libxrandr2\n\
+             Without it, `marathon render` draws policies."
+        )));
+    };
+    let shown = game.display().to_string();
+    let status = Command::new(&game).args(&args.words).status();
+    match status.map_err(|e| CliError::Game(format!("{shown}: cannot be started: {e}")))?.code() {
+        Some(0) => Ok(()),
+        Some(code) => Err(CliError::Game(format!("{GAME} ended with code {code}"))),
+        None => Err(CliError::Game(format!("{GAME} was ended by a signal"))),
+    }
+}
+
+/// The first folder's that has it.
+fn find(folders: impl Iterator<Item = PathBuf>) -> Option<PathBuf> {
+    let name = format!("{GAME}{}", env::consts::EXE_SUFFIX);
+    folders.map(|folder| folder.join(&name)).find(|path| path.is_file())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_one_on_the_way_is_taken() -> std::io::Result<()> {
+        let [none, first, second] = [tempfile::tempdir()?, tempfile::tempdir()?, tempfile::tempdir()?];
+        let name = format!("{GAME}{}", env::consts::EXE_SUFFIX);
+        for folder in [&first, &second] {
+            std::fs::write(folder.path().join(&name), "")?;
+        }
+        let paths = || [&none, &first, &second].map(|folder| folder.path().to_path_buf()).into_iter();
+        assert_eq!(find(paths()), Some(first.path().join(&name)));
+        assert_eq!(find(paths().take(1)), None);
+        Ok(())
+    }
+}

@@ -1,0 +1,236 @@
+//! The command line of `marathon-game`.
+
+use crate::ground::Ground;
+use crate::look::{CameraMode, Quality};
+use clap::{Parser, ValueEnum};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  marathon-game                                  a trained hopper; everything else is in the menu (Esc)
+  marathon-game humanoid --agents 16             a row of them
+  marathon-game runs/hopper-1                    the policy of a run, which is read again whenever training saves it
+  marathon-game hopper --mode learn              from random weights to a run, before your eyes
+  marathon-game walker --mode push               click to push, B to throw balls, sliders for gravity and friction
+  marathon-game --mode testbed my-robot.xml      a slider per motor
+  marathon-game ant --ground stairs              or hills, or boards
+  marathon-game hopper --record hop.mp4          a film, without a window (needs ffmpeg)
+  marathon-game --replay run.replay              what R recorded, with a time line
+  marathon-game hopper --agents 16 --mlagents-port 5004   mlagents-learn trains, and one watches
+
+Keys are shown on the screen (F1) and can be changed in the menu.";
+
+/// Watch, push, teach and film physical characters.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
+pub struct Args {
+    /// Agent (such as hopper, walker, humanoid, ant), policy file, folder of a run, or MJCF file (.xml).
+    #[arg(default_value = "hopper")]
+    pub what: String,
+    /// What to do.
+    #[arg(long, value_enum, default_value_t = Mode::Watch)]
+    pub mode: Mode,
+    /// Policy file, or folder of a run [default: the one that comes with the agent].
+    #[arg(long, value_name = "FILE")]
+    pub policy: Option<PathBuf>,
+    /// Agents side by side.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub agents: u16,
+    /// What they run on.
+    #[arg(long, value_enum, default_value_t = GroundArg::Level)]
+    pub ground: GroundArg,
+    /// Seed of everything random.
+    #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
+    pub seed: u64,
+    /// Recording to show, as R makes them.
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// Configuration of the trainer in the YAML schema of ML-Agents, for --mode learn.
+    #[arg(long, value_name = "F.yaml")]
+    pub config: Option<PathBuf>,
+    /// Threads of the trainer; 0 means all processors but one.
+    #[arg(long, value_name = "T", default_value_t = 0)]
+    pub threads: usize,
+
+    /// Port on which mlagents-learn listens (5004 by default): it trains the agents, and one watches.
+    #[arg(long, value_name = "N", conflicts_with_all = ["mode", "policy", "replay", "record", "watch_stream"])]
+    pub mlagents_port: Option<u16>,
+    /// Show what comes through the standard input; the Python package does so for render_mode="human".
+    #[arg(long, conflicts_with_all = ["mode", "policy", "replay", "record"])]
+    pub watch_stream: bool,
+
+    /// How much a frame may cost; [default: medium, and low where a processor draws the window].
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    /// Size of the window or the film, pixels [default: 1280x720].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(u32, u32)>,
+    /// Where the camera stands.
+    #[arg(long, value_enum, default_value_t = CameraArg::Side)]
+    pub camera: CameraArg,
+    /// Most frames per second of the window; 0: as many as the screen shows.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub max_fps: u32,
+    /// Draw contacts and their forces.
+    #[arg(long)]
+    pub contacts: bool,
+    /// Draw joints and their limits.
+    #[arg(long)]
+    pub joints: bool,
+
+    /// Film to write instead of opening a window: .mp4 (needs ffmpeg), .png (one picture, of the last frame), or a folder for
+    /// a sequence of .png.
+    #[arg(long, value_name = "OUT")]
+    pub record: Option<PathBuf>,
+    /// Length of the film.
+    #[arg(long, value_name = "S", default_value_t = 8.0)]
+    pub seconds: f64,
+    /// Seconds that pass before the film begins.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    pub start: f64,
+    /// Frames per second of the film.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
+    pub fps: u32,
+    /// Film without text and bars.
+    #[arg(long)]
+    pub no_hud: bool,
+}
+
+/// Size of a window or film when nobody has chosen one, pixels.
+const SIZE: (u32, u32) = (1280, 720);
+
+impl Args {
+    /// Size of the window or film, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size.unwrap_or(SIZE)
+    }
+
+    /// How much a frame may cost.
+    pub fn quality(&self) -> Quality {
+        self.quality.map_or(Quality::Medium, Quality::from)
+    }
+}
+
+/// What to do with the characters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// Look at a policy.
+    #[default]
+    Watch,
+    /// Try to make it fall.
+    Push,
+    /// Train from random weights and look on.
+    Learn,
+    /// Move the motors of any MJCF model.
+    Testbed,
+    /// Look at a recording.
+    Replay,
+    /// Look at what another program moves.
+    #[value(skip)]
+    Outside,
+}
+
+impl Mode {
+    /// What it is called on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Watch => "watch",
+            Mode::Push => "push",
+            Mode::Learn => "learn live",
+            Mode::Testbed => "test bed",
+            Mode::Replay => "replay",
+            Mode::Outside => "from outside",
+        }
+    }
+}
+
+/// [`Ground`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum GroundArg {
+    /// Level, as in training.
+    Level,
+    /// Waves that grow to 60 cm.
+    Hills,
+    /// Flights of five steps, up and down.
+    Stairs,
+    /// Low boards across the track.
+    Boards,
+}
+
+impl From<GroundArg> for Ground {
+    fn from(ground: GroundArg) -> Self {
+        match ground {
+            GroundArg::Level => Ground::Level,
+            GroundArg::Hills => Ground::Hills,
+            GroundArg::Stairs => Ground::Stairs,
+            GroundArg::Boards => Ground::Boards,
+        }
+    }
+}
+
+/// [`Quality`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum QualityArg {
+    /// No shadows, no smoothed edges.
+    Low,
+    /// Shadows, edges smoothed.
+    Medium,
+    /// Larger shadow maps.
+    High,
+}
+
+impl From<QualityArg> for Quality {
+    fn from(quality: QualityArg) -> Self {
+        match quality {
+            QualityArg::Low => Quality::Low,
+            QualityArg::Medium => Quality::Medium,
+            QualityArg::High => Quality::High,
+        }
+    }
+}
+
+/// [`CameraMode`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CameraArg {
+    /// Beside the runner.
+    Side,
+    /// Behind it.
+    Chase,
+    /// Around it.
+    Orbit,
+}
+
+impl From<CameraArg> for CameraMode {
+    fn from(camera: CameraArg) -> Self {
+        match camera {
+            CameraArg::Side => CameraMode::Side,
+            CameraArg::Chase => CameraMode::Chase,
+            CameraArg::Orbit => CameraMode::Orbit,
+        }
+    }
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let number = |s: &str| s.parse::<u32>().ok().filter(|n| (16..=8192).contains(n));
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((number(w)?, number(h)?)));
+    sides.ok_or_else(|| "expected a width and a height from 16 to 8192, such as 1280x720".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!(parse_size("320x192"), Ok((320, 192)));
+        for text in ["320", "x", "0x10", "-5x100", "99999x99"] {
+            assert!(parse_size(text).is_err(), "{text}");
+        }
+    }
+}

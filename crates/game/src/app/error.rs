@@ -1,0 +1,77 @@
+//! What can keep the game from starting, with the remedy.
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why the game does not start.
+#[derive(Debug, Error)]
+pub enum GameError {
+    /// A file that is not there.
+    #[error("{}: there is no such file or folder{}", .path.display(), hint(.nearest))]
+    Missing {
+        /// Where it was looked for.
+        path: PathBuf,
+        /// Something beside it with a similar name.
+        nearest: Option<String>,
+    },
+    /// A folder without a policy.
+    #[error("{}: no policy.safetensors in this folder; `marathon train` writes one when it saves a run", .0.display())]
+    NoPolicy(PathBuf),
+    /// A recording of another agent, or none.
+    #[error("{}: {problem}", .path.display())]
+    Replay {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what was expected.
+        problem: String,
+    },
+    /// An agent that does not exist, or a model that is not valid.
+    #[error(transparent)]
+    Env(#[from] marathon_envs::EnvError),
+    /// A policy that is not whole, or for another agent.
+    #[error(transparent)]
+    Learn(#[from] marathon_learn::Error),
+    /// A model file that is not valid.
+    #[error(transparent)]
+    Model(#[from] Box<marathon_physics::mjcf::MjcfError>),
+    /// A run that cannot begin.
+    #[error("{0}")]
+    Train(String),
+    /// No trainer of ML-Agents.
+    #[error(transparent)]
+    Player(#[from] marathon_mlagents::PlayerError),
+    /// What comes through the standard input is not what an environment sends.
+    #[error("the standard input: {0}; the Python package writes it, see render_mode=\"human\"")]
+    Stream(String),
+    /// The other program is gone, or says what makes no sense.
+    #[error("{0}")]
+    Outside(String),
+    /// No screen.
+    #[error(
+        "there is no display to open a window on (DISPLAY is {0}); on a machine without a screen, film instead: \
+         marathon-game hopper --record hop.mp4, or start a virtual one: xvfb-run marathon-game"
+    )]
+    NoDisplay(String),
+    /// No graphics.
+    #[error(
+        "no graphics adapter was found: Marathon draws with Vulkan. Install your card's driver, or the software renderer: \
+         apt install mesa-vulkan-drivers libvulkan1 (Debian, Ubuntu), dnf install mesa-vulkan-drivers vulkan-loader \
+         (Fedora); then `vulkaninfo --summary` lists a device"
+    )]
+    NoGraphics,
+    /// A film or picture that cannot be written.
+    #[error(transparent)]
+    Film(#[from] marathon_render::RenderError),
+    /// A file could not be written.
+    #[error("cannot write {}: {source}", .path.display())]
+    Write {
+        /// Which file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+}
+
+fn hint(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default()
+}

@@ -1,0 +1,192 @@
+//! Films without a window: every frame is as long as the last, drawn to an image, and written out. The same command gives
+//! the same run, however slow the machine.
+
+use crate::app::args::Args;
+use crate::app::error::GameError;
+use crate::app::{GamePlugin, TICKS, check_graphics};
+use crate::look::FollowCamera;
+use bevy::app::PluginsState;
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::RenderTarget;
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use marathon_render::{GifWriter, Image as Picture, Mp4Writer, RenderError};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Frames before the first that counts: until everything has been handed to the graphics card.
+const WARM_UP: usize = 4;
+/// Frames that pictures may come late.
+const PATIENCE: usize = 200;
+
+/// Pictures that have come back, oldest first.
+#[derive(Resource, Default)]
+struct Reel(VecDeque<Vec<u8>>);
+
+/// Where pictures go.
+enum Sink {
+    Mp4(Mp4Writer),
+    Gif(GifWriter),
+    /// The last one only.
+    Png(PathBuf, Option<Picture>),
+    Folder(PathBuf, usize),
+}
+
+impl Sink {
+    fn new(path: &Path, fps: u32) -> Result<Self, GameError> {
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        Ok(match extension.as_deref() {
+            Some("mp4") => Sink::Mp4(Mp4Writer::create(path, f64::from(fps))?),
+            Some("gif") => Sink::Gif(GifWriter::create(path, f64::from(fps))?),
+            Some("png") => Sink::Png(path.into(), None),
+            Some(_) => {
+                return Err(RenderError::Extension {
+                    path: path.into(),
+                    found: extension.unwrap_or_default(),
+                    nearest: "mp4",
+                }
+                .into());
+            }
+            None => {
+                std::fs::create_dir_all(path).map_err(|source| GameError::Write { path: path.into(), source })?;
+                Sink::Folder(path.into(), 0)
+            }
+        })
+    }
+
+    fn push(&mut self, picture: Picture) -> Result<(), GameError> {
+        match self {
+            Sink::Mp4(writer) => writer.push(&picture)?,
+            Sink::Gif(writer) => writer.push(&picture)?,
+            Sink::Png(_, last) => *last = Some(picture),
+            Sink::Folder(path, count) => {
+                *count += 1;
+                picture.save_png(path.join(format!("{count:05}.png")))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(), GameError> {
+        match self {
+            Sink::Mp4(writer) => writer.finish()?,
+            Sink::Gif(writer) => writer.finish()?,
+            Sink::Png(path, last) => match last {
+                Some(picture) => picture.save_png(path)?,
+                None => return Err(GameError::NoGraphics),
+            },
+            Sink::Folder(..) => {}
+        }
+        Ok(())
+    }
+}
+
+/// Makes a film of what the command line asks for.
+///
+/// # Errors
+/// If there are no graphics, or the film cannot be written.
+pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> {
+    let mut sink = Sink::new(out, args.fps)?;
+    check_graphics()?;
+    let frame = Duration::from_secs_f64(1.0 / f64::from(args.fps));
+    let (width, height) = args.size();
+    let mut app = App::new();
+    let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    let render = RenderPlugin { synchronous_pipeline_compilation: true, ..default() };
+    let log = bevy::log::LogPlugin { level: bevy::log::Level::WARN, ..default() };
+    app.add_plugins(
+        DefaultPlugins
+            .set(headless)
+            .set(render)
+            .set(log)
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>(),
+    )
+    .add_plugins(game)
+    .init_resource::<Reel>()
+    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
+
+    let size = Extent3d { width, height, depth_or_array_layers: 1 };
+    let mut target = Image::new_fill(
+        size,
+        TextureDimension::D2,
+        &[0; 4],
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::default(),
+    );
+    target.texture_descriptor.usage =
+        TextureUsages::COPY_SRC | TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
+    let target = app.world_mut().resource_mut::<Assets<Image>>().add(target);
+    // cameras are made at startup
+    app.update();
+    let mut cameras = app.world_mut().query_filtered::<Entity, With<FollowCamera>>();
+    let cameras: Vec<Entity> = cameras.iter(app.world()).collect();
+    for camera in &cameras {
+        app.world_mut().entity_mut(*camera).insert(RenderTarget::Image(target.clone().into()));
+    }
+
+    let pace = |app: &mut App, step: Duration| {
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+        app.update();
+    };
+    let draw = |app: &mut App, on: bool| {
+        for camera in &cameras {
+            if let Some(mut camera) = app.world_mut().get_mut::<Camera>(*camera) {
+                camera.is_active = on;
+            }
+        }
+    };
+    // what happens before the film is not drawn; one tick at least, in which the characters come on stage
+    draw(&mut app, false);
+    let before = (args.start / frame.as_secs_f64()).round() as usize;
+    pace(&mut app, Duration::from_secs_f64(1.0 / TICKS));
+    (0..before).for_each(|_| pace(&mut app, frame));
+    draw(&mut app, true);
+    (0..WARM_UP).for_each(|_| pace(&mut app, Duration::ZERO));
+    let reader = app.world_mut().spawn(Readback::texture(target)).id();
+    app.world_mut().entity_mut(reader).observe(|read: On<ReadbackComplete>, mut reel: ResMut<Reel>| {
+        reel.0.push_back(read.data.clone());
+    });
+
+    let frames = ((args.seconds * f64::from(args.fps)).round() as usize).max(1);
+    let (mut drawn, mut taken, mut waited) = (0, 0, 0);
+    while taken < frames {
+        // pictures come back in their order, some frames late
+        if drawn < frames {
+            pace(&mut app, if drawn == 0 { Duration::ZERO } else { frame });
+            drawn += 1;
+        } else {
+            pace(&mut app, Duration::ZERO);
+            waited += 1;
+            if waited > PATIENCE {
+                return Err(GameError::NoGraphics);
+            }
+        }
+        while let Some(bytes) = app.world_mut().resource_mut::<Reel>().0.pop_front() {
+            if taken < frames {
+                sink.push(unpad(&bytes, width as usize, height as usize)?)?;
+                taken += 1;
+            }
+        }
+    }
+    sink.finish()
+}
+
+/// Rows come padded to 256 bytes, with an alpha that says nothing.
+fn unpad(bytes: &[u8], width: usize, height: usize) -> Result<Picture, GameError> {
+    let row = bytes.len() / height;
+    let rgb = bytes.chunks_exact(row).flat_map(|row| row[..4 * width].chunks_exact(4)).flat_map(|p| [p[0], p[1], p[2]]);
+    Ok(Picture::from_rgb(width, height, rgb.collect())?)
+}

@@ -1,0 +1,360 @@
+//! Text and bars over the picture: who runs how fast, what it is rewarded for, how learning goes, which keys there are.
+
+use crate::app::args::Mode;
+use crate::app::keys::{Bindings, Deed};
+use crate::app::learn::Lesson;
+use crate::app::notes::Notes;
+use crate::app::show::{Actor, Focus, Show};
+use crate::look::FollowCamera;
+use crate::ragdoll::{Anatomy, Episode};
+use crate::simulate::Marathon;
+use bevy::prelude::*;
+use bevy_egui::EguiContexts;
+use bevy_egui::egui::{
+    self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Painter, Pos2, Rect, RichText,
+    Sense, Stroke, Ui,
+};
+use std::collections::VecDeque;
+
+/// Decisions that the reward's curve shows.
+const SHOWN: usize = 240;
+/// How fast the scale of a bar forgets, per decision.
+const FORGET: f32 = 0.998;
+
+const CARD: Color32 = Color32::from_rgba_premultiplied(12, 16, 22, 205);
+const TEXT: Color32 = Color32::from_rgb(236, 240, 244);
+const FAINT: Color32 = Color32::from_rgb(158, 170, 182);
+const ACCENT: Color32 = Color32::from_rgb(255, 158, 64);
+const BAD: Color32 = Color32::from_rgb(255, 106, 96);
+/// Colors of the reward's terms.
+const TERMS: [Color32; 8] = [
+    Color32::from_rgb(86, 180, 233),
+    Color32::from_rgb(120, 200, 120),
+    Color32::from_rgb(240, 180, 60),
+    Color32::from_rgb(230, 110, 100),
+    Color32::from_rgb(190, 140, 230),
+    Color32::from_rgb(90, 205, 195),
+    Color32::from_rgb(235, 140, 190),
+    Color32::from_rgb(190, 190, 120),
+];
+
+/// Size of a picture in which text and bars are as large as they are meant, points; in a smaller one they shrink.
+const FULL: [f32; 2] = [1000.0, 600.0];
+/// Smallest scale at which they can be read.
+const SMALLEST: f32 = 0.66;
+/// Width below which the line of keys, and height below which the reward's bars are left out, points.
+const ROOM: [f32; 2] = [640.0, 320.0];
+
+/// What is drawn over the picture.
+#[derive(Resource, Clone, Copy, Debug)]
+pub struct Hud {
+    /// Anything at all.
+    pub on: bool,
+    /// All keys.
+    pub help: bool,
+}
+
+/// The reward of the character in focus over time.
+#[derive(Resource, Default)]
+pub struct Monitor {
+    whose: Option<Entity>,
+    decisions: u64,
+    terms: VecDeque<Vec<f32>>,
+    /// Largest size of each term of late.
+    peaks: Vec<f32>,
+    /// Decisions of everybody at the last look, and how many there are per second.
+    looked: (f32, u64),
+    rate: f32,
+}
+
+/// Takes in the newest decision of the focus.
+pub fn watch(focus: Res<Focus>, mut monitor: ResMut<Monitor>, actors: Query<(Entity, &Actor, &Episode)>) {
+    let Some((entity, _, episode)) = actors.iter().find(|(_, a, _)| a.0 == focus.0) else { return };
+    if monitor.whose != Some(entity) {
+        *monitor = Monitor { whose: Some(entity), looked: monitor.looked, rate: monitor.rate, ..default() };
+    }
+    if monitor.decisions == episode.decisions || episode.terms.is_empty() {
+        return;
+    }
+    monitor.decisions = episode.decisions;
+    monitor.peaks.resize(episode.terms.len(), 1e-3);
+    for (peak, x) in monitor.peaks.iter_mut().zip(&episode.terms) {
+        *peak = (*peak * FORGET).max(x.abs());
+    }
+    monitor.terms.push_back(episode.terms.clone());
+    if monitor.terms.len() > SHOWN {
+        monitor.terms.pop_front();
+    }
+}
+
+/// Measures how many decisions everybody makes per second.
+pub fn clock(time: Res<Time<Real>>, marathon: Res<Marathon>, mut monitor: ResMut<Monitor>) {
+    let now = time.elapsed_secs();
+    let (then, before) = monitor.looked;
+    if now - then >= 1.0 {
+        monitor.rate = (marathon.decisions() - before) as f32 / (now - then);
+        monitor.looked = (now, marathon.decisions());
+    }
+}
+
+/// Makes text and bars as large as the picture allows.
+pub fn fit(mut contexts: EguiContexts, cameras: Query<&Camera, With<FollowCamera>>) -> Result {
+    let ctx = contexts.ctx_mut()?;
+    if let Some(size) = cameras.iter().next().and_then(Camera::logical_viewport_size) {
+        ctx.set_zoom_factor((size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0));
+    }
+    Ok(())
+}
+
+/// A dark card for text.
+pub fn card() -> Frame {
+    Frame::new().fill(CARD).corner_radius(CornerRadius::same(8)).inner_margin(Margin::symmetric(12, 9))
+}
+
+fn font(size: f32) -> FontId {
+    FontId::new(size, FontFamily::Proportional)
+}
+
+fn text(size: f32, color: Color32, words: impl Into<String>) -> RichText {
+    RichText::new(words).size(size).color(color)
+}
+
+/// Text that does not break, which would make the card jump.
+fn line(ui: &mut Ui, words: RichText) {
+    ui.add(egui::Label::new(words).extend());
+}
+
+/// A number with a sign of its own width, so that it does not jump.
+fn spaced(x: f32) -> String {
+    format!("{x:+.2}").replace('-', "\u{2212}")
+}
+
+/// Draws everything.
+#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+pub fn draw(
+    mut contexts: EguiContexts,
+    hud: Res<Hud>,
+    show: Res<Show>,
+    (focus, bindings, notes, lesson): (Res<Focus>, Res<Bindings>, Res<Notes>, Option<Res<Lesson>>),
+    monitor: Res<Monitor>,
+    time: Res<Time<Virtual>>,
+    frames: Res<Time<Real>>,
+    mut smooth: Local<f32>,
+    actors: Query<(&Actor, &Anatomy, &Episode)>,
+) -> Result {
+    let ctx = contexts.ctx_mut()?.clone();
+    say(&ctx, &notes);
+    if !hud.on {
+        return Ok(());
+    }
+    let delta = frames.delta_secs();
+    *smooth = if *smooth > 0.0 { *smooth + 0.05 * (delta - *smooth) } else { delta };
+    let actor = actors.iter().find(|(a, ..)| a.0 == focus.0);
+    let room = ctx.content_rect().size();
+    if let Some((_, anatomy, episode)) = actor {
+        Area::new(Id::new("who")).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
+            card().show(ui, |ui| {
+                let of = if show.agents > 1 { format!("  {} of {}", focus.0 + 1, show.agents) } else { String::new() };
+                let name = anatomy.spec.as_ref().map_or(anatomy.model.name.as_str(), |s| s.id.as_str());
+                ui.horizontal(|ui| {
+                    ui.label(text(17.0, TEXT, name).strong());
+                    ui.label(text(13.0, ACCENT, show.mode.name()));
+                    ui.label(text(12.0, FAINT, of));
+                });
+                if anatomy.spec.is_some() {
+                    ui.horizontal(|ui| {
+                        // rounded first: there is no -0.0 m/s
+                        let speed = (episode.speed.max(-9.9) * 10.0).round() / 10.0 + 0.0;
+                        ui.label(text(30.0, TEXT, format!("{speed:.1}")).strong());
+                        ui.label(text(14.0, FAINT, "m/s"));
+                        ui.add_space(8.0);
+                        ui.label(text(30.0, TEXT, format!("{:.1}", episode.distance)).strong());
+                        ui.label(text(14.0, FAINT, "m"));
+                    });
+                    let state = if episode.down { "  fallen" } else { "" };
+                    let Episode { number, seconds, total, .. } = episode;
+                    let run = format!("episode {number}   {seconds:.1} s   return {total:.0}{state}");
+                    line(ui, text(13.0, if episode.down { BAD } else { FAINT }, run));
+                }
+                let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
+                let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
+                let rates = format!("{speed}   {:.0} decisions/s   {fps:.0} fps", monitor.rate);
+                line(ui, text(12.0, FAINT, rates));
+            });
+        });
+        if let Some(spec) = anatomy.spec.as_ref().filter(|_| room.y > ROOM[1]) {
+            rewards(&ctx, &monitor, &spec.reward_terms, episode);
+        }
+    }
+    if let Some(lesson) = lesson.filter(|_| show.mode == Mode::Learn) {
+        learning(&ctx, &lesson);
+    }
+    if room.x > ROOM[0] || hud.help {
+        keys(&ctx, &bindings, hud.help, show.mode);
+    }
+    Ok(())
+}
+
+/// Bars of the reward's terms, and their curves.
+fn rewards(ctx: &egui::Context, monitor: &Monitor, names: &[String], episode: &Episode) {
+    if episode.terms.is_empty() {
+        return;
+    }
+    Area::new(Id::new("rewards")).anchor(Align2::RIGHT_BOTTOM, [-14.0, -44.0]).interactable(false).show(ctx, |ui| {
+        card().show(ui, |ui| {
+            const WIDTH: f32 = 270.0;
+            ui.set_width(WIDTH);
+            ui.horizontal(|ui| {
+                ui.label(text(13.0, FAINT, "reward"));
+                ui.label(text(15.0, TEXT, spaced(episode.reward)).strong());
+            });
+            for (i, name) in names.iter().enumerate() {
+                let (value, peak) = (episode.terms[i], monitor.peaks.get(i).copied().unwrap_or(1.0));
+                let color = TERMS[i % TERMS.len()];
+                let (response, painter) = ui.allocate_painter(egui::vec2(WIDTH, 17.0), Sense::hover());
+                let row = response.rect;
+                let y = row.center().y;
+                painter.text(Pos2::new(row.left(), y), Align2::LEFT_CENTER, name.replace('_', " "), font(12.0), TEXT);
+                let value_at = Pos2::new(row.right(), y);
+                painter.text(value_at, Align2::RIGHT_CENTER, spaced(value), font(12.0), FAINT);
+                let (left, right) = (row.left() + 112.0, row.right() - 46.0);
+                let middle = 0.5 * (left + right);
+                let end = middle + 0.5 * (right - left) * (value / peak.max(1e-6)).clamp(-1.0, 1.0);
+                let trough = Rect::from_min_max(Pos2::new(left, y - 4.0), Pos2::new(right, y + 4.0));
+                painter.rect_filled(trough, 3.0, Color32::from_white_alpha(18));
+                let bar = Rect::from_two_pos(Pos2::new(middle, y - 4.0), Pos2::new(end, y + 4.0));
+                painter.rect_filled(bar, 2.0, color);
+                painter.line_segment([Pos2::new(middle, y - 6.0), Pos2::new(middle, y + 6.0)], (1.0, FAINT));
+            }
+            ui.add_space(4.0);
+            let (response, painter) = ui.allocate_painter(egui::vec2(WIDTH, 64.0), Sense::hover());
+            curves(&painter, response.rect, monitor);
+        });
+    });
+}
+
+fn curves(painter: &Painter, rect: Rect, monitor: &Monitor) {
+    painter.rect_filled(rect, 4.0, Color32::from_black_alpha(90));
+    let most = monitor.peaks.iter().copied().fold(1e-3, f32::max);
+    let y = |x: f32| rect.center().y - 0.46 * rect.height() * (x / most).clamp(-1.0, 1.0);
+    painter.line_segment(
+        [Pos2::new(rect.left(), y(0.0)), Pos2::new(rect.right(), y(0.0))],
+        (1.0, FAINT.gamma_multiply(0.4)),
+    );
+    let n = monitor.terms.len();
+    for term in 0..monitor.peaks.len() {
+        let at = |i: usize| rect.right() - rect.width() * (n - 1 - i) as f32 / (SHOWN - 1) as f32;
+        let point = |(i, terms): (usize, &Vec<f32>)| Some(Pos2::new(at(i), y(*terms.get(term)?)));
+        let line: Vec<Pos2> = monitor.terms.iter().enumerate().filter_map(point).collect();
+        painter.add(egui::Shape::line(line, Stroke::new(1.4, TERMS[term % TERMS.len()])));
+    }
+}
+
+/// The curve of what is being learned.
+fn learning(ctx: &egui::Context, lesson: &Lesson) {
+    Area::new(Id::new("learning")).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).interactable(false).show(ctx, |ui| {
+        card().show(ui, |ui| {
+            const WIDTH: f32 = 290.0;
+            ui.set_width(WIDTH);
+            let progress = lesson.progress();
+            let state = if progress.paused { "paused" } else { progress.state.as_str() };
+            ui.horizontal(|ui| {
+                ui.label(text(15.0, TEXT, "learning").strong());
+                ui.label(text(13.0, ACCENT, state));
+            });
+            let last = progress.curve.last().copied().unwrap_or_default();
+            ui.label(text(
+                13.0,
+                FAINT,
+                format!(
+                    "{:.0} s   {:.2} million steps   return {:.0}",
+                    last.seconds,
+                    last.steps as f64 / 1e6,
+                    last.total
+                ),
+            ));
+            let (response, painter) = ui.allocate_painter(egui::vec2(WIDTH, 90.0), Sense::hover());
+            let rect = response.rect;
+            painter.rect_filled(rect, 4.0, Color32::from_black_alpha(90));
+            let totals = progress.curve.iter().map(|p| p.total);
+            let (low, high) = (totals.clone().fold(0.0, f64::min), totals.fold(1.0, f64::max));
+            let end = last.seconds.max(20.0);
+            let point = |p: &crate::app::learn::Point| {
+                let x = rect.left() + rect.width() * (p.seconds / end) as f32;
+                let y = rect.bottom() - 4.0 - (rect.height() - 8.0) * ((p.total - low) / (high - low)) as f32;
+                Pos2::new(x, y)
+            };
+            let line: Vec<Pos2> = progress.curve.iter().map(point).collect();
+            painter.add(egui::Shape::line(line, Stroke::new(2.0, ACCENT)));
+            painter.text(
+                rect.left_top() + egui::vec2(4.0, 2.0),
+                Align2::LEFT_TOP,
+                format!("{high:.0}"),
+                font(11.0),
+                FAINT,
+            );
+        });
+    });
+}
+
+/// The keys: the most useful ones in a line, or all of them.
+fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
+    if all {
+        Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -44.0]).interactable(false).show(ctx, |ui| {
+            card().show(ui, |ui| {
+                egui::Grid::new("all keys").num_columns(3).spacing([18.0, 3.0]).show(ui, |ui| {
+                    for (_, name, key, button) in bindings.rows() {
+                        ui.label(text(13.0, TEXT, key).strong());
+                        ui.label(text(13.0, FAINT, button.unwrap_or("")));
+                        ui.label(text(13.0, TEXT, name));
+                        ui.end_row();
+                    }
+                });
+                ui.label(text(12.0, FAINT, "right mouse button or right stick: turn the camera   wheel: closer"));
+            });
+        });
+    }
+    let useful: &[Deed] = match mode {
+        Mode::Watch => {
+            &[Deed::Menu, Deed::Pause, Deed::NextFocus, Deed::NextAgent, Deed::Camera, Deed::Push, Deed::Learn]
+        }
+        Mode::Push => &[Deed::Menu, Deed::Push, Deed::Throw, Deed::Restart, Deed::Camera, Deed::Contacts],
+        Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
+        Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
+        Mode::Outside => &[Deed::Menu, Deed::NextFocus, Deed::Camera, Deed::Hud],
+        Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Slower, Deed::Camera],
+    };
+    Area::new(Id::new("keys")).anchor(Align2::CENTER_BOTTOM, [0.0, -10.0]).interactable(false).show(ctx, |ui| {
+        Frame::new().fill(CARD).corner_radius(CornerRadius::same(6)).inner_margin(Margin::symmetric(10, 4)).show(
+            ui,
+            |ui| {
+                ui.horizontal(|ui| {
+                    for (deed, name, key, _) in
+                        bindings.rows().filter(|row| useful.contains(&row.0) || row.0 == Deed::Help)
+                    {
+                        let _ = deed;
+                        ui.label(text(12.0, ACCENT, key).strong());
+                        ui.label(text(12.0, TEXT, name));
+                        ui.add_space(4.0);
+                    }
+                });
+            },
+        );
+    });
+}
+
+/// Messages.
+fn say(ctx: &egui::Context, notes: &Notes) {
+    if notes.0.is_empty() {
+        return;
+    }
+    Area::new(Id::new("notes")).anchor(Align2::CENTER_TOP, [0.0, 18.0]).interactable(false).show(ctx, |ui: &mut Ui| {
+        for note in &notes.0 {
+            card().show(ui, |ui| {
+                ui.set_max_width(560.0);
+                ui.label(text(14.0, if note.error { BAD } else { TEXT }, &note.text));
+            });
+            ui.add_space(4.0);
+        }
+    });
+}

@@ -1,0 +1,324 @@
+//! Keys and buttons: what they do, what they are called, and how they are changed and kept.
+
+use bevy::input::gamepad::{Gamepad, GamepadButton};
+use bevy::prelude::*;
+use bevy_egui::input::EguiWantsInput;
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+
+/// What a key can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Deed {
+    /// Open or close the menu.
+    Menu,
+    /// Stop the time, or let it go on.
+    Pause,
+    /// One decision, while paused.
+    Step,
+    /// Let time pass faster.
+    Faster,
+    /// Let time pass slower.
+    Slower,
+    /// Start all characters anew.
+    Restart,
+    /// Look at the next character.
+    NextFocus,
+    /// Another agent.
+    NextAgent,
+    /// Another place of the camera.
+    Camera,
+    /// Push the character in focus.
+    Push,
+    /// Throw a ball at it.
+    Throw,
+    /// Contacts and forces.
+    Contacts,
+    /// Joints and limits.
+    Joints,
+    /// Text and bars.
+    Hud,
+    /// Keys on the screen.
+    Help,
+    /// Begin to learn from random weights, or go back to watching.
+    Learn,
+    /// Save what has been learned.
+    Save,
+    /// Begin or end a recording.
+    Record,
+    /// A picture of the screen.
+    Picture,
+    /// Leave.
+    Quit,
+}
+
+/// A deed, its name on the screen, its key and its button.
+type Row = (Deed, &'static str, KeyCode, Option<GamepadButton>);
+
+const DEFAULTS: [Row; 20] = [
+    (Deed::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
+    (Deed::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
+    (Deed::Step, "one step", KeyCode::Period, None),
+    (Deed::Faster, "faster", KeyCode::ArrowUp, Some(GamepadButton::DPadUp)),
+    (Deed::Slower, "slower", KeyCode::ArrowDown, Some(GamepadButton::DPadDown)),
+    (Deed::Restart, "start anew", KeyCode::KeyX, Some(GamepadButton::West)),
+    (Deed::NextFocus, "next character", KeyCode::Tab, Some(GamepadButton::RightTrigger)),
+    (Deed::NextAgent, "next agent", KeyCode::KeyN, Some(GamepadButton::North)),
+    (Deed::Camera, "camera", KeyCode::KeyC, Some(GamepadButton::LeftTrigger)),
+    (Deed::Push, "push", KeyCode::KeyP, Some(GamepadButton::South)),
+    (Deed::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::East)),
+    (Deed::Contacts, "contacts", KeyCode::KeyF, None),
+    (Deed::Joints, "joints", KeyCode::KeyJ, None),
+    (Deed::Hud, "text and bars", KeyCode::KeyH, None),
+    (Deed::Help, "keys", KeyCode::F1, None),
+    (Deed::Learn, "learn live", KeyCode::KeyL, None),
+    (Deed::Save, "save policy", KeyCode::KeyS, None),
+    (Deed::Record, "record", KeyCode::KeyR, Some(GamepadButton::RightThumb)),
+    (Deed::Picture, "picture", KeyCode::F12, None),
+    (Deed::Quit, "quit", KeyCode::KeyQ, None),
+];
+
+/// Keys that something can be bound to, with their names on the screen.
+const KEYS: [(KeyCode, &str); 64] = [
+    (KeyCode::Escape, "Esc"),
+    (KeyCode::Space, "Space"),
+    (KeyCode::Enter, "Enter"),
+    (KeyCode::Tab, "Tab"),
+    (KeyCode::Backspace, "Backspace"),
+    (KeyCode::Delete, "Delete"),
+    (KeyCode::Home, "Home"),
+    (KeyCode::End, "End"),
+    (KeyCode::PageUp, "Page up"),
+    (KeyCode::PageDown, "Page down"),
+    (KeyCode::ArrowUp, "Up"),
+    (KeyCode::ArrowDown, "Down"),
+    (KeyCode::ArrowLeft, "Left"),
+    (KeyCode::ArrowRight, "Right"),
+    (KeyCode::Period, "."),
+    (KeyCode::Comma, ","),
+    (KeyCode::KeyA, "A"),
+    (KeyCode::KeyB, "B"),
+    (KeyCode::KeyC, "C"),
+    (KeyCode::KeyD, "D"),
+    (KeyCode::KeyE, "E"),
+    (KeyCode::KeyF, "F"),
+    (KeyCode::KeyG, "G"),
+    (KeyCode::KeyH, "H"),
+    (KeyCode::KeyI, "I"),
+    (KeyCode::KeyJ, "J"),
+    (KeyCode::KeyK, "K"),
+    (KeyCode::KeyL, "L"),
+    (KeyCode::KeyM, "M"),
+    (KeyCode::KeyN, "N"),
+    (KeyCode::KeyO, "O"),
+    (KeyCode::KeyP, "P"),
+    (KeyCode::KeyQ, "Q"),
+    (KeyCode::KeyR, "R"),
+    (KeyCode::KeyS, "S"),
+    (KeyCode::KeyT, "T"),
+    (KeyCode::KeyU, "U"),
+    (KeyCode::KeyV, "V"),
+    (KeyCode::KeyW, "W"),
+    (KeyCode::KeyX, "X"),
+    (KeyCode::KeyY, "Y"),
+    (KeyCode::KeyZ, "Z"),
+    (KeyCode::Digit0, "0"),
+    (KeyCode::Digit1, "1"),
+    (KeyCode::Digit2, "2"),
+    (KeyCode::Digit3, "3"),
+    (KeyCode::Digit4, "4"),
+    (KeyCode::Digit5, "5"),
+    (KeyCode::Digit6, "6"),
+    (KeyCode::Digit7, "7"),
+    (KeyCode::Digit8, "8"),
+    (KeyCode::Digit9, "9"),
+    (KeyCode::F1, "F1"),
+    (KeyCode::F2, "F2"),
+    (KeyCode::F3, "F3"),
+    (KeyCode::F4, "F4"),
+    (KeyCode::F5, "F5"),
+    (KeyCode::F6, "F6"),
+    (KeyCode::F7, "F7"),
+    (KeyCode::F8, "F8"),
+    (KeyCode::F9, "F9"),
+    (KeyCode::F10, "F10"),
+    (KeyCode::F11, "F11"),
+    (KeyCode::F12, "F12"),
+];
+
+/// Which key does what.
+#[derive(Resource, Clone, Debug, PartialEq)]
+pub struct Bindings {
+    rows: Vec<Row>,
+}
+
+impl Default for Bindings {
+    fn default() -> Self {
+        Bindings { rows: DEFAULTS.to_vec() }
+    }
+}
+
+/// The deed whose key is to be pressed next, to bind it.
+#[derive(Resource, Default)]
+pub struct Rebinding(pub Option<Deed>);
+
+/// What keys and buttons ask for in this frame.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Do(pub Deed);
+
+/// Turns keys and buttons into [`Do`] messages.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct KeysPlugin;
+
+impl Plugin for KeysPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Bindings>()
+            .init_resource::<Rebinding>()
+            .add_message::<Do>()
+            .add_systems(Startup, load)
+            .add_systems(PreUpdate, (read, rebind).chain().after(bevy::input::InputSystems));
+    }
+}
+
+impl Bindings {
+    /// All deeds in the order of the help: name, key, button.
+    pub fn rows(&self) -> impl Iterator<Item = (Deed, &'static str, &'static str, Option<&'static str>)> {
+        self.rows.iter().map(|(deed, name, key, button)| (*deed, *name, key_name(*key), button.map(button_name)))
+    }
+
+    /// Name of the key that does something.
+    pub fn key(&self, deed: Deed) -> &'static str {
+        self.rows.iter().find(|row| row.0 == deed).map_or("", |row| key_name(row.2))
+    }
+
+    /// Binds a key; a deed that had it before gets the old one, so that nothing is ever without a key.
+    pub fn bind(&mut self, deed: Deed, key: KeyCode) {
+        let Some(old) = self.rows.iter().find(|row| row.0 == deed).map(|row| row.2) else { return };
+        for row in &mut self.rows {
+            if row.0 == deed {
+                row.2 = key;
+            } else if row.2 == key {
+                row.2 = old;
+            }
+        }
+    }
+
+    /// Where they are kept: in the user's folder for configurations, if there is one.
+    pub fn path() -> Option<PathBuf> {
+        let own = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from);
+        let home = std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".config"));
+        let roaming = std::env::var_os("APPDATA").map(PathBuf::from);
+        own.or(home).or(roaming).map(|folder| folder.join("marathon/keys.json"))
+    }
+
+    /// The kept ones; what cannot be read is as by default.
+    pub fn load(text: &str) -> Self {
+        let mut bindings = Bindings::default();
+        let Ok(Value::Object(map)) = serde_json::from_str(text) else { return bindings };
+        for (name, key) in &map {
+            let deed = DEFAULTS.iter().find(|row| row.1 == name).map(|row| row.0);
+            let key = KEYS.iter().find(|(_, label)| Some(*label) == key.as_str()).map(|(key, _)| *key);
+            if let (Some(deed), Some(key)) = (deed, key) {
+                bindings.bind(deed, key);
+            }
+        }
+        bindings
+    }
+
+    /// As text to keep.
+    pub fn text(&self) -> String {
+        let map: Map<String, Value> = self.rows().map(|(_, name, key, _)| (name.into(), key.into())).collect();
+        format!("{:#}\n", Value::Object(map))
+    }
+}
+
+fn key_name(key: KeyCode) -> &'static str {
+    KEYS.iter().find(|(known, _)| *known == key).map_or("?", |(_, name)| name)
+}
+
+fn button_name(button: GamepadButton) -> &'static str {
+    match button {
+        GamepadButton::South => "A",
+        GamepadButton::East => "B",
+        GamepadButton::West => "X",
+        GamepadButton::North => "Y",
+        GamepadButton::Start => "Start",
+        GamepadButton::Select => "Back",
+        GamepadButton::LeftTrigger => "LB",
+        GamepadButton::RightTrigger => "RB",
+        GamepadButton::RightThumb => "R3",
+        GamepadButton::DPadUp => "D-pad up",
+        GamepadButton::DPadDown => "D-pad down",
+        _ => "?",
+    }
+}
+
+/// Turns keys and buttons into deeds.
+fn read(
+    keys: Res<ButtonInput<KeyCode>>,
+    pads: Query<&Gamepad>,
+    bindings: Res<Bindings>,
+    rebinding: Res<Rebinding>,
+    wants: Option<Res<EguiWantsInput>>,
+    mut deeds: MessageWriter<Do>,
+) {
+    // a text field has the keyboard, or the next key is to be bound
+    let typing = wants.is_some_and(|w| w.wants_keyboard_input()) || rebinding.0.is_some();
+    for (deed, _, key, button) in &bindings.rows {
+        let key = !typing && keys.just_pressed(*key);
+        let button = button.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
+        if key || button {
+            deeds.write(Do(*deed));
+        }
+    }
+}
+
+/// Binds the next key that is pressed, if one is asked for, and keeps the bindings.
+fn rebind(keys: Res<ButtonInput<KeyCode>>, mut bindings: ResMut<Bindings>, mut rebinding: ResMut<Rebinding>) {
+    let Some(deed) = rebinding.0 else { return };
+    let Some(key) = keys.get_just_pressed().find(|key| KEYS.iter().any(|(known, _)| known == *key)) else { return };
+    bindings.bind(deed, *key);
+    rebinding.0 = None;
+    if let Some(path) = Bindings::path() {
+        let kept = path.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|e| e.to_string());
+        let kept = kept.and_then(|()| {
+            let text = bindings.text();
+            marathon_learn::write_atomic(&path, text.as_bytes()).map_err(|e| e.to_string())
+        });
+        if let Err(error) = kept {
+            warn!("the keys hold for now, but cannot be kept: {error}");
+        }
+    }
+}
+
+/// Takes in the kept bindings.
+fn load(mut bindings: ResMut<Bindings>) {
+    if let Some(text) = Bindings::path().and_then(|path| std::fs::read_to_string(path).ok()) {
+        *bindings = Bindings::load(&text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_does_one_thing_and_has_a_name() {
+        let bindings = Bindings::default();
+        let mut keys: Vec<_> = bindings.rows().map(|(_, _, key, _)| key).collect();
+        assert!(!keys.contains(&"?") && bindings.rows().all(|(.., button)| button != Some("?")));
+        keys.sort_unstable();
+        keys.dedup();
+        assert_eq!(keys.len(), DEFAULTS.len());
+    }
+
+    #[test]
+    fn a_key_that_is_taken_changes_places() {
+        let mut bindings = Bindings::default();
+        bindings.bind(Deed::Push, KeyCode::KeyB);
+        assert_eq!((bindings.key(Deed::Push), bindings.key(Deed::Throw)), ("B", "P"));
+        assert_eq!(Bindings::load(&bindings.text()), bindings);
+        for broken in ["", "[1]", "{\"push\": 7}", "{\"push\": \"no such key\"}"] {
+            assert_eq!(Bindings::load(broken), Bindings::default());
+        }
+    }
+}

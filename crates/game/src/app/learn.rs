@@ -1,0 +1,275 @@
+//! Learning beside the picture: the trainer of `marathon train` on threads of its own, its newest policy on stage.
+
+use crate::app::args::Mode;
+use crate::app::keys::{Deed, Do};
+use crate::app::notes::Notes;
+use crate::app::show::{Script, Show, Source};
+use crate::asset::PolicyAsset;
+use crate::ground::Ground;
+use bevy::prelude::*;
+use marathon_cli::session::{Session, TrainArgs};
+use marathon_learn::{Control, IterationStats, Policy, PpoConfig, Snapshot, train};
+use marathon_physics::lanes::Isa;
+use std::path::PathBuf;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Seconds between two lines of the log.
+const TELL: f32 = 5.0;
+
+/// How the trainer is made.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Teaching {
+    /// Configuration in the schema of ML-Agents, in place of the agent's own.
+    pub config: Option<PathBuf>,
+    /// Threads; 0 means all processors but one.
+    pub threads: usize,
+    /// Seed of the next run.
+    pub seed: u64,
+}
+
+/// A point of the learning curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Seconds of learning.
+    pub seconds: f64,
+    /// Agent-steps.
+    pub steps: u64,
+    /// Mean return of the episodes that have ended.
+    pub total: f64,
+}
+
+/// How it goes.
+#[derive(Clone, Debug, Default)]
+pub struct Progress {
+    /// The curve so far.
+    pub curve: Vec<Point>,
+    /// In a word.
+    pub state: String,
+    /// It waits.
+    pub paused: bool,
+}
+
+/// What both sides see.
+#[derive(Default)]
+struct Board {
+    progress: Progress,
+    newest: Option<Arc<Policy>>,
+    stop: bool,
+}
+
+/// A run of the trainer. Dropped, it ends.
+#[derive(Resource)]
+pub struct Lesson {
+    shared: Arc<(Mutex<Board>, Condvar)>,
+    agent: String,
+    ground: Ground,
+    shown: Option<Arc<Policy>>,
+}
+
+/// What the trainer for an agent is told: its own fast configuration, or that of a file.
+///
+/// # Errors
+/// If the file is no configuration for the agent.
+pub fn settings(agent: &str, teaching: &Teaching) -> Result<PpoConfig, String> {
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let args = TrainArgs {
+        agent: Some(agent.into()),
+        algo: None,
+        config: teaching.config.clone(),
+        agents: None,
+        steps: None,
+        seed: Some(teaching.seed),
+        threads: Some(if teaching.threads > 0 { teaching.threads } else { cores.saturating_sub(1).max(1) }),
+        processes: 0,
+        out: None,
+        resume: None,
+    };
+    let (session, _) = Session::begin(&args, None, true).map_err(|e| e.to_string())?;
+    Ok(session.run.config)
+}
+
+impl Lesson {
+    /// Begins to learn.
+    ///
+    /// # Errors
+    /// If the configuration cannot be used.
+    pub fn begin(agent: &str, ground: Ground, teaching: &Teaching) -> Result<Self, String> {
+        let config = settings(agent, teaching)?;
+        let factory = ground.agent(agent).and_then(|a| a.shards(Isa::best())).map_err(|e| e.to_string())?;
+        let shared = Arc::new((Mutex::new(Board::default()), Condvar::new()));
+        board(&shared).progress.state = "first steps".into();
+        let ours = shared.clone();
+        let learn = move || {
+            let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| observe(&ours, stats, snapshot);
+            let result = train(&*factory, Isa::best(), &config, None, &mut observer);
+            let mut board = board(&ours);
+            board.progress.state = match result {
+                Ok(output) => {
+                    board.newest = Some(Arc::new(output.policy));
+                    "finished".into()
+                }
+                Err(error) => error.to_string(),
+            };
+        };
+        let thread = std::thread::Builder::new().name("marathon-trainer".into()).spawn(learn);
+        thread.map_err(|e| format!("the trainer's thread cannot be started: {e}"))?;
+        Ok(Lesson { shared, agent: agent.into(), ground, shown: None })
+    }
+
+    /// How it goes.
+    pub fn progress(&self) -> Progress {
+        board(&self.shared).progress.clone()
+    }
+
+    /// The newest policy.
+    pub fn newest(&self) -> Option<Arc<Policy>> {
+        board(&self.shared).newest.clone()
+    }
+
+    /// Lets it wait at the end of an iteration, or go on.
+    pub fn pause(&self, paused: bool) {
+        board(&self.shared).progress.paused = paused;
+        self.shared.1.notify_all();
+    }
+}
+
+impl Drop for Lesson {
+    fn drop(&mut self) {
+        board(&self.shared).stop = true;
+        // it ends after its iteration; nobody waits for it
+        self.shared.1.notify_all();
+    }
+}
+
+fn board(shared: &(Mutex<Board>, Condvar)) -> MutexGuard<'_, Board> {
+    // whoever panicked has left whole numbers behind
+    shared.0.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &Snapshot<'_>) -> Control {
+    let policy = Arc::new(snapshot.policy());
+    let mut board = board(shared);
+    board.newest = Some(policy);
+    board.progress.state = "from random weights".into();
+    if let Some(total) = stats.return_mean {
+        board.progress.curve.push(Point { seconds: stats.wall_seconds, steps: stats.steps, total });
+    }
+    while board.progress.paused && !board.stop {
+        board = shared.1.wait(board).unwrap_or_else(PoisonError::into_inner);
+    }
+    if board.stop { Control::Stop } else { Control::Continue }
+}
+
+/// Begins and ends lessons as the show wants.
+pub fn attend(
+    mut commands: Commands,
+    show: Res<Show>,
+    lesson: Option<Res<Lesson>>,
+    mut teaching: ResMut<Teaching>,
+    mut notes: ResMut<Notes>,
+    mut failed: Local<bool>,
+) {
+    if show.is_changed() {
+        *failed = false;
+    }
+    let wanted = show.mode == Mode::Learn && show.source == Source::Trainer;
+    let right = lesson.as_ref().is_some_and(|l| l.agent == show.agent && l.ground == show.ground);
+    if lesson.is_some() && !(wanted && right) {
+        commands.remove_resource::<Lesson>();
+    }
+    if wanted && !right && !*failed {
+        match Lesson::begin(&show.agent, show.ground, &teaching) {
+            Ok(lesson) => {
+                info!("learning {} from random weights, seed {}", show.agent, teaching.seed);
+                commands.insert_resource(lesson);
+            }
+            Err(error) => {
+                *failed = true;
+                notes.error(error);
+            }
+        }
+        teaching.seed += 1;
+    }
+}
+
+/// Puts the newest policy on stage.
+pub fn perform(mut lesson: Option<ResMut<Lesson>>, script: Res<Script>, mut policies: ResMut<Assets<PolicyAsset>>) {
+    let (Some(lesson), Some(handle)) = (&mut lesson, &script.policy) else { return };
+    let Some(newest) = lesson.newest() else { return };
+    if lesson.shown.as_ref().is_some_and(|p| Arc::ptr_eq(p, &newest)) && policies.contains(handle.id()) {
+        return;
+    }
+    let _ = policies.insert(handle.id(), PolicyAsset(newest.clone()));
+    lesson.shown = Some(newest);
+}
+
+/// Frame times since the last line of the log, s.
+#[derive(Default)]
+pub struct Frames(Vec<f32>);
+
+/// Tells every few seconds how learning goes and whether the picture stutters.
+pub fn tell(time: Res<Time<Real>>, lesson: Option<Res<Lesson>>, mut frames: Local<Frames>, mut last: Local<f32>) {
+    let Some(lesson) = lesson else {
+        frames.0.clear();
+        *last = time.elapsed_secs();
+        return;
+    };
+    frames.0.push(time.delta_secs());
+    if time.elapsed_secs() - *last < TELL {
+        return;
+    }
+    *last = time.elapsed_secs();
+    frames.0.sort_unstable_by(f32::total_cmp);
+    let share = |share: f32| 1e3 * frames.0[((frames.0.len() - 1) as f32 * share) as usize];
+    let (median, most, slowest) = (share(0.5), share(0.95), share(1.0));
+    let Point { seconds, steps, total } = lesson.progress().curve.last().copied().unwrap_or_default();
+    info!(
+        "learning: {seconds:.0} s, {steps} steps, return {total:.0}; frames of the last {TELL} s: median {median:.0} ms, \
+         95 % within {most:.0} ms, slowest {slowest:.0} ms"
+    );
+    frames.0.clear();
+}
+
+/// Pause, save, begin anew.
+pub fn obey(
+    mut deeds: MessageReader<Do>,
+    mut show: ResMut<Show>,
+    lesson: Option<Res<Lesson>>,
+    time: Res<Time<Virtual>>,
+    mut commands: Commands,
+    mut notes: ResMut<Notes>,
+) {
+    for Do(deed) in deeds.read() {
+        match (deed, &lesson) {
+            (Deed::Pause, Some(lesson)) => lesson.pause(time.is_paused()),
+            (Deed::Save, Some(lesson)) => match lesson.newest() {
+                Some(policy) => match save(&policy, &lesson.agent) {
+                    Ok(path) => notes.say(format!("saved as {}", path.display())),
+                    Err(error) => notes.error(error),
+                },
+                None => notes.say("there is nothing to save yet"),
+            },
+            (Deed::Restart, Some(_)) if show.mode == Mode::Learn => {
+                commands.remove_resource::<Lesson>();
+                notes.say("from random weights again");
+                show.again();
+            }
+            (Deed::Learn, _) => {
+                let learning = show.mode == Mode::Learn;
+                show.mode = if learning { Mode::Watch } else { Mode::Learn };
+                show.source = if learning { Source::Shipped } else { Source::Trainer };
+                show.again();
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Saves a policy under the first free name of the agent, such as `hopper-live-1.safetensors`.
+fn save(policy: &Policy, agent: &str) -> Result<PathBuf, String> {
+    let name = agent.split("-v").next().unwrap_or(agent).to_lowercase();
+    let free = (1..).map(|i| PathBuf::from(format!("{name}-live-{i}.safetensors"))).find(|path| !path.exists());
+    let path = free.ok_or("all names are taken")?;
+    policy.save(&path).map_err(|e| e.to_string())?;
+    Ok(path)
+}

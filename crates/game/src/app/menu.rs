@@ -1,0 +1,267 @@
+//! The menu: mode, agent, policy, how many; keys. And the sliders of the modes that have some.
+
+use crate::app::args::Mode;
+use crate::app::hud::card;
+use crate::app::keys::{Bindings, Rebinding};
+use crate::app::show::{Actor, Show, Source};
+use crate::app::weather::Weather;
+use crate::ground::Ground;
+use crate::ragdoll::{Anatomy, Controls};
+use crate::simulate::{Marathon, RagdollState};
+use bevy::prelude::*;
+use bevy_egui::EguiContexts;
+use bevy_egui::egui::{self, Align2, Area, ComboBox, Id, RichText, Slider, Ui};
+use marathon_envs::{AgentState, registry};
+use marathon_physics::model::JointType;
+use std::path::PathBuf;
+
+/// Whether the menu is open, and what has been chosen in it so far.
+#[derive(Resource, Default)]
+pub struct Menu {
+    /// It is open.
+    pub open: bool,
+    choice: Option<Show>,
+    /// Policies of runs in the present folder: file, and what it is called.
+    runs: Vec<(PathBuf, String)>,
+}
+
+impl Menu {
+    /// Opens or closes it.
+    pub fn toggle(&mut self) {
+        self.open = !self.open;
+        self.choice = None;
+    }
+}
+
+/// Policies of the runs for an agent in the present folder.
+fn runs(agent: &str) -> Vec<(PathBuf, String)> {
+    let folders = std::fs::read_dir("runs").into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut runs: Vec<_> = folders
+        .map(|folder| (folder.join("policy.safetensors"), folder.display().to_string()))
+        .filter(|(file, _)| marathon_learn::Policy::load(file).is_ok_and(|p| p.meta().agent == agent))
+        .collect();
+    runs.sort();
+    runs
+}
+
+/// Draws the menu.
+pub fn draw(
+    mut contexts: EguiContexts,
+    mut menu: ResMut<Menu>,
+    mut show: ResMut<Show>,
+    bindings: Res<Bindings>,
+    mut rebinding: ResMut<Rebinding>,
+    mut exit: MessageWriter<AppExit>,
+) -> Result {
+    if !menu.open {
+        return Ok(());
+    }
+    let ctx = contexts.ctx_mut()?.clone();
+    let fresh = menu.choice.is_none();
+    let mut choice = menu.choice.take().unwrap_or_else(|| show.clone());
+    if fresh {
+        menu.runs = runs(&choice.agent);
+    }
+    let (mut start, mut quit, mut open) = (false, false, true);
+    egui::Window::new("Marathon")
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .collapsible(false)
+        .resizable(false)
+        .open(&mut open)
+        .show(&ctx, |ui| {
+            ui.set_width(430.0);
+            let before = choice.agent.clone();
+            choose(ui, &mut choice, &menu.runs);
+            if choice.agent != before {
+                menu.runs = runs(&choice.agent);
+                if matches!(choice.source, Source::File(_)) {
+                    choice.source = Source::Shipped;
+                }
+            }
+            ui.add_space(8.0);
+            ui.horizontal(|ui| {
+                start = ui.button(RichText::new("  Start  ").size(17.0).strong()).clicked();
+                quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
+            });
+            ui.add_space(6.0);
+            ui.collapsing("Keys", |ui| keys(ui, &bindings, &mut rebinding));
+        });
+    if quit {
+        exit.write(AppExit::Success);
+    }
+    if start {
+        choice.again();
+        *show = choice;
+        menu.open = false;
+    } else {
+        menu.open = open;
+        menu.choice = Some(choice).filter(|_| open);
+    }
+    Ok(())
+}
+
+fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
+    ui.horizontal(|ui| {
+        for mode in [Mode::Watch, Mode::Push, Mode::Learn, Mode::Testbed] {
+            let clicked = ui.selectable_label(choice.mode == mode, RichText::new(mode.name()).size(15.0)).clicked();
+            if clicked {
+                choice.mode = mode;
+                choice.source = match mode {
+                    Mode::Learn => Source::Trainer,
+                    Mode::Testbed => Source::Nothing,
+                    _ => Source::Shipped,
+                };
+            }
+        }
+    });
+    ui.separator();
+    egui::Grid::new("choice").num_columns(2).spacing([16.0, 8.0]).show(ui, |ui| {
+        ui.label("Agent");
+        ComboBox::from_id_salt("agent").selected_text(choice.agent.as_str()).width(230.0).show_ui(ui, |ui| {
+            for id in registry::ids() {
+                let summary = registry::agent(&id).map(|a| a.facts().summary).unwrap_or_default();
+                ui.selectable_value(&mut choice.agent, id.clone(), id).on_hover_text(summary);
+            }
+        });
+        ui.end_row();
+        if matches!(choice.mode, Mode::Watch | Mode::Push) {
+            ui.label("Policy");
+            let name = |source: &Source| match source {
+                Source::Shipped => "the one that comes with it".to_string(),
+                Source::File(file) => file.display().to_string(),
+                Source::Trainer => "being learned".into(),
+                Source::Nothing => "none: let it fall".into(),
+            };
+            ComboBox::from_id_salt("policy").selected_text(name(&choice.source)).width(230.0).show_ui(ui, |ui| {
+                for source in [Source::Shipped, Source::Nothing] {
+                    let label = name(&source);
+                    ui.selectable_value(&mut choice.source, source, label);
+                }
+                for (file, label) in runs {
+                    ui.selectable_value(&mut choice.source, Source::File(file.clone()), label);
+                }
+            });
+            ui.end_row();
+        }
+        if choice.mode != Mode::Testbed {
+            ui.label("Ground");
+            ui.horizontal(|ui| {
+                for ground in Ground::ALL {
+                    ui.selectable_value(&mut choice.ground, ground, ground.name());
+                }
+            });
+            ui.end_row();
+            ui.label("Characters");
+            ui.add(Slider::new(&mut choice.agents, 1..=64));
+            ui.end_row();
+            ui.label("Seed");
+            ui.add(egui::DragValue::new(&mut choice.seed));
+            ui.end_row();
+        }
+    });
+}
+
+fn keys(ui: &mut Ui, bindings: &Bindings, rebinding: &mut Rebinding) {
+    egui::Grid::new("bindings").num_columns(3).spacing([16.0, 4.0]).show(ui, |ui| {
+        for (deed, name, key, button) in bindings.rows() {
+            ui.label(name);
+            let waits = rebinding.0 == Some(deed);
+            if ui.button(if waits { "press a key" } else { key }).clicked() {
+                rebinding.0 = if waits { None } else { Some(deed) };
+            }
+            ui.label(button.unwrap_or(""));
+            ui.end_row();
+        }
+    });
+}
+
+/// Sliders of the push mode.
+pub fn circumstances(mut contexts: EguiContexts, show: Res<Show>, mut weather: ResMut<Weather>) -> Result {
+    if show.mode != Mode::Push {
+        return Ok(());
+    }
+    let ctx = contexts.ctx_mut()?.clone();
+    let mut now = *weather;
+    Area::new(Id::new("circumstances")).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).show(&ctx, |ui| {
+        card().show(ui, |ui| {
+            ui.label(RichText::new("circumstances").size(15.0).strong());
+            ui.add(Slider::new(&mut now.gravity, 0.0..=2.5).text("gravity").suffix(" x"));
+            ui.add(Slider::new(&mut now.uphill, -20.0..=20.0).text("uphill").suffix(" deg"));
+            ui.add(Slider::new(&mut now.friction, 0.05..=2.0).text("friction").suffix(" x"));
+            ui.add(Slider::new(&mut now.strength, 0.2..=1.5).text("strength").suffix(" x"));
+            ui.add(Slider::new(&mut now.push, 0.1..=3.0).text("push").suffix(" m/s"));
+            ui.add(Slider::new(&mut now.ball, 0.2..=10.0).text("ball").suffix(" kg"));
+            if ui.button("as usual").clicked() {
+                now = Weather::default();
+            }
+        });
+    });
+    // a change that is none would be taken for one
+    if now != *weather {
+        *weather = now;
+    }
+    Ok(())
+}
+
+/// Sliders of the test bed: one per motor, and one per joint while the time stands still.
+pub fn motors(
+    mut contexts: EguiContexts,
+    show: Res<Show>,
+    time: Res<Time<Virtual>>,
+    mut commands: Commands,
+    mut marathon: ResMut<Marathon>,
+    mut actors: Query<(Entity, &Anatomy, &RagdollState, Option<&mut Controls>), With<Actor>>,
+) -> Result {
+    if show.mode != Mode::Testbed {
+        return Ok(());
+    }
+    let ctx = contexts.ctx_mut()?.clone();
+    let Some((entity, anatomy, key, controls)) = actors.iter_mut().next() else { return Ok(()) };
+    let model = anatomy.model.clone();
+    let Some(mut controls) = controls else {
+        commands.entity(entity).insert(Controls(vec![0.0; model.nu]));
+        return Ok(());
+    };
+    Area::new(Id::new("motors")).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).show(&ctx, |ui| {
+        card().show(ui, |ui| {
+            let height = 0.42 * ctx.content_rect().height();
+            ui.label(RichText::new("motors").size(15.0).strong());
+            egui::ScrollArea::vertical().id_salt("motors").max_height(height).show(ui, |ui| {
+                let mut now = controls.0.clone();
+                for (i, (actuator, x)) in model.actuators.iter().zip(&mut now).enumerate() {
+                    let name = if actuator.name.is_empty() { format!("{i}") } else { actuator.name.clone() };
+                    let [low, high] = if actuator.ctrl_limited { actuator.ctrl_range } else { [-1.0, 1.0] };
+                    ui.add(Slider::new(x, low as f32..=high as f32).text(name));
+                }
+                if now != controls.0 {
+                    controls.0 = now;
+                }
+            });
+            if ui.button("all to zero").clicked() {
+                controls.0.fill(0.0);
+            }
+            if !time.is_paused() {
+                ui.label(RichText::new("joints: pause to pose them").size(12.0).weak());
+                return;
+            }
+            ui.label(RichText::new("joints").size(15.0).strong());
+            egui::ScrollArea::vertical().id_salt("joints").max_height(height).show(ui, |ui| {
+                let Some(AgentState { mut qpos, qvel }) = marathon.state(key) else { return };
+                let before = qpos.clone();
+                for joint in model.joints.iter().filter(|j| matches!(j.kind, JointType::Hinge | JointType::Slide)) {
+                    let [low, high] = match (joint.limited, joint.kind) {
+                        (true, _) => joint.range,
+                        (false, JointType::Slide) => [-2.0, 2.0],
+                        (false, _) => [-3.15, 3.15],
+                    };
+                    ui.add(Slider::new(&mut qpos[joint.qpos_adr], low..=high).text(joint.name.as_str()));
+                }
+                if qpos != before {
+                    // lengths and numbers come from the state itself
+                    let _ = marathon.set_state(key, &AgentState { qpos, qvel: vec![0.0; qvel.len()] });
+                }
+            });
+        });
+    });
+    Ok(())
+}

@@ -1,0 +1,57 @@
+//! Characters whose poses come from elsewhere: from a recording, a trainer, a pipe.
+
+use crate::app::show::Actor;
+use crate::axes::{to_game, turn_to_game};
+use crate::look::{FollowCamera, Marks, Tint};
+use crate::ragdoll::{Anatomy, Episode, Part};
+use crate::stage;
+use bevy::prelude::*;
+use marathon_envs::Spec;
+use marathon_physics::Model;
+use marathon_render::Scene;
+use std::sync::Arc;
+
+/// What all puppets of a stage share.
+#[derive(Clone)]
+pub struct Kind {
+    /// The body.
+    pub model: Arc<Model>,
+    /// The task, if there is one.
+    pub spec: Option<Arc<Spec>>,
+    /// Seconds between two poses.
+    pub dt: f64,
+}
+
+/// Puts puppets at their places.
+pub fn stage(
+    commands: &mut Commands,
+    kind: &Kind,
+    places: impl Iterator<Item = Vec3>,
+    cameras: &mut Query<&mut FollowCamera>,
+) {
+    for (number, place) in places.enumerate() {
+        let here = (Actor(number), Transform::from_translation(place), Visibility::default());
+        let puppet = commands.spawn((here, Marks::default(), Episode::default())).id();
+        let parts = stage::parts(commands, &kind.model, puppet);
+        let (model, spec) = (kind.model.clone(), kind.spec.clone());
+        commands.entity(puppet).insert(Anatomy { model, spec, parts, feet: Vec::new(), dt: kind.dt });
+        if number > 0 {
+            commands.entity(puppet).insert(Tint::of_row(number));
+        }
+    }
+    for mut camera in cameras {
+        camera.goal[2] = 3.1 * Scene::new(&kind.model).radius() as f32 + 0.6;
+        camera.jump();
+    }
+}
+
+/// Moves the parts of a puppet.
+pub fn pose(anatomy: &Anatomy, qpos: &[f64], parts: &mut Query<&mut Transform, With<Part>>) {
+    let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, qpos) else { return };
+    for (entity, body) in anatomy.parts.iter().zip(&pose.bodies) {
+        if let Ok(mut transform) = parts.get_mut(*entity) {
+            transform.translation = to_game(body.pos);
+            transform.rotation = turn_to_game(body.quat);
+        }
+    }
+}

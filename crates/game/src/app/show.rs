@@ -1,0 +1,375 @@
+//! What is on stage: which characters, moved by what, and who of them is in focus.
+
+use crate::app::args::{Args, Mode};
+use crate::app::error::GameError;
+use crate::app::notes::Notes;
+use crate::asset::{PolicyAsset, RagdollPrefab};
+use crate::ground::Ground;
+use crate::look::{FollowCamera, Marks, Tint};
+use crate::ragdoll::{Anatomy, Policy, Ragdoll, Restart};
+use bevy::prelude::*;
+use marathon_envs::registry;
+use marathon_learn::Policy as Net;
+use marathon_physics::Model;
+use marathon_physics::lanes::Isa;
+use marathon_render::Scene;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+/// Ragdolls side by side before the next row begins behind.
+const ROW: usize = 16;
+/// Distance between rows, m.
+const ROW_SPACING: f32 = 4.0;
+/// Seconds between looks at a policy's file.
+const WATCH: f32 = 0.5;
+/// Seconds that a fallen character lies when somebody looks on.
+const LIE: f64 = 1.2;
+
+/// Policies that come with the game.
+const SHIPPED: [&[u8]; 4] = [
+    include_bytes!("../../../../assets/policies/hopper.safetensors"),
+    include_bytes!("../../../../assets/policies/walker2d.safetensors"),
+    include_bytes!("../../../../assets/policies/humanoid.safetensors"),
+    include_bytes!("../../../../assets/policies/ant.safetensors"),
+];
+
+/// What is on stage. Who changes it calls [`Show::again`].
+#[derive(Resource, Clone, Debug)]
+pub struct Show {
+    /// What is done with the characters.
+    pub mode: Mode,
+    /// Registry name of the agent; unused by the test bed.
+    pub agent: String,
+    /// What moves them.
+    pub source: Source,
+    /// How many.
+    pub agents: usize,
+    /// What they run on; unused by the test bed.
+    pub ground: Ground,
+    /// Seed of their starts.
+    pub seed: u64,
+    /// Model of the test bed.
+    pub model: Option<PathBuf>,
+    /// Raised when the stage is to be set anew.
+    version: u64,
+}
+
+/// What moves the characters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The policy that comes with the agent.
+    Shipped,
+    /// A file, read again when it changes.
+    File(PathBuf),
+    /// The trainer in the window.
+    Trainer,
+    /// Nothing.
+    Nothing,
+}
+
+/// A character of the show, and its number.
+#[derive(Component, Clone, Copy, Debug)]
+pub struct Actor(pub usize);
+
+/// Number of the character that the camera follows.
+#[derive(Resource, Default)]
+pub struct Focus(pub usize);
+
+/// The policy of the show, and when its file was written.
+#[derive(Resource, Default)]
+pub struct Script {
+    /// The asset that all actors have.
+    pub policy: Option<Handle<PolicyAsset>>,
+    written: Option<SystemTime>,
+    looked: f32,
+}
+
+impl Show {
+    /// What a command line asks for.
+    ///
+    /// # Errors
+    /// If there is no such agent, file or policy.
+    pub fn of(args: &Args) -> Result<Self, GameError> {
+        let mut show = Show {
+            mode: args.mode,
+            agent: String::new(),
+            source: Source::Shipped,
+            agents: usize::from(args.agents),
+            ground: args.ground.into(),
+            seed: args.seed,
+            model: None,
+            version: 1,
+        };
+        let path = Path::new(&args.what);
+        let is_model = path.extension().is_some_and(|e| e == "xml" || e == "mjcf");
+        let given = match (&args.policy, registry::agent(&args.what)) {
+            (_, Ok(agent)) => {
+                show.agent = agent.facts().id;
+                args.policy.clone()
+            }
+            (_, Err(_)) if is_model => {
+                exists(path)?;
+                Model::from_xml_file(path).map_err(Box::new)?;
+                (show.mode, show.model, show.source) = (Mode::Testbed, Some(path.into()), Source::Nothing);
+                show.agent = "hopper".into();
+                return Ok(show);
+            }
+            (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => Some(path.to_path_buf()),
+            // neither an agent nor a file: the registry's message names the nearest agent
+            (_, Err(error)) => return Err(error.into()),
+        };
+        if let Some(given) = given {
+            let file = policy_file(&given)?;
+            let policy = Net::load(&file)?;
+            let agent = if show.agent.is_empty() { policy.meta().agent.clone() } else { show.agent.clone() };
+            let factory = registry::factory(&agent, Isa::best())?;
+            Net::load_for(&file, factory.spec())?;
+            show.agent = factory.spec().id.clone();
+            show.source = Source::File(file);
+        }
+        if show.mode == Mode::Learn {
+            show.source = Source::Trainer;
+        }
+        Ok(show)
+    }
+
+    /// Sets the stage anew.
+    pub fn again(&mut self) {
+        self.version += 1;
+    }
+}
+
+/// The policy in a file or a run's folder.
+///
+/// # Errors
+/// If there is none.
+pub fn policy_file(given: &Path) -> Result<PathBuf, GameError> {
+    exists(given)?;
+    if !given.is_dir() {
+        return Ok(given.into());
+    }
+    let file = given.join("policy.safetensors");
+    if file.exists() { Ok(file) } else { Err(GameError::NoPolicy(given.into())) }
+}
+
+/// # Errors
+/// If there is no such file; the error names one with a similar name.
+pub fn exists(path: &Path) -> Result<(), GameError> {
+    if path.exists() {
+        return Ok(());
+    }
+    let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let others = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let nearest = others
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .map(|other| (strsim::damerau_levenshtein(&other.to_lowercase(), &name), other))
+        .filter(|(distance, other)| *distance <= 2.max(other.len() / 3))
+        .min()
+        .map(|(_, other)| folder.join(other).display().to_string());
+    Err(GameError::Missing { path: path.into(), nearest })
+}
+
+/// The policy that comes with an agent.
+pub fn shipped(agent: &str) -> Option<Net> {
+    let policies = SHIPPED.iter().filter_map(|bytes| Net::from_bytes(Path::new("built in"), bytes).ok());
+    policies.into_iter().find(|p| p.meta().agent == agent)
+}
+
+/// Agents that a policy comes with, in the order in which a key goes through them.
+pub fn shipped_agents() -> Vec<String> {
+    SHIPPED
+        .iter()
+        .filter_map(|b| Net::from_bytes(Path::new("built in"), b).ok())
+        .map(|p| p.meta().agent.clone())
+        .collect()
+}
+
+/// Where character `i` stands: in rows, or side by side where hills must be at the same place for all.
+pub fn place(i: usize, spacing: f32, ground: Ground) -> Vec3 {
+    if ground != Ground::Level {
+        return Vec3::new(0.0, 0.0, -spacing * i as f32);
+    }
+    Vec3::new(-ROW_SPACING * (i / ROW) as f32, 0.0, -spacing * (i % ROW) as f32)
+}
+
+/// Sets the stage when the show has changed.
+#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+pub fn set_stage(
+    mut commands: Commands,
+    show: Res<Show>,
+    mut staged: Local<u64>,
+    mut focus: ResMut<Focus>,
+    mut script: ResMut<Script>,
+    mut notes: ResMut<Notes>,
+    mut policies: ResMut<Assets<PolicyAsset>>,
+    mut prefabs: ResMut<Assets<RagdollPrefab>>,
+    actors: Query<Entity, With<Actor>>,
+    mut cameras: Query<&mut FollowCamera>,
+) {
+    if *staged == show.version {
+        return;
+    }
+    *staged = show.version;
+    actors.iter().for_each(|actor| commands.entity(actor).despawn());
+    focus.0 = 0;
+    *script = Script::default();
+    if matches!(show.mode, Mode::Replay | Mode::Outside) {
+        return;
+    }
+    let (ragdoll, model) = match (&show.model, show.mode) {
+        (Some(path), Mode::Testbed) => match Model::from_xml_file(path) {
+            Ok(model) => {
+                let model = Arc::new(model);
+                (Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() })), model)
+            }
+            Err(error) => return notes.error(error.to_string()),
+        },
+        (None, Mode::Testbed) => match registry::agent(&show.agent).and_then(|a| a.model()) {
+            Ok(model) => {
+                let model = Arc::new(model);
+                (Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() })), model)
+            }
+            Err(error) => return notes.error(error.to_string()),
+        },
+        _ => match registry::agent(&show.agent).and_then(|a| a.model()) {
+            Ok(model) => (Ragdoll::agent(&show.agent).on(show.ground), Arc::new(model)),
+            Err(error) => return notes.error(error.to_string()),
+        },
+    };
+    match read_policy(&show) {
+        Ok(Some(policy)) => script.policy = Some(policies.add(policy)),
+        Ok(None) => {}
+        Err(text) => notes.error(text),
+    }
+    if let Source::File(path) = &show.source {
+        script.written = written(path);
+    }
+    if show.source == Source::Trainer {
+        // the trainer puts its policies here
+        script.policy = Some(policies.reserve_handle());
+    }
+    let scene = Scene::new(&model);
+    let (spacing, radius) = (scene.spacing() as f32, scene.radius() as f32);
+    let after_fall = if show.mode == Mode::Learn { 0.0 } else { LIE };
+    for i in 0..if show.mode == Mode::Testbed { 1 } else { show.agents } {
+        let mut actor = commands.spawn((
+            Actor(i),
+            ragdoll.clone().with_seed(show.seed, i as u64),
+            Restart { after_fall, on_time_up: true },
+            Transform::from_translation(place(i, spacing, show.ground)),
+            Marks::default(),
+        ));
+        if i > 0 {
+            actor.insert(Tint::of_row(i));
+        }
+        if let Some(policy) = &script.policy {
+            actor.insert(Policy(policy.clone()));
+        }
+    }
+    for mut camera in &mut cameras {
+        let crowd = (show.agents.min(ROW) as f32 - 1.0) * spacing * 0.28;
+        camera.goal[2] = 3.1 * radius + crowd + 0.6;
+        camera.goal[1] = if show.agents > 1 { 0.32 } else { 0.16 };
+        camera.jump();
+    }
+    info!("on stage: {} of {} ({})", show.agents, show.agent, show.mode.name());
+}
+
+/// The policy of a show; the text of an error names the remedy.
+fn read_policy(show: &Show) -> Result<Option<PolicyAsset>, String> {
+    let spec = || registry::factory(&show.agent, Isa::best()).map_err(|e| e.to_string());
+    match &show.source {
+        Source::Nothing | Source::Trainer => Ok(None),
+        Source::File(path) => Ok(Some(Net::load_for(path, spec()?.spec()).map_err(|e| e.to_string())?.into())),
+        Source::Shipped if show.mode == Mode::Testbed => Ok(None),
+        Source::Shipped => match shipped(&show.agent) {
+            Some(policy) => Ok(Some(policy.into())),
+            None => {
+                let name = &show.agent;
+                Err(format!("no policy comes with {name}; `marathon train {name}` makes one, or learn live (menu)"))
+            }
+        },
+    }
+}
+
+fn written(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|m| m.modified()).ok()
+}
+
+/// Reads the policy's file again when it has changed.
+pub fn reload(
+    time: Res<Time<Real>>,
+    show: Res<Show>,
+    mut script: ResMut<Script>,
+    mut policies: ResMut<Assets<PolicyAsset>>,
+    mut notes: ResMut<Notes>,
+) {
+    let Source::File(path) = &show.source else { return };
+    script.looked += time.delta_secs();
+    if script.looked < WATCH {
+        return;
+    }
+    script.looked = 0.0;
+    let now = written(path);
+    if now.is_none() || now == script.written {
+        return;
+    }
+    script.written = now;
+    match read_policy(&show) {
+        Ok(Some(policy)) => {
+            let steps = policy.0.meta().training.as_ref().map(|t| t.steps);
+            if let Some(handle) = &script.policy {
+                let _ = policies.insert(handle.id(), policy);
+            }
+            let steps = steps.map(|s| format!(" ({:.1} million steps)", s as f64 / 1e6)).unwrap_or_default();
+            notes.say(format!("the policy has changed{steps}"));
+        }
+        Ok(None) => {}
+        // half a file, perhaps; the next look finds the whole
+        Err(text) => notes.error(text),
+    }
+}
+
+/// Points the camera at the focus and marks it.
+pub fn follow_focus(
+    focus: Res<Focus>,
+    actors: Query<(Entity, &Actor)>,
+    mut cameras: Query<&mut FollowCamera>,
+    mut marks: Query<(&Actor, &mut Marks)>,
+) {
+    let target = actors.iter().find(|(_, actor)| actor.0 == focus.0).map(|(entity, _)| entity);
+    for mut camera in &mut cameras {
+        if camera.target != target {
+            camera.target = target;
+        }
+    }
+    let several = actors.iter().count() > 1;
+    for (actor, mut marks) in &mut marks {
+        let ring = several && actor.0 == focus.0;
+        if marks.ring != ring {
+            marks.ring = ring;
+        }
+    }
+}
+
+/// Which marks are drawn about the focus.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct Shown {
+    /// Contacts and forces.
+    pub contacts: bool,
+    /// Joints and limits.
+    pub joints: bool,
+}
+
+/// Draws the marks about the focus alone: one probe is cheap, a crowd of arrows tells nothing.
+pub fn show_marks(shown: Res<Shown>, focus: Res<Focus>, mut actors: Query<(&Actor, &mut Marks), With<Anatomy>>) {
+    for (actor, mut marks) in &mut actors {
+        let on = actor.0 == focus.0;
+        let wanted = Marks { contacts: on && shown.contacts, joints: on && shown.joints, ring: marks.ring };
+        if *marks != wanted {
+            *marks = wanted;
+        }
+    }
+}

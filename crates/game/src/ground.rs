@@ -1,0 +1,185 @@
+//! Grounds other than the level one: hills, stairs, boards, as height fields in the agent's own model.
+//!
+//! They are profiles along the track, the same at every distance from it. The first meters are level, so that episodes
+//! begin as in training.
+
+use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Registry, registry};
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::sync::Arc;
+
+/// Level meters at the start of the track.
+const LEVEL: f64 = 4.0;
+/// Length of the uneven part, m; beyond it the ground is level again.
+const LENGTH: f64 = 120.0;
+/// Meters behind the start that the field covers.
+const BEHIND: f64 = 2.0;
+/// Distance between the points of a profile, m.
+const GRID: f64 = 0.1;
+/// Half the width of the field, m.
+const HALF_WIDTH: f64 = 30.0;
+/// What lies below this is the level ground, m: two surfaces at one height would both carry.
+const SUNK: f64 = 0.01;
+
+/// What a track is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Ground {
+    /// As in training.
+    #[default]
+    Level,
+    /// Waves eight meters long, which grow to a height of 60 cm.
+    Hills,
+    /// Flights of stairs up and down: five steps of 6 cm, half a meter deep.
+    Stairs,
+    /// Boards across the track, 2 to 5 cm high.
+    Boards,
+}
+
+impl Ground {
+    /// All of them.
+    pub const ALL: [Ground; 4] = [Ground::Level, Ground::Hills, Ground::Stairs, Ground::Boards];
+
+    /// What it is called on the screen, on the command line and in recordings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Ground::Level => "level",
+            Ground::Hills => "hills",
+            Ground::Stairs => "stairs",
+            Ground::Boards => "boards",
+        }
+    }
+
+    /// The ground of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Ground::ALL.into_iter().find(|ground| ground.name() == name)
+    }
+
+    /// Height at a place of the track, m.
+    pub fn height(self, x: f64) -> f64 {
+        let (way, end) = (x - LEVEL, LENGTH - LEVEL);
+        if !(0.0..end).contains(&way) {
+            return 0.0;
+        }
+        match self {
+            Ground::Level => 0.0,
+            Ground::Hills => {
+                // growing over 24 m, and back to level ground at the end
+                let most = 0.6 * (0.25 + way / 32.0).min((end - way) / 8.0).min(1.0);
+                0.5 * most * (1.0 - (TAU * way / 8.0).cos())
+            }
+            Ground::Stairs => {
+                // five up, a landing, five down, a pause
+                const UP: [f64; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0, 5.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0, 0.0, 0.0];
+                0.06 * UP[(way / 0.5) as usize % UP.len()]
+            }
+            Ground::Boards => {
+                let number = (way / 1.5) as u64;
+                // any order that does not repeat to the eye
+                let height = 0.02 + 0.01 * (number.wrapping_mul(2_654_435_761) >> 7 & 3) as f64;
+                if way % 1.5 < 0.4 { height } else { 0.0 }
+            }
+        }
+    }
+
+    /// An agent of the registry on this ground.
+    ///
+    /// # Errors
+    /// If there is no such agent, or its model cannot be read.
+    pub fn agent(self, name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        let agent = registry::agent(name)?;
+        if self == Ground::Level {
+            return Ok(agent);
+        }
+        let facts = agent.facts();
+        let text = self.laid(&source(&facts)?);
+        let text =
+            text.ok_or_else(|| wrong(&facts, "its model has no <worldbody>, where a ground could lie".into()))?;
+        Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(text))))
+    }
+
+    /// A registry of this one agent, on this ground.
+    pub(crate) fn registry(self, name: &str) -> Result<Registry, EnvError> {
+        if self == Ground::Level {
+            return Ok(registry::global());
+        }
+        let mut registry = Registry::empty();
+        registry.register(self.agent(name)?)?;
+        Ok(registry)
+    }
+
+    /// MJCF with this ground in it; `None` if it has no world.
+    fn laid(self, text: &str) -> Option<String> {
+        let world = text.find("<worldbody")?;
+        let world = world + text[world..].find('>')? + 1;
+        let points = ((LENGTH + BEHIND) / GRID).round() as usize + 1;
+        let heights: Vec<f64> = (0..points).map(|i| self.height(i as f64 * GRID - BEHIND)).collect();
+        let top = heights.iter().copied().fold(0.0, f64::max);
+        let mut elevation = String::new();
+        for _row in 0..2 {
+            for height in &heights {
+                // writing to a string cannot fail
+                let _ = write!(elevation, "{height:.4} ");
+            }
+        }
+        let (half, middle) = (0.5 * (LENGTH + BEHIND), 0.5 * (LENGTH - BEHIND));
+        let name = self.name();
+        // geoms collide if the contype of one meets the conaffinity of the other: 1 is what every agent's geoms have
+        Some(format!(
+            "{}\n<geom name=\"{name}\" type=\"hfield\" hfield=\"{name}\" pos=\"{middle} 0 {}\" contype=\"0\" conaffinity=\"1\" \
+             rgba=\"1 1 1 1\"/>{}<asset><hfield name=\"{name}\" nrow=\"2\" ncol=\"{points}\" \
+             size=\"{half} {HALF_WIDTH} {top} 0.5\" elevation=\"{elevation}\"/></asset>\n</mujoco>\n",
+            &text[..world],
+            -SUNK,
+            text[world..].trim_end().strip_suffix("</mujoco>")?,
+        ))
+    }
+}
+
+/// The agent's model as text.
+fn source(facts: &Facts) -> Result<String, EnvError> {
+    match &facts.model {
+        ModelSource::Text(text) => Ok(text.to_string()),
+        ModelSource::File(path) => {
+            std::fs::read_to_string(path).map_err(|e| wrong(facts, format!("{}: {e}", path.display())))
+        }
+    }
+}
+
+fn wrong(facts: &Facts, problem: String) -> EnvError {
+    EnvError::Agent { id: facts.id.clone(), problem }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_agent_has_every_ground() -> Result<(), Box<dyn std::error::Error>> {
+        for name in ["hopper", "walker", "humanoid", "ant", "Hopper-v5", "walker-run-v0"] {
+            let level = registry::agent(name)?.model()?;
+            for ground in Ground::ALL.into_iter().filter(|g| *g != Ground::Level) {
+                let model = ground.agent(name)?.model()?;
+                assert_eq!(
+                    (model.nq, model.nu, model.bodies.len()),
+                    (level.nq, level.nu, level.bodies.len()),
+                    "{name} {ground:?}"
+                );
+                assert_eq!(model.hfields.len(), level.hfields.len() + 1);
+            }
+        }
+        assert!(Ground::Hills.agent("hoper").is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn tracks_begin_and_end_level() {
+        for ground in Ground::ALL {
+            for x in [-5.0, 0.0, 3.9, LENGTH + 1.0] {
+                assert_eq!(ground.height(x), 0.0, "{ground:?} at {x}");
+            }
+            let most = (0..1200).map(|i| ground.height(0.1 * f64::from(i))).fold(0.0, f64::max);
+            assert!(ground == Ground::Level || (0.03..0.7).contains(&most), "{ground:?}: {most}");
+            assert_eq!(Ground::named(ground.name()), Some(ground));
+        }
+    }
+}

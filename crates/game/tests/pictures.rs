@@ -1,0 +1,141 @@
+//! What the game draws, without a window: a small picture at low quality has a sky above, a checkered ground below and a
+//! character in the middle; the same command draws the same picture; what is wrong is told in words.
+//!
+//! Needs a Vulkan device; a software one will do (Debian: mesa-vulkan-drivers libvulkan1).
+#![cfg(feature = "render")]
+
+use marathon_render::Image;
+use std::error::Error;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SIZE: [usize; 2] = [320, 192];
+
+fn game(folder: &Path, words: &[&str]) -> Result<Output, Box<dyn Error>> {
+    Ok(Command::new(env!("CARGO_BIN_EXE_marathon-game")).current_dir(folder).args(words).output()?)
+}
+
+fn read(path: &Path) -> Result<Image, Box<dyn Error>> {
+    let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path)?)).read_info()?;
+    let mut bytes = vec![0; reader.output_buffer_size().ok_or("the picture is too large")?];
+    let info = reader.next_frame(&mut bytes)?;
+    assert_eq!(info.color_type, png::ColorType::Rgb);
+    bytes.truncate(info.buffer_size());
+    Ok(Image::from_rgb(info.width as usize, info.height as usize, bytes)?)
+}
+
+fn draw(folder: &Path, name: &str, more: &[&str]) -> Result<Image, Box<dyn Error>> {
+    let common = ["--quality", "low", "--size", "320x192", "--start", "0.5", "--seconds", "0.2", "--fps", "10"];
+    let words = [more, &common[..], &["--record", name][..]].concat();
+    let output = game(folder, &words)?;
+    assert!(
+        output.status.success(),
+        "{words:?}: {}\nNo graphics? apt install mesa-vulkan-drivers libvulkan1",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let image = read(&folder.join(name))?;
+    // kept for whoever looks at the results of a run of the tests
+    image.save_png(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name))?;
+    Ok(image)
+}
+
+/// Mean color of a part of the picture, given in shares of its sides.
+fn mean(image: &Image, x: [f64; 2], y: [f64; 2]) -> [f64; 3] {
+    let span = |[a, b]: [f64; 2], n: usize| (a * n as f64) as usize..(b * n as f64) as usize;
+    let mut sum = [0.0; 4];
+    for v in span(y, SIZE[1]) {
+        for u in span(x, SIZE[0]) {
+            let p = image.pixel(u, v);
+            (0..3).for_each(|k| sum[k] += f64::from(p[k]));
+            sum[3] += 1.0;
+        }
+    }
+    [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]
+}
+
+#[test]
+fn a_runner_between_sky_and_ground() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let image = draw(folder.path(), "hopper.png", &["hopper", "--no-hud"])?;
+    let sky = mean(&image, [0.0, 1.0], [0.0, 0.12]);
+    assert!(sky[2] > sky[0] + 10.0 && sky[2] > 120.0, "the sky is blue: {sky:?}");
+    let ground = mean(&image, [0.0, 1.0], [0.85, 1.0]);
+    assert!((ground[0] - ground[2]).abs() < 60.0 && ground[1] < sky[1], "the ground is gray: {ground:?}");
+    // the hopper wears warm colors, which nothing else has
+    let warm = (0..SIZE[0] * SIZE[1])
+        .map(|i| image.pixel(i % SIZE[0], i / SIZE[0]))
+        .filter(|p| i32::from(p[0]) > i32::from(p[2]) + 50)
+        .count();
+    assert!((100..12_000).contains(&warm), "pixels of the hopper: {warm}");
+    Ok(())
+}
+
+#[test]
+fn the_same_command_draws_the_same_picture() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let words = ["ant", "--agents", "3", "--no-hud", "--seed", "4"];
+    let first = draw(folder.path(), "ants.png", &words)?;
+    let again = draw(folder.path(), "ants-again.png", &words)?;
+    let differing = first.rgb().iter().zip(again.rgb()).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+    assert!(differing < first.rgb().len() / 500, "{differing} numbers differ");
+    Ok(())
+}
+
+#[test]
+fn text_and_marks_are_drawn() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let plain = draw(folder.path(), "walker-plain.png", &["walker", "--no-hud"])?;
+    let full = draw(folder.path(), "walker-full.png", &["walker", "--contacts", "--joints"])?;
+    let differing = plain.rgb().iter().zip(full.rgb()).filter(|(a, b)| a.abs_diff(**b) > 30).count();
+    assert!(differing > plain.rgb().len() / 50, "{differing} numbers differ");
+    Ok(())
+}
+
+#[test]
+fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("broken.safetensors"), "no policy")?;
+    std::fs::write(folder.path().join("broken.xml"), "<mujoco><worldbody><geom type='spere'/></worldbody></mujoco>")?;
+    std::fs::create_dir(folder.path().join("empty"))?;
+    let cases: [(&[&str], i32, &[&str]); 9] = [
+        (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
+        (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
+        (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
+        (&["broken.safetensors"], 1, &["broken.safetensors"]),
+        (&["empty"], 1, &["no policy.safetensors", "marathon train"]),
+        (&["broken.xml"], 1, &["broken.xml:1", "sphere"]),
+        (&["--replay", "broken.safetensors"], 1, &["broken.safetensors", "not a recording"]),
+        (&["hopper", "--agents", "0"], 2, &["--agents"]),
+        (&["hopper", "--record", "a.mov"], 1, &["a.mov", "mp4"]),
+    ];
+    for (words, code, parts) in cases {
+        let output = game(folder.path(), words)?;
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{words:?}: {text}");
+        for part in parts {
+            assert!(text.contains(part), "{words:?} lacks '{part}': {text}");
+        }
+        assert!(!text.contains("panicked"), "{words:?}: {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn without_a_display_or_graphics_the_remedy_is_named() -> Result<(), Box<dyn Error>> {
+    let game = || Command::new(env!("CARGO_BIN_EXE_marathon-game"));
+    let output = game().env_remove("DISPLAY").arg("hopper").output()?;
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("xvfb-run") && text.contains("--record"), "{text}");
+    let output = game().env("DISPLAY", ":7999").arg("hopper").output()?;
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains(":7999"), "{text}");
+    let nothing = game()
+        .env("VK_DRIVER_FILES", "/nonexistent.json")
+        .env("WGPU_BACKEND", "vulkan")
+        .env("VK_ICD_FILENAMES", "/nonexistent.json")
+        .args(["hopper", "--record", "a.png"])
+        .output()?;
+    let text = String::from_utf8_lossy(&nothing.stderr).into_owned();
+    assert!(nothing.status.code() == Some(1) && text.contains("mesa-vulkan-drivers"), "{text}");
+    Ok(())
+}
