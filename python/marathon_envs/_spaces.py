@@ -56,10 +56,12 @@ def steps_limit(max_episode_steps: int | None, default: int | None) -> int | Non
 
 def check_render_mode(render_mode: str | None, metadata: dict[str, Any]) -> None:
     """Refuse what cannot be drawn."""
-    if render_mode == "human":
+    known = (*metadata["render_modes"], None)
+    if render_mode == "human" and "human" not in known:
         raise gymnasium.error.Error(
-            "render_mode is 'human', expected 'rgb_array' or None; for a window, make one environment with "
-            "gymnasium.make(..., render_mode='human'), which needs pygame"
+            "render_mode is 'human', expected 'rgb_array' or None; a window shows one environment: "
+            "gymnasium.make(..., render_mode='human')"
         )
-    if render_mode not in (None, *metadata["render_modes"]):
-        raise gymnasium.error.Error(f"render_mode is {render_mode!r}, expected 'rgb_array' or None")
+    if render_mode not in known:
+        expected = ", ".join(repr(mode) for mode in known)
+        raise gymnasium.error.Error(f"render_mode is {render_mode!r}, expected one of: {expected}")

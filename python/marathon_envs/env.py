@@ -9,6 +9,7 @@ from marathon_envs import _spaces, _tasks
 from marathon_envs._native import Renderer
 from marathon_envs._spaces import FloatArray
 from marathon_envs._tasks import Task
+from marathon_envs._window import Window
 
 
 class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
@@ -25,7 +26,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
     Gymnasium's own tasks have the terms of the reward under Gymnasium's names, too.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
         self,
@@ -42,8 +43,9 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
 
         Args:
             task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
-            render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels. For a window, use
-                `gymnasium.make(..., render_mode="human")`, which shows them with pygame.
+            render_mode: None; "rgb_array" for pictures of `width` x `height` pixels; or "human" for a window of the
+                game, with which steps take the time that they simulate. The program `marathon-game` is looked up on
+                the search path, or where the environment variable MARATHON_GAME says.
             max_episode_steps: steps after which an episode is truncated; None means never.
             isa: instruction set, as in `VecEnv`.
             width: width of a picture, pixels.
@@ -66,6 +68,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._flat = _spaces.is_gymnasiums(self.task_spec)
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
+        # opened before the first episode, so that what is missing is told at once
+        self._window = Window(task, self.dt) if render_mode == "human" else None
         # for the camera: time, and that of the last picture
         self._seconds = self._drawn = 0.0
         self._seeded = False
@@ -86,6 +90,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         obs = self._env.reset(None if seed is None else _spaces.native_seed(seed))
         # far from the last picture, so that the camera jumps to the start
         self._seconds += 2.0
+        if self._window is not None:
+            self._window.show(self._env.get_state()[0][0], begins=True)
         return obs[0].astype(self._dtype), self._report(self._env.read_info())
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
@@ -93,6 +99,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         env = self._env
         obs, reward, terminated, truncated = env.step(np.asarray(action, np.float32)[None])
         self._seconds += self.dt
+        if self._window is not None:
+            self._window.show(env.get_state()[0][0], begins=False, reward=float(reward[0]))
         info = self._report(env.info)
         if self._add_x and "x_position" in info:
             info["x_velocity"] = float(env.forward[0]) / self.dt
@@ -120,7 +128,9 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         return obs.astype(self._dtype)
 
     def render(self) -> FloatArray | None:
-        """Draw the agent: `(height, width, 3)`, uint8; None without a render mode."""
+        """Draw the agent: `(height, width, 3)`, uint8. None without a render mode, or with a window."""
+        if self._window is not None:
+            return None
         if self.render_mode is None:
             gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
             return None
@@ -128,3 +138,9 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             self._renderer = _tasks.renderer(self._task, *self._size, **self._options)
         elapsed, self._drawn = self._seconds - self._drawn, self._seconds
         return self._renderer.render(self._env.get_state()[0], elapsed)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None

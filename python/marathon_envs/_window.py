@@ -1,0 +1,93 @@
+"""The window of `render_mode="human"`: the program `marathon-game`, which is sent every state through a pipe."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+
+if TYPE_CHECKING:
+    from marathon_envs._arrays import FloatArray
+    from marathon_envs._tasks import Task
+
+#: Environment variable that names the program.
+VARIABLE = "MARATHON_GAME"
+PROGRAM = "marathon-game"
+
+
+def program() -> str:
+    """Path of the game: what `MARATHON_GAME` names, or what is on the search path."""
+    named = os.environ.get(VARIABLE)
+    found = shutil.which(named or PROGRAM)
+    if found is None:
+        where = f"{VARIABLE} is {named!r}, where no program is" if named else f"{PROGRAM} is not on the search path"
+        raise gymnasium.error.DependencyNotInstalled(
+            f"render_mode='human' opens a window of the game, but {where}. Build it in Marathon's repository (about 15 "
+            f"minutes, once): cargo build --release -p {PROGRAM}; then put target/release on PATH or set {VARIABLE}. "
+            "Without it, pygame does: gymnasium.wrappers.HumanRendering(gymnasium.make(..., render_mode='rgb_array'))"
+        )
+    return found
+
+
+def _about(task: Task, dt: float) -> dict[str, Any]:
+    """What the game must know of a task: its name, or the model of a class."""
+    if isinstance(task, str):
+        return {"agent": task}
+    source = os.fspath(task.mjcf)
+    if source.lstrip().startswith("<"):
+        return {"model": source, "dt": dt}
+    return {"file": str(Path(source).resolve()), "dt": dt}
+
+
+class Window:
+    """A window onto one environment. Showing a state takes as long as a step does in the world."""
+
+    def __init__(self, task: Task, dt: float) -> None:
+        """Open the window."""
+        self._game = subprocess.Popen(
+            [program(), "--watch-stream"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+        )
+        self._open = True
+        self._write(json.dumps(_about(task, dt)).encode() + b"\n")
+
+    def show(self, qpos: FloatArray, *, begins: bool, reward: float = 0.0) -> None:
+        """Show a state and wait for its time; nothing happens once the window has been closed."""
+        self._write(np.concatenate(([float(begins), reward], qpos)).astype("<f8").tobytes())
+        if self._open and self._game.stdout is not None and not self._game.stdout.read(1):
+            self._closed()
+
+    def _write(self, data: bytes) -> None:
+        if not self._open or self._game.stdin is None:
+            return
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._game.stdin.write(rest) or 0 :]
+        except (BrokenPipeError, ConnectionResetError):
+            self._closed()
+
+    def _closed(self) -> None:
+        """Take in that the window is gone: an error if it failed; the game has explained it on its standard error."""
+        self._open = False
+        if self._game.wait() != 0:
+            raise gymnasium.error.Error(
+                f"the game could not show the environment (exit code {self._game.returncode}); it says why above"
+            )
+
+    def close(self) -> None:
+        """Close the window."""
+        self._open = False
+        for pipe in (self._game.stdin, self._game.stdout):
+            if pipe is not None:
+                pipe.close()
+        try:
+            self._game.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self._game.kill()
+            self._game.wait()
