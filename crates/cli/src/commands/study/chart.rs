@@ -23,6 +23,8 @@ const COLORS: [RGBColor; 8] = [
 /// Height of the names of bars, and mean width of a letter of theirs, pixels.
 const NAMES: u32 = 76;
 const LETTER: f64 = 6.4;
+/// Height of a name of a line, pixels; names stand in two columns.
+const LINE_NAME: u32 = 20;
 
 /// A picture.
 pub enum Chart {
@@ -63,11 +65,15 @@ impl Chart {
             root.draw_text(label, &style(18, INK, FontStyle::Bold), at(24, 18))?;
             let room = 0.08 * (high - low).max(1e-6);
             let bottom = if low < 0.0 { low - room } else { 0.0 };
+            let names = match self {
+                Chart::Lines(_, lines) => LINE_NAME * lines.len().div_ceil(2) as u32,
+                Chart::Bars(..) => 0,
+            };
             let mut chart = ChartBuilder::on(&root)
                 .margin_left(14 * SCALE)
                 .margin_right(32 * SCALE)
                 .margin_top(60 * SCALE)
-                .margin_bottom(10 * SCALE)
+                .margin_bottom((10 + names) * SCALE)
                 .x_label_area_size(if let Chart::Bars(..) = self { NAMES } else { 28 } * SCALE)
                 .y_label_area_size(64 * SCALE)
                 .build_cartesian_2d(ends, bottom..high + room)?;
@@ -86,8 +92,9 @@ impl Chart {
                     for (i, (name, points)) in lines.iter().enumerate() {
                         let color = COLORS[i % COLORS.len()];
                         chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2 * SCALE)))?;
-                        // the names in a column at the left
-                        let place = at(110, 66 + 20 * i as u32);
+                        // the names below, where no line runs
+                        let (column, row) = (i as u32 % 2, i as u32 / 2);
+                        let place = at(78 + column * (SIZE[0] - 110) / 2, SIZE[1] - 8 - names + LINE_NAME * row);
                         root.draw_text(name, &style(14, color, FontStyle::Bold), place)?;
                     }
                 }
