@@ -21,11 +21,16 @@ VARIABLE = "MARATHON_GAME"
 PROGRAM = "marathon-game"
 
 
+def find() -> str | None:
+    """Path of the game, if it is there: what `MARATHON_GAME` names, or what is on the search path."""
+    return shutil.which(os.environ.get(VARIABLE) or PROGRAM)
+
+
 def program() -> str:
-    """Path of the game: what `MARATHON_GAME` names, or what is on the search path."""
-    named = os.environ.get(VARIABLE)
-    found = shutil.which(named or PROGRAM)
+    """Path of the game; an error that says how to build it if it is not there."""
+    found = find()
     if found is None:
+        named = os.environ.get(VARIABLE)
         where = f"{VARIABLE} is {named!r}, where no program is" if named else f"{PROGRAM} is not on the search path"
         raise gymnasium.error.DependencyNotInstalled(
             f"render_mode='human' opens a window of the game, but {where}. Build it in Marathon's repository (about 15 "

@@ -5,11 +5,18 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from marathon_envs import _spaces, _tasks
+from marathon_envs import _spaces, _tasks, _window
 from marathon_envs._native import Renderer
 from marathon_envs._spaces import FloatArray
 from marathon_envs._tasks import Task
-from marathon_envs._window import Window
+
+
+class _Metadata:
+    """Of `MarathonEnv`: without the game, `gymnasium.make` shows `render_mode="human"` with pygame instead."""
+
+    def __get__(self, env: object, owner: object) -> dict[str, Any]:
+        """Return what is so now."""
+        return {"render_modes": ["rgb_array", "human"] if _window.find() else ["rgb_array"], "render_fps": 50}
 
 
 class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
@@ -26,7 +33,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
     Gymnasium's own tasks have the terms of the reward under Gymnasium's names, too.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}  # noqa: RUF012
+    metadata: dict[str, Any] = _Metadata()  # type: ignore[assignment]
 
     def __init__(
         self,
@@ -45,14 +52,15 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
             render_mode: None; "rgb_array" for pictures of `width` x `height` pixels; or "human" for a window of the
                 game, with which steps take the time that they simulate. The program `marathon-game` is looked up on
-                the search path, or where the environment variable MARATHON_GAME says.
+                the search path, or where the environment variable MARATHON_GAME says; if it is not there,
+                `gymnasium.make(..., render_mode="human")` shows pictures with pygame.
             max_episode_steps: steps after which an episode is truncated; None means never.
             isa: instruction set, as in `VecEnv`.
             width: width of a picture, pixels.
             height: height of a picture, pixels.
             **options: arguments of the task, see `marathon_envs.spec(task).options`.
         """
-        _spaces.check_render_mode(render_mode, self.metadata)
+        _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array", "human"]})
         limit = _spaces.steps_limit(max_episode_steps, _spaces.NEVER)
         self._env = _tasks.vec_env(
             task, 1, threads=1, isa=isa, autoreset="disabled", max_episode_steps=limit, copy=True, **options
@@ -69,7 +77,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
         # opened before the first episode, so that what is missing is told at once
-        self._window = Window(task, self.dt) if render_mode == "human" else None
+        self._window = _window.Window(task, self.dt) if render_mode == "human" else None
         # for the camera: time, and that of the last picture
         self._seconds = self._drawn = 0.0
         self._seeded = False

@@ -85,7 +85,10 @@ def test_what_is_missing_or_fails_is_told(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv("PATH", os.fspath(tmp_path))
     with pytest.raises(gymnasium.error.DependencyNotInstalled, match="not on the search path"):
         MarathonEnv("hopper", render_mode="human")
+    # then Gymnasium is to show pictures itself
+    assert MarathonEnv.metadata["render_modes"] == ["rgb_array"]
     stand_in(tmp_path, monkeypatch, nq=7, frames=0, code=1)
+    assert MarathonEnv.metadata["render_modes"] == ["rgb_array", "human"]
     env = MarathonEnv("hopper", render_mode="human")
     with pytest.raises(gymnasium.error.Error, match="exit code 1"):
         env.reset(seed=1)
