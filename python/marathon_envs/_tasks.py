@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import gymnasium
-
+from marathon_envs import _spaces
 from marathon_envs._native import Renderer, VecEnv, spec
 from marathon_envs.agent_env import AgentVecEnv
 from marathon_envs.agents import MarathonAgent
@@ -20,7 +19,7 @@ def vec_env(task: Task, num_envs: int, *, dtype: str = "float32", **options: Any
 
 def dtype(task: Task) -> str:
     """Type of the numbers of observations: that of Gymnasium, which has tasks of the same names, or ours."""
-    return "float64" if isinstance(task, str) and spec(task).id in gymnasium.registry else "float32"
+    return "float64" if isinstance(task, str) and _spaces.is_gymnasiums(spec(task)) else "float32"
 
 
 def renderer(task: Task, width: int, height: int, agents: int = 1, **options: Any) -> Renderer:

@@ -1,5 +1,8 @@
 //! Derivatives equal finite differences, in double precision lanes, for every activation and both losses.
 
+mod common;
+
+use common::numbers::{noise, worst};
 use marathon_learn::buffer::Blocks;
 use marathon_learn::gaussian::Gaussian;
 use marathon_learn::loss::{Loss, LossSums, Objective, Samples};
@@ -10,16 +13,6 @@ use std::marker::PhantomData;
 
 const BLOCKS: usize = 3;
 
-/// Numbers in [-1, 1) that look random.
-fn noise(n: usize, salt: u64) -> Vec<f64> {
-    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    (0..n).map(|_| next()).collect()
-}
-
 fn fill(net: &Mlp, salt: u64) -> Blocks<f64> {
     let mut input = net.input();
     for b in 0..BLOCKS {
@@ -27,23 +20,6 @@ fn fill(net: &Mlp, salt: u64) -> Blocks<f64> {
         input.block_mut(b).copy_from_slice(&row);
     }
     input
-}
-
-/// Largest difference between a gradient and the central differences of a function, relative to the gradient's size.
-fn worst(gradient: &[f64], params: &[f64], mut f: impl FnMut(&[f64]) -> f64) -> f64 {
-    let size = gradient.iter().map(|g| g * g).sum::<f64>().sqrt().max(1e-3);
-    let mut worst = 0f64;
-    let mut p = params.to_vec();
-    for i in 0..p.len() {
-        let h = 1e-6;
-        p[i] = params[i] + h;
-        let up = f(&p);
-        p[i] = params[i] - h;
-        let down = f(&p);
-        p[i] = params[i];
-        worst = worst.max(((up - down) / (2.0 * h) - gradient[i]).abs() / size);
-    }
-    worst
 }
 
 #[test]

@@ -2,24 +2,11 @@
 
 mod common;
 
-use common::PuckTask;
+use common::{PuckTask, learning_config};
 use marathon_learn::{
     Acktr, Activation, Algorithm, Control, IterationStats, PpoConfig, Sac, Schedule, Snapshot, evaluate, train,
 };
 use marathon_physics::lanes::Isa;
-
-fn config() -> PpoConfig {
-    PpoConfig {
-        agents: 128,
-        horizon: 32,
-        minibatches: 4,
-        total_steps: 400_000,
-        actor_hidden: vec![32, 32],
-        critic_hidden: vec![32, 32],
-        threads: 1,
-        ..Default::default()
-    }
-}
 
 /// Return of the best policy is about 64 (holding still at the origin) less the way there and the effort against drift.
 fn learned(config: &PpoConfig) -> f64 {
@@ -41,7 +28,7 @@ fn learned(config: &PpoConfig) -> f64 {
 
 #[test]
 fn adaptive_rate_solves_the_task() {
-    assert!(learned(&config()) > 52.0);
+    assert!(learned(&learning_config()) > 52.0);
 }
 
 #[test]
@@ -51,14 +38,16 @@ fn linear_rate_with_value_clipping_and_swish_solves_the_task() {
         value_clip: Some(0.5),
         final_entropy_coef: Some(0.0),
         activation: Activation::Swish,
-        ..config()
+        ..learning_config()
     };
     assert!(learned(&config) > 52.0);
 }
 
 #[test]
 fn constant_rate_with_elu_solves_the_task() {
-    assert!(learned(&PpoConfig { schedule: Schedule::Constant, activation: Activation::Elu, ..config() }) > 52.0);
+    assert!(
+        learned(&PpoConfig { schedule: Schedule::Constant, activation: Activation::Elu, ..learning_config() }) > 52.0
+    );
 }
 
 /// With a rate ten times that of the paper's comparison, which takes ten times as many steps.
@@ -102,7 +91,7 @@ fn observer_can_stop_and_looks_at_every_iteration() {
         assert_eq!(snapshot.policy().meta().training.as_ref().unwrap().steps, stats.steps);
         if seen.len() == 3 { Control::Stop } else { Control::Continue }
     };
-    let output = train(&PuckTask::new(), Isa::best(), &config(), None, &mut observer).unwrap();
+    let output = train(&PuckTask::new(), Isa::best(), &learning_config(), None, &mut observer).unwrap();
     let last = output.last.unwrap();
     assert_eq!((seen, last.iteration), (vec![4096, 8192, 12288], 3));
     assert!(last.cpu_seconds > 0.0 && last.reward_terms.len() == 2);
@@ -113,7 +102,7 @@ fn observer_can_stop_and_looks_at_every_iteration() {
 fn poisoned_observation_is_contained() {
     let mut task = PuckTask::new();
     task.poison = Some((5, 20));
-    let output = train(&task, Isa::best(), &config(), None, &mut common::silent).unwrap();
+    let output = train(&task, Isa::best(), &learning_config(), None, &mut common::silent).unwrap();
     let (policy, normalizer) = (&output.policy, output.policy.normalizer());
     let numbers = policy.params().iter().chain(policy.log_std()).chain(normalizer.mean()).chain(normalizer.std());
     assert!(numbers.into_iter().all(|x| x.is_finite()));
@@ -128,13 +117,13 @@ fn impossible_settings_are_refused_with_the_nearest_possible_one() {
         result.expect_err("an error").to_string()
     };
     assert_eq!(
-        refuse(PpoConfig { agents: 100, ..config() }),
+        refuse(PpoConfig { agents: 100, ..learning_config() }),
         "configuration: agents is 100, expected a multiple of 16, such as 96"
     );
-    assert!(refuse(PpoConfig { minibatches: 5000, ..config() }).contains("at most 256"));
-    assert!(refuse(PpoConfig { gamma: 1.5, ..config() }).contains("gamma is 1.5"));
-    assert!(refuse(PpoConfig { lr: f64::NAN, ..config() }).contains("lr is NaN"));
-    let isa = train(&PuckTask::new(), Isa::F64, &config(), None, &mut common::silent);
+    assert!(refuse(PpoConfig { minibatches: 5000, ..learning_config() }).contains("at most 256"));
+    assert!(refuse(PpoConfig { gamma: 1.5, ..learning_config() }).contains("gamma is 1.5"));
+    assert!(refuse(PpoConfig { lr: f64::NAN, ..learning_config() }).contains("lr is NaN"));
+    let isa = train(&PuckTask::new(), Isa::F64, &learning_config(), None, &mut common::silent);
     assert!(isa.err().unwrap().to_string().contains("f64"));
     assert_eq!(
         refuse(PpoConfig { epochs: 3, ..PpoConfig::a2c() }),

@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{PuckTask, silent, small_config};
+use common::numbers::{noise, worst};
+use common::{PuckTask, learning_config, silent, small_config};
 use marathon_learn::curiosity::Curiosity;
 use marathon_learn::rnd::Rnd;
 use marathon_learn::signal::Step;
@@ -14,16 +15,6 @@ use marathon_physics::lanes::Isa;
 
 const BLOCKS: usize = 2;
 
-/// Numbers in [-1, 1) that look random.
-fn noise(n: usize, salt: u64) -> Vec<f64> {
-    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    (0..n).map(|_| next()).collect()
-}
-
 /// Steps of 5 numbers with 3 actions; some actions are out of bounds.
 fn data() -> Vec<[Vec<f64>; 3]> {
     let row = |n, salt, scale: f64| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<_>>();
@@ -32,21 +23,6 @@ fn data() -> Vec<[Vec<f64>; 3]> {
 
 fn steps(data: &[[Vec<f64>; 3]]) -> Vec<Step<'_, f64>> {
     data.iter().map(|[obs, action, next]| Step { obs, action, next }).collect()
-}
-
-/// Largest difference between a gradient and the central differences of a function, relative to the gradient's size.
-fn worst(gradient: &[f64], params: &[f64], mut f: impl FnMut(&[f64]) -> f64) -> f64 {
-    let size = gradient.iter().map(|g| g * g).sum::<f64>().sqrt().max(1e-3);
-    let (mut worst, mut p, h) = (0f64, params.to_vec(), 1e-6);
-    for i in (0..p.len()).step_by(p.len() / 400 + 1) {
-        p[i] = params[i] + h;
-        let up = f(&p);
-        p[i] = params[i] - h;
-        let down = f(&p);
-        p[i] = params[i];
-        worst = worst.max(((up - down) / (2.0 * h) - gradient[i]).abs() / size);
-    }
-    worst
 }
 
 #[test]
@@ -140,17 +116,7 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
 fn novelty_fades_and_the_task_is_solved() {
     for kind in [SignalKind::Curiosity, SignalKind::Rnd] {
         let signal = Signal { strength: 0.01, hidden: vec![32, 32], lr: 1e-3, ..Signal::new(kind) };
-        let config = PpoConfig {
-            agents: 128,
-            horizon: 32,
-            minibatches: 4,
-            total_steps: 400_000,
-            actor_hidden: vec![32, 32],
-            critic_hidden: vec![32, 32],
-            threads: 1,
-            signals: vec![signal],
-            ..Default::default()
-        };
+        let config = PpoConfig { signals: vec![signal], ..learning_config() };
         let mut rewards = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
             assert_eq!(stats.signal_rewards[0].0, kind);

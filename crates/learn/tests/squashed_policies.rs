@@ -1,6 +1,9 @@
 //! The squashed policy of SAC: derivatives of its objective equal finite differences in double precision, and its
 //! log-probabilities are those of a density.
 
+mod common;
+
+use common::numbers::noise;
 use marathon_learn::BLOCK;
 use marathon_learn::buffer::Blocks;
 use marathon_learn::squash::{Draw, Objective};
@@ -9,16 +12,6 @@ use std::marker::PhantomData;
 
 const ACT: usize = 3;
 const ALPHA: f64 = 0.3;
-
-/// Numbers in [-1, 1) that look random.
-fn noise(n: usize, salt: u64) -> Vec<f64> {
-    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    (0..n).map(|_| next()).collect()
-}
 
 fn draw(output: &[f64], z: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut blocks = Blocks::new(1, 2 * ACT);

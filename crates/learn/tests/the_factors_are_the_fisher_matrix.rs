@@ -2,21 +2,14 @@
 //! a network of one layer, and means over the samples otherwise; the natural gradient solves with them, and in a
 //! linear policy a step changes the distribution by the divergence that was asked for.
 
+mod common;
+
+use common::numbers::noise_f32 as noise;
 use marathon_learn::buffer::Blocks;
 use marathon_learn::kfac::Layer;
 use marathon_learn::mlp::Mlp;
 use marathon_learn::{Activation, BLOCK};
 use marathon_physics::lanes::Isa;
-
-/// Numbers in [-1, 1) that look random.
-fn noise(n: usize, salt: u64) -> Vec<f32> {
-    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    };
-    (0..n).map(|_| next()).collect()
-}
 
 /// A policy network with deviations, parameters and observations of two blocks.
 struct Case {

@@ -1,5 +1,8 @@
 //! Networks, losses and gradients agree with PyTorch's to 1e-5, in single precision on every instruction set.
 
+mod common;
+
+use common::numbers::noise_f32 as noise;
 use marathon_learn::buffer::Blocks;
 use marathon_learn::gaussian::Gaussian;
 use marathon_learn::loss::{Loss, LossSums, Objective, Samples};
@@ -37,16 +40,6 @@ fn ask_torch(request: &Value) -> Value {
     let output = child.wait_with_output().expect("the oracle ends");
     assert!(output.status.success(), "torch_ppo.py failed with {}; {advice}", python.display());
     serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
-}
-
-/// Numbers in [-1, 1) that look random, exact in single precision.
-fn noise(n: usize, salt: u64) -> Vec<f32> {
-    let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    };
-    (0..n).map(|_| next()).collect()
 }
 
 struct Case {

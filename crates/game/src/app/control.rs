@@ -5,7 +5,7 @@ use crate::app::hud::Hud;
 use crate::app::keys::{Deed, Do};
 use crate::app::menu::Menu;
 use crate::app::notes::Notes;
-use crate::app::show::{Actor, Focus, Show, Shown, Source, shipped_agents};
+use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name, shipped_agents};
 use crate::look::FollowCamera;
 use crate::ragdoll::RestartNow;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
@@ -141,9 +141,8 @@ pub fn look(
 /// Saves what the window shows.
 pub fn picture(mut commands: Commands, mut deeds: MessageReader<Do>, mut notes: ResMut<Notes>) {
     for _ in deeds.read().filter(|d| d.0 == Deed::Picture) {
-        let free = (1..10_000).map(|i| format!("marathon-{i}.png")).find(|name| !std::path::Path::new(name).exists());
-        let name = free.unwrap_or_else(|| "marathon.png".into());
-        commands.spawn(Screenshot::primary_window()).observe(save_to_disk(name.clone()));
-        notes.say(format!("picture: {name}"));
+        let path = free_name("marathon", "png");
+        commands.spawn(Screenshot::primary_window()).observe(save_to_disk(path.clone()));
+        notes.say(format!("picture: {}", path.display()));
     }
 }

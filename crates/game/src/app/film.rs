@@ -16,7 +16,7 @@ use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, T
 use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
-use marathon_render::{GifWriter, Image as Picture, Mp4Writer, RenderError};
+use marathon_render::{Format, Image as Picture, Recorder};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -32,8 +32,7 @@ struct Reel(VecDeque<Vec<u8>>);
 
 /// Where pictures go.
 enum Sink {
-    Mp4(Mp4Writer),
-    Gif(GifWriter),
+    Film(Recorder),
     /// The last one only.
     Png(PathBuf, Option<Picture>),
     Folder(PathBuf, usize),
@@ -41,30 +40,19 @@ enum Sink {
 
 impl Sink {
     fn new(path: &Path, fps: u32) -> Result<Self, GameError> {
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        Ok(match extension.as_deref() {
-            Some("mp4") => Sink::Mp4(Mp4Writer::create(path, f64::from(fps))?),
-            Some("gif") => Sink::Gif(GifWriter::create(path, f64::from(fps))?),
-            Some("png") => Sink::Png(path.into(), None),
-            Some(_) => {
-                return Err(RenderError::Extension {
-                    path: path.into(),
-                    found: extension.unwrap_or_default(),
-                    nearest: "mp4",
-                }
-                .into());
-            }
-            None => {
-                std::fs::create_dir_all(path).map_err(|source| GameError::Write { path: path.into(), source })?;
-                Sink::Folder(path.into(), 0)
-            }
+        if path.extension().is_none() {
+            std::fs::create_dir_all(path).map_err(|source| GameError::Write { path: path.into(), source })?;
+            return Ok(Sink::Folder(path.into(), 0));
+        }
+        Ok(match Format::of(path)? {
+            Format::Png => Sink::Png(path.into(), None),
+            Format::Gif | Format::Mp4 => Sink::Film(Recorder::create(path, f64::from(fps), 1)?),
         })
     }
 
     fn push(&mut self, picture: Picture) -> Result<(), GameError> {
         match self {
-            Sink::Mp4(writer) => writer.push(&picture)?,
-            Sink::Gif(writer) => writer.push(&picture)?,
+            Sink::Film(recorder) => recorder.push(&picture)?,
             Sink::Png(_, last) => *last = Some(picture),
             Sink::Folder(path, count) => {
                 *count += 1;
@@ -76,8 +64,7 @@ impl Sink {
 
     fn finish(self) -> Result<(), GameError> {
         match self {
-            Sink::Mp4(writer) => writer.finish()?,
-            Sink::Gif(writer) => writer.finish()?,
+            Sink::Film(recorder) => recorder.finish()?,
             Sink::Png(path, last) => match last {
                 Some(picture) => picture.save_png(path)?,
                 None => return Err(GameError::NoGraphics),

@@ -329,10 +329,9 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
             ui,
             |ui| {
                 ui.horizontal(|ui| {
-                    for (deed, name, key, _) in
+                    for (_, name, key, _) in
                         bindings.rows().filter(|row| useful.contains(&row.0) || row.0 == Deed::Help)
                     {
-                        let _ = deed;
                         ui.label(text(12.0, ACCENT, key).strong());
                         ui.label(text(12.0, TEXT, name));
                         ui.add_space(4.0);

@@ -3,7 +3,7 @@
 use crate::app::args::Mode;
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
-use crate::app::show::{Script, Show, Source};
+use crate::app::show::{Script, Show, Source, file_stem, free_name};
 use crate::asset::PolicyAsset;
 use crate::ground::Ground;
 use bevy::prelude::*;
@@ -267,9 +267,7 @@ pub fn obey(
 
 /// Saves a policy under the first free name of the agent, such as `hopper-live-1.safetensors`.
 fn save(policy: &Policy, agent: &str) -> Result<PathBuf, String> {
-    let name = agent.split("-v").next().unwrap_or(agent).to_lowercase();
-    let free = (1..).map(|i| PathBuf::from(format!("{name}-live-{i}.safetensors"))).find(|path| !path.exists());
-    let path = free.ok_or("all names are taken")?;
+    let path = free_name(&format!("{}-live", file_stem(agent)), "safetensors");
     policy.save(&path).map_err(|e| e.to_string())?;
     Ok(path)
 }

@@ -6,7 +6,7 @@ use crate::app::hud::card;
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
 use crate::app::puppets::{self, Kind};
-use crate::app::show::{Actor, Show};
+use crate::app::show::{Actor, Show, file_stem, free_name};
 use crate::ground::Ground;
 use crate::look::FollowCamera;
 use crate::ragdoll::{Anatomy, Episode, Part};
@@ -241,9 +241,7 @@ pub fn obey(
 
 /// Saves under the first free name.
 fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
-    let name = recording.agent.split("-v").next().unwrap_or("run").to_lowercase();
-    let free = (1..10_000).map(|i| PathBuf::from(format!("{name}-{i}.replay"))).find(|path| !path.exists());
-    let path = free.unwrap_or_else(|| PathBuf::from(format!("{name}.replay")));
+    let path = free_name(&file_stem(&recording.agent), "replay");
     recording.save(&path)?;
     Ok(path)
 }

@@ -8,7 +8,7 @@ use crate::ground::Ground;
 use crate::look::{FollowCamera, Marks, Tint};
 use crate::ragdoll::{Anatomy, Policy, Ragdoll, Restart};
 use bevy::prelude::*;
-use marathon_envs::registry;
+use marathon_envs::{nearest, registry};
 use marathon_learn::Policy as Net;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
@@ -159,15 +159,14 @@ pub fn exists(path: &Path) -> Result<(), GameError> {
     if path.exists() {
         return Ok(());
     }
-    let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let others = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let nearest = others
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .map(|other| (strsim::damerau_levenshtein(&other.to_lowercase(), &name), other))
-        .filter(|(distance, other)| *distance <= 2.max(other.len() / 3))
-        .min()
-        .map(|(_, other)| folder.join(other).display().to_string());
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut others: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    // the first of several that are as near; folders have no order
+    others.sort();
+    let nearest = nearest(&name, others.iter().map(String::as_str));
+    let nearest = nearest.map(|other| folder.join(other).display().to_string());
     Err(GameError::Missing { path: path.into(), nearest })
 }
 
@@ -175,6 +174,23 @@ pub fn exists(path: &Path) -> Result<(), GameError> {
 pub fn shipped(agent: &str) -> Option<Net> {
     let policies = SHIPPED.iter().filter_map(|bytes| Net::from_bytes(Path::new("built in"), bytes).ok());
     policies.into_iter().find(|p| p.meta().agent == agent)
+}
+
+/// What files about an agent are called: its name without the version.
+pub fn file_stem(agent: &str) -> String {
+    agent.split("-v").next().unwrap_or(agent).to_lowercase()
+}
+
+/// The first of `stem-1.extension`, `stem-2.extension` and so on that is not there yet.
+pub fn free_name(stem: &str, extension: &str) -> PathBuf {
+    let mut number = 1;
+    loop {
+        let path = PathBuf::from(format!("{stem}-{number}.{extension}"));
+        if !path.exists() {
+            return path;
+        }
+        number += 1;
+    }
 }
 
 /// Agents that a policy comes with, in the order in which a key goes through them.
@@ -218,25 +234,19 @@ pub fn set_stage(
     if matches!(show.mode, Mode::Replay | Mode::Outside) {
         return;
     }
-    let (ragdoll, model) = match (&show.model, show.mode) {
-        (Some(path), Mode::Testbed) => match Model::from_xml_file(path) {
-            Ok(model) => {
-                let model = Arc::new(model);
-                (Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() })), model)
-            }
-            Err(error) => return notes.error(error.to_string()),
-        },
-        (None, Mode::Testbed) => match registry::agent(&show.agent).and_then(|a| a.model()) {
-            Ok(model) => {
-                let model = Arc::new(model);
-                (Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() })), model)
-            }
-            Err(error) => return notes.error(error.to_string()),
-        },
-        _ => match registry::agent(&show.agent).and_then(|a| a.model()) {
-            Ok(model) => (Ragdoll::agent(&show.agent).on(show.ground), Arc::new(model)),
-            Err(error) => return notes.error(error.to_string()),
-        },
+    let testbed = show.mode == Mode::Testbed;
+    let model = match show.model.as_ref().filter(|_| testbed) {
+        Some(path) => Model::from_xml_file(path).map_err(|e| e.to_string()),
+        None => registry::agent(&show.agent).and_then(|a| a.model()).map_err(|e| e.to_string()),
+    };
+    let model = match model {
+        Ok(model) => Arc::new(model),
+        Err(error) => return notes.error(error),
+    };
+    let ragdoll = if testbed {
+        Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() }))
+    } else {
+        Ragdoll::agent(&show.agent).on(show.ground)
     };
     match read_policy(&show) {
         Ok(Some(policy)) => script.policy = Some(policies.add(policy)),
@@ -253,7 +263,7 @@ pub fn set_stage(
     let scene = Scene::new(&model);
     let (spacing, radius) = (scene.spacing() as f32, scene.radius() as f32);
     let after_fall = if show.mode == Mode::Learn { 0.0 } else { LIE };
-    for i in 0..if show.mode == Mode::Testbed { 1 } else { show.agents } {
+    for i in 0..if testbed { 1 } else { show.agents } {
         let mut actor = commands.spawn((
             Actor(i),
             ragdoll.clone().with_seed(show.seed, i as u64),

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "every test file uses a part")]
 
+pub mod numbers;
+
 use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Sac};
 
@@ -205,4 +207,18 @@ pub fn small_of(algorithm: &str) -> marathon_learn::PpoConfig {
 /// An observer that never stops.
 pub fn silent(_: &marathon_learn::IterationStats, _: &marathon_learn::Snapshot<'_>) -> marathon_learn::Control {
     marathon_learn::Control::Continue
+}
+
+/// A configuration with which the puck is learned within seconds.
+pub fn learning_config() -> marathon_learn::PpoConfig {
+    marathon_learn::PpoConfig {
+        agents: 128,
+        horizon: 32,
+        minibatches: 4,
+        total_steps: 400_000,
+        actor_hidden: vec![32, 32],
+        critic_hidden: vec![32, 32],
+        threads: 1,
+        ..Default::default()
+    }
 }

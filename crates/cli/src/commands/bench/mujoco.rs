@@ -9,13 +9,11 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout};
 use std::thread::JoinHandle;
 
 /// What the process runs; its requests and answers are described there.
 const SCRIPT: &str = include_str!("mujoco_side.py");
-/// Last characters of the process's complaints that are worth showing.
-const COMPLAINT: usize = 2000;
 
 /// A Python process with MuJoCo.
 pub struct Mujoco {
@@ -55,11 +53,7 @@ impl Mujoco {
     /// If there is no Python or it has no MuJoCo.
     pub fn start() -> Result<Self, CliError> {
         let python = python::find();
-        let mut command = Command::new(&python);
-        // a folder called mujoco in the working directory is not the package
-        command.args(["-c", SCRIPT]).env("PYTHONSAFEPATH", "1");
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|e| {
+        let mut child = python::command(&python, SCRIPT).spawn().map_err(|e| {
             CliError::Python(format!(
                 "{}: cannot be started: {e}; expected a Python with MuJoCo: install Python 3 and the package by \
                  `python3 -m pip install mujoco`, or let the variable {VARIABLE} name the Python that has it",
@@ -159,9 +153,10 @@ impl Mujoco {
         self.requests = None;
         let status = self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string());
         let text = self.complaints.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
-        let text = text.trim();
-        let from = text.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);
-        let complaint = if text.is_empty() { String::new() } else { format!(":\n{}", &text[from..]) };
+        let complaint = match python::complaint(&text) {
+            "" => String::new(),
+            end => format!(":\n{end}"),
+        };
         CliError::Python(format!(
             "{}: ended early ({status}), expected a Python 3 with the package mujoco; let the variable {VARIABLE} name \
              one{complaint}",

@@ -11,7 +11,6 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 /// What the Python processes run; requests and answers are described there.
 const SCRIPT: &str = include_str!("peers.py");
@@ -19,8 +18,6 @@ const SCRIPT: &str = include_str!("peers.py");
 const MLAGENTS_VARIABLE: &str = "MARATHON_MLAGENTS_PYTHON";
 /// Agents of the paper's scenes.
 const AGENTS: usize = 16;
-/// Last characters of a process's complaints that are worth showing.
-const COMPLAINT: usize = 2000;
 
 /// What a process answers.
 #[derive(Deserialize)]
@@ -97,10 +94,7 @@ pub fn sb3(
         speed_mean: answer.speed,
         ..Default::default()
     };
-    Ok((
-        finish(answer.steps, &answer, eval, (&format!("Stable-Baselines3's {}", algorithm.name()), seed)),
-        answer.versions,
-    ))
+    Ok((finish(&answer, eval, (&format!("Stable-Baselines3's {}", algorithm.name()), seed)), answer.versions))
 }
 
 /// Trains with `mlagents-learn` and our player with the settings of a PPO configuration that came from a file of ML-Agents,
@@ -125,7 +119,7 @@ pub fn mlagents(agent: &str, config: &PpoConfig, time_horizon: u64) -> Result<(R
     let options = EvalOptions { episodes: EPISODES, threads: 1, ..Default::default() };
     let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
     let _ = std::fs::remove_dir_all(&folder);
-    Ok((finish(answer.steps, &answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
+    Ok((finish(&answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
 }
 
 /// Name of the GPU that PyTorch can use, if there is one.
@@ -137,8 +131,8 @@ pub fn gpu() -> Result<Option<String>, CliError> {
     Ok(answer["gpu"].as_str().map(Into::into))
 }
 
-fn finish(steps: u64, answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
-    let Answer { wall, cpu, rate, .. } = *answer;
+fn finish(answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
+    let Answer { steps, wall, cpu, rate, .. } = *answer;
     let run = Run { curve: answer.curve.clone(), steps, wall, cpu, rate: rate.unwrap_or(steps as f64 / wall), eval };
     run.note(&format!("{who} seed {seed}"));
     run
@@ -191,11 +185,7 @@ fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value
     let place = text::path_word(python);
     let advice = format!("install it by `{advice}`, or let the variable {variable} name a Python that has it");
     let failed = |e: &dyn std::fmt::Display| CliError::Python(format!("{place}: cannot be started: {e}; {advice}"));
-    let mut command = Command::new(python);
-    // a folder called like a package in the working directory is not the package
-    command.args(["-c", SCRIPT]).env("PYTHONSAFEPATH", "1");
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().map_err(|e| failed(&e))?;
+    let mut child = python::command(python, SCRIPT).spawn().map_err(|e| failed(&e))?;
     let mut requests = child.stdin.take().ok_or_else(|| failed(&"no pipe"))?;
     // a process that has ended already tells why below
     let _ = writeln!(requests, "{job}");
@@ -209,10 +199,9 @@ fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value
     if answer.is_object() && answer["error"].is_null() {
         return Ok(answer);
     }
-    let complaint: String =
-        answer["error"].as_str().map_or_else(|| String::from_utf8_lossy(&output.stderr).into(), Into::into);
-    let from = complaint.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);
-    Err(CliError::Python(format!("{place}: failed ({}):\n{}", output.status, complaint[from..].trim())))
+    let said = String::from_utf8_lossy(&output.stderr);
+    let complaint = python::complaint(answer["error"].as_str().unwrap_or(&said));
+    Err(CliError::Python(format!("{place}: failed ({}):\n{complaint}", output.status)))
 }
 
 /// The answer of a trainer.
