@@ -5,7 +5,7 @@
 mod config;
 
 use config::{Loaded, default_for, parse};
-use marathon_learn::{Acktr, Activation, Algorithm, PpoConfig, Sac, Schedule, Signal, SignalKind};
+use marathon_learn::{Acktr, Activation, Algorithm, Init, PpoConfig, Ratio, Sac, Schedule, Signal, SignalKind};
 use std::path::{Path, PathBuf};
 
 fn read(text: &str, agent: &str) -> Loaded {
@@ -41,10 +41,14 @@ fn what_is_left_out_has_the_value_of_ml_agents() {
         gae_lambda: 0.95,
         clip: 0.2,
         final_clip: Some(0.1),
-        value_clip: Some(0.2),
+        ratio: Ratio::PerAction,
+        value_clip: None,
+        adam_epsilon: 1e-8,
         entropy_coef: 5e-3,
         final_entropy_coef: Some(1e-5),
-        init_log_std: (1.0f64 / 3.0).ln(),
+        initialization: Init::MlAgents,
+        action_clip: 3.0,
+        init_log_std: 0.0,
         min_std: 1e-3,
         max_std: 1e3,
         normalize_observations: false,
@@ -86,7 +90,7 @@ env_settings: {seed: 77}
     let ppo = loaded.ppo;
     assert_eq!((ppo.lr, ppo.value_lr, ppo.schedule), (2e-3, 2e-3, Schedule::Constant));
     assert_eq!((ppo.entropy_coef, ppo.final_entropy_coef), (1e-2, Some(1e-5)));
-    assert_eq!((ppo.clip, ppo.final_clip, ppo.value_clip), (0.3, Some(0.1), Some(0.3)));
+    assert_eq!((ppo.clip, ppo.final_clip, ppo.value_clip), (0.3, Some(0.1), None));
     assert_eq!((ppo.gae_lambda, ppo.gamma, ppo.normalize_observations), (0.9, 0.995, true));
     assert_eq!((ppo.actor_hidden, ppo.critic_hidden), (vec![96; 3], vec![96; 3]));
     assert_eq!((ppo.seed, loaded.summary_freq), (77, 30_000));
@@ -123,6 +127,10 @@ fn every_key_of_marathon_counts() {
       lr_range: [1e-4, 2e-3]
       max_grad_norm: 0.5
       value_clip: 0.4
+      ratio: joint
+      adam_epsilon: 1e-6
+      initialization: orthogonal
+      action_clip: 2
       final_clip: 0.15
       final_entropy_coef: 0.001
       init_log_std: -0.7
@@ -161,6 +169,10 @@ fn every_key_of_marathon_counts() {
         clip: 0.2,
         final_clip: Some(0.15),
         value_clip: Some(0.4),
+        ratio: Ratio::Joint,
+        adam_epsilon: 1e-6,
+        initialization: Init::Orthogonal,
+        action_clip: 2.0,
         entropy_coef: 0.01,
         final_entropy_coef: Some(0.001),
         init_log_std: -0.7,

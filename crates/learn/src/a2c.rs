@@ -10,6 +10,7 @@
 //! The rollout was drawn from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of
 //! `A log pi`: the gradient comes from the same code as PPO's. The bound of its norm is for both networks together.
 
+use crate::config::Ratio;
 use crate::f32_lanes;
 use crate::loss::{LossSums, Objective};
 use crate::run::NETWORKS;
@@ -52,6 +53,7 @@ pub fn update(mut update: Update<'_>, settings: &A2c) {
 pub fn objective(update: &Update<'_>) -> Objective {
     let config = update.run.config;
     Objective {
+        ratio: Ratio::Joint,
         clip: NO_CLIP,
         value_clip: None,
         entropy_coef: update.run.moved(update.learner, config.entropy_coef, config.final_entropy_coef),

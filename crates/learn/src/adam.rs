@@ -8,8 +8,6 @@ use marathon_physics::lanes::{Isa, Kernel, Real, sum16};
 
 const BETA1: f64 = 0.9;
 const BETA2: f64 = 0.999;
-/// Larger than Adam's 1e-8: in single precision a second moment of a nearly dead weight underflows.
-const EPSILON: f64 = 1e-5;
 
 /// Moments of the gradient.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +18,14 @@ pub struct Adam {
     pub v: Vec<f32>,
     /// Powers of the decay rates for the bias correction, by repeated multiplication.
     pub powers: [f64; 2],
+    /// Added to the root of the second moment.
+    pub epsilon: f32,
 }
 
 impl Adam {
     /// For `n` parameters.
-    pub fn new(n: usize) -> Self {
-        Self { m: vec![0.0; n], v: vec![0.0; n], powers: [1.0; 2] }
+    pub fn new(n: usize, epsilon: f64) -> Self {
+        Self { m: vec![0.0; n], v: vec![0.0; n], powers: [1.0; 2], epsilon: epsilon as f32 }
     }
 
     /// Starts the next step: call once before the [`Adam::update`]s of all parameters.
@@ -52,6 +52,7 @@ impl Adam {
             scale: scale as f32,
             rate: (lr / (1.0 - self.powers[0])) as f32,
             correction: (1.0 / (1.0 - self.powers[1])) as f32,
+            epsilon: self.epsilon,
         };
         f32_lanes!(isa, T => <T as Real>::enter(step))
     }
@@ -65,6 +66,7 @@ struct Step<'a> {
     scale: f32,
     rate: f32,
     correction: f32,
+    epsilon: f32,
 }
 
 impl<T: Real<Scalar = f32>> Kernel<T> for Step<'_> {
@@ -83,7 +85,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Step<'_> {
             let v1 = b2.mul_add(T::load(v), c2 * g * g);
             m1.store(m);
             v1.store(v);
-            let root = (v1 * correction).sqrt() + T::lit(EPSILON);
+            let root = (v1 * correction).sqrt() + T::splat(self.epsilon);
             (T::load(p) - (rate * m1).div(root)).store(p);
         }
     }

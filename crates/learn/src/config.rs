@@ -17,6 +17,47 @@ pub enum Schedule {
     Adaptive,
 }
 
+/// What the networks of policy and values start from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Init {
+    /// Orthogonal weights, a hundredth of that in the policy's last layer: actions hardly depend on the state.
+    #[default]
+    Orthogonal,
+    /// Normal numbers as ML-Agents draws them: smaller in the hidden layers, larger in the policy's last.
+    MlAgents,
+}
+
+impl Init {
+    /// Names in configurations, in the order of the variants.
+    pub const NAMES: [&str; 2] = ["orthogonal", "ml_agents"];
+}
+
+/// Whose probability ratio the objective bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ratio {
+    /// That of all actions together, as Schulman et al. have it.
+    #[default]
+    Joint,
+    /// That of each action by itself, as ML-Agents has it: the objective is the mean over the actions. Each may move as far
+    /// as else all together, so steps are larger, the more so the more actions there are.
+    PerAction,
+}
+
+impl Ratio {
+    /// Names in configurations, in the order of the variants.
+    pub const NAMES: [&str; 2] = ["joint", "per_action"];
+
+    /// Numbers that a sample's log-probability is kept as.
+    pub(crate) fn rows(self, actions: usize) -> usize {
+        match self {
+            Ratio::Joint => 1,
+            Ratio::PerAction => actions,
+        }
+    }
+}
+
 /// What learns from the rollouts, with the settings that are its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -75,6 +116,8 @@ pub struct PpoConfig {
     pub critic_hidden: Vec<usize>,
     /// Activation of all hidden layers.
     pub activation: Activation,
+    /// What the networks start from.
+    pub initialization: Init,
 
     /// Learning rate of the policy (where the adaptive schedule starts).
     pub lr: f64,
@@ -88,6 +131,8 @@ pub struct PpoConfig {
     pub final_target_kl: Option<f64>,
     /// Bounds of the adaptive schedule.
     pub lr_range: [f64; 2],
+    /// Added to the root of Adam's second moment: how small a gradient may be and still count.
+    pub adam_epsilon: f64,
     /// Bound of the gradient's norm, for each network by itself.
     pub max_grad_norm: f64,
 
@@ -99,17 +144,23 @@ pub struct PpoConfig {
     pub signals: Vec<Signal>,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
+    /// Whose probability ratio is clipped.
+    pub ratio: Ratio,
     /// Clip range of the probability ratio at the start.
     pub clip: f64,
     /// Clip range of the probability ratio at the end, reached linearly; the same as at the start by default.
     pub final_clip: Option<f64>,
-    /// Clip range of the value's change (in units of the scaled return); none by default.
+    /// Clip range of the value's change (in units of the scaled return) at the start; it shrinks as that of the ratio does.
+    /// None by default.
     pub value_clip: Option<f64>,
     /// Weight of the entropy bonus at the start.
     pub entropy_coef: f64,
     /// Weight of the entropy bonus at the end, reached linearly; the same as at the start by default.
     pub final_entropy_coef: Option<f64>,
 
+    /// Bound of the actions drawn, which are then divided by it; standard deviations are those before that. ML-Agents has 3:
+    /// with a larger number the same step of the optimizer moves the actions less. Without effect with SAC.
+    pub action_clip: f64,
     /// Logarithm of the standard deviation of the actions at the start.
     pub init_log_std: f64,
     /// Smallest standard deviation, at the start: a floor keeps a policy that has found one safe way from ceasing to
@@ -149,22 +200,26 @@ impl Default for PpoConfig {
             actor_hidden: vec![64, 64],
             critic_hidden: vec![64, 64],
             activation: Activation::Tanh,
+            initialization: Init::Orthogonal,
             lr: 1e-3,
             value_lr: 1e-3,
             schedule: Schedule::Adaptive,
             target_kl: 0.015,
             final_target_kl: None,
             lr_range: [1e-5, 3e-3],
+            adam_epsilon: 1e-5,
             max_grad_norm: 1.0,
             gamma: 0.99,
             reward_strength: 1.0,
             signals: Vec::new(),
             gae_lambda: 0.95,
+            ratio: Ratio::Joint,
             clip: 0.2,
             final_clip: None,
             value_clip: None,
             entropy_coef: 0.002,
             final_entropy_coef: None,
+            action_clip: 1.0,
             init_log_std: -0.5,
             min_std: 0.05,
             final_min_std: None,
@@ -300,10 +355,12 @@ impl PpoConfig {
             ("reward_strength", self.reward_strength),
             ("target_kl", self.target_kl),
             ("final_target_kl", self.final_target_kl.unwrap_or(self.target_kl)),
+            ("adam_epsilon", self.adam_epsilon),
             ("max_grad_norm", self.max_grad_norm),
             ("clip", self.clip),
             ("final_clip", self.final_clip.unwrap_or(1.0)),
             ("value_clip", self.value_clip.unwrap_or(1.0)),
+            ("action_clip", self.action_clip),
             ("min_std", self.min_std),
             ("final_min_std", self.final_min_std.unwrap_or(self.min_std)),
             ("observation_clip", self.observation_clip),
@@ -440,6 +497,9 @@ impl PpoConfig {
             }
         }
         let name = self.algorithm.name();
+        if self.ratio != Ratio::Joint {
+            return Err(Error::config("ratio", "per_action", format!("joint with {name}, which clips no ratio")));
+        }
         for (field, n) in [("epochs", self.epochs), ("minibatches", self.minibatches)] {
             if n != 1 {
                 return Err(Error::config(field, n, format!("1: {name} makes one step on each rollout")));

@@ -2,6 +2,7 @@
 
 use crate::BLOCK;
 use crate::buffer::Blocks;
+use crate::config::Ratio;
 use crate::noise::Noise;
 use marathon_physics::lanes::{Kernel, Real};
 use std::marker::PhantomData;
@@ -19,6 +20,8 @@ pub struct Gaussian<S> {
     pub std: Vec<S>,
     /// Its reciprocal.
     pub inv_std: Vec<S>,
+    /// Its logarithm.
+    pub log_std: Vec<S>,
     /// Sum of the logarithms.
     pub log_sum: S,
 }
@@ -37,7 +40,7 @@ impl<T: Real<Scalar = T>> Kernel<T> for Prepare<'_, T> {
             std.push((*l).exp());
             inv_std.push((-*l).exp());
         }
-        Gaussian { std, inv_std, log_sum }
+        Gaussian { std, inv_std, log_std: self.0.to_vec(), log_sum }
     }
 }
 
@@ -83,8 +86,10 @@ pub(crate) struct Sample<'a, T> {
     pub noise: &'a mut [Noise],
     /// Out: `[block][action][16]`.
     pub action: &'a mut [f32],
-    /// Out: `[block][16]`.
+    /// Out: `[block][16]`, or with a row for each action `[block][action][16]`.
     pub log_prob: &'a mut [f32],
+    /// Whether each action has a row there.
+    pub ratio: Ratio,
     /// Work space: a row per action.
     pub eps: &'a mut [[f32; BLOCK]],
     pub lanes: PhantomData<T>,
@@ -100,15 +105,23 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Sample<'_, T> {
             noise.normals::<T>(self.eps);
             let mean = self.mean.block(b);
             let action = &mut self.action[b * n * BLOCK..][..n * BLOCK];
-            let log_prob = &mut self.log_prob[b * BLOCK..][..BLOCK];
+            let rows = self.ratio.rows(n) * BLOCK;
+            let log_prob = &mut self.log_prob[b * rows..][..rows];
             for lane in (0..BLOCK).step_by(T::LANES) {
                 let mut lp = -T::splat(self.gaussian.log_sum);
                 for k in 0..n {
                     let (at, e) = (k * BLOCK + lane, T::load(&self.eps[k][lane..]));
                     lp = (e * T::lit(0.5)).neg_mul_add(e, lp);
                     e.mul_add(T::splat(self.gaussian.std[k]), T::load(&mean[at..])).store(&mut action[at..]);
+                    if self.ratio == Ratio::PerAction {
+                        (e * T::lit(0.5))
+                            .neg_mul_add(e, -T::splat(self.gaussian.log_std[k]))
+                            .store(&mut log_prob[at..]);
+                    }
                 }
-                lp.store(&mut log_prob[lane..]);
+                if self.ratio == Ratio::Joint {
+                    lp.store(&mut log_prob[lane..]);
+                }
             }
         }
     }

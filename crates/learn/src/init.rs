@@ -1,4 +1,4 @@
-//! Orthogonal initialization (Saxe, McClelland and Ganguli, 2014).
+//! What networks start from: orthogonal weights (Saxe, McClelland and Ganguli, 2014), or those of ML-Agents.
 
 use crate::mlp::Mlp;
 use crate::noise::SplitMix;
@@ -21,6 +21,18 @@ pub fn orthogonal(net: &Mlp, params: &mut [f32], last_gain: f64, random: &mut Sp
                 w[j * inputs + k] = (gain * x) as f32;
             }
         }
+        params[biases].fill(0.0);
+    }
+}
+
+/// Fills the parameters of a network as ML-Agents 1.1.0 does (`NetworkBody` and its heads): normal weights with deviation
+/// `1 / sqrt(inputs)` in hidden layers, and with that of `last`, a function of the inputs, in the last; biases zero. The heads of values are uniform there; here they are normal with the same deviation.
+pub fn ml_agents(net: &Mlp, params: &mut [f32], last: impl Fn(f64) -> f64, random: &mut SplitMix) {
+    let sizes = net.sizes();
+    for (l, (weights, biases)) in net.layers().enumerate() {
+        let inputs = sizes[l] as f64;
+        let deviation = if l + 2 == sizes.len() { last(inputs) } else { 1.0 / inputs.sqrt() };
+        params[weights].iter_mut().for_each(|w| *w = (deviation * normal(random)) as f32);
         params[biases].fill(0.0);
     }
 }
@@ -57,6 +69,20 @@ fn normal(random: &mut SplitMix) -> f64 {
 mod tests {
     use super::*;
     use crate::Activation;
+
+    #[test]
+    fn weights_of_ml_agents_have_their_deviations() {
+        let net = Mlp::new(&[40, 90, 80, 30], Activation::Swish);
+        let mut params = vec![7.0; net.len()];
+        ml_agents(&net, &mut params, |inputs| 0.2 / inputs.sqrt(), &mut SplitMix::new(1, 2));
+        let wanted = [1.0 / 40f64.sqrt(), 1.0 / 90f64.sqrt(), 0.2 / 80f64.sqrt()];
+        for ((weights, biases), wanted) in net.layers().zip(wanted) {
+            let w = &params[weights];
+            let deviation = (w.iter().map(|x| (*x as f64).powi(2)).sum::<f64>() / w.len() as f64).sqrt();
+            assert!((deviation / wanted - 1.0).abs() < 0.06, "{deviation}, not {wanted}");
+            assert!(params[biases].iter().all(|b| *b == 0.0));
+        }
+    }
 
     #[test]
     fn weights_are_orthogonal_with_their_gain() {

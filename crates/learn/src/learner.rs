@@ -5,6 +5,7 @@
 
 use crate::adam::Adam;
 use crate::advantage::Discounts;
+use crate::config::{Init, Ratio};
 use crate::gaussian::Gaussian;
 use crate::mlp::Mlp;
 use crate::noise::{PARAMETERS, SIGNALS, SplitMix};
@@ -30,6 +31,8 @@ pub struct Layout {
     pub log_std: Range<usize>,
     /// First parameter of the value network, which has an output for each stream of rewards.
     pub critic_start: usize,
+    /// Whether each action has a probability ratio of its own.
+    pub ratio: Ratio,
     /// The second value network and what else SAC has.
     pub twin: Option<Twin>,
     /// Networks of the reward signals, with the places of their parameters, which follow.
@@ -75,7 +78,7 @@ impl Layout {
             len = place.end.next_multiple_of(BLOCK);
             signals.push((nets, place));
         }
-        Self { actor, critic, log_std, critic_start, twin, signals, len }
+        Self { actor, critic, log_std, critic_start, ratio: config.ratio, twin, signals, len }
     }
     /// The policy network's parameters.
     pub fn actor_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
@@ -144,8 +147,18 @@ impl Learner {
     pub fn new(layout: &Layout, spec: &Spec, config: &PpoConfig) -> Self {
         let mut params = vec![0.0; layout.len];
         let mut random = SplitMix::new(config.seed, PARAMETERS);
-        init::orthogonal(&layout.actor, &mut params, 0.01, &mut random);
-        init::orthogonal(&layout.critic, &mut params[layout.critic_start..], 1.0, &mut random);
+        let (actor, critic) = params.split_at_mut(layout.critic_start);
+        match config.initialization {
+            Init::Orthogonal => {
+                init::orthogonal(&layout.actor, actor, 0.01, &mut random);
+                init::orthogonal(&layout.critic, critic, 1.0, &mut random);
+            }
+            Init::MlAgents => {
+                init::ml_agents(&layout.actor, actor, |inputs| 0.2 / inputs.sqrt(), &mut random);
+                // each stream of rewards has an output layer there
+                init::ml_agents(&layout.critic, critic, |inputs| (2.0 / (inputs + 1.0)).sqrt(), &mut random);
+            }
+        }
         params[layout.log_std.clone()].fill(config.init_log_std as f32);
         for (i, (nets, place)) in layout.signals.iter().enumerate() {
             nets.init(&mut params[place.clone()], &mut SplitMix::new(config.seed, SIGNALS + 2 * i as u64 + 1));
@@ -156,7 +169,7 @@ impl Learner {
             params[twin.alpha] = Real::ln(sac.init_alpha) as f32;
             targets = params[layout.critic_start..twin.alpha].to_vec();
         }
-        let mut adam = Adam::new(layout.len);
+        let mut adam = Adam::new(layout.len, config.adam_epsilon);
         if let Algorithm::A2c(_) = config.algorithm {
             // its mean square starts at 1, or the first steps would be ten times the rate
             adam.v.fill(1.0);
@@ -207,6 +220,8 @@ impl Learner {
             gaussian: &self.gaussian(layout),
             normalizer: &self.normalizer(config),
             signals: signals.collect(),
+            ratio: layout.ratio,
+            action_scale: 1.0 / config.action_clip as f32,
             squash: matches!(config.algorithm, Algorithm::Sac(_)),
             discounts: Discounts { gamma, lambda: config.gae_lambda },
             reward_scale: self.reward_scale(config) * config.reward_strength,

@@ -88,7 +88,7 @@ pub use a2c::A2c;
 pub use acktr::Acktr;
 pub use activation::Activation;
 pub use checkpoint::Checkpoint;
-pub use config::{Algorithm, PpoConfig, Schedule};
+pub use config::{Algorithm, Init, PpoConfig, Ratio, Schedule};
 pub use error::Error;
 pub use eval::{EvalOptions, Evaluation, evaluate};
 pub use files::write_atomic;

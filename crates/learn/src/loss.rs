@@ -7,9 +7,13 @@
 //! policy:  -min(r A, clip(r, 1 - clip, 1 + clip) A) - entropy_coef H
 //! value:   max((V - R)^2, (clip(V, V_old - value_clip, V_old + value_clip) - R)^2) / 2      (without value_clip: (V - R)^2 / 2)
 //! ```
+//!
+//! With [`Ratio::PerAction`] each of the `n` actions has a ratio of its own, and the policy's part is the mean over the
+//! actions, that of the entropy too (`trust_region_policy_loss` and `entropy` of ML-Agents 1.1.0).
 
 use crate::BLOCK;
 use crate::buffer::Blocks;
+use crate::config::Ratio;
 use crate::gaussian::{Gaussian, log_prob};
 use marathon_physics::lanes::{Kernel, Real, sum16};
 use std::marker::PhantomData;
@@ -17,6 +21,8 @@ use std::marker::PhantomData;
 /// Constants of the objective.
 #[derive(Clone, Copy, Debug)]
 pub struct Objective {
+    /// Whose ratio is clipped.
+    pub ratio: Ratio,
     /// Clip range of the probability ratio.
     pub clip: f64,
     /// Clip range of the value's change, if any.
@@ -34,7 +40,7 @@ pub struct Objective {
 pub struct Samples<'a, S> {
     /// Actions taken, `[action][16]`.
     pub action: &'a [S],
-    /// Their log-probabilities then (see [`Gaussian`] for the constant).
+    /// Their log-probabilities then (see [`Gaussian`] for the constant): of all actions, or with a ratio for each of each.
     pub log_prob: &'a [S],
     /// Advantages, not normalized.
     pub advantage: &'a [S],
@@ -53,7 +59,8 @@ pub struct LossSums {
     pub value: f64,
     /// Estimate of the divergence from the policy that acted, `r - 1 - ln r`.
     pub kl: f64,
-    /// Samples whose ratio left the clip range in the direction of their advantage.
+    /// Samples whose ratio left the clip range in the direction of their advantage; the share of the actions where each has
+    /// its own.
     pub clipped: f64,
     /// Of SAC, whose deviations depend on the state: minus the log-probabilities of the actions drawn.
     pub entropy: f64,
@@ -107,7 +114,13 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
         let (zero, one) = (T::zero(), T::lit(1.0));
         let (low, high) = (T::lit(1.0 - objective.clip), T::lit(1.0 + objective.clip));
         let (shift, scale) = (T::lit(objective.advantage_mean), T::lit(objective.advantage_scale));
-        let entropy_coef = T::lit(objective.entropy_coef);
+        // the mean over the actions, where each has a ratio
+        let weight = match objective.ratio {
+            Ratio::Joint => 1.0,
+            Ratio::PerAction => 1.0 / gaussian.std.len() as f64,
+        };
+        let entropy_coef = T::lit(objective.entropy_coef * weight);
+        let weight = T::lit(weight);
         rows.as_flattened_mut().fill(T::Scalar::default());
         let [mut policy_sum, mut value_sum, mut kl_sum, mut clipped_sum] = [[zero; BLOCK]; 4];
         for (b, s) in samples.iter().enumerate() {
@@ -115,27 +128,29 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
             let (value, d_value) = (value.block(b), d_value.block_mut(b));
             for part in 0..BLOCK / T::LANES {
                 let lane = part * T::LANES;
-                // probability ratio; a clamped logarithm keeps the exponential finite
                 let lp = log_prob::<T>(gaussian, s.action, mean, d_mean, lane);
-                let log_ratio = (lp - T::load(&s.log_prob[lane..])).max(T::lit(-20.0)).min(T::lit(20.0));
-                let ratio = log_ratio.exp();
                 let advantage = (T::load(&s.advantage[lane..]) - shift) * scale;
-
-                // no gradient where the ratio has left the clip range in the direction of the advantage
-                let above = T::and(zero.lt(advantage), high.lt(ratio));
-                let below = T::and(advantage.lt(zero), ratio.lt(low));
-                let clipped = T::or(above, below);
-                let gain = ratio * advantage;
-                let bound = ratio.max(low).min(high) * advantage;
-                policy_sum[part] -= gain.min(bound);
-                kl_sum[part] += (ratio - one) - log_ratio;
-                clipped_sum[part] += T::masked(clipped, one);
-                let d_lp = T::masked(T::not(clipped), -gain);
+                let mut d_lp = zero;
+                if objective.ratio == Ratio::Joint {
+                    let surrogate = Surrogate::new(lp - T::load(&s.log_prob[lane..]), advantage, (low, high));
+                    policy_sum[part] -= surrogate.gain;
+                    kl_sum[part] += surrogate.kl;
+                    clipped_sum[part] += T::masked(surrogate.clipped, one);
+                    d_lp = surrogate.d_log_prob;
+                }
 
                 // d lp / d mean = z / std, d lp / d log std = z^2 - 1, d H / d log std = 1
                 for (k, inv_std) in gaussian.inv_std.iter().enumerate() {
                     let at = k * BLOCK + lane;
                     let z = T::load(&d_mean[at..]);
+                    if objective.ratio == Ratio::PerAction {
+                        let lp = (z * T::lit(0.5)).neg_mul_add(z, -T::splat(gaussian.log_std[k]));
+                        let surrogate = Surrogate::new(lp - T::load(&s.log_prob[at..]), advantage, (low, high));
+                        policy_sum[part] = surrogate.gain.neg_mul_add(weight, policy_sum[part]);
+                        kl_sum[part] += surrogate.kl;
+                        clipped_sum[part] += T::masked(surrogate.clipped, weight);
+                        d_lp = surrogate.d_log_prob * weight;
+                    }
                     (d_lp * z * T::splat(*inv_std)).store(&mut d_mean[at..]);
                     let row = &mut rows[k][lane..];
                     (d_lp.mul_add(z.mul_add(z, -one), T::load(row)) - entropy_coef).store(row);
@@ -172,6 +187,38 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
             clipped: T::widen(sum16(&clipped_sum[..parts])),
             samples: (samples.len() * BLOCK) as f64,
             ..LossSums::default()
+        }
+    }
+}
+
+/// The clipped objective of one ratio.
+struct Surrogate<T: Real> {
+    /// `min(r A, clip(r) A)`.
+    gain: T,
+    /// `r - 1 - ln r`.
+    kl: T,
+    /// Where the ratio has left the clip range in the direction of the advantage.
+    clipped: T::Mask,
+    /// Derivative of `-gain` with respect to the log-probability.
+    d_log_prob: T,
+}
+
+impl<T: Real> Surrogate<T> {
+    #[inline(always)]
+    fn new(log_ratio: T, advantage: T, (low, high): (T, T)) -> Self {
+        // a clamped logarithm keeps the exponential finite
+        let log_ratio = log_ratio.max(T::lit(-20.0)).min(T::lit(20.0));
+        let ratio = log_ratio.exp();
+        let above = T::and(T::zero().lt(advantage), high.lt(ratio));
+        let below = T::and(advantage.lt(T::zero()), ratio.lt(low));
+        let clipped = T::or(above, below);
+        let gain = ratio * advantage;
+        let bound = ratio.max(low).min(high) * advantage;
+        Self {
+            gain: gain.min(bound),
+            kl: (ratio - T::lit(1.0)) - log_ratio,
+            clipped,
+            d_log_prob: T::masked(T::not(clipped), -gain),
         }
     }
 }

@@ -135,13 +135,17 @@ impl Policy {
         }
         meta.observation_clip = config.observation_clip as f32;
         meta.training = Some(training);
-        Self {
-            meta,
-            net: layout.actor.clone(),
-            params: layout.actor_params(&learner.params).to_vec(),
-            normalizer: learner.normalizer(config),
-            log_std: learner.params[layout.log_std.clone()].to_vec(),
+        let (net, mut params) = (layout.actor.clone(), layout.actor_params(&learner.params).to_vec());
+        let mut log_std = learner.params[layout.log_std.clone()].to_vec();
+        if config.action_clip != 1.0 {
+            // the last layer takes in the scale of the actions, so that every policy is bounded by 1
+            let scale = 1.0 / config.action_clip as f32;
+            let (weights, biases) = net.layers().last().expect("a network has layers");
+            params[weights].iter_mut().for_each(|w| *w *= scale);
+            params[biases].iter_mut().for_each(|b| *b *= scale);
+            log_std.iter_mut().for_each(|l| *l += Real::ln(scale));
         }
+        Self { meta, net, params, normalizer: learner.normalizer(config), log_std }
     }
 
     /// The means of SAC's policy; its deviations depend on the state and are left out.

@@ -33,9 +33,11 @@ fn objective(update: &Update<'_>) -> Objective {
     let config = update.run.config;
     let moved = |first, last| update.run.moved(update.learner, first, last);
     let (mean, var) = update.totals.advantage();
+    let clip = moved(config.clip, config.final_clip);
     Objective {
-        clip: moved(config.clip, config.final_clip),
-        value_clip: config.value_clip,
+        ratio: config.ratio,
+        clip,
+        value_clip: config.value_clip.map(|range| range * (clip / config.clip)),
         entropy_coef: moved(config.entropy_coef, config.final_entropy_coef),
         advantage_mean: mean,
         advantage_scale: 1.0 / var.max(1e-12).sqrt(),

@@ -7,6 +7,7 @@
 use crate::advantage::{self, Discounts};
 use crate::buffer::{Aligned, Blocks};
 use crate::clock;
+use crate::config::Ratio;
 use crate::gaussian::{Gaussian, Sample};
 use crate::learner::Layout;
 use crate::loss::Samples;
@@ -29,6 +30,10 @@ pub struct Acting<'a> {
     pub normalizer: &'a Normalizer,
     /// Networks of the reward signals with their parameters, and the factors of their rewards.
     pub signals: Vec<(&'a SignalNets, &'a [f32], f64)>,
+    /// Whether each action has a probability ratio of its own.
+    pub ratio: Ratio,
+    /// Multiplies the actions drawn before they are clipped.
+    pub action_scale: f32,
     /// Whether the policy is SAC's, and observations are kept as they are.
     pub squash: bool,
     pub discounts: Discounts,
@@ -113,8 +118,9 @@ pub struct Rollout {
     action: Aligned<f32>,
     /// What was observed next, normalized, where a reward signal asks for it; else nothing.
     next_obs: Aligned<f32>,
-    /// `[item][16]`.
+    /// `[item][16]`, or with a ratio for each action `[item][act][16]`.
     log_prob: Aligned<f32>,
+    /// `[item][16]`.
     advantage: Aligned<f32>,
     /// `[item][stream][16]`.
     reward: Aligned<f32>,
@@ -149,7 +155,7 @@ impl Rollout {
             obs: Aligned::rows(items * obs_len),
             action: Aligned::rows(items * act_len),
             next_obs: Aligned::rows(next_items * obs_len),
-            log_prob: row(),
+            log_prob: Aligned::rows(items * layout.ratio.rows(act_len)),
             advantage: row(),
             reward: stream_rows(),
             value: stream_rows(),
@@ -214,10 +220,11 @@ impl Rollout {
     /// What the objective needs to know about an item.
     pub fn samples(&self, item: usize) -> Samples<'_, f32> {
         let row = item * BLOCK..(item + 1) * BLOCK;
+        let log_prob = self.log_prob.len() / self.items();
         let rows = item * self.streams * BLOCK..(item + 1) * self.streams * BLOCK;
         Samples {
             action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
-            log_prob: &self.log_prob[row.clone()],
+            log_prob: &self.log_prob[item * log_prob..(item + 1) * log_prob],
             advantage: &self.advantage[row],
             value: &self.value[rows.clone()],
             target: &self.target[rows],
@@ -341,7 +348,10 @@ impl Actor {
             }
             let start = clock::wall();
             let row = blocks * rollout.act_len * BLOCK;
-            self.announce(&rollout.action[t * row..(t + 1) * row]);
+            self.announce(
+                &rollout.action[t * row..(t + 1) * row],
+                if acting.squash { 1.0 } else { acting.action_scale },
+            );
             for b in 0..blocks {
                 self.step(acting, rollout, t * blocks + b, b);
             }
@@ -389,17 +399,18 @@ impl Actor {
             mean: self.tape.output(),
             noise: &mut self.noise[first..first + n],
             action: &mut rollout.action[at(act_row)],
-            log_prob: &mut rollout.log_prob[at(BLOCK)],
+            log_prob: &mut rollout.log_prob[at(acting.ratio.rows(rollout.act_len) * BLOCK)],
+            ratio: acting.ratio,
             eps: &mut self.eps,
             lanes: PhantomData,
         }));
     }
 
     /// Tells the environments the actions of all blocks, in their own units.
-    fn announce(&mut self, drawn: &[f32]) {
+    fn announce(&mut self, drawn: &[f32], scale: f32) {
         let spec = self.shard.spec();
         for (i, (action, drawn)) in self.action.iter_mut().zip(drawn).enumerate() {
-            *action = spec.action_of(i / BLOCK % spec.act, *drawn);
+            *action = spec.action_of(i / BLOCK % spec.act, *drawn * scale);
         }
         self.shard.announce(&self.action);
     }

@@ -1,4 +1,4 @@
-//! Derivatives equal finite differences, in double precision lanes, for every activation and both losses.
+//! Derivatives equal finite differences, in double precision lanes, for every activation both losses of values and both ratios.
 
 mod common;
 
@@ -7,7 +7,7 @@ use marathon_learn::buffer::Blocks;
 use marathon_learn::gaussian::Gaussian;
 use marathon_learn::loss::{Loss, LossSums, Objective, Samples};
 use marathon_learn::mlp::Mlp;
-use marathon_learn::{Activation, BLOCK};
+use marathon_learn::{Activation, BLOCK, Ratio};
 use marathon_physics::lanes::Real;
 use std::marker::PhantomData;
 
@@ -66,15 +66,16 @@ struct Case {
 }
 
 impl Case {
-    fn new(value_clip: Option<f64>) -> Self {
+    fn new(ratio: Ratio, value_clip: Option<f64>) -> Self {
         let actor = Mlp::new(&[6, 10, 7, 3], Activation::Tanh);
         let critic = Mlp::new(&[6, 9, 1], Activation::Swish);
         let objective =
-            Objective { clip: 0.2, value_clip, entropy_coef: 0.013, advantage_mean: 0.1, advantage_scale: 1.7 };
+            Objective { ratio, clip: 0.2, value_clip, entropy_coef: 0.013, advantage_mean: 0.1, advantage_scale: 1.7 };
+        let rows = if ratio == Ratio::Joint { 1 } else { 3 };
         let row = |n, salt, scale| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<f64>>();
         let data = (0..BLOCKS as u64).map(|b| {
             // old log-probabilities around the new ones (about -2), so that ratios lie inside and outside the clip range
-            let log_prob = row(1, 30 + b, 1.5).iter().map(|x| x - 1.0).collect();
+            let log_prob = row(rows, 30 + b, 1.5).iter().map(|x| x - 1.0 / rows as f64).collect();
             [row(3, 20 + b, 1.0), log_prob, row(1, 50 + b, 2.0), row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
         });
         Self { input: fill(&actor, 10), data: data.collect(), actor, critic, objective }
@@ -114,8 +115,8 @@ impl Case {
 
 #[test]
 fn objective_gradients_equal_finite_differences() {
-    for value_clip in [None, Some(0.4)] {
-        let case = Case::new(value_clip);
+    for (ratio, value_clip) in [(Ratio::Joint, None), (Ratio::Joint, Some(0.4)), (Ratio::PerAction, None)] {
+        let case = Case::new(ratio, value_clip);
         let params = case.params();
         let (sums, gradient) = case.evaluate(&params);
         let n = sums.samples;
@@ -123,7 +124,7 @@ fn objective_gradients_equal_finite_differences() {
         let (net, m) = (case.actor.len(), case.actor.len() + 3);
         // the entropy is not in the sums: it is a function of the log standard deviations alone
         let policy = |p: &[f64]| {
-            let entropy = Gaussian::new(&p[net..m]).entropy();
+            let entropy = Gaussian::new(&p[net..m]).entropy() / if ratio == Ratio::Joint { 1.0 } else { 3.0 };
             case.evaluate(p).0.policy - case.objective.entropy_coef * entropy * n
         };
         let pad = |f: &dyn Fn(&[f64]) -> f64, part: &[f64], at: usize| {
@@ -132,7 +133,7 @@ fn objective_gradients_equal_finite_differences() {
             f(&whole)
         };
         let error = worst(&gradient[..m], &params[..m], |p| pad(&policy, p, 0));
-        assert!(error < 1e-7, "policy: {error}");
+        assert!(error < 1e-7, "policy, {ratio:?}: {error}");
         let value = |p: &[f64]| case.evaluate(p).0.value;
         let error = worst(&gradient[m..], &params[m..], |p| pad(&value, p, m));
         assert!(error < 1e-7, "value, clip {value_clip:?}: {error}");
@@ -143,20 +144,32 @@ fn objective_gradients_equal_finite_differences() {
 /// that of the plain policy gradient.
 #[test]
 fn nothing_is_clipped_before_the_first_step() {
-    let mut case = Case::new(None);
-    let params = case.params();
-    let (net, m) = (case.actor.len(), case.actor.len() + 3);
-    let mut tape = case.actor.tape();
-    case.actor.forward_on::<f64>(&params[..net], &case.input, &mut tape, BLOCKS);
-    let gaussian = Gaussian::new(&params[net..m]);
-    for (b, data) in case.data.iter_mut().enumerate() {
-        for lane in 0..BLOCK {
-            let z = |k: usize| (data[0][k * BLOCK + lane] - tape.output().block(b)[k * BLOCK + lane]) / gaussian.std[k];
-            let lp: f64 = (0..3).map(|k| -0.5 * z(k) * z(k)).sum::<f64>() - gaussian.log_sum;
-            data[1][lane] = lp;
+    let gradients = [Ratio::Joint, Ratio::PerAction].map(|ratio| {
+        let mut case = Case::new(ratio, None);
+        case.objective.entropy_coef = 0.0;
+        let params = case.params();
+        let (net, m) = (case.actor.len(), case.actor.len() + 3);
+        let mut tape = case.actor.tape();
+        case.actor.forward_on::<f64>(&params[..net], &case.input, &mut tape, BLOCKS);
+        let gaussian = Gaussian::new(&params[net..m]);
+        for (b, data) in case.data.iter_mut().enumerate() {
+            for lane in 0..BLOCK {
+                let at = |k: usize| k * BLOCK + lane;
+                let z = |k: usize| (data[0][at(k)] - tape.output().block(b)[at(k)]) / gaussian.std[k];
+                let lp = [0, 1, 2].map(|k| -0.5 * z(k) * z(k) - gaussian.log_std[k]);
+                match ratio {
+                    Ratio::Joint => data[1][lane] = lp.iter().sum(),
+                    Ratio::PerAction => (0..3).for_each(|k| data[1][at(k)] = lp[k]),
+                }
+            }
         }
+        let (sums, gradient) = case.evaluate(&params);
+        let advantage: f64 = case.data.iter().flat_map(|d| &d[2]).map(|a| (a - 0.1) * 1.7).sum();
+        assert!(sums.clipped == 0.0 && sums.kl.abs() < 1e-12 && (sums.policy + advantage).abs() < 1e-9, "{sums:?}");
+        gradient[..m].to_vec()
+    });
+    // a ratio for each action: the mean over the actions in place of the sum
+    for (joint, each) in gradients[0].iter().zip(&gradients[1]) {
+        assert!((joint - 3.0 * each).abs() < 1e-9 * (1.0 + joint.abs()), "{joint} {each}");
     }
-    let (sums, _) = case.evaluate(&params);
-    let mean_advantage: f64 = case.data.iter().flat_map(|d| &d[2]).map(|a| (a - 0.1) * 1.7).sum();
-    assert!(sums.clipped == 0.0 && sums.kl.abs() < 1e-12 && (sums.policy + mean_advantage).abs() < 1e-9, "{sums:?}");
 }

@@ -7,7 +7,7 @@ use marathon_learn::buffer::Blocks;
 use marathon_learn::gaussian::Gaussian;
 use marathon_learn::loss::{Loss, LossSums, Objective, Samples};
 use marathon_learn::mlp::Mlp;
-use marathon_learn::{Activation, BLOCK};
+use marathon_learn::{Activation, BLOCK, Ratio};
 use marathon_physics::lanes::{F32x4, Real};
 #[cfg(target_arch = "x86_64")]
 use marathon_physics::lanes::{F32x8, F32x16};
@@ -54,7 +54,7 @@ struct Case {
 }
 
 impl Case {
-    fn new(activation: Activation, value_clip: Option<f64>) -> Self {
+    fn new(activation: Activation, ratio: Ratio, value_clip: Option<f64>) -> Self {
         let (actor, critic) = (Mlp::new(&[31, 64, 48, ACT], activation), Mlp::new(&[31, 40, 1], activation));
         let mut input = actor.input();
         for b in 0..BLOCKS {
@@ -62,13 +62,16 @@ impl Case {
         }
         let row =
             |n: usize, salt: u64, scale: f32| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<_>>();
+        let rows = if ratio == Ratio::Joint { 1 } else { ACT };
         let data = (0..BLOCKS as u64).map(|b| {
-            let log_prob = row(1, 30 + b, 1.0).iter().map(|x| x - 1.0).collect();
-            [row(ACT, 20 + b, 1.0), log_prob, row(1, 50 + b, 2.0), row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
+            let log_prob = row(rows, 30 + b, 1.0).iter().map(|x| x - 1.0 / rows as f32).collect();
+            // a mean that is far from zero, or the mean objective would be the small difference of large sums
+            let advantage = row(1, 50 + b, 2.0).iter().map(|x| x + 0.5).collect();
+            [row(ACT, 20 + b, 1.0), log_prob, advantage, row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
         });
         let scaled = |net: &Mlp, salt| noise(net.len(), salt).iter().map(|x| x * 0.25).collect();
         let objective =
-            Objective { clip: 0.2, value_clip, entropy_coef: 0.01, advantage_mean: 0.0, advantage_scale: 1.0 };
+            Objective { ratio, clip: 0.2, value_clip, entropy_coef: 0.01, advantage_mean: 0.0, advantage_scale: 1.0 };
         Self {
             params: [scaled(&actor, 1), scaled(&critic, 2)],
             log_std: noise(ACT, 3).iter().map(|x| x * 0.5 - 0.3).collect(),
@@ -94,14 +97,15 @@ impl Case {
             "activation": self.actor.activation().name(),
             "sizes": {"actor": self.actor.sizes(), "critic": self.critic.sizes()},
             "params": {"actor": self.params[0], "critic": self.params[1]},
-            "log_std": self.log_std, "obs": obs, "action": matrix(0), "log_prob": list(1), "advantage": list(2),
+            "log_std": self.log_std, "obs": obs, "action": matrix(0), "log_prob": matrix(1), "advantage": list(2),
             "value": list(3), "target": list(4), "clip": self.objective.clip, "value_clip": self.objective.value_clip,
-            "entropy_coef": self.objective.entropy_coef,
+            "entropy_coef": self.objective.entropy_coef, "per_action": self.objective.ratio == Ratio::PerAction,
         })
     }
 
     fn check<T: Real<Scalar = f32>>(&self, want: &Value) {
-        let place = format!("{} {} {:?}", T::ISA, self.actor.activation().name(), self.objective.value_clip);
+        let Objective { ratio, value_clip, .. } = self.objective;
+        let place = format!("{} {} {ratio:?} {value_clip:?}", T::ISA, self.actor.activation().name());
         let (mut actor, mut critic) = (self.actor.tape(), self.critic.tape());
         self.actor.forward_on::<T>(&self.params[0], &self.input, &mut actor, BLOCKS);
         self.critic.forward_on::<T>(&self.params[1], &self.input, &mut critic, BLOCKS);
@@ -168,8 +172,9 @@ fn agree(got: &Value, want: &Value, what: &str) {
 
 #[test]
 fn networks_losses_and_gradients_agree_with_pytorch() {
+    let losses = [(Ratio::Joint, None), (Ratio::Joint, Some(0.3)), (Ratio::PerAction, Some(0.3))];
     let cases: Vec<Case> =
-        Activation::ALL.into_iter().flat_map(|a| [None, Some(0.3)].map(|clip| Case::new(a, clip))).collect();
+        Activation::ALL.into_iter().flat_map(|a| losses.map(|(ratio, clip)| Case::new(a, ratio, clip))).collect();
     let request: Vec<Value> = cases.iter().map(Case::request).collect();
     let answers = ask_torch(&request.into());
     for (case, want) in cases.iter().zip(answers.as_array().expect("a list")) {

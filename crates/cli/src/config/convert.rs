@@ -5,7 +5,7 @@ use super::behavior::{Behavior, Notes};
 use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
-use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, PpoConfig, Sac, Schedule};
+use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, Init, PpoConfig, Ratio, Sac, Schedule};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads, with any algorithm.
-const COMMON: [&str; 27] = [
+const COMMON: [&str; 31] = [
     "agents",
     "horizon",
     "rollouts",
@@ -33,7 +33,11 @@ const COMMON: [&str; 27] = [
     "final_target_kl",
     "lr_range",
     "max_grad_norm",
+    "adam_epsilon",
     "value_clip",
+    "ratio",
+    "initialization",
+    "action_clip",
     "final_clip",
     "final_entropy_coef",
     "init_log_std",
@@ -111,6 +115,10 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
         actor_hidden,
         activation: activation(&marathon, base.activation)?,
+        initialization: match marathon.get("initialization") {
+            Some(entry) => [Init::Orthogonal, Init::MlAgents][entry.word(&Init::NAMES)?],
+            None => base.initialization,
+        },
 
         lr: settings.learning_rate,
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
@@ -118,6 +126,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         target_kl: marathon.number("target_kl", Range::Positive, base.target_kl)?,
         final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, base.target_kl)?,
         lr_range: lr_range(&marathon, base.lr_range)?,
+        adam_epsilon: marathon.number("adam_epsilon", Range::Positive, base.adam_epsilon)?,
         max_grad_norm: marathon.number("max_grad_norm", Range::Positive, base.max_grad_norm)?,
 
         gamma: settings.gamma,
@@ -125,6 +134,10 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         reward_strength: if signals.is_empty() { 1.0 } else { strength },
         signals,
         gae_lambda: settings.lambd,
+        ratio: match marathon.get("ratio") {
+            Some(entry) => [Ratio::Joint, Ratio::PerAction][entry.word(&Ratio::NAMES)?],
+            None => base.ratio,
+        },
         clip: settings.epsilon,
         final_clip: match is_ppo {
             true => end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
@@ -133,7 +146,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         value_clip: match marathon.get("value_clip") {
             Some(entry) if entry.node.is_null() => None,
             Some(entry) => Some(entry.number(Range::Positive)?),
-            None => is_ppo.then_some(settings.epsilon),
+            None => base.value_clip,
         },
         entropy_coef: settings.beta,
         final_entropy_coef: end(
@@ -144,6 +157,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
             last_beta,
         )?,
 
+        action_clip: marathon.number("action_clip", Range::Positive, base.action_clip)?,
         init_log_std: marathon.number("init_log_std", Range::Finite, base.init_log_std)?,
         min_std: marathon.number("min_std", Range::Positive, min_std)?,
         final_min_std: end(&marathon, "final_min_std", Range::Positive, Decay::Constant, min_std)?,

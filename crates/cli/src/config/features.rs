@@ -5,7 +5,7 @@ use super::behavior::Notes;
 use super::current::NETWORK;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
-use marathon_learn::{Activation, Algorithm, PpoConfig, Schedule, Signal, SignalKind};
+use marathon_learn::{Activation, Algorithm, Init, PpoConfig, Ratio, Schedule, Signal, SignalKind};
 
 /// Features that a file asks for and lets go again, under `marathon: without:`.
 pub struct Without<'a> {
@@ -111,15 +111,22 @@ fn ml_agents() -> PpoConfig {
         lr: 3e-4,
         schedule: Schedule::Linear,
         entropy_coef: 5e-3,
+        ratio: Ratio::PerAction,
         normalize_observations: false,
         // normalized observations lie within this
         observation_clip: 5.0,
-        // a sample is clipped to [-3, 3] and divided by 3, and its deviation starts at 1
-        init_log_std: (1.0 / 3.0_f64).ln(),
+        initialization: Init::MlAgents,
+        action_clip: 3.0,
+        init_log_std: 0.0,
         // neither the deviation nor the gradient is bounded: far out
         min_std: 1e-3,
         max_std: 1e3,
         max_grad_norm: 1e9,
+        // PyTorch's
+        adam_epsilon: 1e-8,
+        // ML-Agents means to bound the value's change by epsilon, but reads the returns where it stored the old values
+        // (`RewardSignalUtil.value_estimates_key` of 1.1.0): nothing is bounded
+        value_clip: None,
         scale_rewards: false,
         ..PpoConfig::default()
     }

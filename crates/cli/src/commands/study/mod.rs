@@ -73,6 +73,17 @@ pub struct Options {
     /// Folder that the three files go to.
     #[arg(long, value_name = "DIR", default_value = "docs/studies")]
     pub out: PathBuf,
+    /// Folder that keeps runs of other people's trainers: one that is found there is not made again, so that a study that
+    /// was interrupted goes on.
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
+}
+
+impl Options {
+    /// A folder in that one, for the runs with one configuration.
+    fn keep_for(&self, configuration: &str) -> Option<PathBuf> {
+        self.keep.as_ref().map(|folder| folder.join(configuration))
+    }
 }
 
 /// Other people's trainers.

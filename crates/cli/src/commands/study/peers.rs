@@ -5,9 +5,9 @@ use crate::error::CliError;
 use crate::python::{self, VARIABLE};
 use crate::{policy_file, text};
 use marathon_envs::registry;
-use marathon_learn::{EvalOptions, Evaluation, PpoConfig, Schedule, evaluate};
+use marathon_learn::{EvalOptions, Evaluation, PpoConfig, Schedule, evaluate, write_atomic};
 use marathon_physics::lanes::Isa;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -69,57 +69,102 @@ impl Sb3 {
     }
 }
 
+/// A finished training, as a file keeps it.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    job: Value,
+    run: Run,
+    versions: String,
+}
+
+/// A training of other people's, which takes minutes: taken from a folder where the same one is kept, else made and put there.
+fn once(
+    keep: Option<&Path>,
+    (name, seed): (&str, u64),
+    job: &Value,
+    make: impl FnOnce() -> Result<(Run, String), CliError>,
+) -> Result<(Run, String), CliError> {
+    let Some(folder) = keep else { return make() };
+    let agent = job["agent"].as_str().unwrap_or_default();
+    let path = folder.join(format!("{name}-{agent}-{seed}.json"));
+    if let Ok(bytes) = std::fs::read(&path) {
+        let kept: Kept = serde_json::from_slice(&bytes)
+            .map_err(|e| CliError::file(&path, "kept run", e, "a run that a study has put there"))?;
+        if kept.job == *job {
+            kept.run.note(&format!("{name} seed {seed}, kept"));
+            return Ok((kept.run, kept.versions));
+        }
+    }
+    let (run, versions) = make()?;
+    let kept = Kept { job: job.clone(), run, versions };
+    std::fs::create_dir_all(folder).map_err(CliError::io(folder, "create folder"))?;
+    let bytes = serde_json::to_vec(&kept).map_err(|e| CliError::file(&path, "kept run", e, "numbers and words"))?;
+    write_atomic(&path, &bytes)?;
+    Ok((kept.run, kept.versions))
+}
+
 /// Trains with Stable-Baselines3, sixteen agents, on a device of PyTorch's (`cpu`, `cuda`). Deviations of the actions start
-/// at `exp(log_std)`. Returns the versions too.
+/// at `exp(log_std)`. A training that `keep` has is not made again. Returns the versions too.
 ///
 /// # Errors
 /// If the packages are missing, or training fails.
 pub fn sb3(
     (agent, algorithm): (&str, Sb3),
-    device: &str,
-    log_std: f64,
+    (device, log_std): (&str, f64),
     (seed, steps): (u64, u64),
+    keep: Option<&Path>,
 ) -> Result<(Run, String), CliError> {
     let job = json!({
         "trainer": "sb3", "agent": agent, "algorithm": algorithm.name(), "settings": algorithm.settings(),
         "device": device, "log_std": log_std, "agents": AGENTS, "seed": seed, "steps": steps, "threads": 1,
         "episodes": EPISODES,
     });
-    let advice = "pip install stable-baselines3 torch marathon-envs";
-    let answer = trained(ask(&python::find(), VARIABLE, advice, &job)?)?;
-    let eval = Evaluation {
-        episodes: EPISODES as u64,
-        return_mean: answer.return_mean,
-        length_mean: answer.length,
-        speed_mean: answer.speed,
-        ..Default::default()
-    };
-    Ok((finish(&answer, eval, (&format!("Stable-Baselines3's {}", algorithm.name()), seed)), answer.versions))
+    once(keep, (&format!("sb3-{}-{device}", algorithm.name()), seed), &job, || {
+        let advice = "pip install stable-baselines3 torch marathon-envs";
+        let answer = trained(ask(&python::find(), VARIABLE, advice, &job)?)?;
+        let eval = Evaluation {
+            episodes: EPISODES as u64,
+            return_mean: answer.return_mean,
+            length_mean: answer.length,
+            speed_mean: answer.speed,
+            ..Default::default()
+        };
+        Ok((finish(&answer, eval, (&format!("Stable-Baselines3's {}", algorithm.name()), seed)), answer.versions))
+    })
 }
 
 /// Trains with `mlagents-learn` and our player with the settings of a PPO configuration that came from a file of ML-Agents,
-/// and evaluates its policy as our own. Returns the versions too.
+/// and evaluates its policy as our own. A training that `keep` has is not made again. Returns the versions too.
 ///
 /// # Errors
 /// If ML-Agents or the player is missing, or training fails.
-pub fn mlagents(agent: &str, config: &PpoConfig, time_horizon: u64) -> Result<(Run, String), CliError> {
+pub fn mlagents(
+    agent: &str,
+    config: &PpoConfig,
+    time_horizon: u64,
+    keep: Option<&Path>,
+) -> Result<(Run, String), CliError> {
     let factory = registry::factory(agent, Isa::best())?;
     let id = &factory.spec().id;
-    let folder = std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.seed));
-    std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
-    let job = json!({
+    let mut job = json!({
         "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.agents,
-        "seed": config.seed, "threads": 1, "player": player()?, "folder": folder,
+        "seed": config.seed, "threads": 1,
     });
-    let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
-    let python = named.map_or_else(|| ".venv-mlagents/bin/python".into(), PathBuf::from);
-    let answer = trained(ask(&python, MLAGENTS_VARIABLE, "tests/mlagents/run.sh, which makes .venv-mlagents", &job)?)?;
-    let path = answer.policy.as_deref().unwrap_or(&folder);
-    let policy = policy_file::read(path, Some(factory.spec()))?;
-    let options = EvalOptions { episodes: EPISODES, threads: 1, ..Default::default() };
-    let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
-    let _ = std::fs::remove_dir_all(&folder);
-    Ok((finish(&answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
+    once(keep, ("mlagents", config.seed), &job.clone(), || {
+        let folder = std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.seed));
+        std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
+        (job["player"], job["folder"]) = (json!(player()?), json!(folder));
+        let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
+        let python = named.map_or_else(|| ".venv-mlagents/bin/python".into(), PathBuf::from);
+        let advice = "tests/mlagents/run.sh, which makes .venv-mlagents";
+        let answer = trained(ask(&python, MLAGENTS_VARIABLE, advice, &job)?)?;
+        let path = answer.policy.as_deref().unwrap_or(&folder);
+        let policy = policy_file::read(path, Some(factory.spec()))?;
+        let options = EvalOptions { episodes: EPISODES, threads: 1, ..Default::default() };
+        let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
+        let _ = std::fs::remove_dir_all(&folder);
+        Ok((finish(&answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
+    })
 }
 
 /// Name of the GPU that PyTorch can use, if there is one.
@@ -223,5 +268,26 @@ mod tests {
         ppo.agents = read.agents;
         ppo.horizon = read.horizon;
         assert_eq!(read, ppo);
+    }
+    #[test]
+    fn a_kept_training_is_not_made_again_unless_another_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut made = 0;
+        let mut train = |steps: u64| {
+            let run =
+                Run { curve: vec![(1.0, 2.0)], steps, wall: 1.0, cpu: 1.0, rate: 1.0, eval: Evaluation::default() };
+            let job = json!({ "agent": "Hopper-v0", "steps": steps });
+            let make = || {
+                made += 1;
+                Ok((run, "1.0".to_string()))
+            };
+            once(Some(folder.path()), ("peer", 1), &job, make).unwrap().0.steps
+        };
+        assert_eq!([train(10), train(10), train(20), train(20)], [10, 10, 20, 20]);
+        assert_eq!(made, 2);
+        std::fs::write(folder.path().join("peer-Hopper-v0-1.json"), "{").unwrap();
+        let job = json!({ "agent": "Hopper-v0" });
+        let error = once(Some(folder.path()), ("peer", 1), &job, || unreachable!()).err().unwrap().to_string();
+        assert!(error.contains("peer-Hopper-v0-1.json"), "{error}");
     }
 }

@@ -11,7 +11,7 @@ use marathon_learn::{
     Control, EvalOptions, Evaluation, IterationStats, Players, PpoConfig, Snapshot, evaluate, train_with, write_atomic,
 };
 use marathon_physics::lanes::Isa;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A table with a picture.
 #[derive(Serialize)]
@@ -39,6 +39,7 @@ pub struct Record {
 pub const EPISODES: usize = 100;
 
 /// One training.
+#[derive(Serialize, Deserialize)]
 pub struct Run {
     /// Steps and mean returns of the episodes on the way.
     pub curve: Vec<(f64, f64)>,

@@ -44,7 +44,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         let mut of_peers = Vec::new();
         for seed in 1..=peers.peer_seeds {
             config.seed = seed;
-            let (run, version) = peers::mlagents(agent, &config, TIME_HORIZON)?;
+            let (run, version) = peers::mlagents(agent, &config, TIME_HORIZON, options.keep.as_deref())?;
             of_peers.push(run.rate);
             versions = vec![version];
         }

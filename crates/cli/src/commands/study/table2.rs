@@ -30,7 +30,8 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         })?;
         let mut theirs = |device| {
             each_seed(options.seeds, |seed| {
-                let (run, version) = peers::sb3((AGENT, algorithm), device, 0.0, (seed, options.steps))?;
+                let (run, version) =
+                    peers::sb3((AGENT, algorithm), (device, 0.0), (seed, options.steps), options.keep.as_deref())?;
                 versions = vec![version];
                 Ok(run)
             })

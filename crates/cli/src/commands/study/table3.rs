@@ -55,6 +55,7 @@ fn cases() -> Result<Vec<Case>, CliError> {
         ("PPO2, deviation 0.5", "", quieter(ppo2())),
         ("A2C, deviation 0.5", "", quieter(PpoConfig::a2c())),
         ("ACKTR, deviation 0.5", "", quieter(PpoConfig::acktr())),
+        ("A2C, deviation 0.5, rate 2e-3", "", PpoConfig { lr: 2e-3, value_lr: 2e-3, ..quieter(PpoConfig::a2c()) }),
         ("PPO, Marathon's own settings", "", config::default_for(AGENT).ppo),
     ])
 }
@@ -96,14 +97,16 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         };
         let mut config = supplement_c()?;
         config.total_steps = options.steps;
+        let keep = options.keep_for("supplement-c");
         let runs = each_seed(peers.peer_seeds, |seed| {
             config.seed = seed;
-            Ok(note(peers::mlagents(AGENT, &config, TIME_HORIZON)?))
+            Ok(note(peers::mlagents(AGENT, &config, TIME_HORIZON, keep.as_deref())?))
         })?;
         add("ML-Agents' own PPO (supplement C)", "418 s, 455", &runs);
+        let keep = options.keep.as_deref();
         for (algorithm, paper) in [(Sb3::Ppo, "475 s, 700"), (Sb3::A2c, "291 s, none")] {
             let runs = each_seed(peers.peer_seeds, |seed| {
-                Ok(note(peers::sb3((AGENT, algorithm), "cpu", 0.0, (seed, options.steps))?))
+                Ok(note(peers::sb3((AGENT, algorithm), ("cpu", 0.0), (seed, options.steps), keep)?))
             })?;
             add(&format!("Stable-Baselines3's {}, settings of Baselines", algorithm.name()), paper, &runs);
         }
@@ -117,8 +120,9 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
                 that return at no speed stands still; how to get from there to hopping, and in how many steps, is in \
                 [Learning](../learning.md#the-floor-under-the-standard-deviation). The settings of Baselines start with a \
                 deviation of 1, with which a third of all actions is clipped and motors at their limits cost more than \
-                staying up brings; the rows with deviation 0.5 differ in nothing else. The returns of the paper's own runs \
-                are of another physics and cannot be compared number by number."
+                staying up brings; ML-Agents starts with a third. The rows with deviation 0.5 differ in nothing else, but \
+                for one with the rate that A2C needs. The returns of the paper's own runs are of another physics and cannot \
+                be compared number by number."
             .into(),
         columns: vec![
             "algorithm and settings",
