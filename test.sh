@@ -27,5 +27,11 @@ cargo fmt --all --check
 cargo clippy --release "${crates[@]}" --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --release "${crates[@]}" --no-deps --quiet
 cargo test --release "${crates[@]}"
+if [ -z "${MARATHON_NO_GAME:-}" ]; then
+  # a workspace of its own, see its Cargo.toml
+  props=crates/game/examples/avian_props/Cargo.toml
+  cargo fmt --manifest-path "$props" --check
+  cargo test --release --no-default-features --manifest-path "$props" --target-dir "${CARGO_TARGET_DIR:-target}"
+fi
 python/tests/run.sh
 tests/mlagents/run.sh

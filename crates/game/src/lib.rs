@@ -29,6 +29,9 @@
 //! The simulation is that of `marathon train` and `marathon eval`: the same seed gives the same bits here and there,
 //! whatever the frame rate.
 //!
+//! Ragdolls and the bodies of another physics engine can touch: the example `avian_props` has a hopper run into a wall of
+//! avian's boxes.
+//!
 //! Without the feature `render` nothing draws and no renderer is compiled: what a server needs. With it (the default),
 //! `look` has plugins that make ragdolls visible, and `marathon-game` is an app around them.
 
