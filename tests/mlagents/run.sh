@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Tests `marathon-player` with the unmodified ML-Agents 1.1.0 of PyPI. Part of ./test.sh. Makes .venv-mlagents for it, unless
-# MARATHON_MLAGENTS_PYTHON names a Python that has it; needs Python 3.11 with venv, gcc and readelf. Arguments go to pytest.
+# Tests `marathon-player` and the game's door with the unmodified ML-Agents 1.1.0 of PyPI. Part of ./test.sh. Makes
+# .venv-mlagents for it, unless MARATHON_MLAGENTS_PYTHON names a Python that has it; needs Python 3.11 with venv, gcc and
+# readelf. MARATHON_NO_GAME=1 leaves the game out. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python="${MARATHON_MLAGENTS_PYTHON:-$PWD/.venv-mlagents/bin/python}"
@@ -17,8 +18,13 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   "$python" tests/oracle/install_torch.py torch==2.1.2
   touch .venv-mlagents/complete
 fi
+targets=(--bin marathon-player --bin marathon)
+if [ -z "${MARATHON_NO_GAME:-}" ]; then
+  # a test among the targets: Bevy has the features that it has in `cargo test`, and is not compiled again
+  targets+=(--bin marathon-game --test a_window_under_xvfb)
+fi
 # `--workspace` keeps the features of dependencies, and with them what is built already
-cargo build --release --workspace --bin marathon-player --bin marathon
+cargo build --release --workspace "${targets[@]}"
 bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
-export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon"
+export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon" MARATHON_GAME="$bin/marathon-game"
 exec "$python" -m pytest --quiet -c tests/mlagents/pytest.ini tests/mlagents "$@"

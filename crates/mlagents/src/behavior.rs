@@ -5,6 +5,8 @@ use crate::error::PlayerError;
 use crate::parameters::{Names, Parameters};
 use crate::wire::{ActionSpec, AgentActionList, AgentInfo, BrainParameters, FloatData, Observation};
 use marathon_envs::{Autoreset, Options, Spec, Step, VecEnv, VecEnvOptions, registry};
+use marathon_physics::Model;
+use std::sync::Arc;
 
 /// What a [`Behavior`] is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +56,7 @@ pub struct Behavior {
     /// What the environment was made with.
     made: VecEnvOptions,
     names: Names,
+    model: Arc<Model>,
     out: Step,
     actions: Vec<f32>,
     ended: Vec<bool>,
@@ -86,7 +89,8 @@ impl Behavior {
         };
         let env = VecEnv::new(&options.env, &made)?;
         let spec = env.spec().clone();
-        let names = Names::new(&registry::agent(&spec.id)?.model()?, &spec.action_names, &spec.options);
+        let model = Arc::new(registry::agent(&spec.id)?.model()?);
+        let names = Names::new(&model, &spec.action_names, &spec.options);
         let n = env.agents();
         Ok(Behavior {
             name: format!("{}?team=0", options.name.as_ref().unwrap_or(&spec.id)),
@@ -103,6 +107,7 @@ impl Behavior {
             env,
             made,
             names,
+            model,
         })
     }
 
@@ -114,6 +119,11 @@ impl Behavior {
     /// Facts of the task.
     pub fn spec(&self) -> &Spec {
         &self.spec
+    }
+
+    /// The compiled model of an agent.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
     }
 
     /// The agents, to be looked at.

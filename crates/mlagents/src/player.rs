@@ -130,7 +130,7 @@ impl Player {
         &self.setup
     }
 
-    /// The behaviors, whose agents may be looked at between two turns.
+    /// The behaviors, whose agents may be looked at between two turns, and within one after [`Player::act`].
     pub fn behaviors(&self) -> &[Behavior] {
         &self.behaviors
     }
@@ -140,11 +140,24 @@ impl Player {
         self.engine
     }
 
-    /// Does what the trainer said, tells it what came of that, and waits for its answer.
+    /// Does what the trainer said, tells it what came of that, and waits for what it says next: [`Player::act`] and
+    /// [`Player::answer`].
     ///
     /// # Errors
     /// If the trainer is gone or says something that makes no sense.
     pub fn advance(&mut self) -> Result<Turn, PlayerError> {
+        let turn = self.act()?;
+        if turn != Turn::Closed {
+            self.answer()?;
+        }
+        Ok(turn)
+    }
+
+    /// Does what the trainer said, which waits for the answer: the moment to look at the agents.
+    ///
+    /// # Errors
+    /// If what it said makes no sense.
+    pub fn act(&mut self) -> Result<Turn, PlayerError> {
         let Some(order) = self.order.take() else { return Ok(Turn::Closed) };
         let changed = self.listen(&order.side_channel);
         let turn = match order.command {
@@ -175,10 +188,18 @@ impl Player {
                 other => other?,
             }
         }
+        Ok(turn)
+    }
+
+    /// Tells the trainer what came of [`Player::act`], and waits for what it says next.
+    ///
+    /// # Errors
+    /// If the trainer is gone.
+    pub fn answer(&mut self) -> Result<(), PlayerError> {
         self.report();
         self.order = self.trainer.exchange(&self.message)?;
         self.begun = true;
-        Ok(turn)
+        Ok(())
     }
 
     /// Goes on until the trainer closes.

@@ -12,7 +12,6 @@ use crate::simulate::Seat;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use marathon_mlagents::EngineSettings;
-use marathon_render::Scene;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -76,8 +75,7 @@ impl Feed {
 pub fn set_stage(mut commands: Commands, feed: Option<ResMut<Feed>>, mut cameras: Query<&mut FollowCamera>) {
     let Some(mut feed) = feed.filter(|f| !f.staged) else { return };
     feed.staged = true;
-    let spacing = Scene::new(&feed.kind.model).spacing() as f32;
-    let places = (0..feed.agents).map(|i| place(i, spacing, Ground::Level));
+    let places = (0..feed.agents).map(|i| place(i, feed.kind.spacing(), Ground::Level));
     puppets::stage(&mut commands, &feed.kind, places, &mut cameras);
     info!("on stage: {} from outside", feed.agents);
 }

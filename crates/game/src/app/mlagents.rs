@@ -4,7 +4,6 @@ use crate::app::error::GameError;
 use crate::app::feed::{Feed, Shared, Sight, board};
 use crate::app::puppets::Kind;
 use crate::app::show::Show;
-use marathon_envs::registry;
 use marathon_mlagents::{Behavior, BehaviorOptions, Log, Player, PlayerOptions, Turn};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -22,7 +21,7 @@ pub fn serve(show: &Show, port: u16, threads: usize) -> Result<Feed, GameError> 
     let mut player = Player::connect(&options, Log::to_stderr())?;
     let behavior = &player.behaviors()[0];
     let spec = Arc::new(behavior.spec().clone());
-    let kind = Kind { model: Arc::new(registry::agent(&spec.id)?.model()?), dt: spec.dt, spec: Some(spec) };
+    let kind = Kind::new(behavior.model().clone(), Some(spec.clone()), spec.dt);
     let feed = Feed::new(kind, behavior.env().agents().min(SHOWN));
     let (shared, agents) = (feed.shared.clone(), feed.agents);
     let talk = move || {
@@ -39,7 +38,7 @@ fn talk(player: &mut Player, shared: &Shared, agents: usize) -> Result<(), marat
     let mut sights = vec![Sight::default(); agents];
     let mut next = Instant::now();
     loop {
-        let turn = player.advance()?;
+        let turn = player.act()?;
         let engine = player.engine();
         let behavior = &player.behaviors()[0];
         match turn {
@@ -60,8 +59,11 @@ fn talk(player: &mut Player, shared: &Shared, agents: usize) -> Result<(), marat
             board.taken = false;
         }
         drop(board);
+        let dt = behavior.spec().dt;
+        // the trainer may take long to answer: what it has led to is to be seen meanwhile
+        player.answer()?;
         if let Some(scale) = engine.time_scale.filter(|scale| *scale > 0.0 && scale.is_finite()) {
-            next += Duration::from_secs_f64((behavior.spec().dt / f64::from(scale)).min(1.0));
+            next += Duration::from_secs_f64((dt / f64::from(scale)).min(1.0));
             let now = Instant::now();
             match next.checked_duration_since(now) {
                 Some(early) => std::thread::sleep(early),

@@ -20,6 +20,21 @@ pub struct Kind {
     pub spec: Option<Arc<Spec>>,
     /// Seconds between two poses.
     pub dt: f64,
+    /// Radius about it and distance between two of it, m.
+    size: [f32; 2],
+}
+
+impl Kind {
+    /// Puppets of a body.
+    pub fn new(model: Arc<Model>, spec: Option<Arc<Spec>>, dt: f64) -> Self {
+        let scene = Scene::new(&model);
+        Kind { size: [scene.radius() as f32, scene.spacing() as f32], model, spec, dt }
+    }
+
+    /// Distance between two that stand side by side, m.
+    pub fn spacing(&self) -> f32 {
+        self.size[1]
+    }
 }
 
 /// Puts puppets at their places.
@@ -40,7 +55,7 @@ pub fn stage(
         }
     }
     for mut camera in cameras {
-        camera.goal[2] = 3.1 * Scene::new(&kind.model).radius() as f32 + 0.6;
+        camera.goal[2] = 3.1 * kind.size[0] + 0.6;
         camera.jump();
     }
 }

@@ -15,7 +15,7 @@ use crate::stage;
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{Align2, Area, Id, Slider};
-use marathon_envs::{Spec, registry};
+use marathon_envs::registry;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -185,8 +185,7 @@ pub struct Recorder {
 #[derive(Resource)]
 pub struct Playback {
     recording: Arc<Recording>,
-    model: Arc<Model>,
-    spec: Arc<Spec>,
+    kind: Kind,
     /// Time of the picture, s.
     pub at: f64,
     staged: bool,
@@ -200,7 +199,8 @@ impl Playback {
     pub fn new(recording: Recording) -> Result<Self, GameError> {
         let model = Arc::new(recording.ground.agent(&recording.agent)?.model()?);
         let spec = Arc::new(registry::factory(&recording.agent, Isa::best())?.spec().clone());
-        Ok(Playback { recording: Arc::new(recording), model, spec, at: 0.0, staged: false })
+        let kind = Kind::new(model, Some(spec), recording.dt);
+        Ok(Playback { recording: Arc::new(recording), kind, at: 0.0, staged: false })
     }
 }
 
@@ -284,10 +284,8 @@ pub fn record(
 pub fn set_stage(mut commands: Commands, playback: Option<ResMut<Playback>>, mut cameras: Query<&mut FollowCamera>) {
     let Some(mut playback) = playback.filter(|p| !p.staged) else { return };
     playback.staged = true;
-    let recording = &playback.recording;
-    let kind = Kind { model: playback.model.clone(), spec: Some(playback.spec.clone()), dt: recording.dt };
-    let places = recording.places.as_chunks::<3>().0.iter().map(|place| Vec3::from_array(*place));
-    puppets::stage(&mut commands, &kind, places, &mut cameras);
+    let places = playback.recording.places.as_chunks::<3>().0.iter().map(|place| Vec3::from_array(*place));
+    puppets::stage(&mut commands, &playback.kind, places, &mut cameras);
 }
 
 /// Moves the recorded characters.

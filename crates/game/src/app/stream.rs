@@ -31,7 +31,7 @@ pub fn watch(mut input: impl BufRead + Send + 'static, output: impl Write + Send
     let kind = match about["agent"].as_str() {
         Some(name) => {
             let spec = Arc::new(registry::factory(name, Isa::best())?.spec().clone());
-            Kind { model: Arc::new(registry::agent(name)?.model()?), dt: spec.dt, spec: Some(spec) }
+            Kind::new(Arc::new(registry::agent(name)?.model()?), Some(spec.clone()), spec.dt)
         }
         None => {
             let model = match (about["model"].as_str(), about["file"].as_str()) {
@@ -41,7 +41,7 @@ pub fn watch(mut input: impl BufRead + Send + 'static, output: impl Write + Send
             };
             let dt = about["dt"].as_f64().filter(|dt| *dt > 0.0 && dt.is_finite());
             let dt = dt.ok_or_else(|| bad("'dt' is missing, expected the seconds between two frames".into()))?;
-            Kind { model: Arc::new(model.map_err(Box::new)?), spec: None, dt }
+            Kind::new(Arc::new(model.map_err(Box::new)?), None, dt)
         }
     };
     let feed = Feed::new(kind, 1);
