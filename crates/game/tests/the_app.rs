@@ -11,9 +11,12 @@ use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use clap::Parser;
 use marathon_game::app::{
-    Actor, Args, Bindings, Deed, Focus, GamePlugin, Lesson, Mode, Playback, Recorder, Recording, Show,
+    Actor, Args, Ball, Bindings, Deed, Focus, GamePlugin, Lesson, Mode, Playback, Recorder, Recording, Show,
 };
+use marathon_game::axes::to_game;
+use marathon_game::look::CameraMode;
 use marathon_game::prelude::*;
+use marathon_render::Scene;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -44,6 +47,8 @@ fn press(app: &mut App, deed: Deed) {
         "Space" => KeyCode::Space,
         "Tab" => KeyCode::Tab,
         "Up" => KeyCode::ArrowUp,
+        "Left" => KeyCode::ArrowLeft,
+        "Right" => KeyCode::ArrowRight,
         "N" => KeyCode::KeyN,
         "P" => KeyCode::KeyP,
         "B" => KeyCode::KeyB,
@@ -103,18 +108,77 @@ fn agents_take_turns_and_time_stops() {
 }
 
 #[test]
-fn pushes_and_balls_are_felt() {
-    for deed in [Deed::Push, Deed::Throw] {
-        let [mut alone, mut struck] = [app(&["hopper", "--mode", "push"]), app(&["hopper", "--mode", "push"])];
-        for app in [&mut alone, &mut struck] {
-            frames(app, 50);
+fn pushes_are_felt() {
+    let [mut alone, mut struck] = [app(&["hopper", "--mode", "push"]), app(&["hopper", "--mode", "push"])];
+    for app in [&mut alone, &mut struck] {
+        frames(app, 50);
+    }
+    press(&mut struck, Deed::Push);
+    frames(&mut alone, 2);
+    for app in [&mut alone, &mut struck] {
+        frames(app, 50);
+    }
+    assert_ne!(actors(&mut alone), actors(&mut struck));
+}
+
+/// Center of mass of the only character, m, and its mass, kg.
+fn center(app: &mut App) -> (Vec3, f32) {
+    let mut query = app.world_mut().query_filtered::<(&RagdollState, &Anatomy), With<Actor>>();
+    let (key, anatomy) = query.single(app.world()).expect("one character");
+    let state = app.world().resource::<Marathon>().state(key).expect("it is simulated");
+    let pose = Scene::pose_from_qpos(&anatomy.model, &state.qpos).expect("a sound state");
+    (to_game(pose.com), anatomy.model.bodies.iter().map(|body| body.mass as f32).sum())
+}
+
+/// Velocity of the only ball.
+fn ball(app: &mut App) -> Vec3 {
+    app.world_mut().query::<&Ball>().single(app.world()).expect("one ball").velocity()
+}
+
+#[test]
+fn a_thrown_ball_hits_from_any_distance_and_moves_whom_it_hits() {
+    // a hopper lives in a plane: what comes from the side only bounces off it
+    let cases = [
+        ("hopper", CameraMode::Chase, &[2.5_f32, 6.0, 14.0][..]),
+        ("humanoid", CameraMode::Side, &[4.0, 9.0]),
+        ("ant", CameraMode::Side, &[3.0, 12.0]),
+    ];
+    for (agent, camera, distances) in cases {
+        for distance in distances {
+            let case = format!("{agent} from {distance} m");
+            let [mut alone, mut struck] = [(); 2].map(|()| app(&[agent, "--mode", "push"]));
+            let mut cameras = struck.world_mut().query::<&mut FollowCamera>();
+            let mut follow = cameras.single_mut(struck.world_mut()).expect("one camera");
+            follow.set_mode(camera);
+            follow.goal[2] = *distance;
+            for app in [&mut alone, &mut struck] {
+                frames(app, 100);
+            }
+            press(&mut struck, Deed::Throw);
+            frames(&mut alone, 2);
+            assert_eq!(center(&mut alone), center(&mut struck), "{case}: nothing has happened yet");
+            // until it bounces off: its flight over the ground is straight before
+            let thrown = ball(&mut struck);
+            let flight = (distance / 11.0 / 0.02) as usize + 25;
+            let mut gone = Vec3::ZERO;
+            for _ in 0..flight {
+                frames(&mut alone, 1);
+                frames(&mut struck, 1);
+                gone = (ball(&mut struck) - thrown) * Vec3::new(1.0, 0.0, 1.0);
+                if gone.length() > 1.0 {
+                    break;
+                }
+            }
+            assert!(gone.length() > 1.0, "{case}: it has missed");
+            // the momentum that the ball has lost is what the character has got
+            let struck_with = -1.5 * gone;
+            frames(&mut alone, 10);
+            frames(&mut struck, 10);
+            let (before, mass) = center(&mut alone);
+            let shift = (center(&mut struck).0 - before).dot(struck_with.normalize());
+            let free = struck_with.length() / mass * 0.2;
+            assert!(shift > 0.2 * free && shift < 2.0 * free, "{case}: moved by {shift} m, {free} m if it were free");
         }
-        press(&mut struck, deed);
-        frames(&mut alone, 2);
-        for app in [&mut alone, &mut struck] {
-            frames(app, 50);
-        }
-        assert_ne!(actors(&mut alone), actors(&mut struck), "{deed:?}");
     }
 }
 
@@ -164,6 +228,14 @@ fn what_is_recorded_is_shown_again() -> Result<(), Box<dyn std::error::Error>> {
     app.world_mut().resource_mut::<Playback>().at = 0.1;
     frames(&mut app, 1);
     assert!(actors(&mut app)[1].1.distance < half, "scrubbed back");
+    press(&mut app, Deed::Pause);
+    for (deed, expected) in
+        [(Deed::Ahead, 0.6), (Deed::Ahead, 1.1), (Deed::Back, 0.6), (Deed::Back, 0.1), (Deed::Back, 0.0)]
+    {
+        press(&mut app, deed);
+        let at = app.world().resource::<Playback>().at;
+        assert!((at - expected).abs() < 0.1, "{deed:?}: {at} s, expected {expected}");
+    }
     Ok(())
 }
 

@@ -1,5 +1,6 @@
 //! The command line of `marathon-game`.
 
+use crate::app::cues::Cue;
 use crate::ground::Ground;
 use crate::look::{CameraMode, Quality};
 use clap::{Parser, ValueEnum};
@@ -15,6 +16,7 @@ Examples:
   marathon-game --mode testbed my-robot.xml      a slider per motor
   marathon-game ant --ground stairs              or hills, or boards
   marathon-game hopper --record hop.mp4          a film, without a window (needs ffmpeg)
+  marathon-game hopper --mode push --press 1.5:throw --record ball.mp4   the same with a ball thrown at it
   marathon-game --replay run.replay              what R recorded, with a time line
   marathon-game hopper --agents 16 --mlagents-port 5004   mlagents-learn trains, and one watches
 
@@ -58,6 +60,10 @@ pub struct Args {
     /// Show what comes through the standard input; the Python package does so for render_mode="human".
     #[arg(long, conflicts_with_all = ["mode", "policy", "replay", "record"])]
     pub watch_stream: bool,
+
+    /// Do at a time what a key does, such as 2.5:throw or 4:next-agent; may be given again.
+    #[arg(long, value_name = "S:DEED")]
+    pub press: Vec<Cue>,
 
     /// How much a frame may cost; [default: medium, and low where a processor draws the window].
     #[arg(long, value_enum)]

@@ -322,7 +322,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
         Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
         Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
         Mode::Outside => &[Deed::Menu, Deed::NextFocus, Deed::Camera, Deed::Hud],
-        Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Slower, Deed::Camera],
+        Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Back, Deed::Ahead, Deed::Slower, Deed::Camera],
     };
     Area::new(Id::new("keys")).anchor(Align2::CENTER_BOTTOM, [0.0, -10.0]).interactable(false).show(ctx, |ui| {
         Frame::new().fill(CARD).corner_radius(CornerRadius::same(6)).inner_margin(Margin::symmetric(10, 4)).show(

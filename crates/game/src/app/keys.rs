@@ -3,11 +3,12 @@
 use bevy::input::gamepad::{Gamepad, GamepadButton};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
+use clap::ValueEnum;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
 /// What a key can do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Deed {
     /// Open or close the menu.
     Menu,
@@ -45,6 +46,10 @@ pub enum Deed {
     Save,
     /// Begin or end a recording.
     Record,
+    /// Half a second back in a replay.
+    Back,
+    /// Half a second on in a replay.
+    Ahead,
     /// A picture of the screen.
     Picture,
     /// Leave.
@@ -54,7 +59,7 @@ pub enum Deed {
 /// A deed, its name on the screen, its key and its button.
 type Row = (Deed, &'static str, KeyCode, Option<GamepadButton>);
 
-const DEFAULTS: [Row; 20] = [
+const DEFAULTS: [Row; 22] = [
     (Deed::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
     (Deed::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
     (Deed::Step, "one step", KeyCode::Period, None),
@@ -73,6 +78,8 @@ const DEFAULTS: [Row; 20] = [
     (Deed::Learn, "learn live", KeyCode::KeyL, None),
     (Deed::Save, "save policy", KeyCode::KeyS, None),
     (Deed::Record, "record", KeyCode::KeyR, Some(GamepadButton::RightThumb)),
+    (Deed::Back, "back", KeyCode::ArrowLeft, Some(GamepadButton::DPadLeft)),
+    (Deed::Ahead, "ahead", KeyCode::ArrowRight, Some(GamepadButton::DPadRight)),
     (Deed::Picture, "picture", KeyCode::F12, None),
     (Deed::Quit, "quit", KeyCode::KeyQ, None),
 ];
@@ -248,6 +255,8 @@ fn button_name(button: GamepadButton) -> &'static str {
         GamepadButton::RightThumb => "R3",
         GamepadButton::DPadUp => "D-pad up",
         GamepadButton::DPadDown => "D-pad down",
+        GamepadButton::DPadLeft => "D-pad left",
+        GamepadButton::DPadRight => "D-pad right",
         _ => "?",
     }
 }

@@ -2,6 +2,7 @@
 
 mod args;
 mod control;
+mod cues;
 mod error;
 mod feed;
 mod film;
@@ -18,6 +19,7 @@ mod stream;
 mod weather;
 
 pub use args::{Args, CameraArg, GroundArg, Mode, QualityArg};
+pub use cues::{Cue, Cues};
 pub use error::GameError;
 pub use feed::{Board, Feed, Sight};
 pub use hud::Hud;
@@ -200,16 +202,18 @@ impl Plugin for GamePlugin {
         .insert_resource(Teaching { config: args.config.clone(), threads: args.threads, seed: args.seed })
         .insert_resource(Start(args.camera.into()))
         .insert_resource(Given { quality: args.quality.is_some(), size: args.size.is_some(), rate: args.max_fps > 0 })
+        .insert_resource(Cues::new(args.press.clone()))
         .init_resource::<Focus>()
         .init_resource::<show::Script>()
         .init_resource::<notes::Notes>()
         .init_resource::<menu::Menu>()
         .init_resource::<hud::Monitor>()
         .add_systems(Startup, open)
+        .add_systems(PreUpdate, cues::perform)
         .add_systems(
             Update,
             (
-                (control::time, control::stage, learn::obey, replay::obey, feed::obey).chain(),
+                (control::time, control::stage, learn::obey, replay::obey, replay::scrub, feed::obey).chain(),
                 (show::set_stage, replay::set_stage, feed::set_stage, learn::attend, learn::perform, learn::tell)
                     .chain(),
                 (show::reload, show::follow_focus, show::show_marks, control::look, notes::fade, hud::clock),

@@ -29,6 +29,8 @@ use std::time::Duration;
 const FORMAT: &str = "marathon-replay";
 /// Numbers per agent and frame besides the configuration: distance, speed, reward, return, and whether an episode begins.
 const NUMBERS: usize = 5;
+/// Seconds that the keys go back and ahead.
+const LEAP: f64 = 0.5;
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
 
@@ -313,6 +315,22 @@ pub fn play(
         episode.distance = f64::from(numbers[0]);
         (episode.speed, episode.reward, episode.total) = (numbers[1], numbers[2], f64::from(numbers[3]));
         episode.terms = recording.row(&recording.terms, now, actor.0).to_vec();
+    }
+}
+
+/// Goes back and ahead, no further than the ends.
+pub fn scrub(mut deeds: MessageReader<Do>, playback: Option<ResMut<Playback>>) {
+    let Some(mut playback) = playback else {
+        deeds.clear();
+        return;
+    };
+    for Do(deed) in deeds.read() {
+        let leap = match deed {
+            Deed::Back => -LEAP,
+            Deed::Ahead => LEAP,
+            _ => continue,
+        };
+        playback.at = (playback.at + leap).clamp(0.0, playback.recording.seconds());
     }
 }
 

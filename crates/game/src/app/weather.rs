@@ -17,12 +17,14 @@ use marathon_physics::{Model, Variation};
 const PUSH_SECONDS: f64 = 0.1;
 /// Radius of a ball, m.
 const BALL_RADIUS: f32 = 0.11;
-/// Speed at which it is thrown, m/s.
+/// Speed at which it is thrown, relative to whom it is thrown at and without what gravity will take, m/s.
 const BALL_SPEED: f32 = 11.0;
 /// Seconds that it stays.
 const BALL_LIFE: f32 = 6.0;
 /// Part of the speed that is left after a bounce.
 const BOUNCE: f32 = 0.55;
+/// What balls fall with, m/s^2.
+const GRAVITY: f32 = 9.81;
 /// Steps of a ball per tick: at its speed it must not pass through an arm.
 const BALL_STEPS: u32 = 8;
 
@@ -55,6 +57,13 @@ pub struct Ball {
     velocity: Vec3,
     mass: f32,
     left: f32,
+}
+
+impl Ball {
+    /// Its velocity, m/s.
+    pub fn velocity(&self) -> Vec3 {
+        self.velocity
+    }
 }
 
 /// Pushes, balls and circumstances.
@@ -234,9 +243,9 @@ fn throw(
         let there = trunk.map_or(camera.focus, GlobalTransform::translation);
         let moving = runner.map_or(Vec3::ZERO, |(_, _, track, episode)| track.rotation * Vec3::X * episode.speed);
         let from = at.translation + at.rotation * Vec3::new(0.25, -0.15, -0.4);
-        let seconds = from.distance(there) / BALL_SPEED;
-        let aim = there + moving * seconds + Vec3::Y * (0.5 * 9.81 * weather.gravity * seconds * seconds);
-        let velocity = (aim - from).normalize_or(Vec3::X) * BALL_SPEED;
+        let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
+        // what comes from afar flies higher, not past it
+        let velocity = (there - from) / seconds + moving + Vec3::Y * (0.5 * GRAVITY * weather.gravity * seconds);
         let mut ball = commands.spawn((
             Name::new("ball"),
             Ball { velocity, mass: weather.ball, left: BALL_LIFE },
@@ -275,7 +284,7 @@ fn fly(
             continue;
         }
         for _ in 0..BALL_STEPS {
-            ball.velocity.y -= 9.81 * weather.gravity * dt;
+            ball.velocity.y -= GRAVITY * weather.gravity * dt;
             transform.translation += ball.velocity * dt;
             if transform.translation.y < BALL_RADIUS && ball.velocity.y < 0.0 {
                 transform.translation.y = BALL_RADIUS;
