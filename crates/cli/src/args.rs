@@ -87,7 +87,7 @@ pub struct TrainArgs {
     /// `trainer_type`.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["resume", "config"], value_parser = marathon_learn::Algorithm::NAMES)]
     pub algo: Option<String>,
-    /// Agents that act side by side, a multiple of 16.
+    /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     pub agents: Option<usize>,
     /// Agent-steps of the whole run.

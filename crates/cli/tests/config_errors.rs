@@ -129,8 +129,9 @@ fn wrong_values_say_what_would_do() {
     }
     let marathon = |text: &str| format!("behaviors: {{Hopper: {{marathon: {{{text}}}}}}}");
     for (text, message) in [
-        ("agents: 100", "found '100', expected a multiple of 16, such as 112"),
-        ("agents: 1", "found '1', expected a whole number between 16"),
+        ("agents: 100", "found '100', expected a multiple of 16, such as 112, or 1, 2, 4 or 8"),
+        ("agents: 12", "found '12', expected a multiple of 16, such as 16, or 1"),
+        ("agents: 0", "found '0', expected a whole number between 1"),
         ("activation: gelu", "found 'gelu', expected one of swish, tanh, elu, relu"),
         ("schedule: cosine", "found 'cosine', expected one of constant, linear, adaptive"),
         ("lr_range: [3, 1]", "found [3.0, 1.0], expected two positive numbers in ascending order"),

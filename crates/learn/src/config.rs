@@ -97,7 +97,7 @@ impl Algorithm {
 pub struct PpoConfig {
     /// What learns from the rollouts.
     pub algorithm: Algorithm,
-    /// Agents that act side by side, a multiple of 16.
+    /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
     pub agents: usize,
     /// Decisions of each agent per rollout.
     pub horizon: usize,
@@ -299,7 +299,7 @@ impl PpoConfig {
 
     /// Number of blocks of sixteen agents.
     pub fn blocks(&self) -> usize {
-        self.agents / BLOCK
+        self.agents.div_ceil(BLOCK)
     }
     /// Agent-steps per rollout.
     pub fn rollout_steps(&self) -> u64 {
@@ -319,9 +319,11 @@ impl PpoConfig {
     /// # Errors
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
-        if self.agents == 0 || !self.agents.is_multiple_of(BLOCK) {
+        let few = self.agents.is_power_of_two() && !matches!(self.algorithm, Algorithm::Sac(_));
+        if self.agents == 0 || !(self.agents.is_multiple_of(BLOCK) || self.agents < BLOCK && few) {
             let nearest = (self.agents as f64 / BLOCK as f64).round().max(1.0) as usize * BLOCK;
-            return Err(Error::config("agents", self.agents, format!("a multiple of {BLOCK}, such as {nearest}")));
+            let or = if let Algorithm::Sac(_) = self.algorithm { " with sac" } else { ", or 1, 2, 4 or 8" };
+            return Err(Error::config("agents", self.agents, format!("a multiple of {BLOCK}, such as {nearest}{or}")));
         }
         let items = self.blocks().saturating_mul(self.horizon);
         if items.saturating_mul(BLOCK) > 1 << 31 {

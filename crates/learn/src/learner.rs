@@ -33,6 +33,8 @@ pub struct Layout {
     pub critic_start: usize,
     /// Whether each action has a probability ratio of its own.
     pub ratio: Ratio,
+    /// Agents in a block: sixteen, or fewer, which the other lanes [mirror](crate::mirror).
+    pub lanes: usize,
     /// The second value network and what else SAC has.
     pub twin: Option<Twin>,
     /// Networks of the reward signals, with the places of their parameters, which follow.
@@ -78,7 +80,17 @@ impl Layout {
             len = place.end.next_multiple_of(BLOCK);
             signals.push((nets, place));
         }
-        Self { actor, critic, log_std, critic_start, ratio: config.ratio, twin, signals, len }
+        Self {
+            actor,
+            critic,
+            log_std,
+            critic_start,
+            ratio: config.ratio,
+            lanes: config.agents.min(BLOCK),
+            twin,
+            signals,
+            len,
+        }
     }
     /// The policy network's parameters.
     pub fn actor_params<'a>(&self, params: &'a [f32]) -> &'a [f32] {
@@ -254,9 +266,9 @@ impl Totals {
     /// Of the workers' rollouts, in order.
     pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
         let mut t = Totals::default();
-        for block in rollouts.iter().flat_map(|r| &r.sums) {
-            t.samples += (horizon * BLOCK) as f64;
-            t.sums.add(block);
+        for rollout in rollouts {
+            t.samples += (rollout.sums.len() * horizon * rollout.lanes) as f64;
+            rollout.sums.iter().for_each(|block| t.sums.add(block));
         }
         t
     }

@@ -4,7 +4,7 @@
 //! generators", 2021), seeded from the run's seed and the agent's number, so its noise depends on the seed, the agent
 //! and the step alone. The loops over `[u32; 16]` become vector instructions inside [`Real::enter`].
 
-use crate::BLOCK;
+use crate::{BLOCK, mirror};
 use marathon_physics::lanes::Real;
 
 /// Marks of the streams for different purposes.
@@ -71,6 +71,12 @@ impl Noise {
             state[0][lane] |= 1;
         }
         Self { state }
+    }
+
+    /// The first streams in place of the others, see [`mirror`](crate::mirror).
+    pub fn mirrored(mut self, agents: usize) -> Self {
+        mirror::rows(self.state.as_flattened_mut(), agents);
+        self
     }
 
     /// Streams for a block of an update's batch.

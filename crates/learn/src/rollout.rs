@@ -16,7 +16,7 @@ use crate::noise::Noise;
 use crate::normalize::{Normalize, Normalizer};
 use crate::signal::{SignalNets, SignalSpace, Step};
 use crate::squash::{Draw, Normals};
-use crate::{BLOCK, f32_lanes};
+use crate::{BLOCK, f32_lanes, mirror};
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
@@ -128,6 +128,8 @@ pub struct Rollout {
     target: Aligned<f32>,
     /// Streams of rewards.
     streams: usize,
+    /// Agents in a block, which the other lanes mirror.
+    pub lanes: usize,
     /// Agents whose episode ended with the item, and whose episode failed.
     done: Vec<u16>,
     failed: Vec<u16>,
@@ -161,6 +163,7 @@ impl Rollout {
             value: stream_rows(),
             target: stream_rows(),
             streams,
+            lanes: layout.lanes,
             done: vec![0; items],
             failed: vec![0; items],
             cut: Vec::new(),
@@ -251,6 +254,8 @@ impl Rollout {
 /// A worker's agents.
 pub struct Actor {
     shard: Box<dyn Shard>,
+    /// Agents in a block, which the other lanes mirror.
+    lanes: usize,
     first_block: usize,
     noise: Vec<Noise>,
     /// Current raw observations, `[block][obs][16]`.
@@ -279,10 +284,13 @@ impl Actor {
         for b in 0..blocks {
             shard.reset(b, !0, &mut obs[b * n..(b + 1) * n]);
         }
+        mirror::rows(&mut obs, layout.lanes);
+        let noise = |b| Noise::new(seed, first_block + b).mirrored(layout.lanes);
         Self {
             shard,
+            lanes: layout.lanes,
             first_block,
-            noise: (0..blocks).map(|b| Noise::new(seed, first_block + b)).collect(),
+            noise: (0..blocks).map(noise).collect(),
             obs,
             tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
@@ -364,6 +372,9 @@ impl Actor {
         self.reward_novelty(acting, rollout);
         self.evaluate(acting, rollout);
         advantage::estimate(acting, rollout);
+        if self.lanes < BLOCK {
+            rollout.sums.iter_mut().for_each(|sums| mirror::scale(sums, self.lanes));
+        }
         env_seconds
     }
 
@@ -421,6 +432,10 @@ impl Actor {
         let out = &mut self.out;
         let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
         self.shard.step(b, &self.action[b * act_row..(b + 1) * act_row], obs, out);
+        let ended = out.terminated | out.truncated | out.diverged;
+        if self.lanes < BLOCK {
+            mirror::step(out, obs, self.lanes);
+        }
 
         // running sums of the agents
         let sums = &mut rollout.sums[b];
@@ -463,7 +478,7 @@ impl Actor {
         // ended episodes
         let done = out.terminated | out.truncated | out.diverged;
         (rollout.done[item], rollout.failed[item]) = (done, out.terminated | out.diverged);
-        if done == 0 {
+        if done | ended == 0 {
             return;
         }
         let cut = out.truncated & !(out.terminated | out.diverged);
@@ -481,7 +496,9 @@ impl Actor {
             sums.diverged += (out.diverged >> i & 1) as f64;
             (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
         }
-        self.shard.reset(b, done, obs);
+        // lanes without an agent live on too
+        self.shard.reset(b, done | ended, obs);
+        mirror::rows(obs, self.lanes);
     }
 
     /// Sums of the observations per block.

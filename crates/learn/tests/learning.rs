@@ -118,7 +118,7 @@ fn impossible_settings_are_refused_with_the_nearest_possible_one() {
     };
     assert_eq!(
         refuse(PpoConfig { agents: 100, ..learning_config() }),
-        "configuration: agents is 100, expected a multiple of 16, such as 96"
+        "configuration: agents is 100, expected a multiple of 16, such as 96, or 1, 2, 4 or 8"
     );
     assert!(refuse(PpoConfig { minibatches: 5000, ..learning_config() }).contains("at most 256"));
     assert!(refuse(PpoConfig { gamma: 1.5, ..learning_config() }).contains("gamma is 1.5"));

@@ -200,9 +200,9 @@ fn agents(
         Algorithm::Ppo => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
     };
     let Some(entry) = marathon.get("agents") else { return Ok(default) };
-    let agents = entry.count(block..=1 << 31)?;
-    if !agents.is_multiple_of(block) {
-        let expected = format!("a multiple of {block}, such as {}", agents.next_multiple_of(block));
+    let agents = entry.count(1..=1 << 31)?;
+    if !(agents.is_multiple_of(block) || agents < block && agents.is_power_of_two()) {
+        let expected = format!("a multiple of {block}, such as {}, or 1, 2, 4 or 8", agents.next_multiple_of(block));
         return Err(ConfigError::value(entry.place, entry.node.describe(), expected));
     }
     Ok(agents)

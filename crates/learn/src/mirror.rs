@@ -1,0 +1,59 @@
+//! Fewer agents than a block has lanes: 1, 2, 4 or 8.
+//!
+//! The lanes that are left over show what those of the agents show: lane `i` has the experience of agent `i % agents`, to the
+//! bit. Every agent then counts as often as any other, so means over samples, and with them gradients and statistics, are
+//! those of the agents alone; sums are scaled down to them. It costs as much as sixteen agents.
+
+use crate::BLOCK;
+use crate::rollout::BlockSums;
+use marathon_envs::BlockStep;
+
+/// The mask of the agents alone, repeated.
+fn repeat(mask: u16, agents: usize) -> u16 {
+    let own = mask & ((1 << agents) - 1);
+    (0..BLOCK).step_by(agents).fold(0, |all, at| all | own << at)
+}
+
+/// Repeats the first lanes of every row of sixteen.
+pub fn rows<S: Copy>(rows: &mut [S], agents: usize) {
+    for row in rows.chunks_exact_mut(BLOCK) {
+        for at in (agents..BLOCK).step_by(agents) {
+            row.copy_within(..agents, at);
+        }
+    }
+}
+
+/// Repeats what a decision led to.
+pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
+    for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms] {
+        rows(row, agents);
+    }
+    for mask in [&mut out.terminated, &mut out.truncated, &mut out.diverged] {
+        *mask = repeat(*mask, agents);
+    }
+}
+
+/// Leaves of a block's sums what the agents alone add up to: exact, since their number is a power of two.
+pub fn scale(sums: &mut BlockSums, agents: usize) {
+    let part = agents as f64 / BLOCK as f64;
+    let BlockSums { episodes, returns, lengths, speeds, falls, diverged, terms, .. } = sums;
+    let BlockSums { discounted, observations, advantages, targets, errors, signals, .. } = sums;
+    let scalars = [episodes, returns, lengths, speeds, falls, diverged].into_iter();
+    let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
+    let all = scalars.chain(terms).chain(signals).chain(pairs.flat_map(|(a, b)| [a, b]));
+    all.for_each(|x| *x *= part);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_repeat() {
+        assert_eq!([1, 2, 4, 8].map(|n| repeat(0b1001_0110, n)), [0, 0xaaaa, 0x6666, 0x9696]);
+        let mut row: Vec<usize> = (0..2 * BLOCK).collect();
+        rows(&mut row, 4);
+        assert_eq!(row[..BLOCK], [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3]);
+        assert_eq!(row[BLOCK..BLOCK + 6], [16, 17, 18, 19, 16, 17]);
+    }
+}
