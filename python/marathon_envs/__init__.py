@@ -40,6 +40,7 @@ from marathon_envs._native import (
 )
 from marathon_envs.agents import MarathonAgent, ResetNoise
 from marathon_envs.env import MarathonEnv
+from marathon_envs.tolerance import Tolerance
 from marathon_envs.vector import MarathonVectorEnv
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "ResetNoise",
     "Simulation",
     "Spec",
+    "Tolerance",
     "TrainResult",
     "VecEnv",
     "__version__",

@@ -7,7 +7,7 @@ use crate::config;
 use crate::error::CliError;
 use crate::processes::Processes;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
-use marathon_learn::{Players, PpoConfig};
+use marathon_learn::{BLOCK, Players, PpoConfig};
 use marathon_physics::lanes::Isa;
 use std::time::Instant;
 
@@ -40,13 +40,21 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     let factory = registry::factory(AGENT, Isa::best())?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let base = PpoConfig { total_steps: options.steps, ..config::default_for(AGENT).ppo };
+    // the same rollouts of one agent, and as long a time
+    let solo = PpoConfig {
+        agents: 1,
+        horizon: base.agents * base.horizon,
+        total_steps: options.steps / BLOCK as u64,
+        ..base.clone()
+    };
     let ways = [
-        ("one world, one thread".to_string(), 1, 0),
-        (format!("one world, {cores} threads"), cores, 0),
-        (format!("{cores} processes that play, one thread that learns"), 1, cores),
-        (format!("{cores} processes that play, {cores} threads that learn"), cores, cores),
+        ("solo".to_string(), &solo, 1, 0),
+        ("one world, one thread".to_string(), &base, 1, 0),
+        (format!("one world, {cores} threads"), &base, cores, 0),
+        (format!("{cores} processes that play, one thread that learns"), &base, 1, cores),
+        (format!("{cores} processes that play, {cores} threads that learn"), &base, cores, cores),
     ];
-    for (way, threads, processes) in ways {
+    for (way, base, threads, processes) in ways {
         let runs = each_seed(options.seeds, |seed| {
             let config = PpoConfig { seed, threads, ..base.clone() };
             match processes {
@@ -68,7 +76,8 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         about: format!(
             "Hopper-v0 in the paper's three ways, on {cores} processors: alone, with others in one world, in several \
              processes (`--agents`, `--threads`, `--processes` of `marathon train`). Without learning, actions are held. A \
-             vector carries sixteen agents, so one alone leaves fifteen lanes empty, at the same cost. Processes copy \
+             vector carries sixteen agents, so one alone leaves fifteen lanes empty, at the same cost, and learns for a \
+             sixteenth of the steps here. Processes copy \
              rollouts and states between each other, threads share them; what is learned is the same to the bit, as the \
              returns show."
         ),
