@@ -91,6 +91,15 @@ fn a_row_runs_and_the_focus_moves() {
     let mut cameras = app.world_mut().query::<&FollowCamera>();
     let target = cameras.single(app.world()).expect("one camera").target.expect("it follows somebody");
     assert_eq!(app.world().get::<Actor>(target).map(|a| a.0), Some(1));
+    // one can look about while the time stands still
+    press(&mut app, Deed::Pause);
+    frames(&mut app, 5);
+    let before = cameras.single(app.world()).expect("one camera").clone();
+    let mut turned = app.world_mut().query::<&mut FollowCamera>();
+    turned.single_mut(app.world_mut()).expect("one camera").turn(1.0, 0.0);
+    frames(&mut app, 50);
+    let after = cameras.single(app.world()).expect("one camera");
+    assert!((after.yaw - before.yaw - 1.0).abs() < 0.05, "{} and {}", before.yaw, after.yaw);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use crate::app::args::Args;
 use crate::app::error::GameError;
+use crate::app::learn::Filmed;
 use crate::app::{GamePlugin, TICKS, check_graphics};
 use crate::look::FollowCamera;
 use bevy::app::PluginsState;
@@ -98,6 +99,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
     )
     .add_plugins(game)
     .init_resource::<Reel>()
+    .insert_resource(Filmed)
     .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();

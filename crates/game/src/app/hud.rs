@@ -4,6 +4,7 @@ use crate::app::args::Mode;
 use crate::app::keys::{Bindings, Deed};
 use crate::app::learn::Lesson;
 use crate::app::notes::Notes;
+use crate::app::replay::Recorder;
 use crate::app::show::{Actor, Focus, Show};
 use crate::look::FollowCamera;
 use crate::ragdoll::{Anatomy, Episode};
@@ -44,6 +45,10 @@ const FULL: [f32; 2] = [1000.0, 600.0];
 const SMALLEST: f32 = 0.66;
 /// Width below which the line of keys, and height below which the reward's bars are left out, points.
 const ROOM: [f32; 2] = [640.0, 320.0];
+/// Height of the reward's bars with what is below them, and of each, points.
+const REWARDS: [f32; 2] = [120.0, 20.0];
+/// Distance of the reward's bars from the lower edge, and of those above a time line, points.
+const LIFT: [f32; 2] = [44.0, 92.0];
 
 /// What is drawn over the picture.
 #[derive(Resource, Clone, Copy, Debug)]
@@ -135,7 +140,8 @@ pub fn draw(
     mut contexts: EguiContexts,
     hud: Res<Hud>,
     show: Res<Show>,
-    (focus, bindings, notes, lesson): (Res<Focus>, Res<Bindings>, Res<Notes>, Option<Res<Lesson>>),
+    (focus, bindings, notes): (Res<Focus>, Res<Bindings>, Res<Notes>),
+    (lesson, recorder): (Option<Res<Lesson>>, Option<Res<Recorder>>),
     monitor: Res<Monitor>,
     time: Res<Time<Virtual>>,
     frames: Res<Time<Real>>,
@@ -168,7 +174,8 @@ pub fn draw(
                         ui.label(text(30.0, TEXT, format!("{speed:.1}")).strong());
                         ui.label(text(14.0, FAINT, "m/s"));
                         ui.add_space(8.0);
-                        ui.label(text(30.0, TEXT, format!("{:.1}", episode.distance)).strong());
+                        let distance = (episode.distance * 10.0).round() / 10.0 + 0.0;
+                        ui.label(text(30.0, TEXT, format!("{distance:.1}")).strong());
                         ui.label(text(14.0, FAINT, "m"));
                     });
                     let state = if episode.down { "  fallen" } else { "" };
@@ -180,10 +187,23 @@ pub fn draw(
                 let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
                 let rates = format!("{speed}   {:.0} decisions/s   {fps:.0} fps", monitor.rate);
                 line(ui, text(12.0, FAINT, rates));
+                if let Some(recorder) = &recorder {
+                    line(ui, text(13.0, BAD, format!("\u{25cf} recording {:.1} s", recorder.seconds())));
+                }
             });
         });
-        if let Some(spec) = anatomy.spec.as_ref().filter(|_| room.y > ROOM[1]) {
-            rewards(&ctx, &monitor, &spec.reward_terms, episode);
+        // what else stands on the right is what its mode is about
+        let above = match show.mode {
+            Mode::Push => Some("circumstances"),
+            Mode::Learn => Some("learning"),
+            _ => None,
+        };
+        let above = above.and_then(|card| ctx.memory(|memory| memory.area_rect(Id::new(card))));
+        let lift = LIFT[usize::from(show.mode == Mode::Replay && room.x < FULL[0])];
+        let free = room.y - lift - above.map_or(0.0, |card| card.bottom());
+        let fits = |terms: usize| room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32;
+        if let Some(spec) = anatomy.spec.as_ref().filter(|spec| fits(spec.reward_terms.len())) {
+            rewards(&ctx, &monitor, &spec.reward_terms, episode, lift);
         }
     }
     if let Some(lesson) = lesson.filter(|_| show.mode == Mode::Learn) {
@@ -196,11 +216,11 @@ pub fn draw(
 }
 
 /// Bars of the reward's terms, and their curves.
-fn rewards(ctx: &egui::Context, monitor: &Monitor, names: &[String], episode: &Episode) {
+fn rewards(ctx: &egui::Context, monitor: &Monitor, names: &[String], episode: &Episode, lift: f32) {
     if episode.terms.is_empty() {
         return;
     }
-    Area::new(Id::new("rewards")).anchor(Align2::RIGHT_BOTTOM, [-14.0, -44.0]).interactable(false).show(ctx, |ui| {
+    Area::new(Id::new("rewards")).anchor(Align2::RIGHT_BOTTOM, [-14.0, -lift]).interactable(false).show(ctx, |ui| {
         card().show(ui, |ui| {
             const WIDTH: f32 = 270.0;
             ui.set_width(WIDTH);

@@ -12,6 +12,7 @@ use marathon_learn::{Control, IterationStats, Policy, PpoConfig, Snapshot, train
 use marathon_physics::lanes::Isa;
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// Seconds between two lines of the log.
 const TELL: f32 = 5.0;
@@ -47,7 +48,15 @@ pub struct Progress {
     pub state: String,
     /// It waits.
     pub paused: bool,
+    /// Seconds that it has waited.
+    waited: f64,
+    /// Seconds of learning that may pass, and then it waits; `None`: any.
+    limit: Option<f64>,
 }
+
+/// The picture's time goes its own way, as in films: a second of it is a second of learning.
+#[derive(Resource)]
+pub(crate) struct Filmed;
 
 /// What both sides see.
 #[derive(Default)]
@@ -64,6 +73,8 @@ pub struct Lesson {
     agent: String,
     ground: Ground,
     shown: Option<Arc<Policy>>,
+    /// Seconds of the picture since it began.
+    age: f64,
 }
 
 /// What the trainer for an agent is told: its own fast configuration, or that of a file.
@@ -113,7 +124,7 @@ impl Lesson {
         };
         let thread = std::thread::Builder::new().name("marathon-trainer".into()).spawn(learn);
         thread.map_err(|e| format!("the trainer's thread cannot be started: {e}"))?;
-        Ok(Lesson { shared, agent: agent.into(), ground, shown: None })
+        Ok(Lesson { shared, agent: agent.into(), ground, shown: None, age: 0.0 })
     }
 
     /// How it goes.
@@ -152,11 +163,17 @@ fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &
     board.newest = Some(policy);
     board.progress.state = "from random weights".into();
     if let Some(total) = stats.return_mean {
-        board.progress.curve.push(Point { seconds: stats.wall_seconds, steps: stats.steps, total });
+        let seconds = stats.wall_seconds - board.progress.waited;
+        board.progress.curve.push(Point { seconds, steps: stats.steps, total });
     }
-    while board.progress.paused && !board.stop {
+    let begun = Instant::now();
+    let early = |progress: &Progress| {
+        progress.limit.is_some_and(|limit| stats.wall_seconds - progress.waited > limit) || progress.paused
+    };
+    while early(&board.progress) && !board.stop {
         board = shared.1.wait(board).unwrap_or_else(PoisonError::into_inner);
     }
+    board.progress.waited += begun.elapsed().as_secs_f64();
     if board.stop { Control::Stop } else { Control::Continue }
 }
 
@@ -190,6 +207,14 @@ pub fn attend(
         }
         teaching.seed += 1;
     }
+}
+
+/// Lets the trainer wait for the picture where that is drawn more slowly than its time passes.
+pub fn pace(lesson: Option<ResMut<Lesson>>, filmed: Option<Res<Filmed>>, time: Res<Time<Real>>) {
+    let (Some(mut lesson), Some(_)) = (lesson, filmed) else { return };
+    lesson.age += time.delta_secs_f64();
+    board(&lesson.shared).progress.limit = Some(lesson.age);
+    lesson.shared.1.notify_all();
 }
 
 /// Puts the newest policy on stage.

@@ -214,7 +214,15 @@ impl Plugin for GamePlugin {
             Update,
             (
                 (control::time, control::stage, learn::obey, replay::obey, replay::scrub, feed::obey).chain(),
-                (show::set_stage, replay::set_stage, feed::set_stage, learn::attend, learn::perform, learn::tell)
+                (
+                    show::set_stage,
+                    replay::set_stage,
+                    feed::set_stage,
+                    learn::attend,
+                    learn::pace,
+                    learn::perform,
+                    learn::tell,
+                )
                     .chain(),
                 (show::reload, show::follow_focus, show::show_marks, control::look, notes::fade, hud::clock),
                 (control::picture, replay::play, feed::play, leave_replay, feed::leave),
@@ -266,6 +274,8 @@ fn style(mut contexts: bevy_egui::EguiContexts, mut done: Local<bool>) -> Result
     ctx.set_visuals(egui::Visuals::dark());
     ctx.global_style_mut(|style| {
         style.interaction.selectable_labels = false;
+        // the first picture of a film is whole
+        style.animation_time = 0.0;
         style.visuals.window_corner_radius = egui::CornerRadius::same(10);
         style.visuals.override_text_color = Some(egui::Color32::from_rgb(236, 240, 244));
         style.visuals.selection.bg_fill = egui::Color32::from_rgb(190, 96, 20);

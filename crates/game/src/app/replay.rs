@@ -183,6 +183,13 @@ pub struct Recorder {
     until: Duration,
 }
 
+impl Recorder {
+    /// Length so far, s.
+    pub fn seconds(&self) -> f64 {
+        self.recording.seconds()
+    }
+}
+
 /// A recording that is being shown.
 #[derive(Resource)]
 pub struct Playback {

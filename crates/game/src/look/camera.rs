@@ -161,12 +161,15 @@ fn equip(mut commands: Commands, quality: Option<Res<Quality>>, cameras: Query<E
 }
 
 fn follow(
-    time: Res<Time>,
+    time: Res<Time<Real>>,
+    game: Res<Time<Virtual>>,
     mut cameras: Query<(&mut FollowCamera, &mut Transform, &mut Projection), Without<Part>>,
     ragdolls: Query<(&Anatomy, &Transform, Option<&Episode>), Without<FollowCamera>>,
     parts: Query<&Transform, (With<Part>, Without<FollowCamera>)>,
 ) {
+    // the picture's own time: one looks about while the game's stands still
     let dt = time.delta_secs();
+    let pace = if dt > 0.0 { game.delta_secs() / dt } else { 1.0 };
     let ease = |seconds: f32| 1.0 - (-dt / seconds).exp();
     for (mut camera, mut transform, mut projection) in &mut cameras {
         if let Projection::Perspective(p) = &mut *projection
@@ -178,7 +181,7 @@ fn follow(
             let root = anatomy.model.joints.first().map_or(1, |j| j.body);
             if let Some(part) = anatomy.parts.get(root).and_then(|p| parts.get(*p).ok()) {
                 // what eases after a runner stays behind by its speed times the easing
-                let ahead = episode.map_or(0.0, |e| e.speed.clamp(-FASTEST, FASTEST) * EASE[0]);
+                let ahead = episode.map_or(0.0, |e| (e.speed * pace).clamp(-FASTEST, FASTEST) * EASE[0]);
                 let to = track.transform_point(part.translation) + track.rotation * (Vec3::X * ahead);
                 let jump = !camera.settled || camera.focus.distance(to) > 12.0;
                 let [side, up] = if jump { [1.0; 2] } else { EASE.map(ease) };
