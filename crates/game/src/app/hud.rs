@@ -49,6 +49,8 @@ const ROOM: [f32; 2] = [640.0, 320.0];
 const REWARDS: [f32; 2] = [120.0, 20.0];
 /// Distance of the reward's bars from the lower edge, and of those above a time line, points.
 const LIFT: [f32; 2] = [44.0, 92.0];
+/// Width from which on a time line fits beside them, points.
+const BESIDE: f32 = 1200.0;
 
 /// What is drawn over the picture.
 #[derive(Resource, Clone, Copy, Debug)]
@@ -185,10 +187,15 @@ pub fn draw(
                 }
                 let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
                 let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
-                let rates = format!("{speed}   {:.0} decisions/s   {fps:.0} fps", monitor.rate);
+                // what comes from elsewhere is decided elsewhere
+                let decisions = match show.mode {
+                    Mode::Replay | Mode::Outside => String::new(),
+                    _ => format!("{:.0} decisions/s   ", monitor.rate),
+                };
+                let rates = format!("{speed}   {decisions}{fps:.0} fps");
                 line(ui, text(12.0, FAINT, rates));
                 if let Some(recorder) = &recorder {
-                    line(ui, text(13.0, BAD, format!("\u{25cf} recording {:.1} s", recorder.seconds())));
+                    line(ui, text(13.0, BAD, format!("recording {:.1} s", recorder.seconds())));
                 }
             });
         });
@@ -199,7 +206,7 @@ pub fn draw(
             _ => None,
         };
         let above = above.and_then(|card| ctx.memory(|memory| memory.area_rect(Id::new(card))));
-        let lift = LIFT[usize::from(show.mode == Mode::Replay && room.x < FULL[0])];
+        let lift = LIFT[usize::from(show.mode == Mode::Replay && room.x < BESIDE)];
         let free = room.y - lift - above.map_or(0.0, |card| card.bottom());
         let fits = |terms: usize| room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32;
         if let Some(spec) = anatomy.spec.as_ref().filter(|spec| fits(spec.reward_terms.len())) {

@@ -284,7 +284,8 @@ pub fn set_stage(
         camera.goal[1] = if show.agents > 1 { 0.32 } else { 0.16 };
         camera.jump();
     }
-    info!("on stage: {} of {} ({})", show.agents, show.agent, show.mode.name());
+    let who = if testbed { &model.name } else { &show.agent };
+    info!("on stage: {} of {who} ({})", show.agents, show.mode.name());
 }
 
 /// The policy of a show; the text of an error names the remedy.
