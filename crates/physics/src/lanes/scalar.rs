@@ -16,6 +16,11 @@ macro_rules! scalar_backend {
             }
             #[inline]
             fn enter<K: Kernel<Self>>(kernel: K) -> K::Output {
+                // not inlined: a function that is not is compiled in one crate, and shared by the others
+                #[inline(never)]
+                fn plain<K: Kernel<$t>>(kernel: K) -> K::Output {
+                    kernel.run()
+                }
                 #[cfg(target_arch = "x86_64")]
                 {
                     /// Same code, compiled with the fused multiply-add instruction.
@@ -29,7 +34,7 @@ macro_rules! scalar_backend {
                         return unsafe { with_fma(kernel) };
                     }
                 }
-                kernel.run()
+                plain(kernel)
             }
             #[inline(always)]
             fn scalar(x: f64) -> $t {
