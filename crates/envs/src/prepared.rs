@@ -53,8 +53,11 @@ impl<T: Real> Prepared<T> {
                 self.starts[first + lane] = Some((ids[lane], state));
             }
             let Some(next) = due.iter().map(|lane| settle[*lane]).filter(|n| *n > steps).min() else { return };
-            task.sim.advance(work, group, next - steps);
-            steps = next;
+            // in calls of single steps: a lane's bits must not depend on when others have settled
+            while steps < next {
+                task.sim.advance(work, group, 1);
+                steps += 1;
+            }
         }
     }
 }

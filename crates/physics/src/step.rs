@@ -17,17 +17,22 @@ use crate::tendon::tendon_blocks;
 use crate::work::{Group, Work};
 
 kernel_fn! {
-    /// Frames, axes, inertias, velocities, and applied forces.
-    fn smooth_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+    /// Frames, axes, inertias, velocities.
+    fn motion_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         kinematics(sim, group, work);
         velocities(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Applied forces.
+    fn force_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         applied_forces(sim, group, work);
     }
 }
 kernel_fn! {
     /// Contacts, limits, dry friction.
     fn constraint_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        work.blocks.clear();
+        work.put_rows_aside();
         collide_floor(sim, group, work);
         joint_rows(sim, group, work);
     }
@@ -63,14 +68,6 @@ kernel_fn! {
     }
 }
 kernel_fn! {
-    /// Positions and velocities only.
-    fn refresh_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        kinematics(sim, group, work);
-        velocities(sim, group, work);
-    }
-}
-
-kernel_fn! {
     /// Velocities, activations and positions at the end of the step.
     fn integrate<'a, T>(sim: &'a Sim<T>, group: &'a mut Group<T>, work: &'a mut Work<T>) {
         let dt = T::splat(sim.dt);
@@ -99,17 +96,30 @@ pub enum Stage {
 impl<T: Real> Sim<T> {
     /// Accelerations and constraint forces at the present state; the state does not change.
     pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
+        work.continues = false;
+        self.forward_again(work, group);
+    }
+
+    /// The same, of a group that was advanced a little since the last evaluation if [`Work::continues`] says so.
+    fn forward_again(&self, work: &mut Work<T>, group: &Group<T>) {
         for stage in [Stage::Smooth, Stage::Constraints, Stage::Solver] {
-            self.run_stage(stage, work, group);
+            self.stage(stage, work, group);
         }
+        work.continues = true;
     }
 
     /// One stage of [`Sim::forward`], after those before it.
     #[doc(hidden)]
     pub fn run_stage(&self, stage: Stage, work: &mut Work<T>, group: &Group<T>) {
+        work.continues = false;
+        self.stage(stage, work, group);
+    }
+
+    fn stage(&self, stage: Stage, work: &mut Work<T>, group: &Group<T>) {
         match stage {
             Stage::Smooth => {
-                smooth_stage(self, group, work);
+                motion_stage(self, group, work);
+                force_stage(self, group, work);
                 work.external.clear();
                 work.bias_is_net = !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty();
                 if work.bias_is_net {
@@ -155,15 +165,19 @@ impl<T: Real> Sim<T> {
 
     /// The same without bringing the readings up to date: they show the state from which the last physics step computed
     /// its forces, as after MuJoCo's `mj_step` (with RK4, the state of its last stage).
+    ///
+    /// What a step learns helps the next ones of the same call, which makes it faster than as many calls of one step each.
+    /// The results are the same to rounding; equal bits take equal calls.
     pub fn advance(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
         for touched in work.touched.iter_mut() {
             *touched = T::none();
         }
+        work.continues = false;
         for _ in 0..substeps {
             if self.rk4 {
                 self.step_rk4(work, group);
             } else {
-                self.forward(work, group);
+                self.forward_again(work, group);
                 self.finish_step(work, group);
             }
         }
@@ -171,7 +185,14 @@ impl<T: Real> Sim<T> {
 
     /// Recomputes positions and velocities of bodies at the present state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
-        refresh_stage(self, group, work);
+        motion_stage(self, group, work);
+        work.bias_is_net = false;
+    }
+
+    /// The same, and the forces of the actuators there, which [`Sim::measure_actuators`] then makes readable.
+    pub fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
+        motion_stage(self, group, work);
+        force_stage(self, group, work);
         work.bias_is_net = false;
     }
 
@@ -185,7 +206,7 @@ impl<T: Real> Sim<T> {
         // weighted sums of velocities and accelerations live in `sum.qvel` and `sum.warm`
         let tableau = [(1.0, 0.0, 0.5), (2.0, 0.5, 0.5), (2.0, 0.5, 1.0), (1.0, 1.0, 0.0)];
         for (stage, (weight, reach_before, reach)) in tableau.into_iter().enumerate() {
-            self.forward(work, group);
+            self.forward_again(work, group);
             let first = stage == 0;
             T::enter(RkStage { sim: self, work, group, start, sum, first, weight, reach_before, reach });
         }

@@ -1,5 +1,6 @@
 //! State of a lane group and the scratch memory of a step.
 
+use crate::collision::Clearances;
 use crate::lanes::Real;
 use crate::model::JointType;
 use crate::narrow::field_capsule::Gaps;
@@ -181,10 +182,15 @@ pub struct Work<T: Real> {
     pub(crate) root_factor: Vec<[[T; 6]; 6]>,
     /// Forces on links for [`crate::articulated::bring_inward`].
     pub(crate) link_force: Vec<V6<T>>,
+    /// The last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a call of
+    /// [`Sim::advance`], and there is much that one can keep from it.
+    pub(crate) continues: bool,
     pub(crate) contacts: Vec<FloorRow<T>>,
     pub(crate) limits: Vec<LimitRow<T>>,
     pub(crate) dry: Vec<DryRow<T>>,
     pub(crate) blocks: Blocks<T>,
+    /// Rows of the last evaluation, if the present one [continues](Work::continues) it; else none.
+    pub(crate) past: Past<T>,
     pub(crate) coupling: Coupling<T>,
     /// Per geom: lanes that touch the static world at the last physics step, and at any step of the last `step` call.
     pub(crate) touching: Vec<T::Mask>,
@@ -196,6 +202,9 @@ pub struct Work<T: Real> {
     pub(crate) touching_bodies: Vec<T::Mask>,
     /// Centers of the geoms that meet others, relative to their trees' reference points; of static ones, in the world.
     pub(crate) centers: Vec<V3<T>>,
+    /// Their third axes: of a plane its normal, of a capsule its direction.
+    pub(crate) directions: Vec<V3<T>>,
+    pub(crate) clearances: Clearances<T>,
     /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
     pub(crate) tree_com: Vec<V3<T>>,
     /// Per body: torque and force from outside, about the center of mass of its tree.
@@ -213,6 +222,16 @@ pub struct Work<T: Real> {
     pub(crate) stats: SolverStats,
 }
 
+/// Rows of an earlier evaluation of the forces. What pushed then mostly pushes now. (The accelerations of then are a
+/// worse guide: a contact that was slowing something down is, by them, about to let go.)
+#[derive(Clone, Debug)]
+pub(crate) struct Past<T: Real> {
+    pub contacts: Vec<FloorRow<T>>,
+    pub limits: Vec<LimitRow<T>>,
+    pub dry: Vec<DryRow<T>>,
+    pub blocks: Blocks<T>,
+}
+
 /// The blocks of a step; their memory is kept from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks<T: Real> {
@@ -221,6 +240,10 @@ pub(crate) struct Blocks<T: Real> {
 }
 
 impl<T: Real> Blocks<T> {
+    fn new() -> Self {
+        Blocks { items: Vec::new(), len: 0 }
+    }
+
     /// Forgets all blocks.
     pub fn clear(&mut self) {
         self.len = 0;
@@ -313,7 +336,9 @@ impl<T: Real> Work<T> {
             contacts: Vec::with_capacity(sim.contacts.floor.len()),
             limits: Vec::with_capacity(2 * sim.limits.len()),
             dry: Vec::with_capacity(sim.dry.len()),
-            blocks: Blocks { items: Vec::new(), len: 0 },
+            continues: false,
+            blocks: Blocks::new(),
+            past: Past { contacts: Vec::new(), limits: Vec::new(), dry: Vec::new(), blocks: Blocks::new() },
             coupling: Coupling::new(nl, nv),
             touching: vec![T::none(); sim.geoms.len()],
             touched: vec![T::none(); sim.geoms.len()],
@@ -321,6 +346,8 @@ impl<T: Real> Work<T> {
             normal_force: vec![z; sim.geoms.len()],
             touching_bodies: vec![T::none(); sim.geoms.len()],
             centers: vec![[z; 3]; sim.geoms.len()],
+            directions: vec![[z; 3]; sim.geoms.len()],
+            clearances: Clearances::new(sim.geoms.len(), sim.contacts.pairs.len()),
             tree_com: vec![[z; 3]; sim.model.bodies.len()],
             body_force: vec![[z; 6]; sim.model.bodies.len()],
             actuation: vec![z; nv],
@@ -330,6 +357,26 @@ impl<T: Real> Work<T> {
             gaps: Gaps::new(),
             stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
             stats: SolverStats::default(),
+        }
+    }
+
+    /// Makes room for new rows; those of before become the [past](Work::past).
+    #[inline(always)]
+    pub(crate) fn put_rows_aside(&mut self) {
+        let Work { contacts, limits, dry, blocks, past, continues, .. } = self;
+        std::mem::swap(contacts, &mut past.contacts);
+        std::mem::swap(limits, &mut past.limits);
+        std::mem::swap(dry, &mut past.dry);
+        std::mem::swap(blocks, &mut past.blocks);
+        contacts.clear();
+        limits.clear();
+        dry.clear();
+        blocks.clear();
+        if !*continues {
+            past.contacts.clear();
+            past.limits.clear();
+            past.dry.clear();
+            past.blocks.clear();
         }
     }
 

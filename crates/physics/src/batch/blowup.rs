@@ -53,9 +53,10 @@ impl Blowup {
         let mut batch = Batch::new(model, &options)?;
         let mut out = Vec::new();
         for state in &self.states {
-            batch.set_agent_state(0, state);
-            for _ in 0..self.substeps {
-                batch.inner.step(1);
+            for steps in 1..=self.substeps {
+                // from the start in one call, as it was: calls of single steps may round otherwise
+                batch.set_agent_state(0, state);
+                batch.inner.step(steps);
                 let (qpos, qvel) = batch.inner.read(0);
                 let finite = batch.inner.broken().is_empty();
                 out.push(Replay { qpos, qvel, finite });

@@ -118,12 +118,12 @@ pub(super) fn add<T: Real>(
 #[inline(always)]
 pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let zero = T::zero();
-    work.contacts.clear();
     work.touching.fill(T::none());
     work.ground_contacts.fill(zero);
     // corners of the present box that are already in contact, per lane
     let mut corners = zero;
-    for c in &sim.contacts.floor {
+    let mut past = 0;
+    for (candidate, c) in sim.contacts.floor.iter().enumerate() {
         let tree = sim.links[c.link].tree;
         let (rot, pos, reference) = (&work.rot[c.link], &work.pos[c.link], &work.reference[tree]);
         let p: V3<T> = splat3(&c.point);
@@ -167,8 +167,22 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let (v1, v2) = (v[0].mul_add(tx, v[1] * ty), v[1].mul_add(tx, -(v[0] * ty)));
         let b = T::splat(c.soft.b);
         let u0 = [v[2].mul_add(b, imp * violation * T::splat(c.soft.k)), v1 * b, v2 * b];
+        // rows come in the order of the candidates
+        while past < work.past.contacts.len() && work.past.contacts[past].candidate < candidate {
+            past += 1;
+        }
+        let mut active = [T::none(); 4];
+        let mut recalled = T::none();
+        if past < work.past.contacts.len() && work.past.contacts[past].candidate == candidate {
+            let row = &work.past.contacts[past];
+            recalled = T::and(on, row.on);
+            for k in 0..4 {
+                active[k] = T::and(recalled, row.active[k]);
+            }
+        }
         work.contacts.push(FloorRow {
             link: c.link,
+            candidate,
             geom: c.geom,
             plane: c.plane,
             r,
@@ -180,8 +194,9 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             u: u0,
             next: u0,
             force: [zero; 3],
-            active: [T::none(); 4],
+            active,
             on,
+            recalled,
         });
         work.touch_ground(c.geom, on);
     }

@@ -2,6 +2,7 @@
 //!
 //! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::narrow`].
 
+use super::clearance::clearance;
 use super::pairs::{Cull, PairSpec, Test};
 use super::slots::{Place, Slots, write_contact};
 use crate::lanes::{MAX_LANES, Real};
@@ -23,21 +24,54 @@ struct Meeting<T: Real> {
 #[inline(always)]
 pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     work.touching_bodies.fill(T::none());
-    for &g in &sim.contacts.paired {
-        let mount = &sim.geoms[g];
-        work.centers[g] = mount.link.map_or(splat3(&mount.pos), |l| work.arm(mount, l));
-    }
+    place_geoms(sim, work);
     let mut slots = Slots::new();
     for (index, pair) in sim.contacts.pairs.iter().enumerate() {
+        if work.clearances.apart(index, pair.geoms) {
+            continue;
+        }
         slots.turn_to(pair.class(), work.blocks.len());
         // everything relative to the reference point of one of the moving geoms' trees
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
         let near = near(sim, group, work, pair, &centers);
-        if T::any(near) {
+        let clearance = if T::any(near) {
             let meeting = Meeting { place: Place { index, base }, centers, near };
-            touch_pair(sim, group, work, &mut slots, &meeting);
+            touch_pair(sim, group, work, &mut slots, &meeting)
+        } else {
+            let (d, reach) = (sub3(&centers[1], &centers[0]), T::splat(pair.reach));
+            Some(clearance(dot(&d, &d).sqrt() - reach, reach))
+        };
+        if let (Some(clearance), true) = (clearance, within_tree(sim, pair)) {
+            work.clearances.remember(index, pair.geoms, clearance);
         }
+    }
+}
+
+/// Whether both geoms move and belong to one tree.
+#[inline(always)]
+fn within_tree<T: Real>(sim: &Sim<T>, pair: &PairSpec<T::Scalar>) -> bool {
+    matches!(pair.links, [Some(a), Some(b)] if sim.links[a].tree == sim.links[b].tree)
+}
+
+/// Centers and axes of the geoms that meet others, and how far they have moved.
+#[inline(always)]
+fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+    if !work.continues {
+        work.clearances.forget();
+    }
+    for paired in &sim.contacts.paired {
+        let (g, mount) = (paired.geom, &sim.geoms[paired.geom]);
+        let (center, axis) = match mount.link {
+            None => (splat3(&mount.pos), splat3(&mount.rot[2])),
+            Some(l) => (work.arm(mount, l), rotate(&work.rot[l], &splat3(&mount.rot[2]))),
+        };
+        if work.continues {
+            let (shift, turn) = (sub3(&center, &work.centers[g]), sub3(&axis, &work.directions[g]));
+            work.clearances.follow(g, &shift, &turn, T::splat(paired.half));
+        }
+        work.centers[g] = center;
+        work.directions[g] = axis;
     }
 }
 
@@ -52,12 +86,11 @@ fn near<T: Real>(
 ) -> T::Mask {
     let reach = T::splat(pair.reach);
     let mut point = centers[0];
-    let first = &sim.geoms[pair.geoms[0]];
+    let normal = work.directions[pair.geoms[0]];
     match pair.cull {
         Cull::Balls => narrow::near(&point, &centers[1], reach),
-        Cull::Plane => narrow::plane::near_plane(&Plane { point, normal: axis(work, first) }, &centers[1], reach),
+        Cull::Plane => narrow::plane::near_plane(&Plane { point, normal }, &centers[1], reach),
         Cull::Field => {
-            let normal = axis(work, first);
             let top = group.ground_top(sim, pair.field);
             for i in 0..3 {
                 point[i] = normal[i].mul_add(top, point[i]);
@@ -78,58 +111,64 @@ fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3
     }
 }
 
-/// Third axis of a geom: of a plane its normal, of a capsule its direction.
+/// Narrow phase of one pair. Returns how far it is from touching, if that is known.
 #[inline(always)]
-fn axis<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>) -> V3<T> {
-    match m.link {
-        None => splat3(&m.rot[2]),
-        Some(l) => rotate(&work.rot[l], &splat3(&m.rot[2])),
-    }
-}
-
-/// Narrow phase of one pair.
-#[inline(always)]
-fn touch_pair<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
+fn touch_pair<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    slots: &mut Slots<T>,
+    meeting: &Meeting<T>,
+) -> Option<T> {
     let pair = &sim.contacts.pairs[meeting.place.index];
-    let [ma, mb] = pair.geoms.map(|g| &sim.geoms[g]);
+    let [a, b] = pair.geoms;
+    let (mb, [ca, cb]) = (&sim.geoms[b], meeting.centers);
     let margin = T::splat(pair.margin);
-    let [a, b] = meeting.centers;
     let [size_a, size_b]: [V3<T>; 2] = [splat3(&pair.sizes[0]), splat3(&pair.sizes[1])];
-    let first_sphere = Sphere { center: a, radius: size_a[0] };
-    let sphere = Sphere { center: b, radius: size_b[0] };
+    let mut known = None;
+    if pair.round() {
+        // few of those that come near touch: their distance is known before the place of contact
+        let distance = narrow::round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b));
+        let clearance = clearance(distance - margin, T::splat(pair.reach));
+        if !T::any(clearance.lt(T::zero())) {
+            return Some(clearance);
+        }
+        known = Some(clearance);
+    }
+    let first_sphere = Sphere { center: ca, radius: size_a[0] };
+    let sphere = Sphere { center: cb, radius: size_b[0] };
+    let plane = Plane { point: ca, normal: work.directions[a] };
     let found: &[Touch<T>] = match pair.test {
-        Test::PlaneSphere => &[narrow::plane::plane_sphere(&plane(work, ma, a), &sphere, margin)],
-        Test::PlaneCapsule => &narrow::plane::plane_capsule(&plane(work, ma, a), &capsule(work, mb, b, size_b), margin),
-        Test::PlaneBox => &narrow::plane::plane_box(&plane(work, ma, a), &block(work, mb, b, size_b), margin),
-        Test::PlaneCylinder => {
-            &narrow::plane::plane_cylinder(&plane(work, ma, a), &cylinder(work, mb, b, size_b), margin)
-        }
-        Test::PlaneEllipsoid => {
-            &[narrow::plane::plane_ellipsoid(&plane(work, ma, a), &block(work, mb, b, size_b), margin)]
-        }
+        Test::PlaneSphere => &[narrow::plane::plane_sphere(&plane, &sphere, margin)],
+        Test::PlaneCapsule => &narrow::plane::plane_capsule(&plane, &capsule(work, b, cb, size_b), margin),
+        Test::PlaneBox => &narrow::plane::plane_box(&plane, &block(work, mb, cb, size_b), margin),
+        Test::PlaneCylinder => &narrow::plane::plane_cylinder(&plane, &cylinder(work, mb, cb, size_b), margin),
+        Test::PlaneEllipsoid => &[narrow::plane::plane_ellipsoid(&plane, &block(work, mb, cb, size_b), margin)],
         Test::SphereSphere => &[narrow::round::sphere_sphere(&first_sphere, &sphere, margin)],
-        Test::SphereCapsule => &[narrow::round::sphere_capsule(&first_sphere, &capsule(work, mb, b, size_b), margin)],
-        Test::SphereBox => &[narrow::round::sphere_box(&first_sphere, &block(work, mb, b, size_b), margin)],
+        Test::SphereCapsule => &[narrow::round::sphere_capsule(&first_sphere, &capsule(work, b, cb, size_b), margin)],
+        Test::SphereBox => &[narrow::round::sphere_box(&first_sphere, &block(work, mb, cb, size_b), margin)],
         Test::SphereCylinder => {
-            &[narrow::round::sphere_cylinder(&first_sphere, &cylinder(work, mb, b, size_b), margin)]
+            &[narrow::round::sphere_cylinder(&first_sphere, &cylinder(work, mb, cb, size_b), margin)]
         }
         Test::CapsuleCapsule => {
-            &narrow::round::capsule_capsule(&capsule(work, ma, a, size_a), &capsule(work, mb, b, size_b), margin)
+            &narrow::round::capsule_capsule(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b), margin)
         }
-        Test::FieldCapsule => return touch_field(sim, group, work, slots, meeting),
-        Test::CapsuleBox | Test::BoxBox | Test::FieldBox => return one_by_one(sim, group, work, slots, meeting),
+        Test::FieldCapsule => {
+            touch_field(sim, group, work, slots, meeting);
+            return None;
+        }
+        Test::CapsuleBox | Test::BoxBox | Test::FieldBox => {
+            one_by_one(sim, group, work, slots, meeting);
+            return None;
+        }
     };
     add_all(sim, group, work, slots, meeting.place, found);
+    known
 }
 
 #[inline(always)]
-fn plane<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, point: V3<T>) -> Plane<T> {
-    Plane { point, normal: axis(work, m) }
-}
-
-#[inline(always)]
-fn capsule<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: V3<T>) -> Capsule<T> {
-    Capsule { center, axis: axis(work, m), radius: size[0], half: size[1] }
+fn capsule<T: Real>(work: &Work<T>, geom: usize, center: V3<T>, size: V3<T>) -> Capsule<T> {
+    Capsule { center, axis: work.directions[geom], radius: size[0], half: size[1] }
 }
 
 #[inline(always)]
@@ -169,10 +208,9 @@ fn touch_field<T: Real>(
     meeting: &Meeting<T>,
 ) {
     let pair = &sim.contacts.pairs[meeting.place.index];
-    let [ma, mb] = pair.geoms.map(|g| &sim.geoms[g]);
     let fields = group.all_grounds(sim, pair.field);
-    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.axes(ma) };
-    let capsule = capsule(work, mb, meeting.centers[1], splat3(&pair.sizes[1]));
+    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.axes(&sim.geoms[pair.geoms[0]]) };
+    let capsule = capsule(work, pair.geoms[1], meeting.centers[1], splat3(&pair.sizes[1]));
     let mut found = std::mem::take(&mut work.touches);
     found.clear();
     let margin = T::splat(pair.margin);

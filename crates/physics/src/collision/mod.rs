@@ -4,17 +4,19 @@
 //! are the common case and have their own list ([`floor`]); everything else is listed by [`pairs`] and
 //! found by [`meet`].
 
+mod clearance;
 mod floor;
 mod meet;
 mod pairs;
 mod params;
 mod slots;
 
+pub(crate) use clearance::Clearances;
 pub(crate) use floor::collide_floor;
 pub(crate) use meet::collide_pairs;
 
 use crate::lanes::Real;
-use crate::model::{GeomType, Model};
+use crate::model::{Geom, GeomType, Model};
 use crate::rigid::BodyMount;
 use crate::sim::{SimError, SimOptions};
 use floor::Candidate;
@@ -29,7 +31,15 @@ pub(crate) struct Contacts<C> {
     /// Other pairs of geoms, those of a kind next to each other.
     pub pairs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
-    pub paired: Vec<usize>,
+    pub paired: Vec<Paired<C>>,
+}
+
+/// A geom that meets others.
+#[derive(Clone, Debug)]
+pub(crate) struct Paired<C> {
+    pub geom: usize,
+    /// Length on either side of the center along the third axis, of a capsule; else 0, and it is a ball that bounds it.
+    pub half: C,
 }
 
 impl<C> Contacts<C> {
@@ -77,9 +87,11 @@ pub(crate) fn contacts<T: Real>(
     out.floor.sort_by_key(|c| c.geom);
     // slots of one class are filled together
     out.pairs.sort_by_key(|p| p.class());
-    out.paired = out.pairs.iter().flat_map(|p| p.geoms).collect();
-    out.paired.sort_unstable();
-    out.paired.dedup();
+    let mut paired: Vec<usize> = out.pairs.iter().flat_map(|p| p.geoms).collect();
+    paired.sort_unstable();
+    paired.dedup();
+    let half = |g: &Geom| if g.kind == GeomType::Capsule { g.size[1] } else { 0.0 };
+    out.paired = paired.into_iter().map(|g| Paired { geom: g, half: T::scalar(half(&model.geoms[g])) }).collect();
     Ok(out)
 }
 

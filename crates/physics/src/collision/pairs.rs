@@ -97,6 +97,11 @@ impl<C> PairSpec<C> {
         self.geoms[if self.links[1].is_some() { 1 } else { 0 }]
     }
 
+    /// Both are spheres or capsules.
+    pub fn round(&self) -> bool {
+        matches!(self.test, Test::SphereSphere | Test::SphereCapsule | Test::CapsuleCapsule)
+    }
+
     /// Both geoms move.
     pub fn coupled(&self) -> bool {
         self.links[0].is_some() && self.links[1].is_some()

@@ -83,7 +83,7 @@ kernel_fn! {
             if T::any(here) {
                 if slot == work.blocks.len() {
                     let new = work.blocks.add();
-                    open(&mut work.blocks[new], pair);
+                    open(&mut work.blocks[new], pair, slot - slots.first);
                 }
                 let block = &mut work.blocks[slot];
                 fill(block, here, pair, &rows);
@@ -183,10 +183,11 @@ fn join<T: Real>(entries: &mut Vec<(usize, T::Mask)>, key: usize, lanes: T::Mask
 
 /// Makes an empty contact slot of a pair's class.
 #[inline(always)]
-fn open<T: Real>(block: &mut Block<T>, pair: &PairSpec<T::Scalar>) {
+fn open<T: Real>(block: &mut Block<T>, pair: &PairSpec<T::Scalar>, slot: usize) {
     let z = [T::zero(); 3];
     block.reset(Source::Contacts, pair.cost, pair.dim);
     block.coupled = pair.coupled();
+    block.slot = slot;
     block.tie_points([z; 3], [z; 3], [(None, z); 2], T::none());
 }
 

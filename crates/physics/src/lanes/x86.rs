@@ -67,6 +67,7 @@ macro_rules! x86_backend {
             const EPSILON: f64 = f32::EPSILON as f64;
             const ISA: &'static str = $isa;
 
+            #[inline(always)]
             fn supported() -> bool {
                 true $(&& std::arch::is_x86_feature_detected!($detect))*
             }

@@ -44,18 +44,10 @@ const PARALLEL: f64 = 1e-8;
 /// each moved along to the second capsule if it lies beyond.
 #[inline(always)]
 pub(crate) fn capsule_capsule<T: Real>(a: &Capsule<T>, b: &Capsule<T>, margin: T) -> [Touch<T>; 2] {
-    let d = sub3(&b.center, &a.center);
-    let c = dot(&a.axis, &b.axis);
-    let (da, db) = (dot(&a.axis, &d), dot(&b.axis, &d));
-    // sin^2 by the vector product, which does not cancel where the axes are almost parallel
-    let n = cross(&a.axis, &b.axis);
-    let sin2 = dot(&n, &n);
-    let crossing = T::lit(PARALLEL).lt(sin2);
+    let axes = axes(a, b);
+    let (s, t) = closest(a, b, &axes);
+    let Axes { c, da, db, n, sin2, crossing } = axes;
     let fallback = crossing_normal(&n, sin2);
-    let s = clamp(c.neg_mul_add(db, da).div(T::select(crossing, sin2, T::lit(1.0))), a.half);
-    // each in turn the closest point to the other; the distance is convex, so this ends at the minimum
-    let t = clamp(c.mul_add(s, -db), b.half);
-    let s = clamp(c.mul_add(t, da), a.half);
     if T::all(crossing) {
         return [axis_points(a, s, b, t, margin, &fallback), Touch::none()];
     }
@@ -65,6 +57,49 @@ pub(crate) fn capsule_capsule<T: Real>(a: &Capsule<T>, b: &Capsule<T>, margin: T
     let mut second = axis_points(a, s1, b, t1, margin, &fallback);
     second.on = T::and(second.on, T::not(crossing));
     [axis_points(a, s0, b, t0, margin, &fallback), second]
+}
+
+/// Distance of two capsules, or balls with a half length of zero.
+#[inline(always)]
+pub(crate) fn gap<T: Real>(a: &Capsule<T>, b: &Capsule<T>) -> T {
+    let (s, t) = closest(a, b, &axes(a, b));
+    let (p, q) = (axpy3(&a.axis, s, &a.center), axpy3(&b.axis, t, &b.center));
+    let d = sub3(&q, &p);
+    dot(&d, &d).sqrt() - a.radius - b.radius
+}
+
+/// How the axes of two capsules lie.
+struct Axes<T: Real> {
+    /// Cosine of the angle between them.
+    c: T,
+    /// From the first's center to the second's, along either axis.
+    da: T,
+    db: T,
+    /// Perpendicular to both, and the square of the sine.
+    n: V3<T>,
+    sin2: T,
+    /// Lanes in which they are not parallel.
+    crossing: T::Mask,
+}
+
+#[inline(always)]
+fn axes<T: Real>(a: &Capsule<T>, b: &Capsule<T>) -> Axes<T> {
+    let d = sub3(&b.center, &a.center);
+    // sin^2 by the vector product, which does not cancel where the axes are almost parallel
+    let n = cross(&a.axis, &b.axis);
+    let sin2 = dot(&n, &n);
+    let crossing = T::lit(PARALLEL).lt(sin2);
+    Axes { c: dot(&a.axis, &b.axis), da: dot(&a.axis, &d), db: dot(&b.axis, &d), n, sin2, crossing }
+}
+
+/// Places on two capsules' axes that are closest to each other; of parallel ones, some such places.
+#[inline(always)]
+fn closest<T: Real>(a: &Capsule<T>, b: &Capsule<T>, axes: &Axes<T>) -> (T, T) {
+    let Axes { c, da, db, sin2, crossing, .. } = *axes;
+    let s = clamp(c.neg_mul_add(db, da).div(T::select(crossing, sin2, T::lit(1.0))), a.half);
+    // each in turn the closest point to the other; the distance is convex, so this ends at the minimum
+    let t = clamp(c.mul_add(s, -db), b.half);
+    (clamp(c.mul_add(t, da), a.half), t)
 }
 
 /// The place `end` of a capsule's axis and the place on a parallel one beside it, which may have to be moved onto both.

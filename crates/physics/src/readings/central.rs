@@ -30,7 +30,13 @@ impl<T: Real> Sim<T> {
     /// Prepares [`Readings::qfrc_actuator`] and [`Readings::qfrc_constraint`]. To be called after [`Sim::advance`] or
     /// [`Sim::forward`], before [`Sim::refresh`] moves the axes on.
     pub fn measure_joints(&self, work: &mut Work<T>) {
+        self.measure_actuators(work);
         T::enter(JointForces(self, work));
+    }
+
+    /// Prepares [`Readings::qfrc_actuator`] alone. To be called as [`Sim::measure_joints`].
+    pub fn measure_actuators(&self, work: &mut Work<T>) {
+        T::enter(Actuation(self, work));
     }
 }
 
@@ -231,13 +237,13 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
     }
 }
 
-/// Forces on degrees of freedom.
-struct JointForces<'a, T: Real>(&'a Sim<T>, &'a mut Work<T>);
-impl<T: Real> Kernel<T> for JointForces<'_, T> {
+/// Forces of actuators on degrees of freedom.
+struct Actuation<'a, T: Real>(&'a Sim<T>, &'a mut Work<T>);
+impl<T: Real> Kernel<T> for Actuation<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let JointForces(sim, work) = self;
+        let Actuation(sim, work) = self;
         work.actuation.fill(T::zero());
         for (motor, force) in sim.motors.iter().zip(&work.actuator_force) {
             match &motor.pull {
@@ -257,7 +263,16 @@ impl<T: Real> Kernel<T> for JointForces<'_, T> {
         for (dof, low, high) in &sim.joint_force_ranges {
             work.actuation[*dof] = work.actuation[*dof].max(T::splat(*low)).min(T::splat(*high));
         }
+    }
+}
 
+/// Forces of constraints on degrees of freedom.
+struct JointForces<'a, T: Real>(&'a Sim<T>, &'a mut Work<T>);
+impl<T: Real> Kernel<T> for JointForces<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let JointForces(sim, work) = self;
         let mut links = std::mem::take(&mut work.link_force);
         let mut joints = std::mem::take(&mut work.constraint);
         constraint_wrenches(work, &mut links, &mut joints);

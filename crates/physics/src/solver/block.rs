@@ -90,6 +90,10 @@ pub(crate) struct Block<T: Real> {
     pub hold: T,
     /// Which edges push; or (bottom, middle) zone of an elliptic cone; or (below the bound, positive).
     pub zones: [T::Mask; 10],
+    /// Lanes whose zones are those of the evaluation before.
+    pub recalled: T::Mask,
+    /// Of contacts: which slot of those with as many rows.
+    pub slot: usize,
     /// Contacts in this slot: what to report the force for.
     pub members: Vec<(usize, T::Mask)>,
 }
@@ -122,6 +126,8 @@ impl<T: Real> Block<T> {
             stiffness: [z; 21],
             hold: z,
             zones: [T::none(); 10],
+            recalled: T::none(),
+            slot: 0,
             members: Vec::new(),
         }
     }
@@ -141,7 +147,42 @@ impl<T: Real> Block<T> {
         self.u0 = [z; 6];
         self.hold = z;
         self.zones = [T::none(); 10];
+        self.recalled = T::none();
         self.members.clear();
+    }
+
+    /// Takes over the zones of the same slot of the evaluation before, in the lanes where both hold the same contact. Not
+    /// of an elliptic cone, whose linear model follows the acceleration.
+    #[inline(always)]
+    pub fn recall(&mut self, past: &[Block<T>]) {
+        match (self.source, self.cost) {
+            (_, Cost::Equal) => self.recalled = self.on,
+            (Source::Contacts, Cost::Push | Cost::Pyramid) => {
+                for former in past {
+                    if former.source == Source::Contacts
+                        && (former.slot, former.coupled, former.dim) == (self.slot, self.coupled, self.dim)
+                    {
+                        self.recall_contacts(former);
+                        break;
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    #[inline(always)]
+    fn recall_contacts(&mut self, past: &Block<T>) {
+        for (pair, lanes) in &self.members {
+            for (former, on) in &past.members {
+                if former == pair {
+                    self.recalled = T::or(self.recalled, T::and(*lanes, *on));
+                }
+            }
+        }
+        for k in 0..10 {
+            self.zones[k] = T::and(self.recalled, past.zones[k]);
+        }
     }
 
     /// One row: a weighted sum over degrees of freedom.

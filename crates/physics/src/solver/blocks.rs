@@ -15,20 +15,35 @@ pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
 }
 
 kernel_fn! {
-    /// Values and zones at the warm start; marks the links that are touched.
-    pub(crate) fn start<'a, T>(work: &'a mut Work<T>) {
-        for b in work.blocks.iter_mut() {
+    /// Marks the links that are touched and recalls zones. Returns whether all zones are known thereby.
+    pub(crate) fn recall<'a, T>(work: &'a mut Work<T>) -> bool {
+        let Work { blocks, past, in_contact, .. } = work;
+        let mut known = true;
+        for b in blocks.iter_mut() {
             if let Jacobian::Points { sides, .. } = &b.jacobian {
                 for (link, _) in sides.iter().flat_map(|s| &s.links) {
-                    work.in_contact[*link] = true;
+                    in_contact[*link] = true;
                 }
             }
-            let ja = b.of_motion(&work.link_acc, &work.acc);
-            for k in 0..b.dim {
-                b.u[k] = ja[k] + b.u0[k];
+            b.recall(&past.blocks);
+            known &= !T::any(T::and(b.on, T::not(b.recalled)));
+        }
+        known
+    }
+}
+
+kernel_fn! {
+    /// Values and zones at the warm start, where they are not recalled.
+    pub(crate) fn start<'a, T>(work: &'a mut Work<T>, known: bool) {
+        for b in work.blocks.iter_mut() {
+            if !known {
+                let ja = b.of_motion(&work.link_acc, &work.acc);
+                for k in 0..b.dim {
+                    b.u[k] = ja[k] + b.u0[k];
+                }
             }
             b.force = [T::zero(); 6];
-            b.activate(T::not(T::none()));
+            b.activate(T::not(b.recalled));
         }
     }
 }

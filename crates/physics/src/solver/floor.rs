@@ -11,6 +11,8 @@ use crate::spatial::*;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FloorRow<T: Real> {
     pub link: usize,
+    /// Which of the points that may touch.
+    pub candidate: usize,
     pub geom: usize,
     /// Geom of the plane.
     pub plane: usize,
@@ -32,6 +34,8 @@ pub(crate) struct FloorRow<T: Real> {
     /// Edges that push.
     pub active: [T::Mask; 4],
     pub on: T::Mask,
+    /// Lanes whose active edges are those of the evaluation before.
+    pub recalled: T::Mask,
 }
 
 impl<T: Real> FloorRow<T> {

@@ -10,6 +10,8 @@ use crate::work::{Group, Work};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimitRow<T: Real> {
     pub dof: usize,
+    /// Which of all limits: they come in this order.
+    pub number: usize,
     /// +1 at the lower limit, -1 at the upper.
     pub sign: T,
     pub d: T,
@@ -19,6 +21,8 @@ pub(crate) struct LimitRow<T: Real> {
     pub force: T,
     pub active: T::Mask,
     pub on: T::Mask,
+    /// Lanes that push or not as in the evaluation before.
+    pub recalled: T::Mask,
 }
 
 /// Dry friction of a joint: a force of bounded size.
@@ -35,6 +39,8 @@ pub(crate) struct DryRow<T: Real> {
     pub sticking: T::Mask,
     /// Sign of `u`, where the force is at its bound.
     pub positive: T::Mask,
+    /// The zone is that of the evaluation before.
+    pub recalled: bool,
 }
 
 impl<T: Real> LimitRow<T> {
@@ -159,25 +165,30 @@ impl<T: Real> Row<T> for DryRow<T> {
 #[inline(always)]
 pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let one = T::lit(1.0);
-    work.limits.clear();
-    for limit in &sim.limits {
+    let mut past = 0;
+    for (i, limit) in sim.limits.iter().enumerate() {
         let q = group.qpos[limit.qpos];
         let low = (q - T::splat(limit.low[0])) - T::splat(limit.low[1]);
         let high = (T::splat(limit.high[0]) - q) + T::splat(limit.high[1]);
+        let [first, second] = [2 * i, 2 * i + 1];
         if limit.two_sided {
-            push_limit(limit.dof, low, one, &limit.soft, group, work);
-            push_limit(limit.dof, high, -one, &limit.soft, group, work);
+            push_limit((limit.dof, first), low, one, &limit.soft, group, work, &mut past);
+            push_limit((limit.dof, second), high, -one, &limit.soft, group, work, &mut past);
         } else {
             // at most one side is violated: one row serves both
             let lower = low.lt(high);
-            let sign = T::select(lower, one, -one);
-            push_limit(limit.dof, T::select(lower, low, high), sign, &limit.soft, group, work);
+            let (dist, sign) = (T::select(lower, low, high), T::select(lower, one, -one));
+            push_limit((limit.dof, first), dist, sign, &limit.soft, group, work, &mut past);
         }
     }
-    work.dry.clear();
-    for dry in &sim.dry {
+    for (i, dry) in sim.dry.iter().enumerate() {
         let (_, d) = impedance(&dry.soft, T::zero());
         let u0 = T::splat(dry.soft.b) * group.qvel[dry.dof];
+        let (mut sticking, mut positive) = (T::none(), T::none());
+        let recalled = i < work.past.dry.len();
+        if recalled {
+            (sticking, positive) = (work.past.dry[i].sticking, work.past.dry[i].positive);
+        }
         work.dry.push(DryRow {
             dof: dry.dof,
             loss: dry.loss,
@@ -186,14 +197,24 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
             u: u0,
             next: u0,
             force: T::zero(),
-            sticking: T::none(),
-            positive: T::none(),
+            sticking,
+            positive,
+            recalled,
         });
     }
 }
 
+/// Writes the row of a joint's limit with a number; `past` walks along the rows of the evaluation before.
 #[inline(always)]
-fn push_limit<T: Real>(dof: usize, dist: T, sign: T, soft: &Softness<T::Scalar>, group: &Group<T>, work: &mut Work<T>) {
+fn push_limit<T: Real>(
+    (dof, number): (usize, usize),
+    dist: T,
+    sign: T,
+    soft: &Softness<T::Scalar>,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    past: &mut usize,
+) {
     let on = dist.lt(T::splat(soft.margin));
     if !T::any(on) {
         return;
@@ -202,5 +223,15 @@ fn push_limit<T: Real>(dof: usize, dist: T, sign: T, soft: &Softness<T::Scalar>,
     let (imp, d) = impedance(soft, violation);
     let u0 = (sign * group.qvel[dof]).mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));
     let d = T::masked(on, d);
-    work.limits.push(LimitRow { dof, sign, d, u0, u: u0, next: u0, force: T::zero(), active: T::none(), on });
+    while *past < work.past.limits.len() && work.past.limits[*past].number < number {
+        *past += 1;
+    }
+    let (mut active, mut recalled) = (T::none(), T::none());
+    if *past < work.past.limits.len() && work.past.limits[*past].number == number {
+        let row = &work.past.limits[*past];
+        recalled = T::and(on, row.on);
+        active = T::and(recalled, row.active);
+    }
+    let force = T::zero();
+    work.limits.push(LimitRow { dof, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
 }

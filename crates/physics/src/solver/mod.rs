@@ -109,32 +109,54 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
     }
 }
 
-/// Rows and active sets at the warm start.
+/// Active sets to start from: those of the evaluation before where there was one, else those at the warm start.
 #[inline(always)]
 fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    work.stale.fill(true);
+    work.in_contact.fill(false);
+    let mut known = true;
+    for c in &work.contacts {
+        work.in_contact[c.link] = true;
+        known &= !T::any(T::and(c.on, T::not(c.recalled)));
+    }
+    for l in &work.limits {
+        known &= !T::any(T::and(l.on, T::not(l.recalled)));
+    }
+    for f in &work.dry {
+        known &= f.recalled;
+    }
+    if !work.blocks.is_empty() {
+        known &= blocks::recall(work);
+    }
+    if !known {
+        warm_start::<T, S>(sim, group, work);
+    }
+    if !work.blocks.is_empty() {
+        blocks::start(work, known);
+    }
+}
+
+/// Row values at the warm start, and the active sets of rows that are new.
+#[inline(always)]
+fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
         work.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
     }
     link_accelerations::<T, S>(sim, work);
-    let all = T::not(T::none());
-    work.stale.fill(true);
-    work.in_contact.fill(false);
     for c in work.contacts.iter_mut() {
-        work.in_contact[c.link] = true;
         let ja = c.of_motion(&work.link_acc[c.link]);
         c.u = add3(&ja, &c.u0);
-        c.activate(all);
+        c.activate(T::not(c.recalled));
     }
     for l in work.limits.iter_mut() {
         l.u = l.sign.mul_add(work.acc[l.dof], l.u0);
-        l.activate(all);
+        l.activate(T::not(l.recalled));
     }
     for f in work.dry.iter_mut() {
         f.u = work.acc[f.dof] + f.u0;
-        f.activate(all);
-    }
-    if !work.blocks.is_empty() {
-        blocks::start(work);
+        if !f.recalled {
+            f.activate(T::not(T::none()));
+        }
     }
 }
 

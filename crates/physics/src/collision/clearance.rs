@@ -1,0 +1,65 @@
+//! How far pairs are from touching, remembered from one evaluation of the forces to the next.
+//!
+//! Between evaluations geoms move by millimeters, and most pairs are apart by much more: a pair that was tested is left
+//! alone until its two geoms together have moved as far as they were apart. That is on the safe side, so contacts are
+//! the same, to the bit, as if every pair were tested every time.
+//!
+//! What is remembered belongs to one group of agents, see [`Work::continues`](crate::work::Work::continues).
+
+use crate::lanes::Real;
+use crate::spatial::*;
+
+/// Distance at which a pair counts as touching already, as a fraction of its reach: far above the rounding of distances
+/// and ways.
+const SAFETY: f64 = 1e-3;
+
+/// What is known of all pairs. Ways and distances are relative to the tree that both geoms belong to.
+#[derive(Clone, Debug)]
+pub(crate) struct Clearances<T: Real> {
+    /// Per geom: the longest way of any of its points since the beginning, m.
+    ways: Vec<T>,
+    /// Per pair: sum of both geoms' ways up to which they cannot touch.
+    safe: Vec<T>,
+}
+
+impl<T: Real> Clearances<T> {
+    pub fn new(geoms: usize, pairs: usize) -> Self {
+        Clearances { ways: vec![T::zero(); geoms], safe: vec![T::zero(); pairs] }
+    }
+
+    /// Forgets everything.
+    #[inline(always)]
+    pub fn forget(&mut self) {
+        self.ways.fill(T::zero());
+        // no sum of ways is below this
+        self.safe.fill(T::lit(-1.0));
+    }
+
+    /// A geom's center moved by `shift` and its axis by `turn`; `half` is the length of the geom on either side along the
+    /// axis. No point of a capsule moves further than the farther of its ends.
+    #[inline(always)]
+    pub fn follow(&mut self, geom: usize, shift: &V3<T>, turn: &V3<T>, half: T) {
+        let along = (half * dot(shift, turn)).abs();
+        let square = (half * half).mul_add(dot(turn, turn), along.mul_add(T::lit(2.0), dot(shift, shift)));
+        self.ways[geom] += square.sqrt();
+    }
+
+    /// Whether a pair is too far apart to touch, in all lanes.
+    #[inline(always)]
+    pub fn apart(&self, pair: usize, geoms: [usize; 2]) -> bool {
+        // a NaN compares false
+        T::all((self.ways[geoms[0]] + self.ways[geoms[1]]).lt(self.safe[pair]))
+    }
+
+    /// A pair was found to be `clearance` from touching, see [`clearance`].
+    #[inline(always)]
+    pub fn remember(&mut self, pair: usize, geoms: [usize; 2], clearance: T) {
+        self.safe[pair] = self.ways[geoms[0]] + self.ways[geoms[1]] + clearance;
+    }
+}
+
+/// How far a pair is from touching that is apart by `distance` beyond its margin: less than nothing where it may touch.
+#[inline(always)]
+pub(super) fn clearance<T: Real>(distance: T, reach: T) -> T {
+    reach.neg_mul_add(T::lit(SAFETY), distance)
+}

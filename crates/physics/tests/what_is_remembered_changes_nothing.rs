@@ -1,0 +1,103 @@
+//! Promise: within a call of `Batch::step`, what is kept from one evaluation of the forces to the next (which pairs are
+//! too far apart to touch, which rows pushed) saves work and changes nothing: agents end where they end when every step
+//! is a call of its own, which starts without it. Contacts agree exactly. States have the same bits in all but a few calls,
+//! in which the solver comes to the same forces on another way, to rounding.
+
+mod common;
+
+use marathon_physics::{Batch, BatchOptions, Isa, Model};
+
+const AGENTS: usize = 16;
+/// Steps in a call.
+const STEPS: usize = 5;
+/// Calls: a second of falling and thrashing.
+const CALLS: usize = 60;
+/// Largest difference that rounding makes in a call: of velocities in contact, m/s and rad/s.
+const ROUNDING: f64 = 2e-3;
+
+/// Uniform numbers in [-1, 1) (SplitMix64).
+struct Uniform(u64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// Largest difference between the states of two batches.
+fn difference(a: &Batch, b: &Batch) -> f64 {
+    let mut most = 0.0f64;
+    for agent in 0..AGENTS {
+        let of = |batch: &Batch| [batch.qpos(agent), batch.qvel(agent)].concat();
+        for (x, y) in of(a).iter().zip(of(b)) {
+            most = most.max((x - y).abs());
+        }
+    }
+    most
+}
+
+/// Runs a model both ways from the same states.
+fn compare(model: &Model, name: &str, isa: Isa) {
+    let batch = || Batch::new(model, &BatchOptions { agents: AGENTS, isa, ..Default::default() }).expect("supported");
+    let (mut at_once, mut singly) = (batch(), batch());
+    let mut random = Uniform(3);
+    for agent in 0..AGENTS {
+        let qpos: Vec<f64> = model.qpos0.iter().map(|q| q + 0.1 * random.next()).collect();
+        let qvel: Vec<f64> = (0..model.nv).map(|_| random.next()).collect();
+        at_once.reset(agent, &qpos, &qvel);
+    }
+    let mut same = 0;
+    for call in 0..CALLS {
+        let ctrl: Vec<f64> = (0..AGENTS * model.nu).map(|_| random.next()).collect();
+        singly.restore(&at_once.snapshot());
+        let contacts = |batches: [&Batch; 2]| batches.map(|b| b.stats().contacts);
+        let before = contacts([&at_once, &singly]);
+        at_once.step(&ctrl, STEPS);
+        for _ in 0..STEPS {
+            singly.step(&ctrl, 1);
+        }
+        let after = contacts([&at_once, &singly]);
+        let off = difference(&at_once, &singly);
+        assert!(off < ROUNDING, "{name} on {isa:?}: call {call} ends {off} apart");
+        if off == 0.0 {
+            same += 1;
+            let [found, expected] = [after[0] - before[0], after[1] - before[1]];
+            assert_eq!(found, expected, "{name} on {isa:?}: contacts in call {call}");
+        }
+    }
+    assert!(same * 10 >= CALLS * 9, "{name} on {isa:?}: only {same} of {CALLS} calls end with the same bits");
+    let stats = [at_once.stats(), singly.stats()];
+    assert!(stats[0].contacts > 0, "{name} on {isa:?}: nothing touched anything");
+    assert!(stats[0].newton < stats[1].newton, "{name} on {isa:?}: nothing was gained");
+}
+
+fn every_width(file: &str) {
+    let model = Model::from_xml_file(common::workspace().join("assets").join(file)).expect("a shipped model loads");
+    for isa in [Isa::F64, Isa::F32, Isa::best()] {
+        compare(&model, file, isa);
+    }
+}
+
+#[test]
+fn humanoid_with_runge_kutta() {
+    every_width("gymnasium/humanoid.xml");
+}
+
+#[test]
+fn humanoid_with_friction_everywhere() {
+    every_width("dm_control/humanoid.xml");
+}
+
+#[test]
+fn ant() {
+    every_width("gymnasium/ant.xml");
+}
+
+#[test]
+fn hopper() {
+    every_width("agents/hopper.xml");
+}
