@@ -144,7 +144,10 @@ pub struct View {
     pub of_last_step: bool,
     /// [`Readings::cinert`](marathon_physics::Readings::cinert), `cvel` and `cfrc_ext` can be read.
     pub bodies: bool,
-    /// [`Readings::qfrc_actuator`](marathon_physics::Readings::qfrc_actuator) and `qfrc_constraint` can be read.
+    /// [`Readings::qfrc_actuator`](marathon_physics::Readings::qfrc_actuator) can be read.
+    pub actuators: bool,
+    /// The same and [`Readings::qfrc_constraint`](marathon_physics::Readings::qfrc_constraint), which at the start of an
+    /// episode takes an evaluation of all forces.
     pub joints: bool,
 }
 

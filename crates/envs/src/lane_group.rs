@@ -141,6 +141,9 @@ impl<T: Real> LaneGroup<T> {
                 task.sim.measure_joints(work);
             }
             T::enter(Feel { sim: &task.sim, group: self, work, sites });
+        } else if task.facts.view.actuators {
+            task.sim.refresh_actuators(work, &self.physics);
+            task.sim.measure_actuators(work);
         } else {
             task.sim.refresh(work, &self.physics);
         }
@@ -167,6 +170,8 @@ impl<T: Real> LaneGroup<T> {
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
         if view.joints {
             task.sim.measure_joints(work);
+        } else if view.actuators {
+            task.sim.measure_actuators(work);
         }
         if view.bodies {
             task.sim.measure_bodies(work, &self.physics);
@@ -223,7 +228,12 @@ fn store<T: Real>(value: T, to: &mut [f32]) {
 
 /// Writes some lanes of values into a block's rows in single precision.
 fn store_lanes<T: Real>(values: &[T], lanes: u32, first: usize, rows: &mut [f32]) {
+    let all = lanes.count_ones() as usize == T::LANES;
     for (row, value) in rows.chunks_exact_mut(BLOCK).zip(values) {
+        if all {
+            store(*value, &mut row[first..]);
+            continue;
+        }
         for lane in (0..T::LANES).filter(|l| lanes >> l & 1 == 1) {
             row[first + lane] = T::widen(value.get(lane)) as f32;
         }

@@ -66,7 +66,7 @@ pub(super) struct Sight {
 impl Sight {
     /// What the physics has to prepare.
     pub fn view() -> View {
-        View { of_last_step: true, bodies: true, joints: true }
+        View { of_last_step: true, bodies: true, actuators: true, ..View::default() }
     }
 
     /// Writes the observation.
