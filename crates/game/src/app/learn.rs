@@ -12,7 +12,6 @@ use marathon_learn::{Control, IterationStats, Policy, PpoConfig, Snapshot, train
 use marathon_physics::lanes::Isa;
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 /// Seconds between two lines of the log.
 const TELL: f32 = 5.0;
@@ -48,8 +47,6 @@ pub struct Progress {
     pub state: String,
     /// It waits.
     pub paused: bool,
-    /// Seconds that it has waited.
-    waited: f64,
     /// Seconds of learning that may pass, and then it waits; `None`: any.
     limit: Option<f64>,
 }
@@ -163,17 +160,13 @@ fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &
     board.newest = Some(policy);
     board.progress.state = "from random weights".into();
     if let Some(total) = stats.return_mean {
-        let seconds = stats.wall_seconds - board.progress.waited;
-        board.progress.curve.push(Point { seconds, steps: stats.steps, total });
+        board.progress.curve.push(Point { seconds: stats.wall_seconds, steps: stats.steps, total });
     }
-    let begun = Instant::now();
-    let early = |progress: &Progress| {
-        progress.limit.is_some_and(|limit| stats.wall_seconds - progress.waited > limit) || progress.paused
-    };
+    // what is spent here does not count as learning
+    let early = |progress: &Progress| progress.limit.is_some_and(|limit| stats.wall_seconds > limit) || progress.paused;
     while early(&board.progress) && !board.stop {
         board = shared.1.wait(board).unwrap_or_else(PoisonError::into_inner);
     }
-    board.progress.waited += begun.elapsed().as_secs_f64();
     if board.stop { Control::Stop } else { Control::Continue }
 }
 
