@@ -232,6 +232,20 @@ pub(crate) struct Past<T: Real> {
     pub blocks: Blocks<T>,
 }
 
+/// The former row with a number, if there is one; both come in ascending order, and `at` walks along the former.
+#[inline(always)]
+pub(crate) fn former<'a, R>(
+    rows: &'a [R],
+    at: &mut usize,
+    number: usize,
+    number_of: impl Fn(&R) -> usize,
+) -> Option<&'a R> {
+    while *at < rows.len() && number_of(&rows[*at]) < number {
+        *at += 1;
+    }
+    if *at < rows.len() && number_of(&rows[*at]) == number { Some(&rows[*at]) } else { None }
+}
+
 /// The blocks of a step; their memory is kept from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks<T: Real> {

@@ -112,9 +112,13 @@ impl Workload {
 }
 
 /// Uniform numbers in [-1, 1) (SplitMix64): a benchmark must not depend on a library's version.
-struct Uniform(u64);
+#[derive(Clone, Debug)]
+pub struct Uniform(pub u64);
+
 impl Uniform {
-    fn next(&mut self) -> f64 {
+    /// The next number.
+    #[expect(clippy::should_implement_trait, reason = "a stream without an end is no iterator's `Option`")]
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -5,6 +5,7 @@
 
 mod common;
 
+use marathon_physics::workload::Uniform;
 use marathon_physics::{Batch, BatchOptions, Isa, Model};
 
 const AGENTS: usize = 16;
@@ -14,19 +15,6 @@ const STEPS: usize = 5;
 const CALLS: usize = 60;
 /// Largest difference that rounding makes in a call: of velocities in contact, m/s and rad/s.
 const ROUNDING: f64 = 2e-3;
-
-/// Uniform numbers in [-1, 1) (SplitMix64).
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
 
 /// Largest difference between the states of two batches.
 fn difference(a: &Batch, b: &Batch) -> f64 {

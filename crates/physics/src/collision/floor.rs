@@ -12,7 +12,7 @@ use crate::sim::Sim;
 use crate::solver::floor::FloorRow;
 use crate::solver::softness::{Softness, impedance, softness};
 use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::work::{Group, Work, former};
 
 /// A point of a moving geom that may touch a level plane.
 #[derive(Clone, Debug)]
@@ -167,14 +167,9 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let (v1, v2) = (v[0].mul_add(tx, v[1] * ty), v[1].mul_add(tx, -(v[0] * ty)));
         let b = T::splat(c.soft.b);
         let u0 = [v[2].mul_add(b, imp * violation * T::splat(c.soft.k)), v1 * b, v2 * b];
-        // rows come in the order of the candidates
-        while past < work.past.contacts.len() && work.past.contacts[past].candidate < candidate {
-            past += 1;
-        }
         let mut active = [T::none(); 4];
         let mut recalled = T::none();
-        if past < work.past.contacts.len() && work.past.contacts[past].candidate == candidate {
-            let row = &work.past.contacts[past];
+        if let Some(row) = former(&work.past.contacts, &mut past, candidate, |row| row.candidate) {
             recalled = T::and(on, row.on);
             for k in 0..4 {
                 active[k] = T::and(recalled, row.active[k]);

@@ -34,15 +34,17 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         // everything relative to the reference point of one of the moving geoms' trees
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
-        let near = near(sim, group, work, pair, &centers);
+        let (near, within) = (near(sim, group, work, pair, &centers), within_tree(sim, pair));
         let clearance = if T::any(near) {
             let meeting = Meeting { place: Place { index, base }, centers, near };
             touch_pair(sim, group, work, &mut slots, &meeting)
-        } else {
+        } else if within {
             let (d, reach) = (sub3(&centers[1], &centers[0]), T::splat(pair.reach));
             Some(clearance(dot(&d, &d).sqrt() - reach, reach))
+        } else {
+            None
         };
-        if let (Some(clearance), true) = (clearance, within_tree(sim, pair)) {
+        if let (Some(clearance), true) = (clearance, within) {
             work.clearances.remember(index, pair.geoms, clearance);
         }
     }

@@ -4,7 +4,7 @@ use crate::lanes::Real;
 use crate::sim::Sim;
 use crate::solver::softness::{Softness, impedance};
 use crate::solver::{Move, Row, replace};
-use crate::work::{Group, Work};
+use crate::work::{Group, Work, former};
 
 /// A joint limit.
 #[derive(Clone, Copy, Debug)]
@@ -223,12 +223,8 @@ fn push_limit<T: Real>(
     let (imp, d) = impedance(soft, violation);
     let u0 = (sign * group.qvel[dof]).mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));
     let d = T::masked(on, d);
-    while *past < work.past.limits.len() && work.past.limits[*past].number < number {
-        *past += 1;
-    }
     let (mut active, mut recalled) = (T::none(), T::none());
-    if *past < work.past.limits.len() && work.past.limits[*past].number == number {
-        let row = &work.past.limits[*past];
+    if let Some(row) = former(&work.past.limits, past, number, |row| row.number) {
         recalled = T::and(on, row.on);
         active = T::and(recalled, row.active);
     }
