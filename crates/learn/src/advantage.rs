@@ -93,7 +93,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rollout::BlockSums;
+    use crate::sums::BlockSums;
     use marathon_physics::lanes::Isa;
 
     /// The definition, for one agent, in double precision.

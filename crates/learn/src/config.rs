@@ -29,8 +29,8 @@ pub enum Init {
 }
 
 impl Init {
-    /// Names in configurations, in the order of the variants.
-    pub const NAMES: [&str; 2] = ["orthogonal", "ml_agents"];
+    /// Names in configurations.
+    pub const NAMED: [(&str, Self); 2] = [("orthogonal", Self::Orthogonal), ("ml_agents", Self::MlAgents)];
 }
 
 /// Whose probability ratio the objective bounds.
@@ -46,8 +46,8 @@ pub enum Ratio {
 }
 
 impl Ratio {
-    /// Names in configurations, in the order of the variants.
-    pub const NAMES: [&str; 2] = ["joint", "per_action"];
+    /// Names in configurations.
+    pub const NAMED: [(&str, Self); 2] = [("joint", Self::Joint), ("per_action", Self::PerAction)];
 
     /// Numbers that a sample's log-probability is kept as.
     pub(crate) fn rows(self, actions: usize) -> usize {
@@ -297,6 +297,17 @@ impl PpoConfig {
         }
     }
 
+    /// Whether so many agents fill their lanes evenly: a multiple of sixteen, or a divisor of it.
+    pub fn fills_lanes(agents: usize) -> bool {
+        agents.is_multiple_of(BLOCK) || agents < BLOCK && agents.is_power_of_two()
+    }
+    /// Factor of the actions drawn, before they are clipped to [-1, 1].
+    pub fn action_scale(&self) -> f32 {
+        match self.algorithm {
+            Algorithm::Sac(_) => 1.0,
+            _ => 1.0 / self.action_clip as f32,
+        }
+    }
     /// Number of blocks of sixteen agents.
     pub fn blocks(&self) -> usize {
         self.agents.div_ceil(BLOCK)
@@ -319,10 +330,10 @@ impl PpoConfig {
     /// # Errors
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
-        let few = self.agents.is_power_of_two() && !matches!(self.algorithm, Algorithm::Sac(_));
-        if self.agents == 0 || !(self.agents.is_multiple_of(BLOCK) || self.agents < BLOCK && few) {
+        let sac = matches!(self.algorithm, Algorithm::Sac(_));
+        if self.agents == 0 || !Self::fills_lanes(self.agents) || sac && self.agents < BLOCK {
             let nearest = (self.agents as f64 / BLOCK as f64).round().max(1.0) as usize * BLOCK;
-            let or = if let Algorithm::Sac(_) = self.algorithm { " with sac" } else { ", or 1, 2, 4 or 8" };
+            let or = if sac { " with sac" } else { ", or 1, 2, 4 or 8" };
             return Err(Error::config("agents", self.agents, format!("a multiple of {BLOCK}, such as {nearest}{or}")));
         }
         let items = self.blocks().saturating_mul(self.horizon);

@@ -10,8 +10,9 @@ use crate::gaussian::Gaussian;
 use crate::mlp::Mlp;
 use crate::noise::{PARAMETERS, SIGNALS, SplitMix};
 use crate::normalize::{Moments, Normalizer};
-use crate::rollout::{Acting, BlockSums, Rollout};
+use crate::rollout::{Acting, Rollout};
 use crate::signal::{MAX_SIGNALS, SignalNets};
+use crate::sums::BlockSums;
 use crate::{Algorithm, BLOCK, PpoConfig, init};
 use marathon_envs::Spec;
 use marathon_physics::lanes::{Isa, Real};
@@ -233,7 +234,7 @@ impl Learner {
             normalizer: &self.normalizer(config),
             signals: signals.collect(),
             ratio: layout.ratio,
-            action_scale: 1.0 / config.action_clip as f32,
+            action_scale: config.action_scale(),
             squash: matches!(config.algorithm, Algorithm::Sac(_)),
             discounts: Discounts { gamma, lambda: config.gae_lambda },
             reward_scale: self.reward_scale(config) * config.reward_strength,

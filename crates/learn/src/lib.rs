@@ -81,6 +81,7 @@ mod run;
 mod sac;
 pub mod signal;
 pub mod squash;
+mod sums;
 mod sync;
 mod tiles;
 mod update;

@@ -2,10 +2,9 @@
 //!
 //! The lanes that are left over show what those of the agents show: lane `i` has the experience of agent `i % agents`, to the
 //! bit. Every agent then counts as often as any other, so means over samples, and with them gradients and statistics, are
-//! those of the agents alone; sums are scaled down to them. It costs as much as sixteen agents.
+//! those of the agents alone; sums are [scaled](crate::sums::BlockSums::scale) down to them. It costs as much as sixteen agents.
 
 use crate::BLOCK;
-use crate::rollout::BlockSums;
 use marathon_envs::BlockStep;
 
 /// The mask of the agents alone, repeated.
@@ -31,17 +30,6 @@ pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
     for mask in [&mut out.terminated, &mut out.truncated, &mut out.diverged] {
         *mask = repeat(*mask, agents);
     }
-}
-
-/// Leaves of a block's sums what the agents alone add up to: exact, since their number is a power of two.
-pub fn scale(sums: &mut BlockSums, agents: usize) {
-    let part = agents as f64 / BLOCK as f64;
-    let BlockSums { episodes, returns, lengths, speeds, falls, diverged, terms, .. } = sums;
-    let BlockSums { discounted, observations, advantages, targets, errors, signals, .. } = sums;
-    let scalars = [episodes, returns, lengths, speeds, falls, diverged].into_iter();
-    let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
-    let all = scalars.chain(terms).chain(signals).chain(pairs.flat_map(|(a, b)| [a, b]));
-    all.for_each(|x| *x *= part);
 }
 
 #[cfg(test)]

@@ -137,9 +137,9 @@ impl Policy {
         meta.training = Some(training);
         let (net, mut params) = (layout.actor.clone(), layout.actor_params(&learner.params).to_vec());
         let mut log_std = learner.params[layout.log_std.clone()].to_vec();
-        if config.action_clip != 1.0 {
+        let scale = config.action_scale();
+        if scale != 1.0 {
             // the last layer takes in the scale of the actions, so that every policy is bounded by 1
-            let scale = 1.0 / config.action_clip as f32;
             let (weights, biases) = net.layers().last().expect("a network has layers");
             params[weights].iter_mut().for_each(|w| *w *= scale);
             params[biases].iter_mut().for_each(|b| *b *= scale);

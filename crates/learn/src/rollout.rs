@@ -16,6 +16,7 @@ use crate::noise::Noise;
 use crate::normalize::{Normalize, Normalizer};
 use crate::signal::{SignalNets, SignalSpace, Step};
 use crate::squash::{Draw, Normals};
+use crate::sums::BlockSums;
 use crate::{BLOCK, f32_lanes, mirror};
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use marathon_physics::lanes::{Isa, Real};
@@ -47,63 +48,6 @@ impl Acting<'_> {
     /// Streams of rewards.
     fn streams(&self) -> usize {
         1 + self.signals.len()
-    }
-}
-
-/// Sums over the episodes that ended in a block, and over its rewards.
-#[derive(Clone, Debug, Default)]
-pub struct BlockSums {
-    /// Episodes ended.
-    pub episodes: f64,
-    /// Their returns (undiscounted, unscaled).
-    pub returns: f64,
-    /// Their lengths in decisions.
-    pub lengths: f64,
-    /// Their mean forward speeds, m per decision.
-    pub speeds: f64,
-    /// Episodes that ended in a terminal state.
-    pub falls: f64,
-    /// Agents whose state stopped being finite.
-    pub diverged: f64,
-    /// Sum of each reward term over the rollout.
-    pub terms: Vec<f64>,
-    /// Discounted returns: deviations from the center and their squares.
-    pub discounted: (f64, f64),
-    /// Observations: deviations from the mean and their squares.
-    pub observations: Vec<(f64, f64)>,
-    /// Advantages and their squares.
-    pub advantages: (f64, f64),
-    /// Value targets of the task's reward and their squares.
-    pub targets: (f64, f64),
-    /// Errors of the values against them, and their squares.
-    pub errors: (f64, f64),
-    /// Sum of each signal's reward over the rollout.
-    pub signals: Vec<f64>,
-}
-
-impl BlockSums {
-    /// Adds those of another block or rollout.
-    pub fn add(&mut self, other: &BlockSums) {
-        fn pair(a: &mut (f64, f64), b: &(f64, f64)) {
-            a.0 += b.0;
-            a.1 += b.1;
-        }
-        self.episodes += other.episodes;
-        self.returns += other.returns;
-        self.lengths += other.lengths;
-        self.speeds += other.speeds;
-        self.falls += other.falls;
-        self.diverged += other.diverged;
-        self.terms.resize(other.terms.len(), 0.0);
-        self.terms.iter_mut().zip(&other.terms).for_each(|(a, b)| *a += b);
-        self.observations.resize(other.observations.len(), (0.0, 0.0));
-        self.observations.iter_mut().zip(&other.observations).for_each(|(a, b)| pair(a, b));
-        pair(&mut self.discounted, &other.discounted);
-        pair(&mut self.advantages, &other.advantages);
-        pair(&mut self.targets, &other.targets);
-        pair(&mut self.errors, &other.errors);
-        self.signals.resize(other.signals.len(), 0.0);
-        self.signals.iter_mut().zip(&other.signals).for_each(|(a, b)| *a += b);
     }
 }
 
@@ -254,8 +198,6 @@ impl Rollout {
 /// A worker's agents.
 pub struct Actor {
     shard: Box<dyn Shard>,
-    /// Agents in a block, which the other lanes mirror.
-    lanes: usize,
     first_block: usize,
     noise: Vec<Noise>,
     /// Current raw observations, `[block][obs][16]`.
@@ -288,7 +230,6 @@ impl Actor {
         let noise = |b| Noise::new(seed, first_block + b).mirrored(layout.lanes);
         Self {
             shard,
-            lanes: layout.lanes,
             first_block,
             noise: (0..blocks).map(noise).collect(),
             obs,
@@ -356,10 +297,7 @@ impl Actor {
             }
             let start = clock::wall();
             let row = blocks * rollout.act_len * BLOCK;
-            self.announce(
-                &rollout.action[t * row..(t + 1) * row],
-                if acting.squash { 1.0 } else { acting.action_scale },
-            );
+            self.announce(&rollout.action[t * row..(t + 1) * row], acting.action_scale);
             for b in 0..blocks {
                 self.step(acting, rollout, t * blocks + b, b);
             }
@@ -372,9 +310,9 @@ impl Actor {
         self.reward_novelty(acting, rollout);
         self.evaluate(acting, rollout);
         advantage::estimate(acting, rollout);
-        if self.lanes < BLOCK {
-            rollout.sums.iter_mut().for_each(|sums| mirror::scale(sums, self.lanes));
-        }
+        // exact, since the number of agents is a power of two
+        let part = rollout.lanes as f64 / BLOCK as f64;
+        rollout.sums.iter_mut().for_each(|sums| sums.scale(part));
         env_seconds
     }
 
@@ -433,8 +371,8 @@ impl Actor {
         let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
         self.shard.step(b, &self.action[b * act_row..(b + 1) * act_row], obs, out);
         let ended = out.terminated | out.truncated | out.diverged;
-        if self.lanes < BLOCK {
-            mirror::step(out, obs, self.lanes);
+        if rollout.lanes < BLOCK {
+            mirror::step(out, obs, rollout.lanes);
         }
 
         // running sums of the agents
@@ -498,7 +436,7 @@ impl Actor {
         }
         // lanes without an agent live on too
         self.shard.reset(b, done | ended, obs);
-        mirror::rows(obs, self.lanes);
+        mirror::rows(obs, rollout.lanes);
     }
 
     /// Sums of the observations per block.

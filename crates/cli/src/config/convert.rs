@@ -114,11 +114,8 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
 
         critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
         actor_hidden,
-        activation: activation(&marathon, base.activation)?,
-        initialization: match marathon.get("initialization") {
-            Some(entry) => [Init::Orthogonal, Init::MlAgents][entry.word(&Init::NAMES)?],
-            None => base.initialization,
-        },
+        activation: one_of(&marathon, "activation", Activation::ALL.map(|a| (a.name(), a)), base.activation)?,
+        initialization: one_of(&marathon, "initialization", Init::NAMED, base.initialization)?,
 
         lr: settings.learning_rate,
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
@@ -134,10 +131,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         reward_strength: if signals.is_empty() { 1.0 } else { strength },
         signals,
         gae_lambda: settings.lambd,
-        ratio: match marathon.get("ratio") {
-            Some(entry) => [Ratio::Joint, Ratio::PerAction][entry.word(&Ratio::NAMES)?],
-            None => base.ratio,
-        },
+        ratio: one_of(&marathon, "ratio", Ratio::NAMED, base.ratio)?,
         clip: settings.epsilon,
         final_clip: match is_ppo {
             true => end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
@@ -201,7 +195,7 @@ fn agents(
     };
     let Some(entry) = marathon.get("agents") else { return Ok(default) };
     let agents = entry.count(1..=1 << 31)?;
-    if !(agents.is_multiple_of(block) || agents < block && agents.is_power_of_two()) {
+    if !PpoConfig::fills_lanes(agents as usize) {
         let expected = format!("a multiple of {block}, such as {}, or 1, 2, 4 or 8", agents.next_multiple_of(block));
         return Err(ConfigError::value(entry.place, entry.node.describe(), expected));
     }
@@ -270,9 +264,15 @@ fn sac(
     }))
 }
 
-fn activation(marathon: &Section<'_>, default: Activation) -> Result<Activation, ConfigError> {
-    let Some(entry) = marathon.get("activation") else { return Ok(default) };
-    Ok(Activation::ALL[entry.word(&Activation::ALL.map(Activation::name))?])
+/// A choice by its name.
+fn one_of<T: Copy, const N: usize>(
+    marathon: &Section<'_>,
+    key: &str,
+    choices: [(&str, T); N],
+    default: T,
+) -> Result<T, ConfigError> {
+    let Some(entry) = marathon.get(key) else { return Ok(default) };
+    Ok(choices[entry.word(&choices.map(|(name, _)| name))?].1)
 }
 
 /// The rate's schedule: ML-Agents', or the one that only Marathon has.

@@ -29,7 +29,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         // the buffer is that of all agents
         config.horizon = (config.rollout_steps() as usize).div_ceil(AGENTS);
         (config.agents, config.total_steps, config.threads) = (AGENTS, options.steps, options.threads);
-        let keep = options.keep_for(if name == "paper-appendix-c" { "supplement-c" } else { name });
+        let keep = options.keep_for(name);
         let (mut theirs, mut ours) = (Vec::new(), Vec::new());
         for seed in 1..=options.seeds {
             config.seed = seed;

@@ -146,11 +146,12 @@ pub fn mlagents(
 ) -> Result<(Run, String), CliError> {
     let factory = registry::factory(agent, Isa::best())?;
     let id = &factory.spec().id;
-    let mut job = json!({
+    let job = json!({
         "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.agents,
         "seed": config.seed, "threads": 1,
     });
-    once(keep, ("mlagents", config.seed), &job.clone(), || {
+    once(keep, ("mlagents", config.seed), &job, || {
+        let mut job = job.clone();
         let folder = std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.seed));
         std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
         (job["player"], job["folder"]) = (json!(player()?), json!(folder));

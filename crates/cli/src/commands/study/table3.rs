@@ -97,7 +97,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         };
         let mut config = supplement_c()?;
         config.total_steps = options.steps;
-        let keep = options.keep_for("supplement-c");
+        let keep = options.keep_for("paper-appendix-c");
         let runs = each_seed(peers.peer_seeds, |seed| {
             config.seed = seed;
             Ok(note(peers::mlagents(AGENT, &config, TIME_HORIZON, keep.as_deref())?))

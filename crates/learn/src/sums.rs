@@ -1,0 +1,68 @@
+//! What is added up over a rollout, block by block: totals taken in the order of the blocks do not depend on workers.
+
+/// Sums over the episodes that ended in a block, and over its rewards.
+#[derive(Clone, Debug, Default)]
+pub struct BlockSums {
+    /// Episodes ended.
+    pub episodes: f64,
+    /// Their returns (undiscounted, unscaled).
+    pub returns: f64,
+    /// Their lengths in decisions.
+    pub lengths: f64,
+    /// Their mean forward speeds, m per decision.
+    pub speeds: f64,
+    /// Episodes that ended in a terminal state.
+    pub falls: f64,
+    /// Agents whose state stopped being finite.
+    pub diverged: f64,
+    /// Sum of each reward term over the rollout.
+    pub terms: Vec<f64>,
+    /// Discounted returns: deviations from the center and their squares.
+    pub discounted: (f64, f64),
+    /// Observations: deviations from the mean and their squares.
+    pub observations: Vec<(f64, f64)>,
+    /// Advantages and their squares.
+    pub advantages: (f64, f64),
+    /// Value targets of the task's reward and their squares.
+    pub targets: (f64, f64),
+    /// Errors of the values against them, and their squares.
+    pub errors: (f64, f64),
+    /// Sum of each signal's reward over the rollout.
+    pub signals: Vec<f64>,
+}
+
+impl BlockSums {
+    /// Adds those of another block or rollout.
+    pub fn add(&mut self, other: &BlockSums) {
+        fn pair(a: &mut (f64, f64), b: &(f64, f64)) {
+            a.0 += b.0;
+            a.1 += b.1;
+        }
+        self.episodes += other.episodes;
+        self.returns += other.returns;
+        self.lengths += other.lengths;
+        self.speeds += other.speeds;
+        self.falls += other.falls;
+        self.diverged += other.diverged;
+        self.terms.resize(other.terms.len(), 0.0);
+        self.terms.iter_mut().zip(&other.terms).for_each(|(a, b)| *a += b);
+        self.observations.resize(other.observations.len(), (0.0, 0.0));
+        self.observations.iter_mut().zip(&other.observations).for_each(|(a, b)| pair(a, b));
+        pair(&mut self.discounted, &other.discounted);
+        pair(&mut self.advantages, &other.advantages);
+        pair(&mut self.targets, &other.targets);
+        pair(&mut self.errors, &other.errors);
+        self.signals.resize(other.signals.len(), 0.0);
+        self.signals.iter_mut().zip(&other.signals).for_each(|(a, b)| *a += b);
+    }
+
+    /// Multiplies all by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        let Self { episodes, returns, lengths, speeds, falls, diverged, terms, .. } = self;
+        let Self { discounted, observations, advantages, targets, errors, signals, .. } = self;
+        let scalars = [episodes, returns, lengths, speeds, falls, diverged].into_iter();
+        let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
+        let all = scalars.chain(terms).chain(signals).chain(pairs.flat_map(|(a, b)| [a, b]));
+        all.for_each(|x| *x *= factor);
+    }
+}
