@@ -52,6 +52,7 @@ fn what_is_left_out_has_the_value_of_ml_agents() {
         min_std: 1e-3,
         max_std: 1e3,
         normalize_observations: false,
+        renormalize: true,
         observation_clip: 5.0,
         scale_rewards: false,
         ..PpoConfig::default()
@@ -180,6 +181,7 @@ fn every_key_of_marathon_counts() {
         final_min_std: Some(0.04),
         max_std: 1.5,
         normalize_observations: false,
+        renormalize: false,
         observation_clip: 8.0,
         scale_rewards: true,
         statistics_cap: 1e6,

@@ -173,6 +173,11 @@ pub struct PpoConfig {
 
     /// Whether observations are normalized by their running mean and deviation.
     pub normalize_observations: bool,
+    /// Whether a rollout is learned from with observations normalized by the statistics that it has changed, as in
+    /// ML-Agents; else by those that its agents acted with. The policy sees the changed ones next: what it has learned
+    /// for others is then a little off, which few agents with long rollouts feel most. The adaptive schedule would take
+    /// the change of the statistics for one of the policy, and does not go with it. Without effect with SAC.
+    pub renormalize: bool,
     /// Bound of the normalized observations.
     pub observation_clip: f64,
     /// Whether rewards are divided by the running deviation of the discounted return.
@@ -225,6 +230,7 @@ impl Default for PpoConfig {
             final_min_std: None,
             max_std: 2.0,
             normalize_observations: true,
+            renormalize: false,
             observation_clip: 10.0,
             scale_rewards: true,
             statistics_cap: 3e7,
@@ -361,6 +367,9 @@ impl PpoConfig {
             if widths.iter().any(|w| !(1..=65536).contains(w)) || widths.len() > 64 {
                 return Err(Error::config(field, format!("{widths:?}"), "up to 64 widths between 1 and 65536"));
             }
+        }
+        if self.renormalize && self.schedule == Schedule::Adaptive {
+            return Err(Error::config("renormalize", true, "false with the schedule 'adaptive', or another schedule"));
         }
         let positive = [
             ("lr", self.lr),

@@ -242,12 +242,16 @@ impl Learner {
         })
     }
 
-    /// Takes in the statistics of a rollout.
-    pub fn absorb(&mut self, totals: &Totals, config: &PpoConfig) {
+    /// Takes in the statistics of a rollout's observations, which change the [`Learner::normalizer`].
+    pub fn observe(&mut self, totals: &Totals, config: &PpoConfig) {
         // without normalization the deviations are from zero, not from the mean
         if config.normalize_observations {
             self.observations.merge(totals.samples, &totals.sums.observations, config.statistics_cap);
         }
+    }
+
+    /// Takes in what else there is to know of a rollout, after all has been learned from it.
+    pub fn count(&mut self, totals: &Totals, config: &PpoConfig) {
         self.returns.merge(totals.samples, &[totals.sums.discounted], config.statistics_cap);
         self.iteration += 1;
         self.steps += totals.samples as u64;

@@ -19,7 +19,7 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads, with any algorithm.
-const COMMON: [&str; 31] = [
+const COMMON: [&str; 32] = [
     "agents",
     "horizon",
     "rollouts",
@@ -44,6 +44,7 @@ const COMMON: [&str; 31] = [
     "min_std",
     "final_min_std",
     "max_std",
+    "renormalize",
     "observation_clip",
     "scale_rewards",
     "statistics_cap",
@@ -99,6 +100,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let actor_hidden = widths(&marathon, "actor_hidden", hidden)?;
     let last_epsilon = settings.epsilon.min(LAST_EPSILON);
     let last_beta = settings.beta.min(LAST_BETA);
+    let schedule = schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?;
     let [min_std, max_std] = [base.min_std, base.max_std];
     let ppo = PpoConfig {
         algorithm: match base.algorithm {
@@ -119,7 +121,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
 
         lr: settings.learning_rate,
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
-        schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
+        schedule,
         target_kl: marathon.number("target_kl", Range::Positive, base.target_kl)?,
         final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, base.target_kl)?,
         lr_range: lr_range(&marathon, base.lr_range)?,
@@ -158,6 +160,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         max_std: marathon.number("max_std", Range::Positive, max_std)?,
 
         normalize_observations: settings.normalize,
+        renormalize: marathon.flag("renormalize", base.renormalize && schedule != Schedule::Adaptive)?,
         observation_clip: marathon.number("observation_clip", Range::Positive, base.observation_clip)?,
         scale_rewards: marathon.flag("scale_rewards", base.scale_rewards)?,
         statistics_cap: marathon.number("statistics_cap", Range::Positive, base.statistics_cap)?,
