@@ -52,7 +52,7 @@ fn what_is_left_out_has_the_value_of_ml_agents() {
         min_std: 1e-3,
         max_std: 1e3,
         normalize_observations: false,
-        renormalize: true,
+        follow_statistics: true,
         observation_clip: 5.0,
         scale_rewards: false,
         ..PpoConfig::default()
@@ -138,6 +138,7 @@ fn every_key_of_marathon_counts() {
       min_std: 0.06
       final_min_std: 0.04
       max_std: 1.5
+      follow_statistics: no
       observation_clip: 8
       scale_rewards: yes
       statistics_cap: 1e6
@@ -181,7 +182,7 @@ fn every_key_of_marathon_counts() {
         final_min_std: Some(0.04),
         max_std: 1.5,
         normalize_observations: false,
-        renormalize: false,
+        follow_statistics: false,
         observation_clip: 8.0,
         scale_rewards: true,
         statistics_cap: 1e6,

@@ -173,11 +173,10 @@ pub struct PpoConfig {
 
     /// Whether observations are normalized by their running mean and deviation.
     pub normalize_observations: bool,
-    /// Whether a rollout is learned from with observations normalized by the statistics that it has changed, as in
-    /// ML-Agents; else by those that its agents acted with. The policy sees the changed ones next: what it has learned
-    /// for others is then a little off, which few agents with long rollouts feel most. The adaptive schedule would take
-    /// the change of the statistics for one of the policy, and does not go with it. Without effect with SAC.
-    pub renormalize: bool,
+    /// Whether the networks' first layers follow the statistics that normalize observations, so that what the networks make
+    /// of an observation stays what it was when a rollout has moved them. Few agents with long rollouts feel the move most.
+    /// Not with SAC.
+    pub follow_statistics: bool,
     /// Bound of the normalized observations.
     pub observation_clip: f64,
     /// Whether rewards are divided by the running deviation of the discounted return.
@@ -230,7 +229,7 @@ impl Default for PpoConfig {
             final_min_std: None,
             max_std: 2.0,
             normalize_observations: true,
-            renormalize: false,
+            follow_statistics: false,
             observation_clip: 10.0,
             scale_rewards: true,
             statistics_cap: 3e7,
@@ -368,8 +367,12 @@ impl PpoConfig {
                 return Err(Error::config(field, format!("{widths:?}"), "up to 64 widths between 1 and 65536"));
             }
         }
-        if self.renormalize && self.schedule == Schedule::Adaptive {
-            return Err(Error::config("renormalize", true, "false with the schedule 'adaptive', or another schedule"));
+        if self.follow_statistics && sac {
+            return Err(Error::config(
+                "follow_statistics",
+                true,
+                "false with sac, which learns from more than one policy's steps",
+            ));
         }
         let positive = [
             ("lr", self.lr),

@@ -242,16 +242,19 @@ impl Learner {
         })
     }
 
-    /// Takes in the statistics of a rollout's observations, which change the [`Learner::normalizer`].
-    pub fn observe(&mut self, totals: &Totals, config: &PpoConfig) {
+    /// Takes in the statistics of a rollout.
+    pub fn absorb(&mut self, totals: &Totals, layout: &Layout, config: &PpoConfig) {
         // without normalization the deviations are from zero, not from the mean
         if config.normalize_observations {
+            let before = self.normalizer(config);
             self.observations.merge(totals.samples, &totals.sums.observations, config.statistics_cap);
+            // the first rollout's are those that the weights at the start are meant for
+            if config.follow_statistics && self.iteration > 0 {
+                let after = self.normalizer(config);
+                layout.actor.follow(&mut self.params[..layout.critic_start], &before, &after);
+                layout.critic.follow(&mut self.params[layout.critic_start..], &before, &after);
+            }
         }
-    }
-
-    /// Takes in what else there is to know of a rollout, after all has been learned from it.
-    pub fn count(&mut self, totals: &Totals, config: &PpoConfig) {
         self.returns.merge(totals.samples, &[totals.sums.discounted], config.statistics_cap);
         self.iteration += 1;
         self.steps += totals.samples as u64;

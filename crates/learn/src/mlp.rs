@@ -10,6 +10,7 @@
 use crate::activation::{self, Activation};
 use crate::buffer::Blocks;
 use crate::f32_lanes;
+use crate::normalize::Normalizer;
 use crate::tiles;
 use marathon_physics::lanes::{Isa, Kernel, Real};
 use std::marker::PhantomData;
@@ -125,6 +126,25 @@ impl Mlp {
     pub fn flops(&self) -> f64 {
         let cost = |(i, l): (usize, &Layer)| (l.inputs * l.outputs) as f64 * if i == 0 { 4.0 } else { 6.0 };
         self.layers.iter().enumerate().map(cost).sum()
+    }
+
+    /// Moves the first layer to other statistics of the inputs: what the network makes of a raw input stays the same. Where
+    /// a deviation has more than doubled, as that of an input that has never moved before, its weights are doubled only:
+    /// they were never learned at that size.
+    pub fn follow(&self, params: &mut [f32], before: &Normalizer, after: &Normalizer) {
+        let layer = &self.layers[0];
+        let (weights, biases) = params[..layer.biases.end].split_at_mut(layer.weights.end);
+        let growth: Vec<f32> = before.std().iter().zip(after.std()).map(|(old, new)| (new / old).min(2.0)).collect();
+        let means = before.mean().iter().zip(after.mean()).zip(after.std());
+        let shift: Vec<f64> = means.map(|((old, new), std)| (*new as f64 - *old as f64) / *std as f64).collect();
+        for (row, bias) in weights.chunks_exact_mut(layer.inputs).zip(biases) {
+            let mut moved = *bias as f64;
+            for ((weight, growth), shift) in row.iter_mut().zip(&growth).zip(&shift) {
+                *weight *= growth;
+                moved += *weight as f64 * shift;
+            }
+            *bias = moved as f32;
+        }
     }
 
     /// Work space for inference: no derivatives.

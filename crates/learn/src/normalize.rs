@@ -4,9 +4,9 @@
 //! blocks' sums are then merged in double precision in the order of the blocks (Chan, Golub and LeVeque, 1979). A cap on
 //! the count keeps the statistics able to follow a policy that keeps changing.
 
+use crate::BLOCK;
 use crate::buffer::Blocks;
-use crate::{BLOCK, f32_lanes};
-use marathon_physics::lanes::{Isa, Kernel, Real};
+use marathon_physics::lanes::{Kernel, Real};
 use std::marker::PhantomData;
 
 /// Means and variances of a list of quantities.
@@ -96,43 +96,14 @@ impl Normalizer {
     }
 }
 
-/// Normalizes a chunk of raw blocks, `[block][obs][16]`, into a network's input.
-pub(crate) fn normalize(isa: Isa, normalizer: &Normalizer, raw: &[f32], input: &mut Blocks<f32>) {
-    f32_lanes!(isa, T => <T as Real>::enter(Normalize::<T> { normalizer, raw, input, sums: None, lanes: PhantomData }));
-}
-
-/// Normalizes raw blocks, `[block][obs][16]`, where they are.
-pub(crate) fn normalize_in_place(isa: Isa, normalizer: &Normalizer, rows: &mut [f32]) {
-    f32_lanes!(isa, T => <T as Real>::enter(NormalizeInPlace::<T> { normalizer, rows, lanes: PhantomData }));
-}
-
-/// The map of [`Normalizer::row`] for a feature's lanes.
-#[derive(Clone, Copy)]
-struct Scale<T> {
-    mean: T,
-    inv_std: T,
-    clip: T,
-}
-
-impl<T: Real<Scalar = f32>> Scale<T> {
-    #[inline(always)]
-    fn new(normalizer: &Normalizer, feature: usize) -> Self {
-        let splat = |x: &[f32]| T::splat(x[feature]);
-        Self { mean: splat(&normalizer.mean), inv_std: splat(&normalizer.inv_std), clip: T::splat(normalizer.clip) }
-    }
-    /// The deviation from the mean, and the normalized value.
-    #[inline(always)]
-    fn apply(self, raw: T) -> (T, T) {
-        let d = raw - self.mean;
-        (d, (d * self.inv_std).max(-self.clip).min(self.clip))
-    }
-}
-
-/// [`normalize`], which also adds deviations from the mean and their squares to sums, `[block][obs][16]` each.
+/// Normalizes a chunk of raw blocks, `[block][obs][16]`, into a network's input and, if given, a flat copy and sums of
+/// deviations and squares from the mean.
 pub(crate) struct Normalize<'a, T> {
     pub normalizer: &'a Normalizer,
     pub raw: &'a [f32],
     pub input: &'a mut Blocks<f32>,
+    pub copy: Option<&'a mut [f32]>,
+    /// `[block][obs][16]` each.
     pub sums: Option<(&'a mut [f32], &'a mut [f32])>,
     pub lanes: PhantomData<T>,
 }
@@ -142,42 +113,26 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Normalize<'_, T> {
 
     #[inline(always)]
     fn run(self) {
-        let Normalize { normalizer, raw, input, mut sums, .. } = self;
+        let Normalize { normalizer, raw, input, mut copy, mut sums, .. } = self;
         let n = normalizer.mean.len();
+        let clip = T::splat(normalizer.clip);
         for (b, raw) in raw.chunks_exact(n * BLOCK).enumerate() {
             let out = input.block_mut(b);
             for k in 0..n {
-                let scale = Scale::<T>::new(normalizer, k);
+                let (mean, inv_std) = (T::splat(normalizer.mean[k]), T::splat(normalizer.inv_std[k]));
                 for lane in (k * BLOCK..(k + 1) * BLOCK).step_by(T::LANES) {
-                    let (d, y) = scale.apply(T::load(&raw[lane..]));
+                    let d = T::load(&raw[lane..]) - mean;
+                    let y = (d * inv_std).max(-clip).min(clip);
                     y.store(&mut out[lane..]);
+                    if let Some(copy) = &mut copy {
+                        y.store(&mut copy[b * n * BLOCK + lane..]);
+                    }
                     if let Some((sum, square)) = &mut sums {
                         let at = b * n * BLOCK + lane;
                         (T::load(&sum[at..]) + d).store(&mut sum[at..]);
                         d.mul_add(d, T::load(&square[at..])).store(&mut square[at..]);
                     }
                 }
-            }
-        }
-    }
-}
-
-struct NormalizeInPlace<'a, T> {
-    normalizer: &'a Normalizer,
-    rows: &'a mut [f32],
-    lanes: PhantomData<T>,
-}
-
-impl<T: Real<Scalar = f32>> Kernel<T> for NormalizeInPlace<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let n = self.normalizer.mean.len();
-        for (i, row) in self.rows.chunks_exact_mut(BLOCK).enumerate() {
-            let scale = Scale::<T>::new(self.normalizer, i % n);
-            for lane in (0..BLOCK).step_by(T::LANES) {
-                scale.apply(T::load(&row[lane..])).1.store(&mut row[lane..]);
             }
         }
     }

@@ -18,13 +18,14 @@ use crate::files::{TensorReader, TensorWriter, write_atomic};
 use crate::gaussian::Gaussian;
 use crate::learner::Learner;
 use crate::mlp::{CHUNK, Mlp, Tape};
-use crate::normalize::{Normalizer, normalize};
+use crate::normalize::{Normalize, Normalizer};
 use crate::run::{Clocks, Run};
-use crate::{Activation, BLOCK, Error, PpoConfig};
+use crate::{Activation, BLOCK, Error, PpoConfig, f32_lanes};
 use marathon_envs::Spec;
 use marathon_envs::shard::scale_action;
 use marathon_physics::lanes::{Isa, Real};
 use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
 use std::path::Path;
 
 const FORMAT: &str = "marathon-policy";
@@ -405,7 +406,14 @@ impl<'a> BlockPolicy<'a> {
     /// Runs the network for at most [`CHUNK`] blocks of raw observations.
     fn forward(&mut self, raw: &[f32]) {
         let policy = self.policy;
-        normalize(self.isa, &policy.normalizer, raw, &mut self.input);
+        f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
+            normalizer: &policy.normalizer,
+            raw,
+            input: &mut self.input,
+            copy: None,
+            sums: None,
+            lanes: PhantomData,
+        }));
         let blocks = raw.len() / (policy.meta.obs * BLOCK);
         policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, blocks);
     }

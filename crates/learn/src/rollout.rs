@@ -13,7 +13,7 @@ use crate::learner::Layout;
 use crate::loss::Samples;
 use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::noise::Noise;
-use crate::normalize::{Normalize, Normalizer, normalize, normalize_in_place};
+use crate::normalize::{Normalize, Normalizer};
 use crate::signal::{SignalNets, SignalSpace, Step};
 use crate::squash::{Draw, Normals};
 use crate::sums::BlockSums;
@@ -56,11 +56,11 @@ pub struct Rollout {
     blocks: usize,
     obs_len: usize,
     act_len: usize,
-    /// Raw while the agents play, then normalized ([`Rollout::normalize`]), `[item][obs][16]`.
+    /// Normalized, `[item][obs][16]`.
     obs: Aligned<f32>,
     /// `[item][act][16]`.
     action: Aligned<f32>,
-    /// What was observed next, likewise, where a reward signal or SAC asks for it; else nothing.
+    /// What was observed next, normalized, where a reward signal asks for it; else nothing.
     next_obs: Aligned<f32>,
     /// `[item][16]`, or with a ratio for each action `[item][act][16]`.
     log_prob: Aligned<f32>,
@@ -124,15 +124,15 @@ impl Rollout {
     pub fn blocks(&self) -> usize {
         self.blocks
     }
-    /// Observations of an item, `[obs][16]`.
+    /// Normalized observations of an item, `[obs][16]`.
     pub fn obs(&self, item: usize) -> &[f32] {
         &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
     }
     /// What a learner needs to know, `[item][..][16]`, by name.
     pub fn rows(&self) -> [(&'static str, &[f32]); 7] {
         [
-            ("rollout_obs", &self.obs),
-            ("next_obs", &self.next_obs),
+            ("normalized_obs", &self.obs),
+            ("next_normalized_obs", &self.next_obs),
             ("action", &self.action),
             ("log_prob", &self.log_prob),
             ("value", &self.value),
@@ -143,8 +143,8 @@ impl Rollout {
     /// The same, to be filled.
     pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 7] {
         [
-            ("rollout_obs", &mut self.obs),
-            ("next_obs", &mut self.next_obs),
+            ("normalized_obs", &mut self.obs),
+            ("next_normalized_obs", &mut self.next_obs),
             ("action", &mut self.action),
             ("log_prob", &mut self.log_prob),
             ("value", &mut self.value),
@@ -163,11 +163,6 @@ impl Rollout {
             }
         }
         self.sums.push(from.sums[its].clone());
-    }
-    /// Normalizes the raw observations for learning.
-    pub fn normalize(&mut self, isa: Isa, normalizer: &Normalizer) {
-        normalize_in_place(isa, normalizer, &mut self.obs);
-        normalize_in_place(isa, normalizer, &mut self.next_obs);
     }
     /// What the objective needs to know about an item.
     pub fn samples(&self, item: usize) -> Samples<'_, f32> {
@@ -321,7 +316,7 @@ impl Actor {
         env_seconds
     }
 
-    /// Stores the observations of `n` blocks, and draws and stores their actions.
+    /// Normalizes the observations of `n` blocks, and draws and stores their actions.
     fn act(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
         let of = |row: usize| first * row..(first + n) * row;
@@ -331,12 +326,13 @@ impl Actor {
             normalizer: acting.normalizer,
             raw: &self.obs[of(obs_row)],
             input: &mut self.input,
+            copy: if acting.squash { None } else { Some(&mut rollout.obs[at(obs_row)]) },
             sums: Some((&mut sum[of(obs_row)], &mut square[of(obs_row)])),
             lanes: PhantomData,
         }));
-        rollout.obs[at(obs_row)].copy_from_slice(&self.obs[of(obs_row)]);
         acting.actor.0.forward(acting.isa, acting.actor.1, &self.input, &mut self.tape, n);
         if acting.squash {
+            rollout.obs[at(obs_row)].copy_from_slice(&self.obs[of(obs_row)]);
             let (act, action) = (rollout.act_len, &mut rollout.action[at(act_row)]);
             let (z, output, log_prob) =
                 (&mut self.z[..n * act_row], self.tape.output(), &mut rollout.log_prob[at(BLOCK)]);
@@ -404,8 +400,17 @@ impl Actor {
             *sum += term.iter().map(|x| *x as f64).sum::<f64>();
         }
 
-        if !rollout.next_obs.is_empty() {
+        if acting.squash {
             rollout.next_obs[item * obs_row..(item + 1) * obs_row].copy_from_slice(obs);
+        } else if !acting.signals.is_empty() {
+            f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
+                normalizer: acting.normalizer,
+                raw: obs,
+                input: &mut self.input,
+                copy: Some(&mut rollout.next_obs[item * obs_row..(item + 1) * obs_row]),
+                sums: None,
+                lanes: PhantomData,
+            }));
         }
 
         // ended episodes
@@ -447,29 +452,16 @@ impl Actor {
 
     /// Rewards of the signals.
     fn reward_novelty(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
-        if acting.signals.is_empty() {
-            return;
-        }
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
-        for first in (0..items).step_by(CHUNK) {
-            let chunk = first..items.min(first + CHUNK);
-            let of = |row: usize| chunk.start * row..chunk.end * row;
-            let obs_row = rollout.obs_len * BLOCK;
-            let [obs, next] = [&rollout.obs, &rollout.next_obs].map(|raw| {
-                let mut rows = raw[of(obs_row)].to_vec();
-                normalize_in_place(acting.isa, acting.normalizer, &mut rows);
-                rows
-            });
-            let action = rollout.action[of(rollout.act_len * BLOCK)].chunks_exact(rollout.act_len * BLOCK);
-            let steps = obs.chunks_exact(obs_row).zip(action).zip(next.chunks_exact(obs_row));
-            let steps: Vec<Step<'_, f32>> = steps.map(|((obs, action), next)| Step { obs, action, next }).collect();
-            for (s, ((nets, params, strength), space)) in acting.signals.iter().zip(&mut self.signal_spaces).enumerate()
-            {
-                // ML-Agents' bound: what a step gives is not worth more than 1
-                let (strength, most) = (*strength as f32, (1.0 / strength) as f32);
+        for (s, ((nets, params, strength), space)) in acting.signals.iter().zip(&mut self.signal_spaces).enumerate() {
+            // ML-Agents' bound: what a step gives is not worth more than 1
+            let (strength, most) = (*strength as f32, (1.0 / strength) as f32);
+            for first in (0..items).step_by(CHUNK) {
+                let n = CHUNK.min(items - first);
+                let steps: Vec<Step<'_, f32>> = (first..first + n).map(|item| rollout.step(item)).collect();
                 nets.reward(acting.isa, params, &steps, space, &mut rows);
-                for (item, row) in chunk.clone().zip(rows.chunks_exact(BLOCK)) {
+                for (item, row) in (first..first + n).zip(rows.chunks_exact(BLOCK)) {
                     let out = &mut rollout.reward[(item * streams + 1 + s) * BLOCK..][..BLOCK];
                     for (out, x) in out.iter_mut().zip(row) {
                         *out = strength * Real::min(*x, most);
@@ -485,11 +477,25 @@ impl Actor {
     fn evaluate(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
         let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, .. } = rollout;
         let (row, streams) = (*obs_len * BLOCK, acting.streams());
+        // values of normalized observations
+        for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
+            for (b, obs) in obs.chunks_exact(row).enumerate() {
+                self.input.block_mut(b).copy_from_slice(obs);
+            }
+            value_of_input(acting, &self.input, &mut self.critic_tape, value);
+        }
+        // values of raw ones
         let mut cut_value = vec![0.0; cut.len() * streams * BLOCK];
-        let all = [(&obs[..], &mut value[..]), (&self.obs, last_value), (cut_obs, &mut cut_value)];
-        for (raw, value) in all {
+        for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
             for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
-                normalize(acting.isa, acting.normalizer, raw, &mut self.input);
+                f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
+                    normalizer: acting.normalizer,
+                    raw,
+                    input: &mut self.input,
+                    copy: None,
+                    sums: None,
+                    lanes: PhantomData,
+                }));
                 value_of_input(acting, &self.input, &mut self.critic_tape, value);
             }
         }

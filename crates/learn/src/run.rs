@@ -274,20 +274,10 @@ impl<'a> Run<'a> {
 
     /// Learns from the rollout of all workers.
     fn learn(&self, id: usize, learner: &mut Learner, space: &mut Workspace, means: &mut Means) -> Totals {
-        let rollouts = || self.rollouts.iter().map(|r| r.read().expect("no worker has panicked"));
-        let totals = Totals::new(&rollouts().collect::<Vec<_>>(), self.config.horizon);
-        let renormalize = self.config.renormalize && self.sac.is_none();
-        if renormalize {
-            learner.observe(&totals, self.config);
-        }
+        let rollouts: Vec<_> = self.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
+        let totals = Totals::new(&rollouts, self.config.horizon);
         // the first rollout only fills the statistics, and a replay
         if learner.iteration > 0 || self.sac.is_some() {
-            if self.sac.is_none() {
-                let mut own = self.rollouts[id].write().expect("no worker has panicked");
-                own.normalize(self.isa, &learner.normalizer(self.config));
-            }
-            self.barrier.wait();
-            let rollouts: Vec<_> = rollouts().collect();
             let rollouts: Vec<&Rollout> = rollouts.iter().map(|r| &**r).collect();
             // which rollout a block is in, and its place there
             let place = rollouts.iter().enumerate().flat_map(|(r, x)| (0..x.blocks()).map(move |b| (r, b))).collect();
@@ -299,10 +289,7 @@ impl<'a> Run<'a> {
                 Algorithm::Sac(sac) => sac::update(update, sac),
             }
         }
-        if !renormalize {
-            learner.observe(&totals, self.config);
-        }
-        learner.count(&totals, self.config);
+        learner.absorb(&totals, &self.layout, self.config);
         totals
     }
 

@@ -18,7 +18,7 @@ use crate::learner::Learner;
 use crate::loss::LossSums;
 use crate::mlp::{CHUNK, Tape};
 use crate::noise::{Noise, SAMPLES, SplitMix};
-use crate::normalize::{Normalizer, normalize};
+use crate::normalize::{Normalize, Normalizer};
 use crate::replay::{Batch, Replay};
 use crate::run::{NETWORKS, Run};
 use crate::squash::{Draw, LOG_STD, Normals, Objective};
@@ -254,6 +254,12 @@ fn gradient(
         sums.std += logs.iter().map(std).sum::<f64>() / act as f64;
     }
     (gradient, sums)
+}
+
+fn normalize(isa: Isa, normalizer: &Normalizer, raw: &[f32], input: &mut Blocks<f32>) {
+    f32_lanes!(isa, T => <T as Real>::enter(Normalize::<T> {
+        normalizer, raw, input, copy: None, sums: None, lanes: PhantomData,
+    }));
 }
 
 /// Draws actions with the next numbers of each block's noise.

@@ -44,7 +44,7 @@ const COMMON: [&str; 32] = [
     "min_std",
     "final_min_std",
     "max_std",
-    "renormalize",
+    "follow_statistics",
     "observation_clip",
     "scale_rewards",
     "statistics_cap",
@@ -100,7 +100,6 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let actor_hidden = widths(&marathon, "actor_hidden", hidden)?;
     let last_epsilon = settings.epsilon.min(LAST_EPSILON);
     let last_beta = settings.beta.min(LAST_BETA);
-    let schedule = schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?;
     let [min_std, max_std] = [base.min_std, base.max_std];
     let ppo = PpoConfig {
         algorithm: match base.algorithm {
@@ -121,7 +120,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
 
         lr: settings.learning_rate,
         value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
-        schedule,
+        schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
         target_kl: marathon.number("target_kl", Range::Positive, base.target_kl)?,
         final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, base.target_kl)?,
         lr_range: lr_range(&marathon, base.lr_range)?,
@@ -160,7 +159,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         max_std: marathon.number("max_std", Range::Positive, max_std)?,
 
         normalize_observations: settings.normalize,
-        renormalize: marathon.flag("renormalize", base.renormalize && schedule != Schedule::Adaptive)?,
+        follow_statistics: marathon.flag("follow_statistics", base.follow_statistics)?,
         observation_clip: marathon.number("observation_clip", Range::Positive, base.observation_clip)?,
         scale_rewards: marathon.flag("scale_rewards", base.scale_rewards)?,
         statistics_cap: marathon.number("statistics_cap", Range::Positive, base.statistics_cap)?,

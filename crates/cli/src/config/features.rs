@@ -113,7 +113,7 @@ fn ml_agents() -> PpoConfig {
         entropy_coef: 5e-3,
         ratio: Ratio::PerAction,
         normalize_observations: false,
-        renormalize: true,
+        follow_statistics: true,
         // normalized observations lie within this
         observation_clip: 5.0,
         initialization: Init::MlAgents,

@@ -53,6 +53,7 @@ fn cases() -> Result<Vec<Case>, CliError> {
         ("A2C, settings of Baselines", "291 s, none", PpoConfig::a2c()),
         ("ACKTR, settings of Baselines", "281 s, none", PpoConfig::acktr()),
         ("PPO2, deviation 0.5", "", quieter(ppo2())),
+        ("PPO2, deviation 0.5, following the statistics", "", PpoConfig { follow_statistics: true, ..quieter(ppo2()) }),
         ("A2C, deviation 0.5", "", quieter(PpoConfig::a2c())),
         ("ACKTR, deviation 0.5", "", quieter(PpoConfig::acktr())),
         ("A2C, deviation 0.5, rate 2e-3", "", PpoConfig { lr: 2e-3, value_lr: 2e-3, ..quieter(PpoConfig::a2c()) }),
@@ -121,8 +122,9 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
                 [Learning](../learning.md#the-floor-under-the-standard-deviation). The settings of Baselines start with a \
                 deviation of 1, with which a third of all actions is clipped and motors at their limits cost more than \
                 staying up brings; ML-Agents starts with a third. The rows with deviation 0.5 differ in nothing else, but \
-                for one with the rate that A2C needs. The returns of the paper's own runs are of another physics and cannot \
-                be compared number by number."
+                for the rate that A2C needs, and for networks that follow the statistics of observations, as those with \
+                ML-Agents' settings do. The returns of the paper's own runs are of another physics and cannot be compared \
+                number by number."
             .into(),
         columns: vec![
             "algorithm and settings",

@@ -1,0 +1,129 @@
+//! A rollout moves the statistics that normalize observations. With `follow_statistics` the networks' first layers move with
+//! them, so that a policy does after the move what it did before; without, it does something else though nothing was learned.
+
+mod common;
+
+use common::numbers::noise_f32 as noise;
+use common::{PuckTask, silent, small_config, small_of};
+use marathon_learn::mlp::Mlp;
+
+use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, PpoConfig, Schedule, Snapshot, train};
+use marathon_physics::lanes::Isa;
+
+/// Actions for a row of raw observations after each of four rollouts, whose updates move no parameter by as much as a bit.
+fn actions(follow_statistics: bool) -> Vec<Vec<f32>> {
+    let base = small_config();
+    let config = PpoConfig {
+        follow_statistics,
+        schedule: Schedule::Constant,
+        lr: 1e-30,
+        value_lr: 1e-30,
+        // larger weights at the start than ours, with which a policy hardly looks at what it sees
+        initialization: Init::MlAgents,
+        ..base
+    };
+    let mut all = Vec::new();
+    let mut observer = |_: &IterationStats, snapshot: &Snapshot<'_>| {
+        all.push(snapshot.policy().act(&[12.0, 20.0, 3.0, -9.0, 40.0, -30.0]));
+        Control::Continue
+    };
+    train(&PuckTask::new(), Isa::best(), &config, None, &mut observer).unwrap();
+    all
+}
+
+fn furthest(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_policy_does_what_it_did_when_the_statistics_have_moved() {
+    let (followed, left) = (actions(true), actions(false));
+    assert_eq!(followed.len(), 4);
+    // the first rollout's statistics are those that the weights at the start are meant for
+    assert_eq!(followed[0], left[0]);
+    for later in 1..4 {
+        assert!(furthest(&followed[later], &followed[0]) < 1e-6, "{followed:?}");
+        assert!(furthest(&left[later], &left[0]) > 1e-4, "{left:?}");
+    }
+}
+
+/// Output of a network for raw inputs, in double precision.
+fn output(net: &Mlp, params: &[f32], normalizer: &Normalizer, raw: &[f32]) -> Vec<f64> {
+    let mut x: Vec<f64> = normalizer.row(raw).into_iter().map(f64::from).collect();
+    let last = net.layers().count() - 1;
+    for (i, (weights, biases)) in net.layers().enumerate() {
+        let rows = params[weights].chunks_exact(x.len()).zip(&params[biases]);
+        let sums = rows.map(|(row, bias)| *bias as f64 + row.iter().zip(&x).map(|(w, x)| *w as f64 * x).sum::<f64>());
+        x = sums.map(|y| if i < last { y.tanh() } else { y }).collect();
+    }
+    x
+}
+
+#[test]
+fn the_first_layer_undoes_a_move() {
+    let net = Mlp::new(&[5, 9, 3], Activation::Tanh);
+    let before = Normalizer::new(vec![1.0, -3.0, 0.0, 200.0, 0.5], vec![1.0, 0.2, 5.0, 40.0, 2.0], 10.0);
+    let after = Normalizer::new(vec![1.4, -3.1, -1.0, 220.0, 0.5], vec![0.8, 0.3, 9.0, 41.0, 2.0], 10.0);
+    let old = noise_params(&net);
+    let mut new = old.clone();
+    net.follow(&mut new, &before, &after);
+    assert_ne!(old, new);
+    for i in 0..20 {
+        let raw: Vec<f32> =
+            noise(5, 90 + i).iter().zip(before.mean()).zip(before.std()).map(|((x, m), s)| m + 2.0 * x * s).collect();
+        let (was, is) = (output(&net, &old, &before, &raw), output(&net, &new, &after, &raw));
+        assert!(was.iter().zip(&is).all(|(a, b)| (a - b).abs() < 1e-5), "{was:?} {is:?}");
+        assert!(output(&net, &old, &after, &raw).iter().zip(&was).any(|(a, b)| (a - b).abs() > 1e-2));
+    }
+    // what did not move is left alone
+    let mut same = old.clone();
+    net.follow(&mut same, &before, &before);
+    assert_eq!(same, old);
+}
+
+/// An input that never moved has the smallest deviation there is; what its weights are by then is chance.
+#[test]
+fn an_input_that_wakes_up_is_not_blown_up() {
+    let net = Mlp::new(&[2, 4, 1], Activation::Tanh);
+    let before = Normalizer::new(vec![0.0, 0.0], vec![1.0, 1e-4], 5.0);
+    let after = Normalizer::new(vec![0.0, 0.02], vec![1.0, 0.1], 5.0);
+    let old = noise_params(&net);
+    let mut new = old.clone();
+    net.follow(&mut new, &before, &after);
+    for (old, new) in old[..8].chunks_exact(2).zip(new[..8].chunks_exact(2)) {
+        assert_eq!((new[0], new[1]), (old[0], 2.0 * old[1]));
+    }
+    // asleep it counts for what it did
+    let (was, is) = (output(&net, &old, &before, &[0.3, 0.0]), output(&net, &new, &after, &[0.3, 0.0]));
+    assert!((was[0] - is[0]).abs() < 1e-6, "{was:?} {is:?}");
+}
+
+fn noise_params(net: &Mlp) -> Vec<f32> {
+    noise(net.len(), 7).iter().map(|x| 0.7 * x).collect()
+}
+
+#[test]
+fn every_algorithm_and_number_of_threads_gives_the_same_bits() {
+    for algorithm in ["ppo", "a2c", "acktr"] {
+        let base = PpoConfig { agents: 64, ..small_of(algorithm) };
+        let params = |follow_statistics, threads| {
+            let config = PpoConfig { follow_statistics, threads, ..base.clone() };
+            train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy.params().to_vec()
+        };
+        let one = params(true, 1);
+        assert_eq!(one, params(true, 3), "{algorithm}");
+        assert_ne!(one, params(false, 1), "{algorithm}");
+        // nothing moves where nothing is normalized
+        let raw = |follow_statistics| {
+            let config = PpoConfig { follow_statistics, normalize_observations: false, ..base.clone() };
+            train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy.params().to_vec()
+        };
+        assert_eq!(raw(true), raw(false), "{algorithm}");
+    }
+}
+
+#[test]
+fn sac_refuses() {
+    let error = PpoConfig { follow_statistics: true, ..small_of("sac") }.validate().unwrap_err().to_string();
+    assert!(error.contains("follow_statistics is true, expected false with sac"), "{error}");
+}
