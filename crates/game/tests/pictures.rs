@@ -92,12 +92,28 @@ fn text_and_marks_are_drawn() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn a_ball_is_thrown_on_its_cue() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let red = |image: &Image| {
+        let pixels = image.rgb().as_chunks::<3>().0.iter();
+        pixels
+            .filter(|[r, g, b]| *r > 100 && u16::from(*r) > 3 * u16::from(*g) && u16::from(*r) > 3 * u16::from(*b))
+            .count()
+    };
+    let words = ["hopper", "--mode", "push", "--no-hud"];
+    let without = red(&draw(folder.path(), "hopper-alone.png", &words)?);
+    let with = red(&draw(folder.path(), "hopper-ball.png", &[&words[..], &["--press", "0.5:throw"]].concat())?);
+    assert!(with > without + 100, "red pixels: {without}, with a ball {with}");
+    Ok(())
+}
+
+#[test]
 fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("broken.safetensors"), "no policy")?;
     std::fs::write(folder.path().join("broken.xml"), "<mujoco><worldbody><geom type='spere'/></worldbody></mujoco>")?;
     std::fs::create_dir(folder.path().join("empty"))?;
-    let cases: [(&[&str], i32, &[&str]); 9] = [
+    let cases: [(&[&str], i32, &[&str]); 10] = [
         (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
@@ -106,6 +122,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (&["broken.xml"], 1, &["broken.xml:1", "sphere"]),
         (&["--replay", "broken.safetensors"], 1, &["broken.safetensors", "not a recording"]),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
+        (&["hopper", "--press", "1:thorw"], 2, &["--press", "did you mean 'throw'"]),
         (&["hopper", "--record", "a.mov"], 1, &["a.mov", "mp4"]),
     ];
     for (words, code, parts) in cases {
