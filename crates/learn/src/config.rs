@@ -371,7 +371,7 @@ impl PpoConfig {
             return Err(Error::config(
                 "follow_statistics",
                 true,
-                "false with sac, which learns from more than one policy's steps",
+                "false with sac, whose replay is normalized anew whenever it is drawn from",
             ));
         }
         let positive = [
