@@ -153,7 +153,7 @@ impl Anatomy {
 }
 
 /// A body of a [`Ragdoll`]: a child whose [`Transform`] the plugin writes every frame. What is attached to it is carried
-/// along.
+/// along. Where it is in a tick between frames, [`crate::Marathon::places`] knows.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
     /// Whose it is.

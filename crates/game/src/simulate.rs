@@ -1,7 +1,7 @@
 //! The systems between the game's world and the simulation.
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
-use crate::axes::to_physics;
+use crate::axes::{to_game, to_physics, turn_to_game};
 use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
@@ -14,7 +14,7 @@ use bevy::ecs::lifecycle::Remove;
 use bevy::prelude::*;
 use bevy::tasks::ComputeTaskPool;
 use marathon_envs::AgentState;
-use marathon_render::Scene;
+use marathon_render::{BodyPose, Scene};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -51,6 +51,21 @@ impl Marathon {
     pub fn state(&self, ragdoll: &RagdollState) -> Option<AgentState> {
         let still = self.resident(ragdoll.0)?.trail.back()?;
         Some(AgentState { qpos: still.qpos.clone(), qvel: still.qvel.clone() })
+    }
+
+    /// Where the bodies of a ragdoll are at a time, in the order of its model, relative to the ragdoll. Known are the times
+    /// that a frame of the present tick can show: from `Time<Fixed>::elapsed` on, for a timestep.
+    ///
+    /// Systems in [`FixedUpdate`] that follow a ragdoll ask here: the transforms of its [`crate::Part`]s are those of the last
+    /// frame, in which there may have been many ticks or none.
+    pub fn places(&self, ragdoll: &RagdollState, at: Duration) -> Option<Vec<Transform>> {
+        let Seat { herd, .. } = ragdoll.0;
+        let model = &self.herds.get(herd)?.model;
+        let (a, b, share) = self.resident(ragdoll.0)?.between(at)?;
+        let pose = Scene::pose_from_qpos(model, &stage::mix(model, &a.qpos, &b.qpos, share)).ok()?;
+        let place =
+            |body: &BodyPose| Transform::from_translation(to_game(body.pos)).with_rotation(turn_to_game(body.quat));
+        Some(pose.bodies.iter().map(place).collect())
     }
 
     /// Puts a ragdoll into a state.
@@ -260,9 +275,8 @@ pub(crate) fn push(
 fn center_of_mass(marathon: &Marathon, seat: Seat, anatomy: &Anatomy, body: usize) -> Option<[f64; 3]> {
     let still = marathon.resident(seat)?.trail.back()?;
     let pose = Scene::pose_from_qpos(&anatomy.model, &still.qpos).ok()?.bodies.get(body).copied()?;
-    let frame =
-        Transform::from_translation(crate::axes::to_game(pose.pos)).with_rotation(crate::axes::turn_to_game(pose.quat));
-    Some(to_physics(frame.transform_point(crate::axes::to_game(anatomy.model.bodies[body].ipos))))
+    let frame = Transform::from_translation(to_game(pose.pos)).with_rotation(turn_to_game(pose.quat));
+    Some(to_physics(frame.transform_point(to_game(anatomy.model.bodies[body].ipos))))
 }
 
 /// Makes the decisions that are due, so that every state that a frame of this tick can show is there.

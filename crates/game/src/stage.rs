@@ -1,29 +1,23 @@
 //! Frames: the transforms of all parts at the time that a frame shows.
 
-use crate::axes::{to_game, turn_to_game};
 use crate::ragdoll::{Anatomy, Part};
-use crate::simulate::{Marathon, Seat};
+use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
-use marathon_render::Scene;
 
 /// Writes the transforms of all parts.
 pub(crate) fn show(
     marathon: Res<Marathon>,
     time: Res<Time<Fixed>>,
-    ragdolls: Query<(&Seat, &Anatomy)>,
+    ragdolls: Query<(&RagdollState, &Anatomy)>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let now = time.elapsed() + time.overstep();
-    for (seat, anatomy) in &ragdolls {
-        let Some((a, b, share)) = marathon.resident(*seat).and_then(|r| r.between(now)) else { continue };
-        let qpos = mix(&anatomy.model, &a.qpos, &b.qpos, share);
-        let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &qpos) else { continue };
-        for (entity, body) in anatomy.parts.iter().zip(&pose.bodies) {
+    for (ragdoll, anatomy) in &ragdolls {
+        for (entity, place) in anatomy.parts.iter().zip(marathon.places(ragdoll, now).into_iter().flatten()) {
             if let Ok(mut transform) = parts.get_mut(*entity) {
-                transform.translation = to_game(body.pos);
-                transform.rotation = turn_to_game(body.quat);
+                (transform.translation, transform.rotation) = (place.translation, place.rotation);
             }
         }
     }

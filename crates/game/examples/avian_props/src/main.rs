@@ -10,6 +10,7 @@ use bevy::prelude::*;
 use marathon_game::axes::{to_game, turn_to_game};
 use marathon_game::prelude::*;
 use marathon_physics::model::{Geom, GeomType};
+use std::collections::HashMap;
 
 /// Where the wall stands, m.
 const WALL: f32 = 3.0;
@@ -34,17 +35,19 @@ impl Plugin for PropsPlugin {
 /// What avian knows of a geom: a kinematic body that follows a part.
 #[derive(Component)]
 struct Shadow {
-    part: Entity,
+    ragdoll: Entity,
+    body: usize,
+    /// Of the geom on the part.
     place: Transform,
 }
 
-/// Makes the shadows of a ragdoll that has entered the simulation; they go with it.
-fn cast_shadows(mut commands: Commands, new: Query<&Anatomy, Added<Anatomy>>) {
-    for anatomy in &new {
+/// Makes the shadows of a ragdoll that has entered the simulation.
+fn cast_shadows(mut commands: Commands, new: Query<(Entity, &Anatomy), Added<Anatomy>>) {
+    for (ragdoll, anatomy) in &new {
         for geom in &anatomy.model.geoms {
             let Some(collider) = collider(geom) else { continue };
             let place = Transform::from_translation(to_game(geom.pos)).with_rotation(turn_to_game(geom.quat));
-            let shadow = Shadow { part: anatomy.parts[geom.body], place };
+            let shadow = Shadow { ragdoll, body: geom.body, place };
             // out of everybody's way until it follows
             commands.spawn((shadow, RigidBody::Kinematic, collider, Transform::from_xyz(0.0, -100.0, 0.0)));
         }
@@ -63,20 +66,25 @@ fn collider(geom: &Geom) -> Option<Collider> {
     }
 }
 
-/// Takes the shadows to where their parts are: at the velocity that leads there, which is what boxes are hit with.
+/// Takes the shadows to where their parts are at the end of the tick: at the velocity that leads there, which is what boxes
+/// are hit with. They go with their ragdoll.
 fn follow(
     mut commands: Commands,
     time: Res<Time>,
-    parts: Query<&GlobalTransform, With<Part>>,
+    marathon: Res<Marathon>,
+    ragdolls: Query<(&RagdollState, &GlobalTransform)>,
     mut shadows: Query<(Entity, &Shadow, &mut Position, &mut Rotation, &mut LinearVelocity, &mut AngularVelocity)>,
 ) {
     let rate = 1.0 / time.delta_secs();
+    let mut known: HashMap<Entity, Vec<Transform>> = HashMap::new();
     for (entity, shadow, mut position, mut rotation, mut velocity, mut spin) in &mut shadows {
-        let Ok(part) = parts.get(shadow.part) else {
+        let Ok((state, track)) = ragdolls.get(shadow.ragdoll) else {
             commands.entity(entity).despawn();
             continue;
         };
-        let goal = part.mul_transform(shadow.place).compute_transform();
+        let places = || marathon.places(state, time.elapsed()).unwrap_or_default();
+        let Some(part) = known.entry(shadow.ragdoll).or_insert_with(places).get(shadow.body) else { continue };
+        let goal = (*track * *part * shadow.place).compute_transform();
         velocity.0 = (goal.translation - position.0) * rate;
         spin.0 = (goal.rotation * rotation.0.inverse()).to_scaled_axis() * rate;
         // a new episode begins elsewhere; nobody is hit by that
@@ -91,7 +99,6 @@ fn follow(
 fn push_back(
     collisions: Collisions,
     shadows: Query<&Shadow>,
-    parts: Query<&Part>,
     ragdolls: Query<&Anatomy>,
     masses: Query<&ComputedMass>,
     mut pushes: MessageWriter<Push>,
@@ -100,9 +107,7 @@ fn push_back(
         let Some(contact) = pair.find_deepest_contact() else { continue };
         // normals point from the first to the second
         for (ours, other, sign) in [(pair.collider1, pair.body2, -1.0), (pair.collider2, pair.body1, 1.0)] {
-            let Ok(&Part { ragdoll, body }) = shadows.get(ours).and_then(|shadow| parts.get(shadow.part)) else {
-                continue;
-            };
+            let Ok(&Shadow { ragdoll, body, .. }) = shadows.get(ours) else { continue };
             let Ok(anatomy) = ragdolls.get(ragdoll) else { continue };
             // for avian the shadow has no end of mass; the part has one, and takes no more than what two such masses exchange
             let lightness = other.and_then(|other| masses.get(other).ok()).map_or(0.0, |mass| mass.inverse());
@@ -117,9 +122,9 @@ fn push_back(
     }
 }
 
-/// A box of the wall, and where it stood.
+/// A box of the wall.
 #[derive(Component)]
-struct Brick(Vec3);
+struct Brick;
 
 /// A wall of twelve boxes on avian's own ground.
 fn build_wall(mut commands: Commands) {
@@ -129,7 +134,7 @@ fn build_wall(mut commands: Commands) {
         let (across, up) = ((i % 3) as f32 - 1.0, (i / 3) as f32 + 0.5);
         let at = Vec3::new(WALL, EDGE * up, EDGE * across);
         let body = (RigidBody::Dynamic, Collider::cuboid(EDGE, EDGE, EDGE), ColliderDensity(DENSITY));
-        commands.spawn((Brick(at), body, Transform::from_translation(at)));
+        commands.spawn((Brick, body, Transform::from_translation(at)));
     }
 }
 

@@ -4,11 +4,22 @@ use super::*;
 use bevy::time::TimeUpdateStrategy;
 use std::time::Duration;
 
-/// How far each box has gone, m, and the hopper along its track; `hit` counts contacts between them.
+/// Where each box ends and how far it has gone, m, and the hopper along its track; `hit` counts contacts between them.
 struct Outcome {
-    boxes: Vec<f32>,
+    boxes: Vec<(Vec3, f32)>,
     hopper: Option<f64>,
     hit: usize,
+}
+
+impl Outcome {
+    /// Boxes that have gone half an edge or more.
+    fn struck(&self) -> usize {
+        self.boxes.iter().filter(|(_, way)| *way > 0.5 * EDGE).count()
+    }
+    /// How far along the track the boxes have gone in the mean, m.
+    fn along(&self) -> f32 {
+        self.boxes.iter().map(|(at, _)| at.x - WALL).sum::<f32>() / self.boxes.len() as f32
+    }
 }
 
 #[derive(Resource, Default)]
@@ -20,15 +31,25 @@ fn count(mut hits: ResMut<Hits>, collisions: Collisions, shadows: Query<&Shadow>
     hits.0 += pairs.filter(|(a, b)| both(*a, *b) || both(*b, *a)).count();
 }
 
-/// Four seconds, of which the hopper takes about one to the wall.
-fn play(hopper: bool, wall: bool) -> Outcome {
+/// Where a box stood.
+#[derive(Component)]
+struct Start(Vec3);
+
+fn remember(mut commands: Commands, new: Query<(Entity, &Transform), Added<Brick>>) {
+    for (brick, at) in &new {
+        commands.entity(brick).insert(Start(at.translation));
+    }
+}
+
+/// Four seconds in so many frames, of which the hopper takes about one to the wall.
+fn play(hopper: bool, wall: bool, frames: u32) -> Outcome {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, assets(), MarathonPlugin, PropsPlugin))
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs(4) / frames))
         .init_resource::<Hits>()
         .add_systems(FixedPostUpdate, count.after(PhysicsSystems::Last));
     if wall {
-        app.add_systems(Startup, build_wall);
+        app.add_systems(Startup, (build_wall, remember).chain());
     }
     app.finish();
     app.cleanup();
@@ -40,12 +61,12 @@ fn play(hopper: bool, wall: bool) -> Outcome {
         let restart = Restart { after_fall: f64::INFINITY, on_time_up: false };
         app.world_mut().spawn((Ragdoll::agent("hopper"), policy, restart));
     }
-    (0..240).for_each(|_| app.update());
+    (0..frames).for_each(|_| app.update());
     let world = app.world_mut();
-    let mut bricks = world.query::<(&Brick, &Position)>();
+    let mut bricks = world.query::<(&Start, &Position)>();
     let mut runners = world.query::<&Episode>();
     Outcome {
-        boxes: bricks.iter(world).map(|(brick, position)| position.0.distance(brick.0)).collect(),
+        boxes: bricks.iter(world).map(|(start, at)| (at.0, at.0.distance(start.0))).collect(),
         hopper: runners.iter(world).next().map(|episode| episode.distance),
         hit: world.resource::<Hits>().0,
     }
@@ -53,11 +74,27 @@ fn play(hopper: bool, wall: bool) -> Outcome {
 
 #[test]
 fn boxes_and_hopper_feel_each_other() {
-    let [alone, free, both] = [(false, true), (true, false), (true, true)].map(|(hopper, wall)| play(hopper, wall));
-    assert!(alone.hit == 0 && alone.boxes.iter().all(|way| *way < 0.01), "a wall by itself stands: {:?}", alone.boxes);
-    let struck = both.boxes.iter().filter(|way| **way > 0.5 * EDGE).count();
-    assert!(both.hit > 0 && struck >= 3, "{} contacts; the boxes went {:?} m", both.hit, both.boxes);
+    let [alone, free, both] =
+        [(false, true), (true, false), (true, true)].map(|(hopper, wall)| play(hopper, wall, 240));
+    assert!(
+        alone.hit == 0 && alone.boxes.iter().all(|(_, way)| *way < 0.01),
+        "a wall by itself stands: {:?}",
+        alone.boxes
+    );
+    assert!(both.hit > 0 && both.struck() >= 3, "{} contacts; boxes and their ways: {:?}", both.hit, both.boxes);
+    assert!(both.along() > 0.5 * EDGE, "boxes are knocked forwards: {:?}", both.boxes);
     let [free, held] = [free.hopper, both.hopper].map(|way| way.unwrap_or_default());
     assert!(free > f64::from(WALL) + 2.0, "without a wall it gets further: {free} m");
     assert!(held < free - 0.3 && held > 2.0, "{held} m with the wall, {free} m without it");
+}
+
+/// A slow computer shows few frames of many ticks each, a fast one many for each tick: the boxes are hit alike.
+#[test]
+fn frames_do_not_hit() {
+    let [smooth, slow] = [960, 16].map(|frames| play(true, true, frames));
+    assert_eq!((slow.hit, slow.struck()), (smooth.hit, smooth.struck()));
+    for ((a, _), (b, _)) in smooth.boxes.iter().zip(&slow.boxes) {
+        // the first frame has no tick: what still slides is behind by the length of a frame
+        assert!(a.distance(*b) < 0.5, "{:?}, in slow frames {:?}", smooth.boxes, slow.boxes);
+    }
 }
