@@ -72,6 +72,46 @@ fn frames_move_smoothly_between_decisions() {
     assert!(longest < 0.004 * 8.0, "the longest step was {longest} m");
 }
 
+/// Where the torso is at the end of each tick.
+#[derive(Resource, Default)]
+struct Ticks(Vec<Vec3>);
+
+fn follow(marathon: Res<Marathon>, time: Res<Time>, mut ticks: ResMut<Ticks>, ragdolls: Query<&RagdollState>) {
+    let places = ragdolls.iter().filter_map(|ragdoll| marathon.places(ragdoll, time.elapsed()));
+    ticks.0.extend(places.map(|places| places[1].translation));
+}
+
+#[test]
+fn a_tick_knows_the_places_that_a_frame_does_not_show() {
+    let run = |frame: Duration| {
+        let mut app = app(frame);
+        app.init_resource::<Ticks>().add_systems(FixedUpdate, follow.after(MarathonSystems::Report));
+        let policy = with_policy(&mut app, "hopper");
+        let ragdoll = app.world_mut().spawn((Ragdoll::agent("hopper"), policy)).id();
+        for _ in 0..Duration::from_secs(2).div_duration_f64(frame) as usize {
+            app.update();
+        }
+        // at the time of the frame they are what it shows
+        let time = app.world().resource::<Time<Fixed>>();
+        let now = time.elapsed() + time.overstep();
+        let (anatomy, state) = app.world_mut().query::<(&Anatomy, &RagdollState)>().single(app.world()).expect("one");
+        let places = app.world().resource::<Marathon>().places(state, now).expect("it is simulated");
+        assert_eq!(places.len(), anatomy.model.bodies.len());
+        for (part, place) in anatomy.parts.iter().zip(&places) {
+            assert_eq!(app.world().get::<Transform>(*part), Some(place));
+        }
+        assert!(app.world_mut().despawn(ragdoll));
+        std::mem::take(&mut app.world_mut().resource_mut::<Ticks>().0)
+    };
+    // seven ticks a frame, or two frames a tick
+    let (slow, smooth) = (run(Duration::from_millis(125)), run(Duration::from_millis(8)));
+    let both = slow.len().min(smooth.len());
+    assert!(both > 100 && slow[..both] == smooth[..both], "{} and {} ticks", slow.len(), smooth.len());
+    let step = |w: &[Vec3]| w[0].distance(w[1]);
+    let (still, longest) = (slow.windows(2).filter(|w| step(w) == 0.0).count(), slow.windows(2).map(step));
+    assert!(still == 0 && longest.fold(0.0, f32::max) < 8.0 / 64.0, "{still} ticks stood still");
+}
+
 #[test]
 fn one_without_a_policy_falls_lies_and_gets_up() {
     let mut app = app(FRAME);
