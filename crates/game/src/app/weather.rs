@@ -7,6 +7,7 @@ use crate::axes::{to_game, turn_to_game};
 use crate::look::FollowCamera;
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::{Anatomy, Part, Physique, Push, Ragdoll};
+use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::input::EguiWantsInput;
@@ -108,20 +109,14 @@ struct Rod {
     radius: f32,
 }
 
-/// Rods of all geoms of characters.
-fn rods<'a>(
-    actors: impl Iterator<Item = (Entity, &'a Anatomy)>,
-    parts: &Query<&GlobalTransform, With<Part>>,
-) -> Vec<Rod> {
+/// Rods of all geoms of a character whose bodies are at the given places.
+fn rods(ragdoll: Entity, anatomy: &Anatomy, place: impl Fn(usize) -> Option<GlobalTransform>) -> Vec<Rod> {
     let mut rods = Vec::new();
-    for (ragdoll, anatomy) in actors {
-        for geom in anatomy.model.geoms.iter().filter(|g| anatomy.model.bodies[g.body].weld_id != 0) {
-            let Some(part) = anatomy.parts.get(geom.body).and_then(|p| parts.get(*p).ok()) else { continue };
-            let Some((half, radius)) = rod(geom) else { continue };
-            let center = part.transform_point(to_game(geom.pos));
-            let along = part.rotation() * (turn_to_game(geom.quat) * Vec3::Y) * half;
-            rods.push(Rod { ragdoll, body: geom.body, ends: [center - along, center + along], radius });
-        }
+    for geom in anatomy.model.geoms.iter().filter(|g| anatomy.model.bodies[g.body].weld_id != 0) {
+        let (Some(part), Some((half, radius))) = (place(geom.body), rod(geom)) else { continue };
+        let center = part.transform_point(to_game(geom.pos));
+        let along = part.rotation() * (turn_to_game(geom.quat) * Vec3::Y) * half;
+        rods.push(Rod { ragdoll, body: geom.body, ends: [center - along, center + along], radius });
     }
     rods
 }
@@ -191,7 +186,10 @@ fn click(
     }
     let Some(cursor) = window.iter().next().and_then(Window::cursor_position) else { return };
     let Some(ray) = camera.iter().next().and_then(|(c, at)| c.viewport_to_world(at, cursor).ok()) else { return };
-    let rods = rods(actors.iter(), &parts);
+    // what is seen is what is clicked at
+    let shown = |anatomy: &Anatomy, body: usize| parts.get(*anatomy.parts.get(body)?).ok().copied();
+    let rods = actors.iter().flat_map(|(ragdoll, anatomy)| rods(ragdoll, anatomy, |body| shown(anatomy, body)));
+    let rods: Vec<Rod> = rods.collect();
     let Some((rod, at)) = hit(&rods, ray) else { return };
     let Ok((_, anatomy)) = actors.get(rod.ragdoll) else { return };
     let force = *ray.direction * push_of(&anatomy.model, weather.push);
@@ -226,8 +224,8 @@ fn throw(
     mut deeds: MessageReader<Do>,
     weather: Res<Weather>,
     camera: Query<(&FollowCamera, &Transform)>,
-    actors: Query<(&Actor, &Anatomy, &Transform, &crate::ragdoll::Episode), Without<FollowCamera>>,
-    parts: Query<&GlobalTransform, With<Part>>,
+    actors: Query<(&Actor, &Anatomy, &RagdollState, &Transform, &crate::ragdoll::Episode), Without<FollowCamera>>,
+    (marathon, time): (Res<Marathon>, Res<Time<Fixed>>),
     focus: Res<Focus>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
@@ -235,13 +233,14 @@ fn throw(
     for _ in deeds.read().filter(|d| d.0 == Deed::Throw) {
         let Some((camera, at)) = camera.iter().next() else { continue };
         let runner = actors.iter().find(|(actor, ..)| actor.0 == focus.0);
-        let trunk = runner.and_then(|(_, anatomy, ..)| {
+        // where it will be: the camera's focus lags behind, and so do global transforms, by a frame
+        let trunk = runner.and_then(|(_, anatomy, state, track, _)| {
             let root = anatomy.model.joints.first().map_or(1, |j| j.body);
-            parts.get(*anatomy.parts.get(root)?).ok()
+            let places = marathon.places(state, time.elapsed() + time.overstep())?;
+            Some(track.transform_point(places.get(root)?.translation))
         });
-        // where it will be: the camera's focus lags behind
-        let there = trunk.map_or(camera.focus, GlobalTransform::translation);
-        let moving = runner.map_or(Vec3::ZERO, |(_, _, track, episode)| track.rotation * Vec3::X * episode.speed);
+        let there = trunk.unwrap_or(camera.focus);
+        let moving = runner.map_or(Vec3::ZERO, |(.., track, episode)| track.rotation * Vec3::X * episode.speed);
         let from = at.translation + at.rotation * Vec3::new(0.25, -0.15, -0.4);
         let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
         // what comes from afar flies higher, not past it
@@ -267,16 +266,21 @@ fn fly(
     time: Res<Time<Fixed>>,
     weather: Res<Weather>,
     mut balls: Query<(Entity, &mut Ball, &mut Transform), Without<Part>>,
-    actors: Query<(Entity, &Anatomy), With<Ragdoll>>,
+    marathon: Res<Marathon>,
+    actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform), With<Ragdoll>>,
     episodes: Query<(&crate::ragdoll::Episode, &GlobalTransform)>,
-    parts: Query<&GlobalTransform, With<Part>>,
     mut pushes: MessageWriter<Push>,
 ) {
     if balls.is_empty() {
         return;
     }
     let dt = time.delta_secs() / BALL_STEPS as f32;
-    let rods = rods(actors.iter(), &parts);
+    // a frame may have many ticks: where the bodies are in this one is not in their transforms
+    let rods = actors.iter().flat_map(|(ragdoll, anatomy, state, track)| {
+        let places = marathon.places(state, time.elapsed()).unwrap_or_default();
+        rods(ragdoll, anatomy, |body| Some(*track * *places.get(body)?))
+    });
+    let rods: Vec<Rod> = rods.collect();
     for (entity, mut ball, mut transform) in &mut balls {
         ball.left -= time.delta_secs();
         if ball.left <= 0.0 {
@@ -296,7 +300,7 @@ fn fly(
                 let apart = transform.translation - at;
                 let depth = rod.radius + BALL_RADIUS - apart.length();
                 let (Some(normal), true) = (apart.try_normalize(), depth > 0.0) else { continue };
-                let Ok((_, anatomy)) = actors.get(rod.ragdoll) else { continue };
+                let Ok((_, anatomy, ..)) = actors.get(rod.ragdoll) else { continue };
                 // the body moves about as the whole character does
                 let moving =
                     episodes.get(rod.ragdoll).map_or(Vec3::ZERO, |(e, track)| track.rotation() * Vec3::X * e.speed);
