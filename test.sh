@@ -1,21 +1,26 @@
 #!/usr/bin/env bash
-# Runs every test. Sets up what they need by itself: a Python environment in .venv with the oracles (MuJoCo, Gymnasium,
-# dm_control, PyTorch) and what tests the Python package, one in .venv-mlagents with ML-Agents, and as root the Debian packages
-# of the game. Needs a Rust toolchain, Python 3.11 with venv, and a C compiler. MARATHON_NO_GAME=1 leaves the game and with it
-# Bevy out.
+# Tests everything but the game; `./test.sh --all` tests the game as well, which compiles Bevy once.
+#
+# Sets up by itself what the tests need: Python environments with the oracles (MuJoCo, Gymnasium, dm_control, PyTorch) in
+# .venv and with ML-Agents in .venv-mlagents; with --all and as root the Debian packages of the game. Needs a Rust toolchain
+# with clippy and rustfmt, Python 3.11 with venv, and a C compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
-crates=(--workspace)
-if [ -n "${MARATHON_NO_GAME:-}" ]; then
-  crates+=(--exclude marathon-game)
-else
+case "${1:-}" in
+  '') game='' packages=(--workspace --exclude marathon-game --exclude avian_props) ;;
+  --all) game=yes packages=(--workspace) ;;
+  *) echo "usage: ./test.sh [--all], found '$1'" >&2 && exit 2 ;;
+esac
+if [ -n "$game" ]; then
   crates/game/tests/packages.sh
 fi
+export MARATHON_TEST_GAME="$game"
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
+  # most of what is installed is never imported
+  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile)
   "${pip[@]}" --requirement tests/oracle/requirements.txt --requirement python/tests/requirements.txt
   .venv/bin/python tests/oracle/install_torch.py
   "${pip[@]}" --no-deps --requirement python/tests/requirements-no-deps.txt
@@ -23,15 +28,10 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
 cargo fmt --all --check
-# one pass over everything: a second one with other features compiles the physics again
-cargo clippy --release "${crates[@]}" --all-targets -- -D warnings
-RUSTDOCFLAGS="-D warnings" cargo doc --release "${crates[@]}" --no-deps --quiet
-cargo test --release "${crates[@]}"
-if [ -z "${MARATHON_NO_GAME:-}" ]; then
-  # a workspace of its own, see its Cargo.toml
-  props=crates/game/examples/avian_props/Cargo.toml
-  cargo fmt --manifest-path "$props" --check
-  cargo test --release --no-default-features --manifest-path "$props" --target-dir "${CARGO_TARGET_DIR:-target}"
-fi
+cargo check --quiet --release --manifest-path fuzz/Cargo.toml --no-default-features --target-dir "${CARGO_TARGET_DIR:-target}"
+# lints and checks documentation while it compiles
+export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"
+cargo build --release "${packages[@]}" --all-targets
+cargo test --release "${packages[@]}"
 python/tests/run.sh
 tests/mlagents/run.sh

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests `marathon-player` and the game's door with the unmodified ML-Agents 1.1.0 of PyPI. Part of ./test.sh. Makes
 # .venv-mlagents for it, unless MARATHON_MLAGENTS_PYTHON names a Python that has it; needs Python 3.11 with venv, gcc and
-# readelf. MARATHON_NO_GAME=1 leaves the game out. Arguments go to pytest.
+# readelf. MARATHON_TEST_GAME=1 tests the game, too. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python="${MARATHON_MLAGENTS_PYTHON:-$PWD/.venv-mlagents/bin/python}"
@@ -12,19 +12,19 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   rm -rf .venv-mlagents
   "$base" -m venv .venv-mlagents
   pip=("$python" -m pip --quiet --disable-pip-version-check)
-  "${pip[@]}" install --no-deps --ignore-requires-python --requirement tests/mlagents/requirements-no-deps.txt
+  "${pip[@]}" install --no-compile --no-deps --ignore-requires-python --requirement tests/mlagents/requirements-no-deps.txt
   # pip notes that mlagents asks for another grpcio; that is meant
-  "${pip[@]}" install --requirement tests/mlagents/requirements.txt
+  "${pip[@]}" install --no-compile --requirement tests/mlagents/requirements.txt
   "$python" tests/oracle/install_torch.py torch==2.1.2
   touch .venv-mlagents/complete
 fi
-targets=(--bin marathon-player --bin marathon)
-if [ -z "${MARATHON_NO_GAME:-}" ]; then
+targets=(--bin marathon-player --bin marathon) packages=(--workspace --exclude marathon-game --exclude avian_props)
+if [ -n "${MARATHON_TEST_GAME:-}" ]; then
   # a test among the targets: Bevy has the features that it has in `cargo test`, and is not compiled again
-  targets+=(--bin marathon-game --test a_window_under_xvfb)
+  targets+=(--bin marathon-game --test a_window_under_xvfb) packages=(--workspace)
 fi
 # `--workspace` keeps the features of dependencies, and with them what is built already
-cargo build --release --workspace "${targets[@]}"
+cargo build --release "${packages[@]}" "${targets[@]}"
 bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
 export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon" MARATHON_GAME="$bin/marathon-game"
 exec "$python" -m pytest --quiet -c tests/mlagents/pytest.ini tests/mlagents "$@"

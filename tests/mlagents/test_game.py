@@ -18,8 +18,8 @@ from mlagents_envs.base_env import ActionTuple
 from mlagents_envs.environment import UnityEnvironment
 from mlagents_envs.side_channel.engine_configuration_channel import EngineConfigurationChannel
 
-if os.environ.get("MARATHON_NO_GAME"):
-    pytest.skip("MARATHON_NO_GAME is set: the game has not been built", allow_module_level=True)
+if not os.environ.get("MARATHON_TEST_GAME"):
+    pytest.skip("the game is not tested: ./test.sh --all does", allow_module_level=True)
 
 GAME = os.environ["MARATHON_GAME"]
 AGENTS = 16

@@ -4,6 +4,7 @@
 //! that have an axis have it along z, those of the game along y, so the same turn serves shapes and frames.
 
 use bevy::math::{Quat, Vec3};
+use bevy::transform::components::Transform;
 
 /// A point or direction of the physics in the game's axes.
 pub fn to_game(v: [f64; 3]) -> Vec3 {
@@ -20,6 +21,11 @@ pub fn turn_to_game(q: [f64; 4]) -> Quat {
     // a quaternion's vector part is an axis, which turns like any other
     let axis = to_game([q[1], q[2], q[3]]);
     Quat::from_xyzw(axis.x, axis.y, axis.z, q[0] as f32).normalize()
+}
+
+/// A place of the physics, a position and an orientation, in the game's axes.
+pub fn place_to_game(pos: [f64; 3], quat: [f64; 4]) -> Transform {
+    Transform::from_translation(to_game(pos)).with_rotation(turn_to_game(quat))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The systems between the game's world and the simulation.
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
-use crate::axes::{to_game, to_physics, turn_to_game};
+use crate::axes::{to_game, to_physics};
 use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
@@ -14,7 +14,7 @@ use bevy::ecs::lifecycle::Remove;
 use bevy::prelude::*;
 use bevy::tasks::ComputeTaskPool;
 use marathon_envs::AgentState;
-use marathon_render::{BodyPose, Scene};
+use marathon_render::Scene;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -62,10 +62,7 @@ impl Marathon {
         let Seat { herd, .. } = ragdoll.0;
         let model = &self.herds.get(herd)?.model;
         let (a, b, share) = self.resident(ragdoll.0)?.between(at)?;
-        let pose = Scene::pose_from_qpos(model, &stage::mix(model, &a.qpos, &b.qpos, share)).ok()?;
-        let place =
-            |body: &BodyPose| Transform::from_translation(to_game(body.pos)).with_rotation(turn_to_game(body.quat));
-        Some(pose.bodies.iter().map(place).collect())
+        stage::places(model, &stage::mix(model, &a.qpos, &b.qpos, share))
     }
 
     /// Puts a ragdoll into a state.
@@ -274,8 +271,7 @@ pub(crate) fn push(
 /// Center of mass of a body in the axes of the physics.
 fn center_of_mass(marathon: &Marathon, seat: Seat, anatomy: &Anatomy, body: usize) -> Option<[f64; 3]> {
     let still = marathon.resident(seat)?.trail.back()?;
-    let pose = Scene::pose_from_qpos(&anatomy.model, &still.qpos).ok()?.bodies.get(body).copied()?;
-    let frame = Transform::from_translation(to_game(pose.pos)).with_rotation(turn_to_game(pose.quat));
+    let frame = *stage::places(&anatomy.model, &still.qpos)?.get(body)?;
     Some(to_physics(frame.transform_point(to_game(anatomy.model.bodies[body].ipos))))
 }
 
@@ -361,7 +357,7 @@ pub(crate) fn face_targets(
         }
         let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
         let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &still.qpos) else { continue };
-        let place = track.transform_point(crate::axes::to_game(pose.com));
+        let place = track.transform_point(to_game(pose.com));
         if (place - target.place).xz().length() <= target.radius {
             arrived.retain(|(known, _)| *known != entity);
             arrived.push((entity, episode.number));

@@ -1,10 +1,12 @@
 //! Frames: the transforms of all parts at the time that a frame shows.
 
+use crate::axes::place_to_game;
 use crate::ragdoll::{Anatomy, Part};
 use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
+use marathon_render::Scene;
 
 /// Writes the transforms of all parts.
 pub(crate) fn show(
@@ -15,10 +17,21 @@ pub(crate) fn show(
 ) {
     let now = time.elapsed() + time.overstep();
     for (ragdoll, anatomy) in &ragdolls {
-        for (entity, place) in anatomy.parts.iter().zip(marathon.places(ragdoll, now).into_iter().flatten()) {
-            if let Ok(mut transform) = parts.get_mut(*entity) {
-                (transform.translation, transform.rotation) = (place.translation, place.rotation);
-            }
+        put(anatomy, marathon.places(ragdoll, now), &mut parts);
+    }
+}
+
+/// Where the bodies of a model are in a configuration; none if the numbers are not sound.
+pub fn places(model: &Model, qpos: &[f64]) -> Option<Vec<Transform>> {
+    let pose = Scene::pose_from_qpos(model, qpos).ok()?;
+    Some(pose.bodies.iter().map(|body| place_to_game(body.pos, body.quat)).collect())
+}
+
+/// Moves the parts to places that are known.
+pub fn put(anatomy: &Anatomy, places: Option<Vec<Transform>>, parts: &mut Query<&mut Transform, With<Part>>) {
+    for (entity, place) in anatomy.parts.iter().zip(places.into_iter().flatten()) {
+        if let Ok(mut transform) = parts.get_mut(*entity) {
+            (transform.translation, transform.rotation) = (place.translation, place.rotation);
         }
     }
 }

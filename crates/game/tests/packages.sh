@@ -4,7 +4,7 @@ set -euo pipefail
 packages=(pkg-config libudev-dev libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2
   xvfb xdotool imagemagick ffmpeg)
 if ! command -v dpkg > /dev/null; then
-  echo "the game needs what Debian calls: ${packages[*]}; MARATHON_NO_GAME=1 leaves the game out" >&2
+  echo "the game needs what Debian calls: ${packages[*]}; ./test.sh without --all leaves the game out" >&2
   exit 0
 fi
 missing=()
@@ -19,7 +19,7 @@ if [ "$(id -u)" = 0 ]; then
 elif command -v sudo > /dev/null && sudo -n true 2> /dev/null; then
   as_root=(sudo -n)
 else
-  echo "the game needs: sudo apt install ${missing[*]}; MARATHON_NO_GAME=1 ./test.sh leaves the game out" >&2
+  echo "the game needs: sudo apt install ${missing[*]}; ./test.sh without --all leaves the game out" >&2
   exit 1
 fi
 "${as_root[@]}" apt-get update -qq

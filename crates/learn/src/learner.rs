@@ -246,10 +246,10 @@ impl Learner {
     pub fn absorb(&mut self, totals: &Totals, layout: &Layout, config: &PpoConfig) {
         // without normalization the deviations are from zero, not from the mean
         if config.normalize_observations {
-            let before = self.normalizer(config);
-            self.observations.merge(totals.samples, &totals.sums.observations, config.statistics_cap);
             // the first rollout's are those that the weights at the start are meant for
-            if config.follow_statistics && self.iteration > 0 {
+            let followed = (config.follow_statistics && self.iteration > 0).then(|| self.normalizer(config));
+            self.observations.merge(totals.samples, &totals.sums.observations, config.statistics_cap);
+            if let Some(before) = followed {
                 let after = self.normalizer(config);
                 layout.actor.follow(&mut self.params[..layout.critic_start], &before, &after);
                 layout.critic.follow(&mut self.params[layout.critic_start..], &before, &after);

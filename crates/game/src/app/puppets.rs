@@ -1,7 +1,6 @@
 //! Characters whose poses come from elsewhere: from a recording, a trainer, a pipe.
 
 use crate::app::show::Actor;
-use crate::axes::{to_game, turn_to_game};
 use crate::look::{FollowCamera, Marks, Tint};
 use crate::ragdoll::{Anatomy, Episode, Part};
 use crate::stage;
@@ -62,11 +61,5 @@ pub fn stage(
 
 /// Moves the parts of a puppet.
 pub fn pose(anatomy: &Anatomy, qpos: &[f64], parts: &mut Query<&mut Transform, With<Part>>) {
-    let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, qpos) else { return };
-    for (entity, body) in anatomy.parts.iter().zip(&pose.bodies) {
-        if let Ok(mut transform) = parts.get_mut(*entity) {
-            transform.translation = to_game(body.pos);
-            transform.rotation = turn_to_game(body.quat);
-        }
-    }
+    stage::put(anatomy, stage::places(&anatomy.model, qpos), parts);
 }

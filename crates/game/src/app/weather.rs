@@ -6,7 +6,7 @@ use crate::app::show::{Actor, Focus, Show};
 use crate::axes::{to_game, turn_to_game};
 use crate::look::FollowCamera;
 use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, Part, Physique, Push, Ragdoll};
+use crate::ragdoll::{Anatomy, Episode, Part, Physique, Push, Ragdoll};
 use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
@@ -224,7 +224,7 @@ fn throw(
     mut deeds: MessageReader<Do>,
     weather: Res<Weather>,
     camera: Query<(&FollowCamera, &Transform)>,
-    actors: Query<(&Actor, &Anatomy, &RagdollState, &Transform, &crate::ragdoll::Episode), Without<FollowCamera>>,
+    actors: Query<(&Actor, &Anatomy, &RagdollState, &Transform, &Episode), Without<FollowCamera>>,
     (marathon, time): (Res<Marathon>, Res<Time<Fixed>>),
     focus: Res<Focus>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
@@ -260,15 +260,13 @@ fn throw(
 }
 
 /// Balls fly, bounce, and push what they hit.
-#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 fn fly(
     mut commands: Commands,
     time: Res<Time<Fixed>>,
     weather: Res<Weather>,
     mut balls: Query<(Entity, &mut Ball, &mut Transform), Without<Part>>,
     marathon: Res<Marathon>,
-    actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform), With<Ragdoll>>,
-    episodes: Query<(&crate::ragdoll::Episode, &GlobalTransform)>,
+    actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform, &Episode), With<Ragdoll>>,
     mut pushes: MessageWriter<Push>,
 ) {
     if balls.is_empty() {
@@ -276,7 +274,7 @@ fn fly(
     }
     let dt = time.delta_secs() / BALL_STEPS as f32;
     // a frame may have many ticks: where the bodies are in this one is not in their transforms
-    let rods = actors.iter().flat_map(|(ragdoll, anatomy, state, track)| {
+    let rods = actors.iter().flat_map(|(ragdoll, anatomy, state, track, _)| {
         let places = marathon.places(state, time.elapsed()).unwrap_or_default();
         rods(ragdoll, anatomy, |body| Some(*track * *places.get(body)?))
     });
@@ -300,10 +298,9 @@ fn fly(
                 let apart = transform.translation - at;
                 let depth = rod.radius + BALL_RADIUS - apart.length();
                 let (Some(normal), true) = (apart.try_normalize(), depth > 0.0) else { continue };
-                let Ok((_, anatomy, ..)) = actors.get(rod.ragdoll) else { continue };
+                let Ok((_, anatomy, _, track, episode)) = actors.get(rod.ragdoll) else { continue };
                 // the body moves about as the whole character does
-                let moving =
-                    episodes.get(rod.ragdoll).map_or(Vec3::ZERO, |(e, track)| track.rotation() * Vec3::X * e.speed);
+                let moving = track.rotation() * Vec3::X * episode.speed;
                 transform.translation += normal * depth;
                 let closing = (ball.velocity - moving).dot(normal);
                 if closing >= 0.0 {

@@ -1,6 +1,6 @@
 //! Meshes and materials of ragdolls: one shape per visible geom, colored by what it is.
 
-use crate::axes::{to_game, turn_to_game};
+use crate::axes::{place_to_game, to_game};
 use crate::look::{TINTS, ground};
 use crate::ragdoll::{Anatomy, Part, Ragdoll};
 use bevy::asset::RenderAssetUsages;
@@ -91,7 +91,7 @@ fn dress(
                     (mesh, wardrobe.material(&mut materials, stuff))
                 }
             };
-            let place = Transform::from_translation(to_game(geom.pos)).with_rotation(turn_to_game(geom.quat));
+            let place = place_to_game(geom.pos, geom.quat);
             let name = Name::new(if geom.name.is_empty() { "geom".into() } else { geom.name.clone() });
             commands.spawn((Mesh3d(mesh), MeshMaterial3d(material), place, name, ChildOf(anatomy.parts[geom.body])));
         }

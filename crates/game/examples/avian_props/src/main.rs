@@ -7,7 +7,7 @@
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
-use marathon_game::axes::{to_game, turn_to_game};
+use marathon_game::axes::place_to_game;
 use marathon_game::prelude::*;
 use marathon_physics::model::{Geom, GeomType};
 use std::collections::HashMap;
@@ -46,7 +46,7 @@ fn cast_shadows(mut commands: Commands, new: Query<(Entity, &Anatomy), Added<Ana
     for (ragdoll, anatomy) in &new {
         for geom in &anatomy.model.geoms {
             let Some(collider) = collider(geom) else { continue };
-            let place = Transform::from_translation(to_game(geom.pos)).with_rotation(turn_to_game(geom.quat));
+            let place = place_to_game(geom.pos, geom.quat);
             let shadow = Shadow { ragdoll, body: geom.body, place };
             // out of everybody's way until it follows
             commands.spawn((shadow, RigidBody::Kinematic, collider, Transform::from_xyz(0.0, -100.0, 0.0)));
