@@ -2,14 +2,18 @@
 
 use crate::error::CliError;
 use crate::text;
-use marathon_learn::{PpoConfig, write_atomic};
+use marathon_learn::{Checkpoint, PpoConfig, read_description, write_atomic, write_description};
 use serde::{Deserialize, Serialize};
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
 const VERSION: u32 = 1;
+const RUN: &str = "run.json";
+const LOCK: &str = ".lock";
+const PROGRESS: &str = "progress.csv";
 /// Where runs go unless the user says otherwise.
 const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
@@ -48,12 +52,43 @@ impl RunFile {
             config: loaded.ppo.clone(),
         }
     }
+
+    /// Reads a description and looks at every value.
+    fn read(path: &Path) -> Result<Self, CliError> {
+        let run: RunFile = read_description(path, FORMAT, VERSION)?;
+        run.config.validate().map_err(|e| e.in_file(path, "config"))?;
+        for (key, n) in [("summary_freq", run.summary_freq), ("checkpoint_interval", run.checkpoint_interval)] {
+            if n == 0 {
+                return Err(CliError::file(path, key, n, "at least 1"));
+            }
+        }
+        Ok(run)
+    }
+
+    /// Refuses a configuration that is not the one of a checkpoint of the run: only steps and threads may differ.
+    fn check(&self, path: &Path, checkpoint: &Checkpoint) -> Result<(), CliError> {
+        let known = checkpoint.config();
+        let PpoConfig { total_steps, threads, .. } = self.config;
+        let known = PpoConfig { total_steps, threads, ..known.clone() };
+        let keys = |config: &PpoConfig| serde_json::to_value(config).unwrap_or_default();
+        let (found, expected) = (keys(&self.config), keys(&known));
+        let differs = found.as_object().into_iter().flatten().find(|(key, value)| **value != expected[key.as_str()]);
+        match differs {
+            None => Ok(()),
+            Some((key, found)) => {
+                let expected = format!("{}, as in checkpoint/checkpoint.json", expected[key.as_str()]);
+                Err(CliError::file(path, format!("config.{key}"), found, expected))
+            }
+        }
+    }
 }
 
 /// The folder of a run, locked against a second writer while this value lives.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Of a new run: folders that were made for it, the deepest first.
+    made: Option<Vec<PathBuf>>,
     _lock: File,
 }
 
@@ -61,17 +96,23 @@ impl RunFolder {
     /// Makes the folder of a new run: `out`, or the first free `runs/<agent>-<n>`.
     ///
     /// # Errors
-    /// If `out` holds a run already, or the folder cannot be made or written to.
+    /// If `out` holds anything, but for a run without an iteration, or the folder cannot be made or written to.
     pub fn create(out: Option<&Path>, agent: &str) -> Result<Self, CliError> {
-        let path = match out {
+        let (path, made) = match out {
             Some(out) => {
-                refuse_run(out)?;
+                refuse(out)?;
+                let missing = out.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
+                let made = missing.map(Path::to_path_buf).collect();
                 fs::create_dir_all(out).map_err(CliError::io(out, "create folder"))?;
-                out.to_path_buf()
+                (out.to_path_buf(), made)
             }
             None => free_folder(agent)?,
         };
-        Self::lock(path)
+        let folder = Self { made: Some(made), ..Self::lock(path)? };
+        // another process may have been here in between
+        refuse(&folder.path)?;
+        folder.clear();
+        Ok(folder)
     }
 
     /// Opens the folder of a run to go on with it.
@@ -79,26 +120,70 @@ impl RunFolder {
     /// # Errors
     /// If it holds no run, or another process is writing to it.
     pub fn open(path: &Path) -> Result<(Self, RunFile), CliError> {
-        let file = path.join("run.json");
+        let file = path.join(RUN);
         if !file.is_file() {
             let found = if path.is_dir() { "no run.json" } else { "no such folder" };
             return Err(CliError::file(path, "--resume", found, format!("the folder of a run{}", nearest_run(path))));
         }
         let folder = Self::lock(path.into())?;
-        let run = folder.read_run()?;
+        let run = RunFile::read(&file)?;
         folder.remove_leftovers();
         Ok((folder, run))
     }
 
     fn lock(path: PathBuf) -> Result<Self, CliError> {
-        let name = path.join(".lock");
+        let name = path.join(LOCK);
         let lock = File::create(&name).map_err(CliError::io(&path, "write to folder"))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 Err(CliError::file(&path, "run", "another process that is writing to it", "no other"))
             }
             // some network file systems know no locks; then nobody else can have one
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path, _lock: lock }),
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path, made: None, _lock: lock }),
+        }
+    }
+
+    /// Reads the last checkpoint of a run; a run that ended before its first has none.
+    ///
+    /// # Errors
+    /// If it is damaged, of another run, or lost.
+    pub fn last_checkpoint(&self, run: &RunFile) -> Result<Option<Checkpoint>, CliError> {
+        let file = self.checkpoint().join("checkpoint.json");
+        if file.exists() {
+            let checkpoint = Checkpoint::load(&self.checkpoint())?;
+            run.check(&self.path.join(RUN), &checkpoint)?;
+            return Ok(Some(checkpoint));
+        }
+        // these are written after it
+        match [self.policy(), self.summary()].into_iter().find(|later| later.exists()) {
+            None => Ok(None),
+            Some(later) => {
+                let name = later.file_name().unwrap_or_default().to_string_lossy();
+                let expected =
+                    format!("the checkpoint that was written before {name}; without it, train in another folder");
+                Err(CliError::file(&file, "checkpoint", "no such file", expected))
+            }
+        }
+    }
+
+    /// Takes back the folder of a new run that could not begin: what it holds, and the folders that were made for it.
+    pub fn discard(self) {
+        let Some(made) = self.made.as_ref().filter(|_| is_blank(&self.path)) else { return };
+        self.clear();
+        let _ = fs::remove_file(self.path.join(RUN));
+        let _ = fs::remove_file(self.path.join(LOCK));
+        for folder in made {
+            // one that somebody else has put something into stays
+            let _ = fs::remove_dir(folder);
+        }
+    }
+
+    /// Removes what a run without an iteration has left, but for its description.
+    fn clear(&self) {
+        self.remove_leftovers();
+        let _ = fs::remove_file(self.progress());
+        for events in self.events().into_iter().flatten() {
+            let _ = fs::remove_file(events);
         }
     }
 
@@ -116,7 +201,7 @@ impl RunFolder {
     }
     /// Numbers of all iterations.
     pub fn progress(&self) -> PathBuf {
-        self.path.join("progress.csv")
+        self.path.join(PROGRESS)
     }
     /// The learning curve.
     pub fn curve(&self) -> PathBuf {
@@ -153,28 +238,14 @@ impl RunFolder {
     /// # Errors
     /// If that fails.
     pub fn write_run(&self, run: &RunFile) -> Result<(), CliError> {
-        write_json(&self.path.join("run.json"), run)
-    }
-
-    fn read_run(&self) -> Result<RunFile, CliError> {
-        let path = self.path.join("run.json");
-        let text = fs::read_to_string(&path).map_err(CliError::io(&path, "read"))?;
-        let bad = |e: serde_json::Error| CliError::file(&path, "JSON", format!("'{e}'"), "a run's description");
-        let run: RunFile = serde_json::from_str(&text).map_err(bad)?;
-        if run.format != FORMAT || run.version != VERSION {
-            let found = format!("{} {}", run.format, run.version);
-            return Err(CliError::file(&path, "format", found, format!("{FORMAT} {VERSION}")));
-        }
-        run.config.validate().map_err(|e| CliError::file(&path, "config", e, "a valid configuration"))?;
-        Ok(run)
+        Ok(write_description(&self.path.join(RUN), run)?)
     }
 
     /// Removes temporary files of a writer that was killed; failing to harms nobody.
     fn remove_leftovers(&self) {
         for folder in [self.path.clone(), self.checkpoint(), self.policies()] {
             for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-                let name = entry.file_name().to_string_lossy().into_owned();
-                if name.starts_with('.') && name.ends_with(".tmp") {
+                if is_leftover(&entry.file_name()) {
                     let _ = fs::remove_file(entry.path());
                 }
             }
@@ -182,28 +253,79 @@ impl RunFolder {
     }
 }
 
-/// Refuses a folder that holds a run.
-fn refuse_run(out: &Path) -> Result<(), CliError> {
-    let signs = ["run.json", "policy.safetensors", "progress.csv", "summary.json", "checkpoint"];
-    let Some(sign) = signs.iter().find(|sign| out.join(sign).exists()) else { return Ok(()) };
-    let program = text::program();
+/// Refuses a folder that holds anything but a run without an iteration, which is as good as empty.
+fn refuse(out: &Path) -> Result<(), CliError> {
+    if is_blank(out) {
+        return Ok(());
+    }
     let folder = text::path_word(out);
+    if RunFile::read(&out.join(RUN)).is_ok() {
+        let program = text::program();
+        return Err(CliError::Usage(format!(
+            "--out {folder} holds a run already; go on with it by `{program} train --resume {folder}`, or choose another \
+             folder"
+        )));
+    }
+    let mut names: Vec<OsString> = fs::read_dir(out).into_iter().flatten().flatten().map(|e| e.file_name()).collect();
+    names.retain(|name| name != LOCK);
+    names.sort();
+    let first = names.first().map(|name| name.to_string_lossy()).unwrap_or_default();
+    let more = match names.len() {
+        0 | 1 => String::new(),
+        n => format!(" and {} more", n - 1),
+    };
     Err(CliError::Usage(format!(
-        "--out {folder} holds a run already ({sign}); go on with it by `{program} train --resume {folder}`, or choose \
-         another folder"
+        "--out {folder} holds '{first}'{more}, expected a new or empty folder; choose another, or move that away"
     )))
 }
 
-/// Claims the first free `runs/<agent>-<n>`.
-fn free_folder(agent: &str) -> Result<PathBuf, CliError> {
+/// Whether a folder has nothing to lose: it is not there, or empty, or holds a run that has not made an iteration.
+fn is_blank(folder: &Path) -> bool {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(e) => return e.kind() == ErrorKind::NotFound || !folder.is_dir(),
+    };
+    let mut names: Vec<OsString> = Vec::new();
+    for entry in entries {
+        let Ok(entry) = entry else { return false };
+        names.push(entry.file_name());
+    }
+    names.retain(|name| name != LOCK);
+    if names.is_empty() {
+        return true;
+    }
+    let rows = || {
+        let text = fs::read_to_string(folder.join(PROGRESS));
+        text.map_or_else(|e| usize::from(e.kind() != ErrorKind::NotFound), |text| text.lines().skip(1).count())
+    };
+    let ours = |name: &OsString| {
+        let of_events = || name.to_str().is_some_and(|n| n.starts_with(EVENTS) && n.contains(".marathon."));
+        name == RUN || name == PROGRESS || is_leftover(name) || of_events()
+    };
+    names.iter().all(ours) && RunFile::read(&folder.join(RUN)).is_ok() && rows() == 0
+}
+
+/// Whether a file has a temporary name.
+fn is_leftover(name: &OsStr) -> bool {
+    let name = name.as_encoded_bytes();
+    name.starts_with(b".") && name.ends_with(b".tmp")
+}
+
+/// Claims the first free `runs/<agent>-<n>`; also the folders that were made for it.
+fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), CliError> {
     let runs = Path::new(RUNS);
+    let first = !runs.exists();
     fs::create_dir_all(runs).map_err(CliError::io(runs, "create folder"))?;
     let base = text::short_name(agent);
     let mut n = 1;
     loop {
         let path = runs.join(format!("{base}-{n}"));
         match fs::create_dir(&path) {
-            Ok(()) => return Ok(path),
+            Ok(()) => {
+                let mut made = vec![path.clone()];
+                made.extend(first.then(|| runs.to_path_buf()));
+                return Ok((path, made));
+            }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => n += 1,
             Err(e) => return Err(CliError::io(&path, "create folder")(e)),
         }
@@ -218,7 +340,7 @@ pub fn nearest_run(path: &Path) -> String {
     for folder in [parent, Path::new(RUNS)] {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             let run = entry.path();
-            if run.join("run.json").is_file() {
+            if run.join(RUN).is_file() {
                 let name = run.display().to_string();
                 let name = name.strip_prefix("./").unwrap_or(&name).to_string();
                 near.push((strsim::damerau_levenshtein(&asked, &name), name));
@@ -249,7 +371,36 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, CliError> {
 /// # Errors
 /// If that fails.
 pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), CliError> {
-    let mut json = serde_json::to_string_pretty(document).expect("documents are plain data");
+    let bad = |e: serde_json::Error| CliError::file(path, "JSON", e, "plain data");
+    let mut json = serde_json::to_string_pretty(document).map_err(bad)?;
     json.push('\n');
     Ok(write_atomic(path, json.as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One bit of the description is another, as a bad disk leaves it: that is seen, or it means the same.
+    #[test]
+    fn a_flipped_bit_of_a_description_is_refused_or_changes_nothing() {
+        let temp = tempfile::tempdir().unwrap();
+        let path = temp.path().join(RUN);
+        let run = RunFile::new("Hopper-v0", &crate::config::default_for("Hopper-v0"));
+        write_description(&path, &run).unwrap();
+        assert_eq!(RunFile::read(&path).unwrap(), run);
+        let bytes = fs::read(&path).unwrap();
+        let mut refused = 0;
+        // two bits of every byte, all eight in turn
+        for (place, bit) in (0..bytes.len()).flat_map(|place| [place % 4, place % 4 + 4].map(|bit| (place, bit))) {
+            let mut flipped = bytes.clone();
+            flipped[place] ^= 1 << bit;
+            fs::write(&path, &flipped).unwrap();
+            match RunFile::read(&path) {
+                Ok(read) => assert_eq!(read, run, "bit {bit} of byte {place}"),
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(refused > bytes.len(), "{refused} of {}", 2 * bytes.len());
+    }
 }

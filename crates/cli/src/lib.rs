@@ -1,7 +1,8 @@
 //! The `marathon` command: trains, evaluates, benchmarks and shows agents.
 //!
 //! What a person reads goes to stdout, progress and errors to stderr. With `--json`, stdout carries exactly one JSON
-//! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C.
+//! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C. What
+//! stdout does not take is a failure, but for a reader that has left.
 
 mod args;
 mod commands;
@@ -30,23 +31,36 @@ use std::ffi::OsString;
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     text::set_program(words.first());
-    let args = match Args::try_parse_from(words) {
-        Ok(args) => args,
+    let code = match Args::try_parse_from(&words) {
+        Ok(args) => match dispatch(&args) {
+            Ok(()) => 0,
+            Err(error) => {
+                console::note(format!("error: {error}"));
+                // an interrupted run has printed its summary already
+                if args.json && !matches!(error, CliError::Interrupted(_)) {
+                    console::print_json(&serde_json::json!({ "error": error.to_string() }));
+                }
+                error.exit_code()
+            }
+        },
         // help goes to stdout with code 0, a wrong command line to stderr with code 2
         Err(answer) => {
-            let _ = answer.print();
-            return answer.exit_code() as u8;
+            let printed = answer.print();
+            if !answer.use_stderr() {
+                console::written(printed);
+            } else if words.iter().any(|word| word == "--json") {
+                let text = answer.render().to_string();
+                let text = text.trim().trim_start_matches("error: ");
+                console::print_json(&serde_json::json!({ "error": text }));
+            }
+            answer.exit_code() as u8
         }
     };
-    match dispatch(&args) {
-        Ok(()) => 0,
+    match console::finish() {
+        Ok(()) => code,
         Err(error) => {
             console::note(format!("error: {error}"));
-            // an interrupted run has printed its summary already
-            if args.json && !matches!(error, CliError::Interrupted(_)) {
-                console::print_json(&serde_json::json!({ "error": error.to_string() }));
-            }
-            error.exit_code()
+            if code == 0 { error.exit_code() } else { code }
         }
     }
 }

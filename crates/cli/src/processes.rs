@@ -2,7 +2,8 @@
 //!
 //! A process is `marathon rollout-worker`. It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
 //! messages of the learner ([`Players::play`]), and answers with one; before each stands its length, 8 bytes, little-endian. It
-//! leaves when its input ends. The policy has the same bits as without processes.
+//! leaves when its input ends. The policy has the same bits as without processes. A process that is lost ends the run, which
+//! can be gone on with.
 
 use crate::error::CliError;
 use crate::text;
@@ -12,6 +13,7 @@ use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// What a process plays.
 #[derive(Serialize, Deserialize)]
@@ -31,40 +33,67 @@ pub struct Processes {
 
 struct Worker {
     child: Child,
-    requests: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    /// Both ends are gone when the process is told to leave.
+    pipes: Option<(ChildStdin, BufReader<ChildStdout>)>,
 }
 
+/// How long processes may take to leave by themselves, and then to die.
+const GRACE: Duration = Duration::from_millis(500);
+/// Time between two looks at a process that is to leave.
+const LOOK: Duration = Duration::from_millis(2);
+
 impl Processes {
+    /// Refuses what processes cannot play.
+    ///
+    /// # Errors
+    /// If the algorithm is SAC.
+    pub fn check(config: &PpoConfig, count: usize) -> Result<(), CliError> {
+        match config.algorithm {
+            Algorithm::Sac(_) if count > 0 => Err(CliError::Usage(format!(
+                "--processes is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Starts so many processes for a run, at most one for every sixteen agents.
     ///
     /// # Errors
     /// If one cannot be started.
     pub fn start(agent: &str, config: &PpoConfig, count: usize) -> Result<Self, CliError> {
-        if let Algorithm::Sac(_) = config.algorithm {
-            return Err(CliError::Usage(format!(
-                "--processes is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
-            )));
-        }
+        Self::check(config, count)?;
         let slices = count.clamp(1, config.blocks());
         let failed = |e: &dyn std::fmt::Display| CliError::Process(format!("a process cannot be started: {e}"));
         let program = text::program_file();
-        let start = |slice| {
-            let mut child = Command::new(&program)
-                .arg("rollout-worker")
-                .stdin(Stdio::piped())
-                .stdout(Stdio::piped())
-                .spawn()
-                .map_err(|e| failed(&e))?;
-            let (Some(mut requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
-                unreachable!("both are piped")
-            };
+        // those that have been started leave with it
+        let mut all = Processes { workers: Vec::new(), error: None };
+        for slice in 0..slices {
+            let mut worker = Worker::start(Command::new(&program).arg("rollout-worker")).map_err(|e| failed(&e))?;
             let part = Part { agent: agent.into(), config: config.clone(), slice, slices };
             let part = serde_json::to_string(&part).map_err(|e| failed(&e))?;
-            writeln!(requests, "{part}").map_err(|e| failed(&e))?;
-            Ok(Worker { child, requests: Some(requests), answers: BufReader::new(answers) })
-        };
-        Ok(Processes { workers: (0..slices).map(start).collect::<Result<_, CliError>>()?, error: None })
+            let told = worker.pipes.as_mut().map_or(Ok(()), |(requests, _)| writeln!(requests, "{part}"));
+            all.workers.push(worker);
+            told.map_err(|e| failed(&e))?;
+        }
+        Ok(all)
+    }
+}
+
+impl Worker {
+    fn start(command: &mut Command) -> io::Result<Self> {
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let pipes = child.stdin.take().zip(child.stdout.take().map(BufReader::new));
+        Ok(Worker { child, pipes })
+    }
+
+    /// Waits until a moment for the process to end; whether it has.
+    fn ended_by(&mut self, moment: Instant) -> bool {
+        loop {
+            match self.child.try_wait() {
+                Ok(None) if Instant::now() < moment => std::thread::sleep(LOOK),
+                other => return !matches!(other, Ok(None)),
+            }
+        }
     }
 }
 
@@ -78,11 +107,12 @@ impl Players for Processes {
         let mut exchange = || -> Result<(), (usize, String)> {
             // a process reads all before it answers, so none waits for another
             for (i, (worker, state)) in self.workers.iter_mut().zip(states).enumerate() {
-                let Some(requests) = &mut worker.requests else { continue };
+                let Some((requests, _)) = &mut worker.pipes else { continue };
                 send(requests, &[orders, state]).map_err(|e| (i, e.to_string()))?;
             }
             for (i, worker) in self.workers.iter_mut().enumerate() {
-                let answer = receive(&mut worker.answers).and_then(|a| a.ok_or(io::ErrorKind::UnexpectedEof.into()));
+                let Some((_, answers)) = &mut worker.pipes else { continue };
+                let answer = receive(answers).and_then(|a| a.ok_or(io::ErrorKind::UnexpectedEof.into()));
                 let answer = answer.map_err(|e| (i, e.to_string()))?;
                 deliver(i, &answer).map_err(|e| (i, e.to_string()))?;
             }
@@ -102,13 +132,17 @@ impl Players for Processes {
 
 impl Drop for Processes {
     fn drop(&mut self) {
+        // a process ends with its input, and one that is writing, with its reader
+        self.workers.iter_mut().for_each(|worker| worker.pipes = None);
+        let moment = Instant::now() + GRACE;
         for worker in &mut self.workers {
-            // it ends with its input
-            worker.requests = None;
+            if !worker.ended_by(moment) {
+                // it keeps nothing that could be lost
+                let _ = worker.child.kill();
+            }
         }
-        for worker in &mut self.workers {
-            let _ = worker.child.wait();
-        }
+        let moment = Instant::now() + GRACE;
+        self.workers.iter_mut().for_each(|worker| _ = worker.ended_by(moment));
     }
 }
 
@@ -160,6 +194,31 @@ fn receive(pipe: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Processes that do not listen, or write without end, hold nobody up.
+    #[cfg(unix)]
+    #[test]
+    fn a_process_that_does_not_leave_is_ended() {
+        for program in ["yes", "trap '' PIPE TERM; while true; do echo y; done 2> /dev/null", "sleep 1000"] {
+            let mut workers = Vec::new();
+            for _ in 0..2 {
+                workers.push(Worker::start(Command::new("sh").args(["-c", program])).unwrap());
+            }
+            let ids: Vec<u32> = workers.iter().map(|worker| worker.child.id()).collect();
+            // until the pipe is full
+            std::thread::sleep(Duration::from_millis(100));
+            let (done, wait) = std::sync::mpsc::channel();
+            std::thread::spawn(move || {
+                drop(Processes { workers, error: None });
+                done.send(())
+            });
+            let left = wait.recv_timeout(Duration::from_secs(5)).is_ok();
+            for id in &ids {
+                let _ = Command::new("sh").args(["-c", &format!("kill -KILL {id} 2> /dev/null")]).status();
+            }
+            assert!(left, "{program}");
+        }
+    }
 
     #[test]
     fn messages_arrive_whole_or_not_at_all() {

@@ -12,6 +12,7 @@ pub use crate::task::Task;
 
 use crate::config;
 use crate::folder::write_json;
+use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::EPISODES;
 use crate::report::{Reporter, curve, save};
@@ -100,6 +101,7 @@ impl Session {
         ppo.seed = args.seed.unwrap_or(ppo.seed);
         ppo.threads = args.threads.unwrap_or(ppo.threads);
         ppo.validate()?;
+        Processes::check(ppo, args.processes)?;
         let factory = task.factory(ppo.agents)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
@@ -107,7 +109,10 @@ impl Session {
         let mut folder = None;
         if !dry {
             let made = RunFolder::create(args.out.as_deref(), &agent)?;
-            made.write_run(&run)?;
+            if let Err(error) = made.write_run(&run) {
+                made.discard();
+                return Err(error);
+            }
             folder = Some(made);
         }
         Ok((Session { run, folder, factory, checkpoint: None }, loaded.notes))
@@ -134,9 +139,9 @@ impl Session {
             Some(task) => task,
             None => Task::named(&run.agent)?,
         };
+        Processes::check(&run.config, args.processes)?;
         // a run that ended before its first checkpoint begins again, which gives the same bits
-        let has_checkpoint = folder.checkpoint().join("checkpoint.json").exists();
-        let checkpoint = if has_checkpoint { Some(Checkpoint::load(&folder.checkpoint())?) } else { None };
+        let checkpoint = folder.last_checkpoint(&run)?;
         let done = checkpoint.as_ref().map_or(0, Checkpoint::steps);
 
         if let Some(steps) = args.steps {
@@ -149,7 +154,8 @@ impl Session {
             }
             run.config.total_steps = steps;
         }
-        if done >= run.config.total_steps && folder.summary().exists() && is_finished(&folder)? {
+        run.config.validate()?;
+        if done >= run.config.total_steps && is_finished(&folder, done)? {
             let (done, more) = (text::thousands(done), text::thousands(done * 2));
             return Err(CliError::Usage(format!(
                 "{}: the run is complete with {done} steps; to let it learn on, give it more, such as --steps {more}",
@@ -167,6 +173,13 @@ impl Session {
         self.checkpoint.as_ref().map_or(0, Checkpoint::steps)
     }
 
+    /// Takes back a run that could not begin: nothing is left of its folder, unless there was a run before.
+    pub fn abandon(self) {
+        if let Some(folder) = self.folder {
+            folder.discard();
+        }
+    }
+
     /// Trains to the last step, or until `watch` wants to stop, evaluates, and writes everything to the folder.
     /// `show`: with a bar or lines on stderr.
     ///
@@ -181,47 +194,34 @@ impl Session {
     /// # Errors
     /// The same.
     pub fn carry_out_with(
-        self,
+        mut self,
         players: Option<&mut dyn Players>,
         show: bool,
         watch: &mut Watch,
     ) -> Result<Outcome, CliError> {
-        let Session { run, folder, factory, checkpoint } = self;
-        let train = |resume, observer: &mut dyn Observer| {
-            train_with(players, &*factory, Isa::best(), &run.config, resume, observer)
+        let resume = self.checkpoint.take();
+        let TrainOutput { mut policy, checkpoint, .. } = match self.learn(players, resume, show, watch) {
+            Ok(output) => output,
+            // it says how to go on
+            Err(error @ CliError::Stopped { .. }) => return Err(error),
+            Err(error) => {
+                self.abandon();
+                return Err(error);
+            }
         };
+        let Session { run, folder, factory, .. } = self;
         let mut history = History::default();
-        let TrainOutput { mut policy, checkpoint, .. } = match &folder {
-            None => {
-                let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
-                train(checkpoint, &mut observer)?
-            }
-            Some(folder) => {
-                let terms = &factory.spec().reward_terms;
-                let mut reporter = Reporter::new(folder, &run, terms, checkpoint.as_ref(), (show, watch))?;
-                let result = train(checkpoint, &mut reporter);
-                reporter.finish();
-                let error = reporter.error.take();
-                let output = result?;
-                // what was learned is safe before anything else happens
-                let saved = save(folder, &output.policy, &output.checkpoint);
-                let steps = output.checkpoint.steps();
-                if let Some(cause) = error {
-                    return Err(stopped(folder, cause, saved.is_ok(), steps));
-                }
-                saved.map_err(|cause| stopped(folder, cause, false, steps))?;
-                output
-            }
-        };
         let mut drawn = Ok(());
         if let Some(folder) = &folder {
-            match History::read(&folder.progress()) {
-                Ok(read) => {
-                    history = read;
-                    drawn = curve::draw(folder, &run, &history);
-                }
-                Err(error) => drawn = Err(error),
+            let result = History::read(&folder.progress()).and_then(|read| {
+                history = read;
+                curve::draw(folder, &run, &history)
+            });
+            if result.is_err() {
+                // the run is not complete without its curve
+                let _ = std::fs::remove_file(folder.curve());
             }
+            drawn = result;
         }
 
         let steps = checkpoint.steps();
@@ -241,13 +241,49 @@ impl Session {
         drawn?;
         Ok(Outcome { policy, steps, evaluation, summary, folder })
     }
+
+    /// Trains and saves what was learned.
+    fn learn(
+        &self,
+        players: Option<&mut dyn Players>,
+        resume: Option<Checkpoint>,
+        show: bool,
+        watch: &mut Watch,
+    ) -> Result<TrainOutput, CliError> {
+        let Session { run, factory, .. } = self;
+        let train = |resume, observer: &mut dyn Observer| {
+            train_with(players, &**factory, Isa::best(), &run.config, resume, observer)
+        };
+        let Some(folder) = &self.folder else {
+            let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
+            return Ok(train(resume, &mut observer)?);
+        };
+        let terms = &factory.spec().reward_terms;
+        let mut reporter = Reporter::new(folder, run, terms, resume.as_ref(), (show, watch))?;
+        let result = train(resume, &mut reporter);
+        reporter.finish();
+        let (error, told) = (reporter.error.take(), reporter.told);
+        let output = result?;
+        let steps = output.checkpoint.steps();
+        // what was learned is safe before anything else happens; an iteration that is not told of is to come again
+        let saved = if told { save(folder, &output.policy, &output.checkpoint).map(|()| true) } else { Ok(false) };
+        match (error, saved) {
+            (Some(cause), saved) => Err(stopped(folder, cause, saved.unwrap_or(false), steps)),
+            (None, Err(cause)) => Err(stopped(folder, cause, false, steps)),
+            (None, Ok(_)) => Ok(output),
+        }
+    }
 }
 
-/// Whether the summary has an evaluation, the last thing that a run does.
-fn is_finished(folder: &RunFolder) -> Result<bool, CliError> {
+/// Whether a run has done the last thing that it does with so many steps: its summary has an evaluation, and its curve is
+/// there.
+fn is_finished(folder: &RunFolder, steps: u64) -> Result<bool, CliError> {
     let path = folder.summary();
+    if !path.exists() || !folder.curve().exists() {
+        return Ok(false);
+    }
     let text = std::fs::read_to_string(&path).map_err(CliError::io(&path, "read"))?;
-    Ok(serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.eval.is_some()))
+    Ok(serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.eval.is_some() && s.steps == steps))
 }
 
 /// The error of a run whose files could no longer be written.

@@ -1,5 +1,6 @@
 //! Numbers and commands as people read them.
 
+use serde::Serializer;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -84,14 +85,30 @@ pub fn program_file() -> PathBuf {
     own.or_else(|| CALLED.get().cloned()).unwrap_or_else(|| "marathon".into())
 }
 
+/// A path in JSON, which has no other text: bytes that are not UTF-8 become replacement characters.
+pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
 /// A path as a word of a shell command.
 pub fn path_word(path: &Path) -> String {
-    word(&path.display().to_string())
+    match path.to_str() {
+        Some(text) => word(text),
+        None => {
+            // bash, zsh and others read escapes in such quotes
+            let escaped = path.as_os_str().as_encoded_bytes().iter().map(|byte| match byte {
+                b'\'' | b'\\' => format!("\\{}", char::from(*byte)),
+                b' '..=b'~' => char::from(*byte).to_string(),
+                other => format!("\\x{other:02x}"),
+            });
+            format!("$'{}'", escaped.collect::<String>())
+        }
+    }
 }
 
 fn word(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/\\._-+:~=,".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{text}'") }
+    if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
 #[cfg(test)]
@@ -115,5 +132,12 @@ mod tests {
     fn odd_paths_are_quoted() {
         assert_eq!(path_word(Path::new("runs/hopper-1")), "runs/hopper-1");
         assert_eq!(path_word(Path::new("my runs/a")), "'my runs/a'");
+        assert_eq!(path_word(Path::new("it's")), r"'it'\''s'");
+        #[cfg(unix)]
+        {
+            use std::os::unix::ffi::OsStrExt;
+            let odd = std::ffi::OsStr::from_bytes(b"it's \xff");
+            assert_eq!(path_word(Path::new(odd)), r"$'it\'s \xff'");
+        }
     }
 }

@@ -54,6 +54,55 @@ fn runs_are_not_overwritten() {
     says(&fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "1M"]), &["a: run", "another process"]);
 }
 
+/// `run.json` says what the run is; one that was changed is another run.
+#[test]
+fn a_changed_description_is_refused() {
+    let temp = tempfile::tempdir().unwrap();
+    succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat());
+    let path = temp.path().join("a/run.json");
+    let whole = std::fs::read_to_string(&path).unwrap();
+    let resume = ["train", "--resume", "a", "--steps", "12,288"];
+    let refused = |text: &str, parts: &[&str]| {
+        std::fs::write(&path, text).unwrap();
+        says(&fail(temp.path(), 1, &resume), parts);
+    };
+    refused(&whole.replacen("\"lr\": 0.00", "\"lr\": 0.01", 1), &["a/run.json: checksum: found "]);
+
+    // runs of earlier versions have no checksum; their values are looked at all the same
+    let mut run = json(&whole);
+    run.as_object_mut().unwrap().remove("checksum").expect("a checksum");
+    let with = |run: &serde_json::Value, pointer: &str, value: serde_json::Value| {
+        let mut run = run.clone();
+        *run.pointer_mut(pointer).expect(pointer) = value;
+        run.to_string()
+    };
+    for (pointer, value, text) in [
+        ("/config/lr", (-1.0).into(), "config.lr: found -1, expected a positive number"),
+        ("/config/horizon", 0.into(), "config.horizon: found 0, expected at least 1"),
+        ("/config/horizon", 32.into(), "config.horizon: found 32, expected 64, as in checkpoint"),
+        ("/config/gamma", 0.5.into(), "config.gamma: found 0.5, expected 0.9"),
+        ("/config/seed", (-1).into(), "config.seed: found 'invalid value: integer `-1`"),
+        (
+            "/config/total_steps",
+            (1_u64 << 63).into(),
+            "config.total_steps: found 9223372036854775808, expected at most",
+        ),
+        ("/summary_freq", 0.into(), "summary_freq: found 0, expected at least 1"),
+        ("/checkpoint_interval", 0.into(), "checkpoint_interval: found 0, expected at least 1"),
+        ("/keep_checkpoints", (-1).into(), "keep_checkpoints: found 'invalid value: integer `-1`"),
+        ("/agent", "Hoper-v0".into(), "did you mean 'Hopper-v0'?"),
+    ] {
+        std::fs::write(&path, with(&run, pointer, value)).unwrap();
+        says(&fail(temp.path(), 1, &resume), &[text]);
+    }
+    // the largest numbers are no trouble
+    for key in ["summary_freq", "checkpoint_interval", "keep_checkpoints"] {
+        run[key] = u64::MAX.into();
+    }
+    std::fs::write(&path, run.to_string()).unwrap();
+    succeed(temp.path(), &resume);
+}
+
 #[test]
 fn a_place_that_cannot_be_written_is_found_before_training() {
     let temp = tempfile::tempdir().unwrap();

@@ -8,21 +8,11 @@ use common::*;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
 const STEPS: &str = "400k";
 
 fn start(folder: &Path, args: &[&str]) -> Child {
     marathon(folder, args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
-}
-
-/// Waits until a file has at least so many lines.
-fn wait_for_lines(path: &Path, lines: usize) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while std::fs::read_to_string(path).unwrap_or_default().lines().count() < lines {
-        assert!(Instant::now() < deadline, "{} does not grow", path.display());
-        std::thread::sleep(Duration::from_millis(2));
-    }
 }
 
 fn interrupt(child: &Child) {
@@ -158,6 +148,31 @@ fn a_complete_run_goes_on_with_more_steps_only() {
     let iterations: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
     assert_eq!(iterations, ["1", "2", "3", "4", "5", "6", "7", "8", "9", "10"]);
     assert_eq!(read_json(&temp.path().join("runs/hopper-1/summary.json"))["steps"], 40_960);
+}
+
+/// Killed between its last checkpoint and its summary, a run is not complete: the same command finishes it.
+#[test]
+fn a_run_killed_at_its_end_is_finished_by_the_same_command() {
+    let temp = tempfile::tempdir().unwrap();
+    let run = temp.path().join("a");
+    succeed(temp.path(), &[&SMALL[..], &["5", "--steps", "20k", "--out", "a"]].concat());
+    let early = ["summary.json", "curve.png"].map(|name| (name, std::fs::read(run.join(name)).unwrap()));
+    let extend = ["train", "--resume", "a", "--steps", "40,960"];
+    succeed(temp.path(), &extend);
+    let (whole, policy) = (read_json(&run.join("summary.json")), tensors(&run.join("policy.safetensors")));
+    assert_eq!(whole["steps"], 40_960);
+
+    // what a kill after the checkpoint leaves
+    early.iter().for_each(|(name, bytes)| std::fs::write(run.join(name), bytes).unwrap());
+    succeed(temp.path(), &extend);
+    assert_eq!(read_json(&run.join("summary.json")), whole);
+    assert_eq!(tensors(&run.join("policy.safetensors")), policy);
+    // before the curve was drawn
+    std::fs::remove_file(run.join("curve.png")).unwrap();
+    succeed(temp.path(), &["train", "--resume", "a"]);
+    assert!(run.join("curve.png").is_file());
+    let text = fail(temp.path(), 2, &extend);
+    assert!(text.contains("the run is complete with 40,960 steps"), "{text}");
 }
 
 /// Agents whose simulation broke down are told of at the end, those of the run's earlier parts among them.

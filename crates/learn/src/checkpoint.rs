@@ -2,10 +2,11 @@
 //!
 //! `checkpoint.json` describes the run and names the file with its numbers, `state-<iteration>.safetensors`. The state is
 //! written first and the description last, each under a temporary name, so an interruption at any moment leaves the old
-//! or the new checkpoint, never half of one.
+//! or the new checkpoint, never half of one. Both have checksums.
 
 use crate::agents::Agents;
-use crate::files::{self, TensorReader, TensorWriter, write_atomic};
+use crate::config::MAX_STEPS;
+use crate::files::{self, TensorReader, TensorWriter, read_description, write_atomic, write_description};
 use crate::kfac::Kfac;
 use crate::learner::Learner;
 use crate::normalize::Moments;
@@ -60,6 +61,42 @@ struct About {
     wall_seconds: f64,
     cpu_seconds: f64,
     state: StateFile,
+}
+
+impl About {
+    /// Refuses values that no run has: files of earlier versions have no checksum.
+    fn check(&self, path: &Path) -> Result<(), Error> {
+        self.config.validate().map_err(|e| e.in_file(path, "config"))?;
+        let positive = [
+            ("lr", self.lr),
+            ("observation_count", self.observation_count),
+            ("return_count", self.return_count),
+            ("return_var", self.return_var),
+            ("wall_seconds", self.wall_seconds),
+            ("cpu_seconds", self.cpu_seconds),
+        ];
+        if let Some((key, x)) = positive.into_iter().find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
+            return Err(Error::file(path, key, x, "a number not below 0"));
+        }
+        if let Some(x) = self.adam_powers.into_iter().find(|x| !(0.0..=1.0).contains(x)) {
+            return Err(Error::file(path, "adam_powers", x, "a number between 0 and 1"));
+        }
+        // rollouts may have had another horizon before
+        let agents = self.config.agents as u64;
+        let least = self.iteration.checked_mul(agents).filter(|least| *least <= self.steps);
+        let none = (self.iteration == 0) != (self.steps == 0);
+        if least.is_none() || none || self.steps > MAX_STEPS || !self.steps.is_multiple_of(agents) {
+            let expected = format!(
+                "a multiple of the {agents} agents, of at least as many as {} iterations make, and at most {MAX_STEPS}",
+                self.iteration
+            );
+            return Err(Error::file(path, "steps", self.steps, expected));
+        }
+        if self.state.name.contains(['/', '\\']) {
+            return Err(Error::file(path, "state.name", &self.state.name, "a file in the same folder"));
+        }
+        Ok(())
+    }
 }
 
 /// The file with the numbers.
@@ -246,8 +283,7 @@ impl Checkpoint {
         write_atomic(&folder.join(&name), &bytes)?;
         let state = StateFile { name: name.clone(), bytes: bytes.len() as u64, checksum };
         let about = About { state, ..self.about.clone() };
-        let json = serde_json::to_string_pretty(&about).expect("descriptions are plain data");
-        write_atomic(&folder.join(DESCRIPTION), json.as_bytes())?;
+        write_description(&folder.join(DESCRIPTION), &about)?;
 
         // states that no description names any more; failing to remove one harms nobody
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -265,13 +301,8 @@ impl Checkpoint {
     /// If a file is missing, damaged or of another format.
     pub fn load(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(DESCRIPTION);
-        let json = std::fs::read(&path).map_err(Error::io(&path, "read"))?;
-        let json = String::from_utf8(json).map_err(|e| Error::file(&path, "text", e, "UTF-8"))?;
-        let about: About = files::parse(&path, &json, FORMAT, VERSION)?;
-        about.config.validate().map_err(|e| Error::file(&path, "config", e, "a valid configuration"))?;
-        if about.state.name.contains(['/', '\\']) {
-            return Err(Error::file(&path, "state.name", &about.state.name, "a file in the same folder"));
-        }
+        let about: About = read_description(&path, FORMAT, VERSION)?;
+        about.check(&path)?;
 
         let path = folder.join(&about.state.name);
         let bytes = std::fs::read(&path).map_err(Error::io(&path, "read"))?;

@@ -3,6 +3,9 @@
 use crate::{A2c, Acktr, Activation, BLOCK, Error, Sac, Signal};
 use serde::{Deserialize, Serialize};
 
+/// Most steps of a run: as many as double precision can count.
+pub(crate) const MAX_STEPS: u64 = 1 << 53;
+
 /// How the policy's learning rate moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -347,6 +350,9 @@ impl PpoConfig {
         }
         self.validate_algorithm()?;
         self.validate_signals()?;
+        if self.total_steps > MAX_STEPS {
+            return Err(Error::config("total_steps", self.total_steps, format!("at most {MAX_STEPS}")));
+        }
         let counts = [
             ("horizon", self.horizon),
             ("rollouts", self.rollouts),

@@ -53,6 +53,13 @@ pub enum Error {
 }
 
 impl Error {
+    /// The same error as one of a file: what is wrong with a configuration is wrong in the file that holds it, under `key`.
+    pub fn in_file(self, path: &Path, key: &str) -> Self {
+        match self {
+            Error::Config { field, found, expected } => Error::file(path, format!("{key}.{field}"), found, expected),
+            other => other,
+        }
+    }
     pub(crate) fn config(field: &'static str, found: impl ToString, expected: impl ToString) -> Self {
         Error::Config { field, found: found.to_string(), expected: expected.to_string() }
     }

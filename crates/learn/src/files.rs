@@ -1,21 +1,26 @@
-//! Files: safetensors with one JSON document in the header, written whole or not at all.
+//! Files, written whole or not at all: safetensors with one JSON document in the header, and JSON documents that know their
+//! own checksum.
 
 use crate::Error;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Serialize, de::DeserializeOwned};
+use serde_json::Value;
 use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
 /// Key of the JSON document in a safetensors header.
 const KEY: &str = "marathon";
+/// Key of a description's checksum.
+const CHECKSUM: &str = "checksum";
 
 /// Writes a file under a temporary name and renames it, so that a reader never sees half of it.
 ///
 /// # Errors
 /// If the file cannot be written; the old one is whole then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // a name of its own length: that of the file may be as long as names can be
+    let name = checksum(path.file_name().unwrap_or_default().as_encoded_bytes());
     let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
     let write = || {
         let mut file = std::fs::File::create(&temporary)?;
@@ -140,8 +145,9 @@ impl<'a> TensorReader<'a> {
 
 /// Parses a JSON document that names its format and version.
 pub fn parse<D: DeserializeOwned>(path: &Path, json: &str, format: &str, version: u32) -> Result<D, Error> {
-    let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), format!("a {format} document"));
-    let value: serde_json::Value = serde_json::from_str(json).map_err(bad)?;
+    let expected = || format!("a {format} document");
+    let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), expected());
+    let mut value: Value = serde_json::from_str(json).map_err(bad)?;
     let (found, number) = (&value["format"], &value["version"]);
     if found != format {
         return Err(Error::file(path, "format", found, format!("\"{format}\"")));
@@ -149,7 +155,76 @@ pub fn parse<D: DeserializeOwned>(path: &Path, json: &str, format: &str, version
     if *number != version {
         return Err(Error::file(path, "version", number, format!("{version}, the one that this program knows")));
     }
-    serde_json::from_value(value).map_err(bad)
+    // earlier versions wrote none
+    if let Some(found) = value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM)) {
+        let sum = checksum_of(&value);
+        if found != sum.as_str() {
+            return Err(Error::file(
+                path,
+                CHECKSUM,
+                found,
+                format!("\"{sum}\"; the file has changed since it was written"),
+            ));
+        }
+    }
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let place = e.path().to_string();
+        Error::file(path, if place == "." { "JSON" } else { &place }, format!("'{}'", e.into_inner()), expected())
+    })
+}
+
+/// Writes a description: a JSON document that names its format and version, with a checksum of its values.
+///
+/// # Errors
+/// If the file cannot be written; the old one is whole then.
+pub fn write_description(path: &Path, document: &impl Serialize) -> Result<(), Error> {
+    let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), "plain data");
+    let json = serde_json::to_string_pretty(document).map_err(bad)?;
+    let sum = checksum_of(&serde_json::from_str(&json).map_err(bad)?);
+    let open = json.strip_suffix("\n}").expect("a document has keys");
+    write_atomic(path, format!("{open},\n  \"{CHECKSUM}\": \"{sum}\"\n}}\n").as_bytes())
+}
+
+/// Reads a description; one without a checksum, as earlier versions wrote them, too.
+///
+/// # Errors
+/// If the file cannot be read, has changed since it was written, or is of another format.
+pub fn read_description<D: DeserializeOwned>(path: &Path, format: &str, version: u32) -> Result<D, Error> {
+    let json = std::fs::read(path).map_err(Error::io(path, "read"))?;
+    let json = String::from_utf8(json).map_err(|e| Error::file(path, "text", e, "UTF-8"))?;
+    parse(path, &json, format, version)
+}
+
+/// Checksum of a document's values, whatever the order of its keys and the spelling of its numbers.
+fn checksum_of(document: &Value) -> String {
+    fn write(value: &Value, out: &mut Vec<u8>) {
+        match value {
+            Value::Object(keys) => {
+                let mut keys: Vec<_> = keys.iter().collect();
+                keys.sort_by_key(|(key, _)| *key);
+                out.push(b'{');
+                for (key, value) in keys {
+                    out.extend(Value::from(key.as_str()).to_string().bytes());
+                    write(value, out);
+                }
+                out.push(b'}');
+            }
+            Value::Array(values) => {
+                out.push(b'[');
+                values.iter().for_each(|value| write(value, out));
+                out.push(b']');
+            }
+            // a comma ends numbers, of which integers have all their digits
+            Value::Number(n) => match n.as_f64().filter(|_| n.is_f64()) {
+                Some(x) => out.extend(format!("{:x},", x.to_bits()).bytes()),
+                None => out.extend(format!("{n},").bytes()),
+            },
+            other => out.extend(other.to_string().bytes()),
+        }
+    }
+    let mut bytes = Vec::new();
+    write(document, &mut bytes);
+    checksum(&bytes)
 }
 
 /// Checksum (FNV-1a) that tells damaged files.

@@ -93,7 +93,7 @@ pub use checkpoint::Checkpoint;
 pub use config::{Algorithm, Init, PpoConfig, Ratio, Schedule};
 pub use error::Error;
 pub use eval::{EvalOptions, Evaluation, evaluate};
-pub use files::write_atomic;
+pub use files::{read_description, write_atomic, write_description};
 pub use marathon_envs::BLOCK;
 pub use normalize::Normalizer;
 pub use observer::{Control, IterationStats, Observer, Snapshot};

@@ -6,6 +6,7 @@ mod common;
 use common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Checkpoint, Control, Error, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
+use serde_json::json;
 use std::path::Path;
 
 const LIMIT: usize = 30;
@@ -24,6 +25,8 @@ fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
         about[clock] = 0.into();
     }
     about["config"]["threads"] = 0.into();
+    // that of the clocks too
+    assert!(about["checksum"].take().is_string());
     let state = std::fs::read(folder.join(about["state"]["name"].as_str().unwrap())).unwrap();
     (about, state)
 }
@@ -98,7 +101,7 @@ fn damaged_checkpoints_are_refused() {
     run(&small_config(), None).unwrap().save(folder).unwrap();
     let description = folder.join("checkpoint.json");
     let json = std::fs::read_to_string(&description).unwrap();
-    let about: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let mut about: serde_json::Value = serde_json::from_str(&json).unwrap();
     let state = folder.join(about["state"]["name"].as_str().unwrap());
     let bytes = std::fs::read(&state).unwrap();
     let error = || Checkpoint::load(folder).expect_err("an error").to_string();
@@ -112,23 +115,76 @@ fn damaged_checkpoints_are_refused() {
     std::fs::remove_file(&state).unwrap();
     assert!(error().contains("state-"), "{}", error());
     std::fs::write(&state, &bytes).unwrap();
-    Checkpoint::load(folder).unwrap();
+    let whole = Checkpoint::load(folder).unwrap();
+    let steps = whole.steps();
 
+    // what was changed after it was written
+    std::fs::write(&description, json.replacen("\"agents\": 80", "\"agents\": 96", 1)).unwrap();
+    assert!(error().contains("checkpoint.json: checksum: found "), "{}", error());
+
+    // descriptions of earlier versions have no checksum; their values are looked at all the same
+    about.as_object_mut().unwrap().remove("checksum").expect("a checksum");
+    let json = serde_json::to_string_pretty(&about).unwrap();
+    std::fs::write(&description, &json).unwrap();
+    assert_eq!(Checkpoint::load(folder).unwrap(), whole);
     for (from, to, text) in [
         ("marathon-checkpoint", "marathon-policy", "format: found"),
         ("\"version\": 1", "\"version\": 7", "version: found 7, expected 1"),
-        ("\"agents\": 80", "\"agents\": 81", "agents is 81"),
+        ("\"agents\": 80", "\"agents\": 81", "config.agents: found 81, expected a multiple of 16, such as 80"),
+        ("\"horizon\": 24", "\"horizon\": -24", "config.horizon: found 'invalid value: integer `-24`"),
         ("\"lr\"", "\"lrr\"", "lr"),
         ("state-", "../state-", "a file in the same folder"),
         ("{", "[", "JSON"),
     ] {
+        assert!(json.contains(from), "{from} in {json}");
         std::fs::write(&description, json.replacen(from, to, 1)).unwrap();
         assert!(error().contains(text), "{}", error());
+    }
+    for (key, value, text) in [
+        ("lr", json!(-1.0), "lr: found -1, expected a number not below 0"),
+        ("observation_count", json!(-5.0), "observation_count: found -5, expected a number not below 0"),
+        ("return_count", json!(-1e-9), "return_count: found -0.000000001, expected a number not below 0"),
+        ("return_var", json!(-2.0), "return_var: found -2, expected a number not below 0"),
+        ("wall_seconds", json!(-1.0), "wall_seconds: found -1, expected a number not below 0"),
+        ("adam_powers", json!([0.5, 1.5]), "adam_powers: found 1.5, expected a number between 0 and 1"),
+        ("steps", json!(1_u64 << 63), "steps: found 9223372036854775808, expected"),
+        ("steps", json!(steps + 1), "expected a multiple of the 80 agents"),
+        ("iteration", json!(0), "steps: found"),
+        ("iteration", json!(-3), "iteration: found 'invalid value: integer `-3`"),
+        ("obs", json!(1.5), "obs: found 'invalid type"),
+    ] {
+        let mut changed = about.clone();
+        changed[key] = value;
+        std::fs::write(&description, changed.to_string()).unwrap();
+        assert!(error().contains(&format!("checkpoint.json: {text}")) || error().contains(text), "{key}: {}", error());
     }
     std::fs::write(&description, b"\xff\xfe").unwrap();
     assert!(error().contains("UTF-8"), "{}", error());
     std::fs::remove_file(&description).unwrap();
     assert!(error().contains("checkpoint.json: read"), "{}", error());
+}
+
+/// One bit of the description is another, as a bad disk leaves it: that is seen, or it means the same.
+#[test]
+fn a_flipped_bit_is_refused_or_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path();
+    run(&small_config(), None).unwrap().save(folder).unwrap();
+    let whole = Checkpoint::load(folder).unwrap();
+    let description = folder.join("checkpoint.json");
+    let bytes = std::fs::read(&description).unwrap();
+    let mut refused = 0;
+    // two bits of every byte, all eight in turn
+    for (place, bit) in (0..bytes.len()).flat_map(|place| [place % 4, place % 4 + 4].map(|bit| (place, bit))) {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 1 << bit;
+        std::fs::write(&description, &flipped).unwrap();
+        match Checkpoint::load(folder) {
+            Ok(loaded) => assert_eq!(loaded, whole, "bit {bit} of byte {place}"),
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > bytes.len(), "{refused} of {}", 2 * bytes.len());
 }
 
 /// Numbers that lie about their own lengths are refused too, whatever the checksum says.

@@ -23,7 +23,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
     if !policy_file::is_onnx(&out) {
         return Err(CliError::Usage(format!("--out is {}, expected a name that ends with .onnx", path_word(&out))));
     }
-    policy_file::save(&policy, &out)?;
+    save(&policy, &args.policy, &out)?;
     tell(&policy, &out, json);
     Ok(())
 }
@@ -39,16 +39,27 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     }
     let (policy, _) = policy_file::load(&args.network, args.agent.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| args.network.with_extension("safetensors"));
-    policy_file::save(&policy, &out)?;
+    save(&policy, &args.network, &out)?;
     tell(&policy, &out, json);
     Ok(())
+}
+
+/// Writes what was read from `input`, which is kept.
+fn save(policy: &Policy, input: &Path, out: &Path) -> Result<(), CliError> {
+    if let (Ok(a), Ok(b)) = (input.canonicalize(), out.canonicalize())
+        && a == b
+    {
+        let found = path_word(out);
+        return Err(CliError::Usage(format!("--out is {found}, the file that is read; expected another")));
+    }
+    policy_file::save(policy, out)
 }
 
 fn tell(policy: &Policy, out: &Path, json: bool) {
     let meta = policy.meta();
     if json {
         print_json(&serde_json::json!({
-            "out": out, "agent": meta.agent, "observation": meta.obs, "action": meta.act, "hidden": meta.hidden,
+            "out": out.to_string_lossy(), "agent": meta.agent, "observation": meta.obs, "action": meta.act, "hidden": meta.hidden,
             "activation": meta.activation,
         }));
     } else {

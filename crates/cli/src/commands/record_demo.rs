@@ -19,6 +19,7 @@ const MAX_AGENTS: usize = 64;
 /// What was recorded.
 #[derive(Serialize)]
 struct Report {
+    #[serde(serialize_with = "text::path_json")]
     out: PathBuf,
     agent: String,
     episodes: usize,

@@ -34,6 +34,7 @@ struct Shot {
 /// What was shown.
 #[derive(Serialize)]
 struct Report {
+    #[serde(serialize_with = "text::path_json")]
     out: PathBuf,
     agent: String,
     agents: usize,

@@ -32,7 +32,13 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
     let mut processes = match args.processes {
         0 => None,
-        n => Some(Processes::start(&agent, &session.run.config, n)?),
+        n => match Processes::start(&agent, &session.run.config, n) {
+            Ok(processes) => Some(processes),
+            Err(error) => {
+                session.abandon();
+                return Err(error);
+            }
+        },
     };
     let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
     let outcome = session.carry_out_with(players, true, &mut { stop })?;

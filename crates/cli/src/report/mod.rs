@@ -35,6 +35,8 @@ pub struct Reporter<'a> {
     last: (u64, f64),
     /// Why the run was ended, if by an error.
     pub error: Option<CliError>,
+    /// Whether all iterations have their rows and events.
+    pub told: bool,
 }
 
 impl<'a> Reporter<'a> {
@@ -65,8 +67,10 @@ impl<'a> Reporter<'a> {
             due: 0,
             last: (steps, wall),
             error: None,
+            told: true,
         };
         reporter.plan(steps);
+        reporter.prune(steps);
         Ok(reporter)
     }
 
@@ -78,25 +82,29 @@ impl<'a> Reporter<'a> {
     }
 
     fn plan(&mut self, steps: u64) {
-        self.due = (steps / self.run.checkpoint_interval + 1) * self.run.checkpoint_interval;
+        self.due = (steps / self.run.checkpoint_interval + 1).saturating_mul(self.run.checkpoint_interval);
     }
 
     fn report(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Result<(), CliError> {
         let (steps, wall) = self.last;
         let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
         self.last = (stats.steps, stats.wall_seconds);
+        self.told = false;
         self.csv.push(&csv::columns(stats, rate, &self.terms))?;
         self.events.push(stats.steps, &tensorboard::scalars(stats, rate, &self.terms))?;
+        self.told = true;
         if stats.steps >= self.due {
             self.plan(stats.steps);
             let policy = snapshot.policy();
-            save(self.folder, &policy, &snapshot.checkpoint())?;
+            // a run that is killed in between comes by here again
             self.keep(&policy)?;
+            save(self.folder, &policy, &snapshot.checkpoint())?;
+            self.prune(stats.steps);
         }
         Ok(())
     }
 
-    /// Keeps a policy in `policies/` and removes the oldest.
+    /// Keeps a policy in `policies/`.
     fn keep(&self, policy: &Policy) -> Result<(), CliError> {
         if self.run.keep_checkpoints == 0 {
             return Ok(());
@@ -105,13 +113,19 @@ impl<'a> Reporter<'a> {
         std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
         let steps = policy.meta().training.as_ref().map_or(0, |t| t.steps);
         policy.save(&folder.join(format!("policy-{steps}.safetensors")))?;
-        let mut kept = kept_policies(self.folder);
+        Ok(())
+    }
+
+    /// Removes policies of later steps, which are to come again, and the oldest.
+    fn prune(&self, steps: u64) {
+        let (mut kept, later): (Vec<_>, Vec<_>) =
+            kept_policies(self.folder).into_iter().partition(|(n, _)| *n <= steps);
         kept.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
-        for (_, path) in kept.drain(self.run.keep_checkpoints.min(kept.len())..) {
+        let old = kept.into_iter().skip(self.run.keep_checkpoints);
+        for (_, path) in old.chain(later) {
             // one too many harms nobody
             let _ = std::fs::remove_file(path);
         }
-        Ok(())
     }
 }
 

@@ -66,7 +66,7 @@ impl Progress {
         let start = (Instant::now(), done);
         let rate = Rate { start, last: start, recent: None };
         let (shown, waiting) = Default::default();
-        Self { bar, total, every, due: done + every, rate, shown, waiting }
+        Self { bar, total, every, due: done.saturating_add(every), rate, shown, waiting }
     }
 
     /// After an iteration.
@@ -83,7 +83,7 @@ impl Progress {
                 bar.set_message(self.line(stats.steps));
             }
             None if stats.steps >= self.due => {
-                self.due = (stats.steps / self.every + 1) * self.every;
+                self.due = (stats.steps / self.every + 1).saturating_mul(self.every);
                 if self.waiting.count > 0.0 {
                     self.shown = std::mem::take(&mut self.waiting);
                 }

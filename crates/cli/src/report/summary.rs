@@ -1,7 +1,7 @@
 //! A run in numbers: `summary.json`, and the same for a person.
 
 use super::csv::History;
-use crate::text::{duration, short, thousands, unsigned_zero};
+use crate::text::{duration, path_json, short, thousands, unsigned_zero};
 use marathon_learn::{Evaluation, Policy};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -15,6 +15,7 @@ pub struct Summary {
     /// Registry name of the agent.
     pub agent: String,
     /// Folder of the run.
+    #[serde(serialize_with = "path_json")]
     pub folder: PathBuf,
     /// Seed of the run.
     pub seed: u64,

@@ -5,6 +5,7 @@
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 /// A short run: 64 agents make 4096 steps per iteration.
 pub const SMALL: [&str; 5] = ["train", "hopper", "--agents", "64", "--seed"];
@@ -14,6 +15,20 @@ pub fn marathon(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_marathon"));
     command.current_dir(folder).args(args);
     command
+}
+
+/// The command as it calls itself.
+pub fn program() -> &'static str {
+    env!("CARGO_BIN_EXE_marathon")
+}
+
+/// Waits until a file has at least so many lines.
+pub fn wait_for_lines(path: &Path, lines: usize) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while std::fs::read_to_string(path).unwrap_or_default().lines().count() < lines {
+        assert!(Instant::now() < deadline, "{} does not grow", path.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
 }
 
 /// Runs the command to its end.

@@ -33,14 +33,20 @@ pub struct GaitArgs {
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::MAX - 1000))]
     pub first_seed: u64,
     /// Mean speed that is asked for, m/s.
-    #[arg(long, value_name = "M/S", default_value_t = 2.0)]
+    #[arg(long, value_name = "M/S", default_value_t = 2.0, value_parser = speed)]
     pub speed: f64,
     /// Episodes of 100 that may end in a fall.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=EPISODES as u64))]
     pub falls: u64,
     /// Steps between the evaluations, which do not count.
     #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub every: u64,
+}
+
+/// A speed that can be reached or missed.
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().ok().filter(|x: &f64| x.is_finite());
+    speed.ok_or_else(|| "expected a finite number of meters per second, such as 2.5".into())
 }
 
 /// One seed.

@@ -13,7 +13,7 @@ mod table1;
 mod table2;
 mod table3;
 
-use crate::console::print_json;
+use crate::console::{print_json, say};
 use crate::error::CliError;
 use clap::Subcommand;
 use std::path::PathBuf;
@@ -117,9 +117,11 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::Headless(options) => (headless::run(options)?, options),
         What::MultiEnv(options) => (multi_env::run(options)?, options),
     };
-    record.save(options)?;
+    let page = record.save(options)?;
     if json {
-        print_json(&record);
+        print_json(&record)
+    } else {
+        say(page)
     }
     Ok(())
 }

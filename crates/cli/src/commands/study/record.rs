@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::chart::Chart;
-use crate::console::{note, say};
+use crate::console::note;
 use crate::error::CliError;
 use crate::text;
 use marathon_envs::ShardFactory;
@@ -143,11 +143,11 @@ pub fn mean_curve(runs: &[Run], total: u64) -> Vec<(f64, f64)> {
 }
 
 impl Record {
-    /// Writes the three files and says the table.
+    /// Writes the three files and returns the text of the page.
     ///
     /// # Errors
     /// If one cannot be written.
-    pub fn save(&self, options: &Options) -> Result<(), CliError> {
+    pub fn save(&self, options: &Options) -> Result<String, CliError> {
         let out = &options.out;
         std::fs::create_dir_all(out).map_err(CliError::io(out, "create folder"))?;
         let file = |extension: &str| out.join(format!("{}.{extension}", self.name));
@@ -187,8 +187,7 @@ impl Record {
             self.versions.iter().map(|v| format!("; {v}")).collect::<String>(),
         );
         write_atomic(&file("md"), text.as_bytes())?;
-        say(text);
-        Ok(())
+        Ok(text)
     }
 }
 
