@@ -6,7 +6,7 @@
 //! can be gone on with.
 
 use crate::error::CliError;
-use crate::text;
+use crate::{interrupt, text};
 use marathon_envs::registry;
 use marathon_learn::{Algorithm, Control, Deliver, Player, Players, PpoConfig};
 use marathon_physics::lanes::Isa;
@@ -152,7 +152,7 @@ impl Drop for Processes {
 /// If what is asked for makes no sense.
 pub fn serve() -> Result<(), CliError> {
     // Ctrl-C is for the learner, which finishes its iteration
-    ctrlc::set_handler(|| {}).map_err(|e| CliError::Process(e.to_string()))?;
+    interrupt::listen(|| {})?;
     let broken = |e: io::Error| CliError::Process(format!("the learner cannot be talked to: {e}"));
     let (mut requests, mut answers) = (io::stdin().lock(), io::stdout().lock());
     let mut line = String::new();

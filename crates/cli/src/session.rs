@@ -233,7 +233,7 @@ impl Session {
             evaluation = Some(eval);
         }
         let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
-        let summary = Summary::new(path, &policy, &history, evaluation.is_none(), evaluation);
+        let summary = Summary::new(path, &checkpoint, &history, evaluation);
         if let Some(folder) = &folder {
             policy.save(&folder.policy())?;
             write_json(&folder.summary(), &summary)?;

@@ -152,6 +152,44 @@ fn json_carries_errors_too() {
     assert_eq!(output.status.code(), Some(1));
     let error = json(&String::from_utf8(output.stdout).unwrap());
     assert!(error["error"].as_str().unwrap().contains("did you mean 'Hopper-v0'?"));
+    // those of the command line itself
+    for (words, part) in [
+        (&["train", "hopper", "--sede", "3", "--json"][..], "--seed"),
+        (&["--json", "trian"], "'train'"),
+        (&["train", "hopper", "--json", "--steps", "lots"], "4M"),
+        (&["eval", "--json"], "<POLICY>"),
+    ] {
+        let output = run(temp.path(), words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        let error = json(&String::from_utf8(output.stdout.clone()).unwrap());
+        assert!(error["error"].as_str().unwrap().contains(part), "{words:?}: {error}");
+        says(&common::stderr(&output), &[part]);
+    }
+}
+
+/// A run whose checkpoint is gone does not begin again over what it has learned.
+#[test]
+fn a_lost_checkpoint_is_told() {
+    let temp = tempfile::tempdir().unwrap();
+    succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat());
+    let policy = std::fs::read(temp.path().join("a/policy.safetensors")).unwrap();
+    std::fs::remove_file(temp.path().join("a/checkpoint/checkpoint.json")).unwrap();
+    let text = fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "20k"]);
+    says(&text, &["a/checkpoint/checkpoint.json: checkpoint: found no such file", "before policy.safetensors"]);
+    assert_eq!(std::fs::read(temp.path().join("a/policy.safetensors")).unwrap(), policy);
+}
+
+/// The longest names that there can be.
+#[test]
+fn names_may_be_as_long_as_names_can_be() {
+    let temp = tempfile::tempdir().unwrap();
+    let long = |ending: &str| format!("{}{ending}", "n".repeat(255 - ending.len()));
+    let run = long("");
+    succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "4096", "--out", &run]].concat());
+    succeed(temp.path(), &["export", &run, "--out", &long(".onnx")]);
+    succeed(temp.path(), &["record-demo", &run, "--episodes", "1", "--out", &long(".demo")]);
+    succeed(temp.path(), &["render", &run, "--out", &long(".png"), "--frames", "1", "--seconds", "0.1"]);
+    succeed(temp.path(), &["render", &run, "--out", &long(".gif"), "--width", "32", "--seconds", "0.1"]);
 }
 
 #[test]

@@ -16,7 +16,11 @@ fn start(folder: &Path, args: &[&str]) -> Child {
 }
 
 fn interrupt(child: &Child) {
-    let sent = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().expect("sh runs");
+    signal("INT", child);
+}
+
+fn signal(name: &str, child: &Child) {
+    let sent = Command::new("sh").args(["-c", &format!("kill -{name} {}", child.id())]).status().expect("sh runs");
     assert!(sent.success());
 }
 
@@ -218,6 +222,111 @@ fn a_second_interruption_ends_at_once_and_breaks_nothing() {
     assert_no_leftovers(&temp.path().join("a"));
     succeed(temp.path(), &["train", "--resume", "a", "--steps", "500k"]);
     assert_eq!(timeless_rows(&temp.path().join("a/progress.csv"))[1][0], "1");
+}
+
+/// `nohup` and shells that start a command in the background have it ignore signals; it keeps doing so.
+#[test]
+fn an_ignored_signal_stays_ignored() {
+    let temp = tempfile::tempdir().unwrap();
+    for (name, out) in [("HUP", "a"), ("INT", "b")] {
+        let script = format!("trap '' {name}; exec \"$0\" \"$@\"");
+        let mut shell = Command::new("bash");
+        shell.args(["-c", &script, program()]).args(SMALL).args(["5", "--steps", "200k", "--out", out]);
+        let child = shell.current_dir(temp.path()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        wait_for_lines(&temp.path().join(out).join("progress.csv"), 3);
+        signal(name, &child);
+        let output = finish(child);
+        assert!(output.status.success(), "SIG{name}: {}", stderr(&output));
+        assert_eq!(read_json(&temp.path().join(out).join("summary.json"))["interrupted"], false);
+    }
+    // one that is not ignored ends a run in good order
+    let child = start(temp.path(), &[&SMALL[..], &["5", "--steps", "10M", "--out", "c"]].concat());
+    wait_for_lines(&temp.path().join("c/progress.csv"), 3);
+    signal("HUP", &child);
+    assert_eq!(finish(child).status.code(), Some(130));
+}
+
+/// A small run whose events need more room than its other files, with a checkpoint every few iterations.
+const TINY: &str = "
+behaviors:
+  Hopper:
+    trainer_type: ppo
+    hyperparameters: { batch_size: 256, buffer_size: 256, learning_rate: 3.0e-4, num_epoch: 1 }
+    network_settings: { hidden_units: 8, num_layers: 1, normalize: true }
+    max_steps: 60000
+    summary_freq: 20000
+    checkpoint_interval: 2560
+    keep_checkpoints: 3
+    marathon: { agents: 16 }
+";
+
+/// A row or event that could not be written comes with the iteration that is done again.
+#[test]
+fn a_full_disk_loses_no_row_and_no_event() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("tiny.yaml"), TINY).unwrap();
+    let words = |out: &'static str| ["train", "hopper", "--config", "tiny.yaml", "--out", out];
+    succeed(temp.path(), &words("whole"));
+    let (whole, run) = (temp.path().join("whole"), temp.path().join("a"));
+    let length = |path: &Path| std::fs::metadata(path).unwrap().len();
+    let grows = |path: &Path| path.ends_with("progress.csv") || path.to_string_lossy().contains("tfevents");
+    let largest = files(&whole).iter().filter(|path| !grows(path)).map(|path| length(path)).max().unwrap();
+    let events_file = event_files(&whole).remove(0);
+    let limit = largest / 1024 + 3;
+    assert!(length(&events_file) > (limit + 4) * 1024, "the events are what fills the disk");
+
+    let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$0\" \"$@\"");
+    let mut shell = Command::new("bash");
+    let output = shell.args(["-c", &script, program()]).args(words("a")).current_dir(temp.path()).output().unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("write: File too large") && text.contains("the last whole checkpoint has"), "{text}");
+    succeed(temp.path(), &["train", "--resume", "a"]);
+    assert_eq!(timeless_rows(&run.join("progress.csv")), timeless_rows(&whole.join("progress.csv")));
+    assert_eq!(events(&run), events(&whole));
+    assert_eq!(tensors(&run.join("policy.safetensors")), tensors(&whole.join("policy.safetensors")));
+}
+
+/// Killed at any moment, a run has the policies on its way that belong to its checkpoint, and in the end those of a run
+/// that was never killed.
+#[test]
+fn a_kill_loses_no_policy_on_the_way() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("tiny.yaml"), TINY.replace("2560", "1")).unwrap();
+    let run = temp.path().join("a");
+    let kept = |run: &Path| {
+        let mut names: Vec<_> =
+            files(&run.join("policies")).iter().map(|f| f.file_name().unwrap().to_owned()).collect();
+        names.sort();
+        names
+    };
+    let mut first = true;
+    for _ in 0..12 {
+        let words = ["train", "hopper", "--config", "tiny.yaml", "--out", "a"];
+        let mut child = start(temp.path(), if first { &words } else { &["train", "--resume", "a"] });
+        let rows = || std::fs::read_to_string(run.join("progress.csv")).unwrap_or_default().lines().count();
+        // resuming cuts rows first, so what counts is that there are more than before
+        let before = if first { 1 } else { rows() };
+        first = false;
+        wait_for_lines(&run.join("progress.csv"), before + 6);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let checkpoint = read_json(&run.join("checkpoint/checkpoint.json"))["steps"].clone();
+        assert!(
+            run.join(format!("policies/policy-{checkpoint}.safetensors")).is_file(),
+            "{checkpoint}: {:?}",
+            kept(&run)
+        );
+    }
+    // what a kill before the old ones are removed, or before the checkpoint, leaves
+    let newest = files(&run.join("policies")).pop().unwrap();
+    for more in ["policy-1.safetensors", "policy-59999999.safetensors"] {
+        std::fs::copy(&newest, run.join("policies").join(more)).unwrap();
+    }
+    succeed(temp.path(), &["train", "--resume", "a"]);
+    succeed(temp.path(), &["train", "hopper", "--config", "tiny.yaml", "--out", "whole"]);
+    assert_eq!(kept(&run), kept(&temp.path().join("whole")));
+    assert_eq!(kept(&run).len(), 3);
 }
 
 /// A full disk, by a limit on the size of files.

@@ -42,6 +42,14 @@ fn mistakes_are_told() {
     let error = fail(folder, 1, &["import", "x.onnx"]);
     assert!(error.contains("x.onnx: agent: found none, expected one"), "{error}");
     succeed(folder, &["export", &shipped("hopper"), "--out", "hopper.onnx"]);
+    let bytes = std::fs::read(folder.join("hopper.onnx")).unwrap();
+    for command in
+        [["import", "hopper.onnx", "--out", "./hopper.onnx"], ["export", "hopper.onnx", "--out", "hopper.onnx"]]
+    {
+        let error = fail(folder, 2, &command);
+        assert!(error.contains("hopper.onnx, the file that is read; expected another"), "{error}");
+        assert!(std::fs::read(folder.join("hopper.onnx")).unwrap() == bytes);
+    }
     let error = fail(folder, 1, &["import", "hopper.onnx", "--agent", "ant"]);
     assert!(error.contains("expected one observation of 53 numbers, as Ant-v0 has"), "{error}");
 }

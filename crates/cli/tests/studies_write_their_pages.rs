@@ -22,6 +22,15 @@ fn a_page_has_its_command_and_its_files() {
 }
 
 #[test]
+fn json_is_all_that_is_printed_if_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["study", "concurrency", "--seeds", "1", "--steps", "2000", "--out", "pages", "--json"];
+    let record = json(&succeed(folder.path(), &args));
+    assert_eq!(record["name"], "concurrency");
+    assert!(folder.path().join("pages/concurrency.md").is_file());
+}
+
+#[test]
 fn missing_programs_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let asked = |study: &str, variable: &str| {

@@ -80,6 +80,9 @@ fn the_same_command_gives_the_same_policy_in_a_new_folder() {
     let policy = |run: &str| tensors(&temp.path().join(run).join("policy.safetensors"));
     assert_eq!(policy("runs/hopper-1"), policy("runs/hopper-2"));
     assert_eq!(policy("runs/hopper-1"), policy("elsewhere/b"));
+    // the whole file, so that its checksum tells equal policies
+    let file = |run: &str| std::fs::read(temp.path().join(run).join("policy.safetensors")).unwrap();
+    assert!(file("runs/hopper-1") == file("runs/hopper-2") && file("runs/hopper-1") == file("elsewhere/b"));
 }
 
 #[test]

@@ -171,6 +171,10 @@ impl Checkpoint {
     pub fn steps(&self) -> u64 {
         self.about.steps
     }
+    /// Wall-clock and processor seconds of training so far.
+    pub fn seconds(&self) -> (f64, f64) {
+        (self.about.wall_seconds, self.about.cpu_seconds)
+    }
 
     /// Puts a fresh run into the state of the checkpoint.
     pub(crate) fn restore(self, run: &Run<'_>, learner: &mut Learner, clocks: &mut Clocks) -> Result<(), Error> {

@@ -96,7 +96,7 @@ impl<'a> Snapshot<'a> {
     }
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
-        Policy::of(self.run, self.learner, self.clocks)
+        Policy::of(self.run, self.learner)
     }
     /// Everything needed to go on from here.
     pub fn checkpoint(&self) -> Checkpoint {

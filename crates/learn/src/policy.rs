@@ -19,7 +19,7 @@ use crate::gaussian::Gaussian;
 use crate::learner::Learner;
 use crate::mlp::{CHUNK, Mlp, Tape};
 use crate::normalize::{Normalize, Normalizer};
-use crate::run::{Clocks, Run};
+use crate::run::Run;
 use crate::{Activation, BLOCK, Error, PpoConfig, f32_lanes};
 use marathon_envs::Spec;
 use marathon_envs::shard::scale_action;
@@ -94,19 +94,15 @@ impl PolicyMeta {
     }
 }
 
-/// Summary of a policy's training.
+/// Summary of a policy's training: nothing that would tell equal policies apart, so without the time that it took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Training {
-    /// Configuration.
+    /// Configuration, without the number of threads, which is 0.
     pub config: PpoConfig,
     /// Agent-steps.
     pub steps: u64,
     /// Rollouts.
     pub iterations: u64,
-    /// Wall-clock seconds.
-    pub wall_seconds: f64,
-    /// Processor seconds.
-    pub cpu_seconds: f64,
 }
 
 /// A policy that can act.
@@ -120,14 +116,12 @@ pub struct Policy {
 }
 
 impl Policy {
-    pub(crate) fn of(run: &Run<'_>, learner: &Learner, clocks: &Clocks) -> Self {
+    pub(crate) fn of(run: &Run<'_>, learner: &Learner) -> Self {
         let (spec, config, layout) = (&run.spec, run.config, &run.layout);
         let training = Training {
-            config: config.clone(),
+            config: PpoConfig { threads: 0, ..config.clone() },
             steps: learner.steps,
             iterations: learner.iteration,
-            wall_seconds: clocks.wall,
-            cpu_seconds: clocks.cpu,
         };
         let mut meta = PolicyMeta::of(spec, config.actor_hidden.clone(), config.activation);
         if layout.twin.is_some() {

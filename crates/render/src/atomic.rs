@@ -20,14 +20,12 @@ impl Pending {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
 
-        let name = path.file_name().ok_or_else(|| {
+        if path.file_name().is_none() {
             let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "the path names no file");
-            RenderError::io(path, "cannot create")(source)
-        })?;
-        let mut hidden = std::ffi::OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{}-{unique}.tmp", std::process::id()));
-        let temporary = path.with_file_name(hidden);
+            return Err(RenderError::io(path, "cannot create")(source));
+        }
+        // not the file's own name with more to it: that may be as long as names can be
+        let temporary = path.with_file_name(format!(".marathon-{}-{unique}.tmp", std::process::id()));
 
         let file = File::create(&temporary).map_err(RenderError::io(path, "cannot create"))?;
         Ok((Self { path: path.to_path_buf(), temporary, committed: false }, file))

@@ -2,7 +2,7 @@
 
 use super::csv::History;
 use crate::text::{duration, path_json, short, thousands, unsigned_zero};
-use marathon_learn::{Evaluation, Policy};
+use marathon_learn::{Checkpoint, Evaluation};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -37,33 +37,19 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of a run with its policy and rows.
-    pub fn new(
-        folder: PathBuf,
-        policy: &Policy,
-        history: &History,
-        interrupted: bool,
-        eval: Option<Evaluation>,
-    ) -> Self {
-        let meta = policy.meta();
-        let (mut seed, mut steps, mut wall_seconds, mut cpu_seconds) = (0, 0, 0.0, 0.0);
-        if let Some(training) = &meta.training {
-            (seed, steps) = (training.config.seed, training.steps);
-            (wall_seconds, cpu_seconds) = (training.wall_seconds, training.cpu_seconds);
-        }
-        let steps_per_cpu_second = if cpu_seconds > 0.0 { steps as f64 / cpu_seconds } else { 0.0 };
-        let agent = meta.agent.clone();
-        let diverged = history.column("diverged").into_iter().flatten().sum::<f64>() as u64;
+    /// Of a run with its last checkpoint and rows, in a folder.
+    pub fn new(folder: PathBuf, checkpoint: &Checkpoint, history: &History, eval: Option<Evaluation>) -> Self {
+        let (steps, (wall_seconds, cpu_seconds)) = (checkpoint.steps(), checkpoint.seconds());
         Self {
-            agent,
+            agent: checkpoint.agent().into(),
             folder,
-            seed,
+            seed: checkpoint.config().seed,
             steps,
             wall_seconds,
             cpu_seconds,
-            steps_per_cpu_second,
-            diverged,
-            interrupted,
+            steps_per_cpu_second: if cpu_seconds > 0.0 { steps as f64 / cpu_seconds } else { 0.0 },
+            diverged: history.column("diverged").into_iter().flatten().sum::<f64>() as u64,
+            interrupted: eval.is_none(),
             eval,
         }
     }
