@@ -218,5 +218,8 @@ fn help_is_worth_reading() {
         (Some(0.4_f32.into()), Some(5))
     );
     let option = humanoid["options"].as_array().unwrap().iter().find(|o| o["name"] == "healthy_z_range").unwrap();
-    assert_eq!((option["default"].as_str(), option["expected"].as_str()), (Some("(1, 2)"), Some("two numbers")));
+    assert_eq!(
+        (option["default"].as_str(), option["expected"].as_str()),
+        (Some("(1, 2)"), Some("two numbers, the lower one first"))
+    );
 }

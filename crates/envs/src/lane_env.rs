@@ -17,6 +17,7 @@ use crate::mind::Mind;
 use crate::options::Options;
 use crate::prepared::Prepared;
 use crate::random::{EpisodeId, EpisodeRng};
+use crate::saved;
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
 use crate::start::Start;
 
@@ -45,7 +46,7 @@ pub trait AgentShard: Shard {
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
     /// Pushes a body of an agent, numbered within this shard, until told otherwise or until its next episode: force, N, and
-    /// torque, N m, in world axes at the body's center of mass. It does not belong to [`Shard::save`].
+    /// torque, N m, in world axes at the body's center of mass.
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
     /// Feet ([`Facts::feet`]) of an agent that touched the ground during its last decision: a bit each, of the first 32.
     fn feet(&self, agent: usize) -> u32;
@@ -63,6 +64,12 @@ pub trait AgentShard: Shard {
     fn limit_episodes(&mut self, max_episode_steps: usize);
     /// Gives an agent, numbered within this shard, masses, friction, strength and gravity of its own, until changed.
     fn vary(&mut self, agent: usize, variation: &Variation);
+    /// Gives an agent, numbered within this shard, ground of its own, until changed: elevations, m above the zero of the
+    /// model's height field `field`, row by row.
+    ///
+    /// # Errors
+    /// If there is no such field, or the elevations are not finite numbers for each point of its grid.
+    fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError>;
 }
 
 /// A [`ShardFactory`] that can also make [`AgentShard`]s.
@@ -339,35 +346,24 @@ impl<T: Real> Shard for LaneShard<T> {
 
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         let Block { groups, lives } = &self.blocks[block];
+        saved::begin(bytes);
         for (i, life) in lives.iter().enumerate() {
             let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
-            for n in [seed, agent, episode, steps] {
-                bytes.extend(n.to_le_bytes());
-            }
-            let lane = i % T::LANES;
-            for v in groups[i / T::LANES].future() {
-                // exact for single precision too, so a snapshot fits every lane width
-                bytes.extend(T::widen(v.get(lane)).to_le_bytes());
-            }
+            let (physics, memory) = groups[i / T::LANES].save(&self.task.sim, i % T::LANES);
+            saved::add(bytes, [seed, agent, episode, steps], &physics, memory);
         }
     }
 
-    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
+        let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
-        let numbers = 4 + groups[0].future().count();
-        let (mine, rest) = bytes.split_at_checked(BLOCK * numbers * 8)?;
-        for ((i, life), agent) in lives.iter_mut().enumerate().zip(mine.chunks_exact(numbers * 8)) {
-            let mut words = agent.as_chunks::<8>().0.iter();
-            let EpisodeId { seed, agent, episode } = &mut life.id;
-            for n in [seed, agent, episode, &mut life.steps] {
-                *n = u64::from_le_bytes(*words.next()?);
-            }
-            let lane = i % T::LANES;
-            for (v, word) in groups[i / T::LANES].future_mut().zip(words) {
-                v.set(lane, T::scalar(f64::from_le_bytes(*word)));
-            }
+        let (agents, rest) = saved::read(&task.blueprint.model, task.facts.memory, bytes)?;
+        for (i, (life, agent)) in lives.iter_mut().zip(&agents).enumerate() {
+            let [seed, number, episode, steps] = agent.life;
+            *life = Life { id: EpisodeId { seed, agent: number, episode }, steps };
+            groups[i / T::LANES].load(&task.sim, i % T::LANES, &agent.body);
         }
-        Some(rest)
+        Ok(rest)
     }
 }
 
@@ -450,5 +446,23 @@ impl<T: Real> AgentShard for LaneShard<T> {
     fn vary(&mut self, agent: usize, variation: &Variation) {
         let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
         group.vary(&self.task.sim, agent % T::LANES, variation);
+    }
+
+    fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
+        let fields = &self.task.blueprint.model.hfields;
+        let Some(grid) = fields.get(field) else {
+            let expected = "less than the number of the model's height fields";
+            return Err(EnvError::Option { option: "field", found: field.to_string(), expected });
+        };
+        let (found, expected) = (elevations.len(), grid.nrow * grid.ncol);
+        if found != expected {
+            return Err(EnvError::Shape { what: "elevations [nrow][ncol]".into(), found, expected });
+        }
+        if let Some(x) = elevations.iter().find(|x| !x.is_finite()) {
+            return Err(EnvError::Option { option: "elevations", found: x.to_string(), expected: "finite numbers" });
+        }
+        let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        group.set_ground(&self.task.sim, agent % T::LANES, field, elevations);
+        Ok(())
     }
 }

@@ -1,11 +1,12 @@
 //! `L` agents side by side: one decision, from action to observation and reward, inside vector code.
 
 use marathon_physics::lanes::{Kernel, Real};
-use marathon_physics::{Group, Readings, Sim, Variation, Work};
+use marathon_physics::{AgentState as PhysicsState, Group, Readings, Sim, Variation, Work};
 
 use crate::agent::Controls;
 use crate::lane_env::Task;
 use crate::mind::{Occasion, Perceived};
+use crate::saved::Body;
 use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
@@ -92,6 +93,11 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
+    /// Gives an agent ground of its own, until changed.
+    pub fn set_ground(&mut self, sim: &Sim<T>, lane: usize, field: usize, elevations: &[f32]) {
+        self.physics.set_ground(sim, lane, field, elevations);
+    }
+
     /// Gives an agent constants of its own, until changed.
     pub fn vary(&mut self, sim: &Sim<T>, lane: usize, variation: &Variation) {
         self.physics.vary(sim, lane, variation);
@@ -113,16 +119,28 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
-    /// Everything that the future depends on. Controls do not belong to it: every decision sets them.
-    pub fn future(&self) -> impl Iterator<Item = &T> {
-        let p = &self.physics;
-        p.qpos.iter().chain(&p.qvel).chain(&p.warm).chain(&self.memory)
+    /// Copies an agent's physics and memory out of its lane: with its life, everything that its future depends on.
+    pub fn save(&self, sim: &Sim<T>, lane: usize) -> (PhysicsState, impl Iterator<Item = f64>) {
+        (self.physics.save(sim, lane), self.memory.iter().map(move |m| T::widen(m.get(lane))))
     }
 
-    /// Everything that the future depends on.
-    pub fn future_mut(&mut self) -> impl Iterator<Item = &mut T> {
-        let p = &mut self.physics;
-        p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.warm).chain(&mut self.memory)
+    /// Puts an agent where it was when it was saved.
+    pub fn load(&mut self, sim: &Sim<T>, lane: usize, body: &Body) {
+        let LaneGroup { physics: p, memory, .. } = self;
+        match body {
+            Body::Whole { physics, memory: saved } => {
+                p.load(sim, lane, physics);
+                for (m, x) in memory.iter_mut().zip(saved) {
+                    m.set(lane, T::scalar(*x));
+                }
+            }
+            Body::Unmarked(saved) => {
+                let there = p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.warm).chain(memory);
+                for (v, x) in there.zip(saved) {
+                    v.set(lane, T::scalar(*x));
+                }
+            }
+        }
     }
 
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.

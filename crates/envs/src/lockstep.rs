@@ -5,6 +5,7 @@
 //! decision: each [announces](Shard::announce) its actions, the last one to do so steps the whole [`Crowd`], and all go
 //! on with their own rows of the result.
 
+use crate::error::EnvError;
 use crate::rows::{Step, StepMut};
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
 use crate::vec_env::VecEnv;
@@ -282,11 +283,15 @@ impl Shard for LockstepShard {
         }
     }
 
-    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         if self.agents.start + block > 0 {
-            return Some(bytes);
+            return Ok(bytes);
         }
-        self.meeting.enter().crowd.load(bytes).ok()?;
-        Some(&[])
+        let loaded = self.meeting.enter().crowd.load(bytes);
+        loaded.map_err(|error| match error.downcast::<EnvError>() {
+            Ok(error) => *error,
+            Err(error) => EnvError::Snapshot(error.to_string()),
+        })?;
+        Ok(&[])
     }
 }

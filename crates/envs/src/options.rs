@@ -14,7 +14,7 @@ pub enum Value {
     Bool(bool),
     /// A number, which may be infinite but is never NaN.
     Number(f64),
-    /// Two numbers, such as the ends of a range.
+    /// The ends of a range.
     Pair([f64; 2]),
     /// A name or a path.
     Text(String),
@@ -181,6 +181,23 @@ impl OptionValue for f64 {
     }
 }
 
+/// A number that cannot be negative, such as the width of a distribution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale(pub f64);
+
+impl OptionValue for Scale {
+    const EXPECTED: &'static str = "a finite number, 0 or more";
+    fn value(&self) -> Value {
+        Value::Number(self.0)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(x) if *x >= 0.0 && x.is_finite() => Some(Scale(*x)),
+            _ => None,
+        }
+    }
+}
+
 impl OptionValue for usize {
     const EXPECTED: &'static str = "a whole number, 0 or more";
     fn value(&self) -> Value {
@@ -196,13 +213,14 @@ impl OptionValue for usize {
 }
 
 impl OptionValue for [f64; 2] {
-    const EXPECTED: &'static str = "two numbers";
+    const EXPECTED: &'static str = "two numbers, the lower one first";
     fn value(&self) -> Value {
         Value::Pair(*self)
     }
     fn read(value: &Value) -> Option<Self> {
         match value {
-            Value::Pair(x) if !x[0].is_nan() && !x[1].is_nan() => Some(*x),
+            // NaN is not in order either
+            Value::Pair(x) if x[0] <= x[1] => Some(*x),
             _ => None,
         }
     }
@@ -331,6 +349,8 @@ mod tests {
             name: String = "ant.xml".into(),
             /// A switch.
             on: bool = true,
+            /// A width.
+            width: Scale = Scale(1.0),
         }
     }
 
@@ -344,13 +364,16 @@ mod tests {
             ("count", f64::INFINITY.into()),
             ("range", 1.0.into()),
             ("range", [f64::NAN, 0.0].into()),
+            ("range", [2.0, 1.0].into()),
+            ("width", (-0.1).into()),
+            ("width", f64::INFINITY.into()),
             ("name", 1.0.into()),
             ("on", 2.0.into()),
             ("off", true.into()),
         ] {
             assert!(!x.put(name, &value), "{name} {value}");
         }
-        assert_eq!(x, Sample { count: 5, range: [1.0, 2.0], name: "ant.xml".into(), on: false });
+        assert_eq!(x, Sample { count: 5, range: [1.0, 2.0], name: "ant.xml".into(), on: false, width: Scale(1.0) });
         assert_eq!(x.infos()[0].about, "A count of things.");
     }
 }

@@ -6,6 +6,7 @@
 //! whole environment: its random stream, and with it its whole life, depends on that number and the seed alone, never
 //! on how the blocks are spread over shards and threads.
 
+use crate::error::EnvError;
 use crate::options::Options;
 
 /// Agents per block.
@@ -113,8 +114,11 @@ pub trait Shard: Send {
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep);
     /// Appends everything that a block's future depends on to `bytes`.
     fn save(&self, block: usize, bytes: &mut Vec<u8>);
-    /// Restores what [`Shard::save`] wrote and returns the rest of `bytes`; `None` if they are too short.
-    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]>;
+    /// Restores what [`Shard::save`] wrote and returns the rest of `bytes`.
+    ///
+    /// # Errors
+    /// If they do not begin with a block of this task; then nothing has changed.
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError>;
 }
 
 /// Makes shards of a task.

@@ -3,14 +3,16 @@
 //! Arrays are row-major, one row per agent, and belong to the caller. Agents live in blocks of sixteen spread over the
 //! threads of a pool; results do not depend on the number of threads, the number of agents or the instruction set.
 
+mod snapshot;
+
 use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::EnvError;
 use crate::lane_env::{AgentShard, AgentState};
 use crate::options::Options;
+use crate::pool::Pool;
 use crate::registry::{self, Registry};
 use crate::rows::{ObsNumber, Step, StepMut, to_rows};
 use crate::shard::{BLOCK, BlockStep, Spec};
@@ -72,7 +74,7 @@ pub struct VecEnv {
     /// Agents per worker, a multiple of the block; the last worker may have fewer.
     stride: usize,
     /// None for a single worker.
-    pool: Option<ThreadPool>,
+    pool: Option<Pool>,
 }
 
 /// A shard and the block-shaped arrays that it reads and writes.
@@ -84,8 +86,6 @@ struct Worker {
     /// A mask per block: agents that start a new episode at the next step instead of acting.
     pending: Vec<u16>,
 }
-
-const MAGIC: &[u8; 8] = b"MRTHNv02";
 
 impl VecEnv {
     /// Makes an environment of an agent of the global registry. Agents must be [reset](VecEnv::reset) before their
@@ -133,16 +133,7 @@ impl VecEnv {
                 }
             })
             .collect();
-        let pool = if workers.len() > 1 {
-            let builder =
-                ThreadPoolBuilder::new().num_threads(workers.len()).thread_name(|i| format!("marathon-env-{i}"));
-            match builder.build() {
-                Ok(pool) => Some(pool),
-                Err(e) => return wrong("threads", format!("{threads} ({e})"), "a number that the system can start"),
-            }
-        } else {
-            None
-        };
+        let pool = if workers.len() > 1 { Some(Pool::new(workers.len())?) } else { None };
         let (agents, autoreset, stride) = (options.agents, options.autoreset, share * BLOCK);
         Ok(VecEnv { spec, unvaried, agents, autoreset, workers, stride, pool })
     }
@@ -179,8 +170,7 @@ impl VecEnv {
                 worker.shard.reseed(seed);
             }
         }
-        self.each_block(&|_| true, obs, Worker::reset);
-        Ok(())
+        self.each_block(&|_| true, obs, Worker::reset)
     }
 
     /// Starts a new episode for the agents in `mask` and writes their first observations; other rows are left alone.
@@ -190,8 +180,7 @@ impl VecEnv {
     pub fn reset_agents<O: ObsNumber>(&mut self, mask: &[bool], obs: &mut [O]) -> Result<(), EnvError> {
         self.check("mask [agents]", mask.len(), 1)?;
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
-        self.each_block(&|i| mask[i], obs, Worker::reset);
-        Ok(())
+        self.each_block(&|i| mask[i], obs, Worker::reset)
     }
 
     /// Starts the random streams of one agent anew, as those of agent `number` of an environment with this seed; its next
@@ -211,7 +200,7 @@ impl VecEnv {
     }
 
     /// Gives an agent masses, friction, strength and gravity of its own, for domain randomization. They last until changed,
-    /// over all resets, and do not belong to snapshots.
+    /// over all resets; starts that take physics ([`Start::settle`](crate::Start::settle)) are found without them.
     ///
     /// # Errors
     /// If there is no such agent, a length is wrong, or a number makes no sense.
@@ -245,6 +234,17 @@ impl VecEnv {
         Ok(())
     }
 
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
+    /// first of which has the smallest y. It lasts until changed, over all resets; starts that take physics are found on the
+    /// model's own.
+    ///
+    /// # Errors
+    /// If there is no such agent or field, or the elevations are not finite numbers for each point of the field's grid.
+    pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
+        self.check_agent(agent)?;
+        self.workers[agent / self.stride].shard.set_ground(agent % self.stride, field, elevations)
+    }
+
     /// Writes the observations of the agents in `mask` at their present states, which begin an episode there; for use
     /// after [`VecEnv::set_state`]. Other rows are left alone.
     ///
@@ -253,8 +253,7 @@ impl VecEnv {
     pub fn observe<O: ObsNumber>(&mut self, mask: &[bool], obs: &mut [O]) -> Result<(), EnvError> {
         self.check("mask [agents]", mask.len(), 1)?;
         self.check("obs [agents][obs]", obs.len(), self.spec.obs)?;
-        self.each_block(&|i| mask[i], obs, Worker::observe);
-        Ok(())
+        self.each_block(&|i| mask[i], obs, Worker::observe)
     }
 
     /// Writes what the agents report about their present states, `[agents][info]`: after a reset, or of the episodes that
@@ -294,10 +293,11 @@ impl VecEnv {
         self.check("diverged [agents]", out.diverged.len(), 1)?;
 
         let autoreset = self.autoreset;
-        let Some(pool) = &self.pool else {
+        let Some(pool) = &mut self.pool else {
             self.workers[0].step(autoreset, actions, out);
             return Ok(());
         };
+        let pool = pool.get()?;
         // every worker gets the rows of its own agents
         let (spec, n) = (&self.spec, self.stride);
         let mut rest = out.borrow();
@@ -349,7 +349,7 @@ impl VecEnv {
     }
 
     /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
-    /// the body's center of mass. Snapshots do not hold it.
+    /// the body's center of mass.
     ///
     /// # Errors
     /// If there is no such agent or body, or the numbers are not finite.
@@ -376,57 +376,6 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.feet(agent % self.stride))
     }
 
-    /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
-    /// the same bits, whatever the number of threads.
-    pub fn save(&self) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend((self.agents as u64).to_le_bytes());
-        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
-        bytes.extend(self.spec.id.as_bytes());
-        for worker in &self.workers {
-            for block in 0..worker.shard.blocks() {
-                worker.shard.save(block, &mut bytes);
-                bytes.extend(worker.pending[block].to_le_bytes());
-            }
-        }
-        bytes
-    }
-
-    /// Restores what [`VecEnv::save`] returned.
-    ///
-    /// # Errors
-    /// If the bytes are not a snapshot of an environment with the same agent and the same number of them; then nothing
-    /// has changed.
-    pub fn load(&mut self, bytes: &[u8]) -> Result<(), EnvError> {
-        let present = self.save();
-        let header = present.len() - self.body_len(&present);
-        if bytes.get(..header) != Some(&present[..header]) {
-            return Err(EnvError::Snapshot(format!(
-                "it does not begin like one of {} agents of '{}'",
-                self.agents, self.spec.id
-            )));
-        }
-        if bytes.len() != present.len() {
-            return Err(EnvError::Snapshot(format!("it has {} bytes, expected {}", bytes.len(), present.len())));
-        }
-        let mut rest = &bytes[header..];
-        for worker in &mut self.workers {
-            for block in 0..worker.shard.blocks() {
-                let after = worker.shard.load(block, rest).and_then(<[u8]>::split_first_chunk);
-                let Some((pending, after)) = after else {
-                    return Err(EnvError::Snapshot("it ends too early".into()));
-                };
-                worker.pending[block] = u16::from_le_bytes(*pending);
-                rest = after;
-            }
-        }
-        Ok(())
-    }
-
-    fn body_len(&self, snapshot: &[u8]) -> usize {
-        snapshot.len() - (MAGIC.len() + 16 + self.spec.id.len())
-    }
-
     fn check(&self, what: &str, found: usize, columns: usize) -> Result<(), EnvError> {
         let expected = self.agents * columns;
         if found == expected { Ok(()) } else { Err(EnvError::Shape { what: what.into(), found, expected }) }
@@ -440,7 +389,12 @@ impl VecEnv {
     }
 
     /// Hands the blocks with chosen agents, and the rows of each, to a function.
-    fn each_block<O: ObsNumber>(&mut self, chosen: Chosen, obs: &mut [O], act: fn(&mut Worker, usize, u16)) {
+    fn each_block<O: ObsNumber>(
+        &mut self,
+        chosen: Chosen,
+        obs: &mut [O],
+        act: fn(&mut Worker, usize, u16),
+    ) -> Result<(), EnvError> {
         let (columns, n) = (self.spec.obs, self.stride);
         let run = |(i, (worker, obs)): (usize, (&mut Worker, &mut [O]))| {
             for (block, rows) in obs.chunks_mut(BLOCK * columns).enumerate() {
@@ -452,12 +406,13 @@ impl VecEnv {
                 }
             }
         };
-        match &self.pool {
+        match &mut self.pool {
             None => run((0, (&mut self.workers[0], obs))),
-            Some(pool) => pool.install(|| {
+            Some(pool) => pool.get()?.install(|| {
                 self.workers.par_iter_mut().zip(obs.par_chunks_mut(n * columns)).enumerate().for_each(run);
             }),
         }
+        Ok(())
     }
 }
 

@@ -2,9 +2,15 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::{go_on, isas, make, play};
-use marathon_envs::{Autoreset, BLOCK, BlockStep, factory};
-use marathon_physics::lanes::Isa;
+use marathon_envs::memory::Average;
+use marathon_envs::{
+    Agent, Autoreset, BLOCK, BlockStep, Facts, ModelSource, Obs, Part, Registry, ResetNoise, Senses, Spec, Start, Step,
+    Terms, VecEnv, VecEnvOptions, factory, names,
+};
+use marathon_physics::lanes::{Isa, Real};
 
 const BEFORE: usize = 37;
 const AFTER: usize = 90;
@@ -49,7 +55,7 @@ fn a_block_can_move() {
     a.save(1, &mut bytes);
     bytes.push(43);
     assert_eq!(b.load(0, &bytes[1..]).unwrap(), [43]);
-    assert!(b.load(0, &bytes[2..bytes.len() - 1]).is_none(), "one byte too few");
+    assert!(b.load(0, &bytes[1..bytes.len() - 2]).is_err(), "one byte too few");
     assert!(b.load(0, &bytes[1..bytes.len() - 1]).unwrap().is_empty());
 
     let action = vec![0.25; spec.act * BLOCK];
@@ -72,14 +78,266 @@ fn a_wrong_snapshot_is_refused_and_changes_nothing() {
     let good = env.save();
     let other_agent = make("walker", 3, 1, None, Autoreset::SameStep).save();
     let other_number = make("hopper", 4, 1, None, Autoreset::SameStep).save();
+    let longer = [&good[..], &[0]].concat();
+    let newer = [b"MRTHNv99", &good[8..]].concat();
     for (bytes, complaint) in [
-        (&good[..good.len() - 1], "bytes, expected"),
-        (&[], "it does not begin like one of 3 agents of 'Hopper-v0'"),
-        (&other_agent, "it does not begin like"),
-        (&other_number, "it does not begin like"),
+        (&good[..good.len() - 1], "it is damaged or cut short: its checksum is"),
+        (&longer, "it is damaged or cut short: its checksum is"),
+        (&[], "it has 0 bytes, expected one of an environment"),
+        (b"something else altogether", "it does not begin like one of an environment"),
+        (&newer, "its format is 'MRTHNv99', expected 'MRTHNv03' or 'MRTHNv02'"),
+        (&other_agent, "it is of 3 agents of 'Walker2d-v0', expected 3 of 'Hopper-v0'"),
+        (&other_number, "it is of 4 agents of 'Hopper-v0', expected 3 of 'Hopper-v0'"),
     ] {
         let error = env.load(bytes).unwrap_err().to_string();
         assert!(error.contains(complaint), "{error}");
         assert_eq!(env.save(), good);
     }
+}
+
+#[test]
+fn a_damaged_byte_is_found_wherever_it_is() {
+    let mut env = make("hopper", 3, 1, None, Autoreset::SameStep);
+    play(&mut env, 5, 0.5, |_, _| {});
+    let good = env.save();
+    let mut bytes = good.clone();
+    for at in 0..good.len() {
+        bytes[at] ^= 1 << (at % 8);
+        assert!(env.load(&bytes).is_err(), "byte {at} of {} is not what was saved", good.len());
+        bytes[at] = good[at];
+    }
+    assert!(env.save() == good, "nothing has changed");
+}
+
+/// `snapshots/hopper-v02.bin` is of three hoppers after 23 decisions, written before snapshots had checksums, and pushes and
+/// variations in them.
+#[test]
+fn a_snapshot_of_an_earlier_version_is_read() {
+    let old = include_bytes!("snapshots/hopper-v02.bin");
+    let options =
+        VecEnvOptions { agents: 3, autoreset: Autoreset::NextStep, max_episode_steps: Some(25), ..Default::default() };
+    let mut env = VecEnv::new("Hopper-v0", &options).unwrap_or_else(|e| panic!("{e}"));
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).expect("the array fits");
+    env.load(old).unwrap_or_else(|e| panic!("{e}"));
+    // after the head, the state follows seed, agent, episode and decisions, 64 bits each
+    let words: Vec<[u8; 8]> = old[8 + 16 + 9..].as_chunks().0.to_vec();
+    let row = |agent: usize| &words[agent * (words.len() / 16)..];
+    for agent in 0..3 {
+        let state = env.state(agent).expect("it is there");
+        let numbers = [state.qpos, state.qvel].concat();
+        let saved: Vec<f64> = row(agent)[4..][..numbers.len()].iter().map(|w| f64::from_le_bytes(*w)).collect();
+        assert_eq!(numbers, saved, "agent {agent}");
+        assert_eq!(row(agent)[..4].concat()[..], [5_u64, agent as u64, 1, 23].map(u64::to_le_bytes).concat());
+    }
+    let mut truncated = Vec::new();
+    go_on(&mut env, &mut out, 23, 26, 0.1, |_, step| truncated.push(step.truncated[0]));
+    assert_eq!(truncated, [false, true, false], "decision 25 is the last of the episode");
+    env.load(old).unwrap_or_else(|e| panic!("{e}"));
+    let again = env.save();
+    assert!(env.load(&old[..old.len() - 1]).is_err() && env.load(&[&old[..], &[0]].concat()).is_err());
+    assert!(env.save() == again, "nothing has changed");
+}
+
+/// A creature whose future hangs on everything that an agent can have: muscles that react late, ground of its own, and
+/// starts that take physics.
+const MODEL: &str = r#"
+<mujoco model="beetle">
+  <option timestep="0.005"/>
+  <asset>
+    <hfield name="hills" nrow="5" ncol="5" size="3 3 0.3 0.1"/>
+  </asset>
+  <worldbody>
+    <geom name="ground" type="hfield" hfield="hills"/>
+    <body name="shell" pos="0 0 0.5">
+      <freejoint/>
+      <geom name="shell" size="0.15"/>
+      <body name="leg" pos="0.2 0 0">
+        <joint name="hip" axis="0 1 0" range="-60 60" damping="0.2"/>
+        <geom name="leg" type="capsule" fromto="0 0 0 0.3 0 -0.2" size="0.05"/>
+      </body>
+      <body name="tail" pos="-0.2 0 0">
+        <joint name="root" axis="0 1 0" range="-60 60" damping="0.2"/>
+        <geom name="tail" type="capsule" fromto="0 0 0 -0.3 0 -0.2" size="0.05"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <general name="hip" joint="hip" dyntype="filter" dynprm="0.2" gainprm="8" ctrlrange="-1 1" ctrllimited="true"/>
+    <general name="root" joint="root" dyntype="integrator" gainprm="3" ctrlrange="-1 1" ctrllimited="true"/>
+  </actuator>
+</mujoco>"#;
+
+#[derive(Clone)]
+struct Beetle;
+
+impl Agent for Beetle {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: "Beetle-v0".into(),
+            model: ModelSource::Text(MODEL.into()),
+            frame_skip: 4,
+            max_episode_steps: 60,
+            reward_terms: names(["speed"]),
+            parts: names(["shell"]),
+            memory: Average::SLOTS,
+            termination_reward: None,
+            ..Facts::default()
+        }
+    }
+
+    fn reset(&self, start: &mut Start) {
+        start.add_noise(ResetNoise { joint_position: 0.3, joint_velocity: 0.5, root_velocity: 0.5 });
+        start.settle = 7;
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let shell = Part::named(&["shell"], "shell");
+        out.vector(s.position(shell));
+        out.vector(s.linear_velocity(shell));
+        out.joint_velocities(s);
+        out.scalar(s.memory(Average::MEAN));
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        Average::update(memory, s.velocity(Part::named(&["shell"], "shell")));
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        terms.add("speed", 1.0, s.velocity(Part::named(&["shell"], "shell")));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        s.terminate_never()
+    }
+}
+
+fn beetles() -> Registry {
+    let mut registry = Registry::default();
+    registry.register(Arc::new(Beetle)).unwrap_or_else(|e| panic!("{e}"));
+    registry
+}
+
+fn beetle(agents: usize, seed: u64, threads: usize, isa: Option<Isa>) -> VecEnv {
+    let options = VecEnvOptions { agents, seed, threads, isa, ..Default::default() };
+    VecEnv::from_registry(&beetles(), "Beetle-v0", &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Gives some agents things of their own.
+fn make_different(env: &mut VecEnv) {
+    let mut own = env.unvaried().clone();
+    own.mass.fill(1.7);
+    own.friction = 0.4;
+    own.strength.fill(0.6);
+    own.gravity = [0.3, 0.0, -6.0];
+    for agent in [1, 17, 30] {
+        env.vary(agent, &own).expect("a sound variation");
+    }
+    for agent in [2, 18, 33] {
+        env.push(agent, 1, [4.0, 1.0, 2.0], [0.1, 0.0, 0.2]).expect("a body that there is");
+    }
+    for agent in [3, 19, 39] {
+        let hills: Vec<f32> = (0..25).map(|k| 0.04 * (k % 7) as f32).collect();
+        env.set_ground(agent, 0, &hills).expect("the field's grid");
+    }
+}
+
+/// Plays on from a decision and returns everything that was seen.
+fn story(env: &mut VecEnv, from: usize) -> Vec<Step> {
+    let mut out = env.buffers();
+    let mut seen = Vec::new();
+    go_on(env, &mut out, from, AFTER, 1.0, |_, step| seen.push(step.clone()));
+    seen
+}
+
+#[test]
+fn what_an_agent_has_of_its_own_is_in_the_snapshot() {
+    const N: usize = 40;
+    let mut env = beetle(N, 11, 1, None);
+    let mut out = env.buffers();
+    env.reset(Some(5), &mut out.obs).expect("the array fits");
+    go_on(&mut env, &mut out, 0, 10, 1.0, |_, _| {});
+    make_different(&mut env);
+    go_on(&mut env, &mut out, 10, BEFORE, 1.0, |_, _| {});
+    let snapshot = env.save();
+    let uninterrupted = story(&mut env, BEFORE);
+
+    // the things matter: without any of them the agent goes another way
+    let mut plain = beetle(N, 11, 1, None);
+    plain.reset(Some(5), &mut out.obs).expect("the array fits");
+    go_on(&mut plain, &mut out, 0, BEFORE, 1.0, |_, _| {});
+    let plain = story(&mut plain, BEFORE);
+    let last = |seen: &[Step], agent: usize| seen[5].obs.chunks(9).nth(agent).expect("there are 40").to_vec();
+    for agent in 0..N {
+        let own = [1, 17, 30, 2, 18, 33, 3, 19, 39].contains(&agent);
+        assert_eq!(last(&plain, agent) == last(&uninterrupted, agent), !own, "agent {agent}");
+    }
+
+    // into environments in other states, with other things of their own, of other seeds, threads and widths
+    let mut others = vec![env, beetle(N, 2, 3, None)];
+    others.extend(isas().filter(|isa| *isa != Isa::F64).map(|isa| beetle(N, 1, 2, Some(isa))));
+    for mut other in others {
+        let mut out = other.buffers();
+        other.reset(None, &mut out.obs).expect("the array fits");
+        let mut own = other.unvaried().clone();
+        own.mass.fill(0.5);
+        other.vary(0, &own).expect("a sound variation");
+        other.set_ground(1, 0, &[0.2; 25]).expect("the field's grid");
+        go_on(&mut other, &mut out, 0, 3, 0.5, |_, _| {});
+        other.push(4, 1, [9.0; 3], [0.0; 3]).expect("a body that there is");
+        other.load(&snapshot).unwrap_or_else(|e| panic!("{e}"));
+        assert!(other.save() == snapshot, "saving what was loaded");
+        assert!(story(&mut other, BEFORE) == uninterrupted, "the restored environment went another way");
+    }
+}
+
+/// Sixteen agents with things of their own, in another slot of another shard.
+#[test]
+fn a_block_moves_with_what_its_agents_have_of_their_own() {
+    let shards = beetles().shards("Beetle-v0", Isa::best()).unwrap_or_else(|e| panic!("{e}"));
+    let mut a = shards.agent_shard(0, 2, 1);
+    let mut b = shards.agent_shard(7, 3, 99);
+    let mut obs = vec![0.0; a.spec().obs * BLOCK];
+    a.reset(1, 0xffff, &mut obs);
+    let mut own = shards.unvaried();
+    own.strength.fill(0.3);
+    a.vary(20, &own);
+    a.push(21, 1, [3.0, 0.0, 1.0], [0.0; 3]);
+    a.set_ground(22, 0, &[0.1; 25]).expect("the field's grid");
+    let action = vec![0.25; a.spec().act * BLOCK];
+    let (mut here, mut there) = (BlockStep::default(), BlockStep::default());
+    let mut obs_there = obs.clone();
+    for decision in 0..40 {
+        if decision == 10 {
+            let mut bytes = Vec::new();
+            a.save(1, &mut bytes);
+            assert!(b.load(2, &bytes).unwrap_or_else(|e| panic!("{e}")).is_empty());
+        }
+        a.step(1, &action, &mut obs, &mut here);
+        b.step(2, &action, &mut obs_there, &mut there);
+        if decision >= 10 {
+            assert_eq!(obs, obs_there);
+            assert_eq!(here.reward, there.reward);
+        }
+    }
+}
+
+/// Before blocks had a mark, they did not hold the activations of actuators.
+#[test]
+fn a_block_that_lacks_activations_is_refused_by_name() {
+    let shards = beetles().shards("Beetle-v0", Isa::F32).unwrap_or_else(|e| panic!("{e}"));
+    let mut shard = shards.agent_shard(0, 1, 1);
+    let mut before = Vec::new();
+    shard.save(0, &mut before);
+    let Spec { nq, nv, .. } = shard.spec();
+    let old = vec![0; BLOCK * 8 * (4 + nq + 2 * nv + Average::SLOTS)];
+    let error = shard.load(0, &old).expect_err("it lacks something").to_string();
+    assert!(error.contains("left out the activations of actuators; load it with that version"), "{error}");
+    let mut after = Vec::new();
+    shard.save(0, &mut after);
+    assert_eq!(before, after);
 }

@@ -4,7 +4,7 @@
 //! 2. Training: processor microseconds per agent-step around an environment that does nothing, with everything else
 //!    included (acting, advantages, four epochs of updates, optimizer, waiting).
 
-use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
 use marathon_learn::mlp::{CHUNK, Mlp};
 use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
@@ -175,7 +175,7 @@ impl Shard for IdleShard {
         out.terminated = (x < 0.016) as u16;
     }
     fn save(&self, _: usize, _: &mut Vec<u8>) {}
-    fn load<'a>(&mut self, _: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
-        Some(bytes)
+    fn load<'a>(&mut self, _: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
+        Ok(bytes)
     }
 }

@@ -241,6 +241,11 @@ impl Policy {
     /// # Errors
     /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
+        write_atomic(path, &self.to_bytes())
+    }
+
+    /// The bytes of a file with the policy; [`Policy::from_bytes`] is the way back.
+    pub fn to_bytes(&self) -> Vec<u8> {
         let mut file = TensorWriter::default();
         file.list("obs_mean", self.normalizer.mean());
         file.list("obs_std", self.normalizer.std());
@@ -250,7 +255,7 @@ impl Policy {
             file.add(format!("layer.{l}.weight"), &shape, self.params[weights].iter().copied());
             file.list(&format!("layer.{l}.bias"), &self.params[biases]);
         }
-        write_atomic(path, &file.bytes(&self.meta))
+        file.bytes(&self.meta)
     }
 
     /// Reads a policy.

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{PuckTask, learning_config, silent, small_config};
-use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, EnvError, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Control, IterationStats, PpoConfig, Ratio, Snapshot, evaluate, train};
 use marathon_physics::lanes::Isa;
 
@@ -48,7 +48,7 @@ impl Shard for NumberedShard {
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         self.0.save(block, bytes);
     }
-    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+    fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         self.0.load(block, bytes)
     }
 }

@@ -4,7 +4,7 @@
 
 pub mod numbers;
 
-use marathon_envs::{BLOCK, BlockStep, Options, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Sac};
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
@@ -147,7 +147,7 @@ impl Shard for PuckShard {
             bytes.extend_from_slice(&p.random.to_le_bytes());
         }
     }
-    fn load<'a>(&mut self, block: usize, mut bytes: &'a [u8]) -> Option<&'a [u8]> {
+    fn load<'a>(&mut self, block: usize, mut bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         for p in &mut self.pucks[block * BLOCK..(block + 1) * BLOCK] {
             for x in p.pos.iter_mut().chain(&mut p.vel).chain(&mut p.drift) {
                 *x = f32::from_le_bytes(take(&mut bytes)?);
@@ -155,14 +155,15 @@ impl Shard for PuckShard {
             p.steps = u32::from_le_bytes(take(&mut bytes)?);
             p.random = u64::from_le_bytes(take(&mut bytes)?);
         }
-        Some(bytes)
+        Ok(bytes)
     }
 }
 
-fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
-    let (head, rest) = bytes.split_first_chunk()?;
+fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], EnvError> {
+    let short = || EnvError::Snapshot("it ends too early".into());
+    let (head, rest) = bytes.split_first_chunk().ok_or_else(short)?;
     *bytes = rest;
-    Some(*head)
+    Ok(*head)
 }
 
 /// A small setting for tests of equality.

@@ -2,6 +2,7 @@
 
 use crate::lanes::Real;
 use crate::model::Model;
+use crate::narrow::height::HeightField;
 use crate::sim::Sim;
 use crate::variation::Variation;
 use crate::work::Group;
@@ -38,6 +39,66 @@ impl AgentState {
             && self.variation.as_ref().is_none_or(varied)
             && self.grounds.iter().enumerate().all(grid)
     }
+
+    /// Appends the state's bytes; [`read_from`](AgentState::read_from) is the way back.
+    pub fn write_to(&self, bytes: &mut Vec<u8>) {
+        let AgentState { numbers, pushes, variation, grounds } = self;
+        let own = [(PUSHED, !pushes.is_empty()), (VARIED, variation.is_some()), (GROUNDED, !grounds.is_empty())];
+        bytes.push(own.iter().map(|(bit, there)| bit * u8::from(*there)).sum());
+        let varied =
+            variation.iter().flat_map(|v| v.mass.iter().chain([&v.friction]).chain(&v.strength).chain(&v.gravity));
+        for x in numbers.iter().chain(pushes).chain(varied) {
+            bytes.extend(x.to_le_bytes());
+        }
+        for ground in grounds {
+            bytes.push(u8::from(ground.is_some()));
+            bytes.extend(ground.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        }
+    }
+
+    /// Reads a state of an agent of this model, which [`write_to`](AgentState::write_to) has written, and returns it with
+    /// the bytes that follow. `None` if there is none.
+    pub fn read_from<'a>(model: &Model, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
+        let Model { nq, nv, nu, na, bodies, hfields, .. } = model;
+        let (own, mut bytes) = bytes.split_first()?;
+        if own & !(PUSHED | VARIED | GROUNDED) != 0 {
+            return None;
+        }
+        let numbers = take(&mut bytes, nq + 2 * nv + nu + na, f64::from_le_bytes)?;
+        let pushes = if own & PUSHED == 0 { 0 } else { 6 * bodies.len() };
+        let pushes = take(&mut bytes, pushes, f64::from_le_bytes)?;
+        let mut variation = None;
+        if own & VARIED != 0 {
+            let mut mass = take(&mut bytes, bodies.len() + 1, f64::from_le_bytes)?;
+            let friction = mass.pop()?;
+            let strength = take(&mut bytes, *nu, f64::from_le_bytes)?;
+            let gravity = take(&mut bytes, 3, f64::from_le_bytes)?.try_into().ok()?;
+            variation = Some(Variation { mass, friction, strength, gravity });
+        }
+        let mut grounds = Vec::new();
+        for field in hfields.iter().filter(|_| own & GROUNDED != 0) {
+            let (there, rest) = bytes.split_first()?;
+            bytes = rest;
+            grounds.push(match there {
+                0 => None,
+                1 => Some(take(&mut bytes, field.nrow * field.ncol, f32::from_le_bytes)?),
+                _ => return None,
+            });
+        }
+        Some((AgentState { numbers, pushes, variation, grounds }, bytes))
+    }
+}
+
+/// What an agent has of its own, a bit each.
+const PUSHED: u8 = 1;
+const VARIED: u8 = 2;
+const GROUNDED: u8 = 4;
+
+/// Takes so many numbers off the front of some bytes.
+fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) -> X) -> Option<Vec<X>> {
+    let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
+    *bytes = rest;
+    Some(mine.as_chunks::<N>().0.iter().map(|x| number(*x)).collect())
 }
 
 impl PartialEq for AgentState {
@@ -61,27 +122,43 @@ fn from_bits<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::
 }
 
 impl<T: Real> Group<T> {
-    /// Copies an agent's state out of its lane.
-    pub(crate) fn save(&self, sim: &Sim<T>, lane: usize) -> AgentState {
+    /// Copies an agent's state out of its lane. It does not tell what the agents of other lanes have of their own.
+    pub fn save(&self, sim: &Sim<T>, lane: usize) -> AgentState {
         let get = |x: &T| T::widen(x.get(lane));
         let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.warm];
-        let grounds = self.grounds.chunks(T::LANES).map(|lanes| {
+        let mut pushes: Vec<f64> = self.external.iter().flatten().map(get).collect();
+        if pushes.iter().all(|x| x.to_bits() == 0) {
+            pushes.clear();
+        }
+        let lanes = self.grounds.chunks(T::LANES);
+        let mut grounds: Vec<Option<Vec<f32>>> = Vec::new();
+        if lanes.clone().any(|lanes| lanes[lane].is_some()) {
             let elevation = |x: &T::Scalar| T::widen(*x) as f32;
-            lanes[lane].as_ref().map(|field| field.heights.iter().map(elevation).collect())
-        });
+            let of = |field: &HeightField<T::Scalar>| field.heights.iter().map(elevation).collect();
+            grounds.extend(lanes.map(|lanes| lanes[lane].as_deref().map(of)));
+        }
         AgentState {
             numbers: parts.into_iter().flatten().map(get).collect(),
-            pushes: self.external.iter().flatten().map(get).collect(),
-            variation: self.varied.as_ref().map(|_| self.variation(sim, lane)),
-            grounds: grounds.collect(),
+            pushes,
+            variation: self.varied.as_ref().and_then(|_| self.deviation(sim, lane)),
+            grounds,
         }
+    }
+
+    /// The constants of an agent, if they are not the model's.
+    fn deviation(&self, sim: &Sim<T>, lane: usize) -> Option<Variation> {
+        let (own, none) = (self.variation(sim, lane), Variation::none(&sim.model));
+        // as far as the lanes can tell
+        let all = |v: &Variation| [&v.mass[..], &[v.friction], &v.strength, &v.gravity].concat();
+        let same = |(own, none): (&f64, &f64)| T::scalar(*own) == T::scalar(*none);
+        (!all(&own).iter().zip(&all(&none)).all(same)).then_some(own)
     }
 
     /// Copies an agent's state into a lane.
     ///
     /// # Panics
     /// If the state belongs to another model.
-    pub(crate) fn load(&mut self, sim: &Sim<T>, lane: usize, state: &AgentState) {
+    pub fn load(&mut self, sim: &Sim<T>, lane: usize, state: &AgentState) {
         let bodies = sim.model.bodies.len();
         let size = self.qpos.len() + self.qvel.len() + self.ctrl.len() + self.act.len() + self.warm.len();
         assert_eq!(state.numbers.len(), size, "a state of the same model");

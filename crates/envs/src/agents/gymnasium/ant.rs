@@ -9,7 +9,7 @@ use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
 use crate::agent::{Agent, Body, Facts, Motors, View, names};
-use crate::options::{OptionInfo, OptionSet, OptionValue, Options, Value};
+use crate::options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
 use crate::senses::{Senses, clamp};
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -61,7 +61,7 @@ crate::options! {
         contact_force_range: [f64; 2] = [-1.0, 1.0],
         /// Half width of the uniform noise of the start's coordinates, and standard deviation of the normal noise of its
         /// velocities.
-        reset_noise_scale: f64 = 0.1,
+        reset_noise_scale: Scale = Scale(0.1),
         /// Whether x and y are left out of the observation.
         exclude_current_positions_from_observation: bool = true,
         /// Whether contact forces are observed.
@@ -134,7 +134,7 @@ impl Agent for Ant {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Normal);
+        super::start(start, self.reset_noise_scale.0, Noise::Normal);
     }
 
     #[inline(always)]

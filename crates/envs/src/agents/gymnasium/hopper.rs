@@ -8,7 +8,7 @@ use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::Senses;
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -35,7 +35,7 @@ crate::options! {
         /// Range of the torso's angle, rad.
         healthy_angle_range: [f64; 2] = [-0.2, 0.2],
         /// Half width of the uniform noise of the start.
-        reset_noise_scale: f64 = 5e-3,
+        reset_noise_scale: Scale = Scale(5e-3),
         /// Whether x is left out of the observation.
         exclude_current_positions_from_observation: bool = true,
     }
@@ -80,7 +80,7 @@ impl Agent for Hopper {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Uniform);
+        super::start(start, self.reset_noise_scale.0, Noise::Uniform);
     }
 
     #[inline(always)]

@@ -10,7 +10,7 @@ use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, View, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::{Senses, clamp};
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -40,7 +40,7 @@ crate::options! {
         /// Range of the torso's height, m.
         healthy_z_range: [f64; 2] = [1.0, 2.0],
         /// Half width of the uniform noise of the start.
-        reset_noise_scale: f64 = 1e-2,
+        reset_noise_scale: Scale = Scale(1e-2),
         /// Whether x and y are left out of the observation.
         exclude_current_positions_from_observation: bool = true,
         /// Whether inertias of the bodies are observed.
@@ -166,7 +166,7 @@ impl Agent for Humanoid {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Uniform);
+        super::start(start, self.reset_noise_scale.0, Noise::Uniform);
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use marathon_physics::lanes::Real;
 use super::Noise;
 use super::humanoid::Sight;
 use crate::agent::{Agent, Facts, Motors, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::{Senses, clamp};
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -30,7 +30,7 @@ crate::options! {
         /// Range that the cost of the contact forces is clipped to.
         impact_cost_range: [f64; 2] = [f64::NEG_INFINITY, 10.0],
         /// Half width of the uniform noise of the start.
-        reset_noise_scale: f64 = 1e-2,
+        reset_noise_scale: Scale = Scale(1e-2),
         /// Whether x and y are left out of the observation.
         exclude_current_positions_from_observation: bool = true,
         /// Whether inertias of the bodies are observed.
@@ -69,7 +69,7 @@ impl Agent for HumanoidStandup {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Uniform);
+        super::start(start, self.reset_noise_scale.0, Noise::Uniform);
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use marathon_physics::lanes::Real;
 
 use super::Noise;
 use crate::agent::{Agent, Facts, View, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::{Senses, clamp};
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -32,7 +32,7 @@ crate::options! {
         healthy_reward: f64 = 10.0,
         /// Half width of the uniform noise of the start's coordinates, and standard deviation of the normal noise of its
         /// velocities.
-        reset_noise_scale: f64 = 0.1,
+        reset_noise_scale: Scale = Scale(0.1),
     }
 }
 
@@ -62,7 +62,7 @@ impl Agent for InvertedDoublePendulum {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Normal);
+        super::start(start, self.reset_noise_scale.0, Noise::Normal);
     }
 
     #[inline(always)]

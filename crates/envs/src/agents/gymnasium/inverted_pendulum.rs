@@ -7,7 +7,7 @@ use marathon_physics::lanes::Real;
 
 use super::Noise;
 use crate::agent::{Agent, Facts, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::Senses;
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -23,7 +23,7 @@ crate::options! {
         /// Physics steps per decision.
         frame_skip: usize = 2,
         /// Half width of the uniform noise of the start.
-        reset_noise_scale: f64 = 0.01,
+        reset_noise_scale: Scale = Scale(0.01),
     }
 }
 
@@ -48,7 +48,7 @@ impl Agent for InvertedPendulum {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Uniform);
+        super::start(start, self.reset_noise_scale.0, Noise::Uniform);
     }
 
     #[inline(always)]

@@ -8,7 +8,7 @@ use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, names};
-use crate::options::{OptionInfo, OptionSet, Options};
+use crate::options::{OptionInfo, OptionSet, Options, Scale};
 use crate::senses::Senses;
 use crate::start::Start;
 use crate::write::{Obs, Terms};
@@ -25,7 +25,7 @@ crate::options! {
         /// Weight of the squared actions.
         ctrl_cost_weight: f64 = 1e-4,
         /// Half width of the uniform noise of the start.
-        reset_noise_scale: f64 = 0.1,
+        reset_noise_scale: Scale = Scale(0.1),
         /// Whether x and y are left out of the observation.
         exclude_current_positions_from_observation: bool = true,
     }
@@ -54,7 +54,7 @@ impl Agent for Swimmer {
     }
 
     fn reset(&self, start: &mut Start) {
-        super::start(start, self.reset_noise_scale, Noise::Uniform);
+        super::start(start, self.reset_noise_scale.0, Noise::Uniform);
     }
 
     #[inline(always)]

@@ -1,0 +1,55 @@
+//! The threads of an environment.
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::EnvError;
+
+/// A pool of threads of this process. A process that was forked off has the memory of its parent's pool, but none of its
+/// threads, and would wait for them for ever: it gets threads of its own.
+pub(crate) struct Pool {
+    threads: usize,
+    process: u32,
+    pool: Option<ThreadPool>,
+}
+
+impl Pool {
+    pub fn new(threads: usize) -> Result<Self, EnvError> {
+        let pool = Some(start(threads)?);
+        Ok(Pool { threads, process: std::process::id(), pool })
+    }
+
+    /// The pool of the present process.
+    pub fn get(&mut self) -> Result<&ThreadPool, EnvError> {
+        if self.process != std::process::id() {
+            self.forget();
+            self.process = std::process::id();
+        }
+        let pool = match self.pool.take() {
+            Some(pool) => pool,
+            None => start(self.threads)?,
+        };
+        Ok(self.pool.insert(pool))
+    }
+
+    /// Leaves the pool alone that threads of another process belong to.
+    fn forget(&mut self) {
+        std::mem::forget(self.pool.take());
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        if self.process != std::process::id() {
+            self.forget();
+        }
+    }
+}
+
+fn start(threads: usize) -> Result<ThreadPool, EnvError> {
+    let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("marathon-env-{i}"));
+    builder.build().map_err(|error| EnvError::Option {
+        option: "threads",
+        found: format!("{threads} ({error})"),
+        expected: "a number that the system can start",
+    })
+}

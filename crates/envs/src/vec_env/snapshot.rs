@@ -1,0 +1,115 @@
+//! A whole environment as bytes.
+//!
+//! | bytes | |
+//! |---|---|
+//! | 8 | `MRTHNv03` |
+//! | 4 | CRC-32 of all that follows |
+//! | 8 | number of agents |
+//! | 8 | length of the task's name |
+//! | as long | the task's name |
+//!
+//! Then, for every sixteen agents, their [block](crate::saved) and two bytes: a bit per agent that begins an episode at the
+//! next step. Integers are little-endian. Snapshots of `MRTHNv02` had no checksum; they are still read.
+
+use super::VecEnv;
+use crate::error::EnvError;
+
+const MARK: &[u8; 8] = b"MRTHNv03";
+const UNCHECKED: &[u8; 8] = b"MRTHNv02";
+
+fn refuse<X>(problem: String) -> Result<X, EnvError> {
+    Err(EnvError::Snapshot(problem))
+}
+
+impl VecEnv {
+    /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
+    /// the same bits, whatever the number of threads. What agents have of their own ([`VecEnv::vary`],
+    /// [`VecEnv::push`], [`VecEnv::set_ground`]) is included; the task's arguments and the limit of episodes are not.
+    pub fn save(&self) -> Vec<u8> {
+        let mut bytes = [&MARK[..], &[0; 4]].concat();
+        bytes.extend((self.agents as u64).to_le_bytes());
+        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
+        bytes.extend(self.spec.id.as_bytes());
+        for worker in &self.workers {
+            for block in 0..worker.shard.blocks() {
+                worker.shard.save(block, &mut bytes);
+                bytes.extend(worker.pending[block].to_le_bytes());
+            }
+        }
+        let (head, body) = bytes.split_at_mut(12);
+        head[8..].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
+        bytes
+    }
+
+    /// Restores what [`VecEnv::save`] returned, of an earlier version too unless that left out something that this task needs.
+    ///
+    /// # Errors
+    /// If the bytes are damaged, or not a snapshot of an environment with the same agent and the same number of them; then
+    /// nothing has changed.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), EnvError> {
+        let blocks = self.blocks_in(bytes)?;
+        let before = self.save();
+        let result = self.load_blocks(blocks);
+        if result.is_err() {
+            let own = self.blocks_in(&before).and_then(|blocks| self.load_blocks(blocks));
+            debug_assert!(own.is_ok(), "an environment loads what it saved");
+        }
+        result
+    }
+
+    /// The blocks of a snapshot of this kind of environment.
+    fn blocks_in<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
+        let Some((mark, rest)) = bytes.split_first_chunk::<8>() else {
+            return refuse(format!("it has {} bytes, expected one of an environment", bytes.len()));
+        };
+        let body = match rest.split_first_chunk() {
+            Some((sum, body)) if mark == MARK => {
+                let (found, expected) = (crc32fast::hash(body), u32::from_le_bytes(*sum));
+                if found != expected {
+                    return refuse(format!(
+                        "it is damaged or cut short: its checksum is {found:08x}, expected {expected:08x}"
+                    ));
+                }
+                body
+            }
+            _ if mark == UNCHECKED => rest,
+            _ if mark.starts_with(b"MRTHNv") => {
+                return refuse(format!(
+                    "its format is '{}', expected '{}' or '{}': another version of Marathon has saved it",
+                    mark.escape_ascii(),
+                    MARK.escape_ascii(),
+                    UNCHECKED.escape_ascii()
+                ));
+            }
+            _ => return refuse("it does not begin like one of an environment".into()),
+        };
+        let expected = (self.agents, self.spec.id.as_str());
+        match head(body) {
+            Some((agents, id, blocks)) if (agents, id) == expected => Ok(blocks),
+            Some((agents, id, _)) => {
+                refuse(format!("it is of {agents} agents of '{id}', expected {} of '{}'", expected.0, expected.1))
+            }
+            None => refuse("it ends too early".into()),
+        }
+    }
+
+    fn load_blocks(&mut self, mut bytes: &[u8]) -> Result<(), EnvError> {
+        for worker in &mut self.workers {
+            for block in 0..worker.shard.blocks() {
+                let rest = worker.shard.load(block, bytes)?;
+                let Some((pending, rest)) = rest.split_first_chunk() else { return refuse("it ends too early".into()) };
+                worker.pending[block] = u16::from_le_bytes(*pending);
+                bytes = rest;
+            }
+        }
+        if bytes.is_empty() { Ok(()) } else { refuse(format!("it goes on for {} bytes after its end", bytes.len())) }
+    }
+}
+
+/// Number of agents and name of the task at the head of a snapshot's body, and its blocks.
+fn head(body: &[u8]) -> Option<(usize, &str, &[u8])> {
+    let (agents, rest) = body.split_first_chunk()?;
+    let (length, rest) = rest.split_first_chunk()?;
+    let (id, blocks) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+    Some((usize::try_from(u64::from_le_bytes(*agents)).ok()?, std::str::from_utf8(id).ok()?, blocks))
+}
