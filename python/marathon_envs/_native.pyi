@@ -87,6 +87,9 @@ class VecEnv:
 
     Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
     overwrites them at the next step; with `copy`, every step returns new ones.
+
+    `copy.deepcopy` and `pickle` make an environment that goes on as this one does. A process that was forked gets
+    threads of its own.
     """
 
     def __new__(
@@ -108,7 +111,8 @@ class VecEnv:
         Args:
             id: name of the task, as in `marathon_envs.ids()`; case does not matter, and without a version it means v0.
             num_envs: number of agents.
-            seed: seed until `reset` gives another.
+            seed: seed until `reset` gives another. It is a number, not chance: without one given, every environment
+                begins with the same episodes.
             threads: number of threads; 0 means one per processor core, but not more than there are blocks of 16 agents.
             isa: instruction set; None means the widest that the processor has.
             autoreset: what happens to an agent whose episode ended. "same_step": `obs` is the first observation of the
@@ -202,6 +206,7 @@ class VecEnv:
         """Everything that the future depends on.
 
         Loaded, the environment continues with the same bits, whatever the number of threads and the instruction set.
+        The bytes have a checksum.
         """
     def load(self, snapshot: bytes) -> None:
         """Restore what `save` returned for the same task and number of agents."""

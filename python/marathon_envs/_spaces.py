@@ -42,6 +42,14 @@ def info_names(spec: Spec | AgentSpec) -> tuple[list[str], bool]:
     return spec.info, "x_position" not in spec.info
 
 
+def warn_of_divergence(actions: Any) -> None:
+    """Tell, as often as Python's filters let it through, why episodes end for no reason that an observation shows."""
+    if np.isfinite(np.asarray(actions, np.float32)).all():
+        gymnasium.logger.warn("a simulation broke down: its episode ends, info['diverged'] is True")
+    else:
+        gymnasium.logger.warn("an action is not finite: its agent's episode ends, info['diverged'] is True")
+
+
 def native_seed(seed: Any) -> int:
     """Turn a seed of Gymnasium's, which may be of any size, into one of 64 bits."""
     return int(seed) % 2**64

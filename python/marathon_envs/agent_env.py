@@ -1,7 +1,5 @@
 """Episodes of agents written in Python, with the interface of the native `VecEnv`."""
 
-import io
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from marathon_envs import _snapshots
 from marathon_envs._arrays import BoolArray, FloatArray, Streams
 from marathon_envs.agents import MarathonAgent
 
@@ -68,6 +67,16 @@ class AgentVecEnv:
 
         Arrays are new at every step, whatever `copy` says.
         """
+        self._made = {
+            "agent": agent,
+            "num_envs": num_envs,
+            "seed": seed,
+            "threads": threads,
+            "isa": isa,
+            "autoreset": autoreset,
+            "max_episode_steps": max_episode_steps,
+            **options,
+        }
         mode = _AUTORESET.get(autoreset.replace("_", "").lower())
         if mode is None:
             raise ValueError(f"autoreset is '{autoreset}', expected one of 'next_step', 'same_step', 'disabled'")
@@ -318,29 +327,28 @@ class AgentVecEnv:
 
     def save(self) -> bytes:
         """Everything that the future depends on: NumPy's `.npz`, without pickles."""
-        file = io.BytesIO()
-        simulation = np.frombuffer(self.agent.sim.save(), np.uint8)
-        np.savez(file, simulation=simulation, **{name: getattr(self, name) for name in _SAVED})
-        return file.getvalue()
+        return _snapshots.pack(self.agent.sim.save(), {name: getattr(self, name) for name in _SAVED})
 
     def load(self, snapshot: bytes) -> None:
         """Restore what `save` returned for the same task and number of agents."""
-        if not zipfile.is_zipfile(io.BytesIO(snapshot)):
-            raise ValueError(f"snapshot: it is not one of {self._id}")
-        try:
-            with np.load(io.BytesIO(snapshot), allow_pickle=False) as file:
-                saved = {name: file[name] for name in ("simulation", *_SAVED)}
-        except (KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise ValueError(f"snapshot: it is not one of {self._id}: {error}") from None
-        for name in _SAVED:
-            present = getattr(self, name)
-            if saved[name].shape != present.shape or saved[name].dtype != present.dtype:
-                found, expected = saved[name].shape, present.shape
-                raise ValueError(f"snapshot: {name} has the shape {found}, expected {expected}")
-        self.agent.sim.load(saved["simulation"].tobytes())
-        for name in _SAVED:
-            getattr(self, name)[...] = saved[name]
+        present = {name: getattr(self, name) for name in _SAVED}
+        simulation, saved = _snapshots.unpack(snapshot, self._id, present)
+        self.agent.sim.load(simulation)
+        for name, array in present.items():
+            array[...] = saved[name]
         self._ready = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made of: arguments, a snapshot, observations. Of the agent, only its memory is copied."""
+        return {"made": self._made, "snapshot": self.save() if self._ready else None, "obs": self.obs}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the copy, or go on from a snapshot and its observations."""
+        if "made" in state:
+            self.__init__(**state["made"])  # type: ignore[misc]
+        if state["snapshot"] is not None:
+            self.load(state["snapshot"])
+            self.obs = np.array(state["obs"], np.float32)
 
     def __len__(self) -> int:
         """Return the number of agents."""

@@ -388,7 +388,7 @@ class MarathonAgent:
             agents: number of agents that act side by side, a multiple of 16.
             threads: number of threads; 0 means one per processor core.
             callback: called after every iteration with a dictionary of its numbers, such as `steps` and `return_mean`;
-                if it returns a false value other than None, training ends.
+                if it returns False, training ends.
             checkpoint: a folder. If it holds the checkpoint of an earlier call, training goes on from there, with the
                 bits of a training that was never interrupted; at the end, after Ctrl-C too, it holds the newest.
             settings: the trainer's settings by name, such as `total_steps`, `seed`, `gamma` or `actor_hidden`.

@@ -5,7 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from marathon_envs import _spaces, _tasks, _window
+from marathon_envs import _snapshots, _spaces, _tasks, _window
 from marathon_envs._native import Renderer
 from marathon_envs._spaces import FloatArray
 from marathon_envs._tasks import Task
@@ -29,8 +29,13 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
     `(act_size,)`: for Marathon's own tasks, shares of the motors' strengths, clipped to [-1, 1].
 
     `info` has `reward_terms`, a dictionary of the numbers that add up to the reward; `x_position`, m, and `x_velocity`,
-    the mean velocity along +x during the step, m/s, if the agent can move along x; and what else the task reports.
-    Gymnasium's own tasks have the terms of the reward under Gymnasium's names, too.
+    the mean velocity along +x during the step, m/s, if the agent can move along x; `diverged`; and what else the task
+    reports. Gymnasium's own tasks have the terms of the reward under Gymnasium's names, too.
+
+    An action that is not finite, or a simulation that breaks down, ends the episode with reward 0 and an observation of
+    zeros; then `diverged` is True.
+
+    `copy.deepcopy` and `pickle` make an environment that goes on as this one does; `save` and `load` do it with bytes.
     """
 
     metadata: dict[str, Any] = _Metadata()  # type: ignore[assignment]
@@ -44,6 +49,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         isa: Any = None,
         width: int = 480,
         height: int = 480,
+        reward_terms: bool = True,
         **options: Any,
     ) -> None:
         """Make an environment.
@@ -58,6 +64,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             isa: instruction set, as in `VecEnv`.
             width: width of a picture, pixels.
             height: height of a picture, pixels.
+            reward_terms: whether `info` has the dictionary `reward_terms`. There are libraries that take no dictionary
+                within the infos.
             **options: arguments of the task, see `marathon_envs.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array", "human"]})
@@ -71,7 +79,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self.observation_space = _spaces.observation_space(self.task_spec)
         self.action_space = _spaces.action_space(self.task_spec)
         self._dtype = self.observation_space.dtype
-        self._terms = self.task_spec.reward_terms
+        self._terms, self._nested = self.task_spec.reward_terms, reward_terms
         self._info, self._add_x = _spaces.info_names(self.task_spec)
         self._flat = _spaces.is_gymnasiums(self.task_spec)
         self._task, self._size, self._options = task, (width, height), options
@@ -115,7 +123,11 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         terms = dict(zip(self._terms, env.reward_terms[0].tolist(), strict=True))
         if self._flat:
             info |= terms
-        info["reward_terms"] = terms
+        if self._nested:
+            info["reward_terms"] = terms
+        info["diverged"] = bool(env.diverged[0])
+        if info["diverged"]:
+            _spaces.warn_of_divergence(action)
         return obs[0].astype(self._dtype), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def _report(self, info: FloatArray) -> dict[str, Any]:
@@ -124,6 +136,27 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         if x is not None:
             report["x_position"] = float(x[0])
         return report
+
+    def save(self) -> bytes:
+        """Everything that the episodes to come depend on; of wrappers, such as time limits, nothing."""
+        if not self._seeded:
+            raise gymnasium.error.ResetNeeded("reset must be called before save")
+        return _snapshots.pack(self._env.save(), {"obs": self._env.obs})
+
+    def load(self, snapshot: bytes) -> FloatArray:
+        """Go on where an environment of the same task was saved; returns the observation to act upon."""
+        native, saved = _snapshots.unpack(snapshot, self.task_spec.id, {"obs": self._env.obs})
+        self._env.__setstate__({"snapshot": native, "obs": saved["obs"]})
+        self._seeded = True
+        # the camera jumps
+        self._seconds += 2.0
+        return saved["obs"][0].astype(self._dtype)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made of. A renderer is made anew, a window cannot be copied."""
+        if self._window is not None:
+            raise TypeError("an environment with a window cannot be copied or pickled, expected another render_mode")
+        return {**self.__dict__, "_renderer": None}
 
     def get_state(self) -> tuple[FloatArray, FloatArray]:
         """`qpos`, `(nq,)`, and `qvel`, `(nv,)`, in MuJoCo's layout, float64."""
@@ -148,7 +181,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         return self._renderer.render(self._env.get_state()[0], elapsed)
 
     def close(self) -> None:
-        """Close the window, if there is one."""
+        """Close the window, if there is one. Threads and memory go with the object: until then, it works on."""
         if self._window is not None:
             self._window.close()
             self._window = None

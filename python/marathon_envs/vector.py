@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from marathon_envs import _spaces, _tasks
+from marathon_envs import _snapshots, _spaces, _tasks
 from marathon_envs._native import Renderer
 from marathon_envs._spaces import BoolArray, FloatArray
 from marathon_envs._tasks import Task
@@ -26,8 +26,14 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     All three autoreset modes of Gymnasium work. With `SAME_STEP`, `infos["final_obs"]` and `infos["final_info"]` belong
     to the episodes that ended. With `DISABLED`, ended episodes are reset by `reset(options={"reset_mask": mask})`.
 
+    An action that is not finite, or a simulation that breaks down, ends the episode of its agent; `infos["diverged"]` says
+    which.
+
     A seed is for all agents together: agent `i` has random streams of its own, made of the seed and `i`. A list of
     seeds makes agent `i` live as a `MarathonEnv` with the seed `seeds[i]`.
+
+    `copy.deepcopy` and `pickle` make an environment that goes on as this one does; `save` and `load` do it with bytes.
+    `close` is Gymnasium's: threads and memory go with the object, which works on until then.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -49,6 +55,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         copy: bool = True,
         width: int = 480,
         height: int = 480,
+        reward_terms: bool = True,
         **options: Any,
     ) -> None:
         """Make an environment.
@@ -65,6 +72,8 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
                 overwritten by the next step: faster, for code that uses them up before.
             width: width of a picture, pixels.
             height: height of a picture, pixels.
+            reward_terms: whether `infos` have the dictionary `reward_terms`. There are libraries that take no dictionary
+                within the infos.
             **options: arguments of the task, see `marathon_envs.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, self.metadata)
@@ -97,7 +106,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         # names in infos, of the numbers and of the masks
         self._terms = [(name, f"_{name}") for name in self.task_spec.reward_terms]
         self._info = [(name, f"_{name}") for name in info]
-        self._flat = _spaces.is_gymnasiums(self.task_spec)
+        self._flat, self._nested = _spaces.is_gymnasiums(self.task_spec), reward_terms
         self._task, self._size, self._options = task, (width, height), options
         self._renderers: list[Renderer] | None = None
         # for the cameras: time of each agent, and of its last picture
@@ -150,6 +159,9 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             )
         obs, reward, terminated, truncated = env.step(actions)
         ended = self._ended = terminated | truncated
+        diverged = env.diverged if env.copy else env.diverged.copy()
+        if diverged.any():
+            _spaces.warn_of_divergence(actions)
         before, self._x = self._x, env.x_position if self._add_x else None
         if self.render_mode is not None:
             self._seconds += self.task_spec.dt
@@ -165,15 +177,15 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             # those that begin an episode in this step have not acted
             acted = ~begun if mode is AutoresetMode.NEXT_STEP else every
             infos = self._report(info, self._x, every)
-            self._add_step(infos, terms, distance, acted)
+            self._add_step(infos, terms, distance, diverged, acted)
             return self._observed(obs), rewards, terminated, truncated, infos
 
         # what is told of the agents whose episode ended belongs to the end, the rest to the next beginning
         last_x = None if before is None else _only(rows, before + distance)
         final = self._report(_only(rows, info) if self._info else info, last_x, ended)
-        self._add_step(final, _only(rows, terms), _only(rows, distance), ended)
+        self._add_step(final, _only(rows, terms), _only(rows, distance), diverged, ended)
         infos = self._report(env.read_info() if self._info else info, self._x, every)
-        self._add_step(infos, _without(rows, terms), _without(rows, distance), going_on)
+        self._add_step(infos, _without(rows, terms), _without(rows, distance), np.zeros_like(diverged), going_on)
         # None where there is none
         infos["final_obs"] = last_obs = np.empty(self.num_envs, dtype=object)
         for i, last in zip(rows.tolist(), env.final_obs.take(rows, 0).astype(self._dtype, copy=False), strict=True):
@@ -199,16 +211,40 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             infos["x_position"], infos["_x_position"] = x.copy(), mask
         return infos
 
-    def _add_step(self, infos: Infos, terms: FloatArray, distance: FloatArray, mask: BoolArray) -> None:
+    def _add_step(
+        self, infos: Infos, terms: FloatArray, distance: FloatArray, diverged: BoolArray, mask: BoolArray
+    ) -> None:
         """Add what a step tells of the agents in `mask`."""
         shares: Infos = {}
         for (name, which), numbers in zip(self._terms, terms.T, strict=True):
             shares[name], shares[which] = numbers, mask
         if self._flat:
             infos |= shares
-        infos["reward_terms"], infos["_reward_terms"] = shares, mask
+        if self._nested:
+            infos["reward_terms"], infos["_reward_terms"] = shares, mask
+        infos["diverged"], infos["_diverged"] = diverged, mask
         if self._x is not None:
             infos["x_velocity"], infos["_x_velocity"] = distance / self.task_spec.dt, mask
+
+    def save(self) -> bytes:
+        """Everything that the episodes to come depend on; of wrappers, nothing."""
+        if not self._seeded:
+            raise gymnasium.error.ResetNeeded("reset must be called before save")
+        return _snapshots.pack(self._env.save(), {"obs": self._env.obs, "ended": self._ended})
+
+    def load(self, snapshot: bytes) -> FloatArray:
+        """Go on where an environment of the same task and number of agents was saved; returns the observations."""
+        env = self._env
+        native, saved = _snapshots.unpack(snapshot, self.task_spec.id, {"obs": env.obs, "ended": self._ended})
+        env.__setstate__({"snapshot": native, "obs": saved["obs"]})
+        self._ended, self._seeded = saved["ended"], True
+        self._x = env.x_position if self._add_x else None
+        self._jump(np.ones(self.num_envs, np.bool_))
+        return self._observed(saved["obs"])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy is made of; renderers are made anew."""
+        return {**self.__dict__, "_renderers": None}
 
     def get_state(self) -> tuple[FloatArray, FloatArray]:
         """`qpos`, `(num_envs, nq)`, and `qvel`, `(num_envs, nv)`, in MuJoCo's layout, float64."""

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
 import marathon_envs
 
@@ -62,6 +63,51 @@ class TestStableBaselines3:
         assert model.num_timesteps == 1024 and len(model.ep_info_buffer) > 0
         assert env.render().shape == (4 * 24, 4 * 32, 3)
         SAC("MlpPolicy", Sb3VecEnv("hopper", 4), learning_starts=20, seed=1, device="cpu").learn(60)
+
+
+    def test_a_monitor_can_keep_what_a_task_reports(self) -> None:
+        from stable_baselines3.common.vec_env import VecMonitor  # noqa: PLC0415
+
+        from marathon_envs.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
+
+        for id, names in (("Hopper-v5", ("x_position", "z_distance_from_origin")), ("hopper", ("x_position",))):
+            native = Sb3VecEnv(id, 3, max_episode_steps=4)
+            env, ended = VecMonitor(native, info_keywords=names), 0
+            native.seed(1)
+            env.reset()
+            for _ in range(4):
+                x = native._env.get_state()[0][:, 0]
+                _, _, dones, infos = env.step(np.zeros((3, *env.action_space.shape), np.float32))
+                for i in np.flatnonzero(dones):
+                    ended += 1
+                    assert set(names) <= set(infos[i]["episode"])
+                    # of the state that the episode ended in, not of the next one's start
+                    assert abs(infos[i]["x_position"] - x[i]) < 0.1 and infos[i]["diverged"] is False
+            assert ended >= 3
+            assert [spec.id for spec in env.get_attr("spec")] == [f"marathon_envs/{native.task_spec.id}"] * 3
+
+
+class TestTorchRl:
+    """Without its own dependencies, which are heavy: what is asked for here does without."""
+
+    @pytest.mark.parametrize("id", ["Hopper-v0", "Hopper-v5", "Humanoid-v5"])
+    def test_it_makes_environments_by_name(self, id: str) -> None:
+        from torchrl.envs import GymEnv, check_env_specs  # noqa: PLC0415
+
+        env = GymEnv(f"marathon_envs/{id}")
+        check_env_specs(env)
+        assert env.rollout(5, break_when_any_done=False).shape == (5,)
+        assert GymEnv(f"marathon_envs/{id}", frame_skip=2).rollout(2).shape == (2,)
+
+    @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.DISABLED])
+    @pytest.mark.parametrize("id", ["Hopper-v0", "Hopper-v5"])
+    def test_it_wraps_many_agents(self, id: str, mode: AutoresetMode) -> None:
+        from torchrl.envs import GymWrapper  # noqa: PLC0415
+
+        made = {"num_envs": 4, "autoreset_mode": mode, "max_episode_steps": 6, "reward_terms": False}
+        env = GymWrapper(gymnasium.make_vec(f"marathon_envs/{id}", **made))
+        rollout = env.rollout(20, break_when_any_done=False)
+        assert rollout.shape == (4, 20) and rollout["next", "done"].sum() >= 12
 
 
 class TestPettingZoo:

@@ -1,7 +1,10 @@
 """Gymnasium's checks pass without warnings on every task, and many agents behave as Gymnasium's own vector environment
 of single ones does. (A warning is an error in all of these tests.)"""
 
+import copy
+import pickle
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -167,6 +170,113 @@ def test_gymnasiums_wrappers_work(mode: AutoresetMode) -> None:
         if "episode" in infos:
             lengths += infos["episode"]["l"][infos["_episode"]].tolist()
     assert len(lengths) >= 12 and max(lengths) == 20
+
+
+def test_an_episode_that_ends_by_nonsense_says_so() -> None:
+    nonsense = np.array([0.0, np.nan, 0.0, 0.0], np.float32)
+    env = gymnasium.make("marathon_envs/Hopper-v0")
+    env.reset(seed=1)
+    assert env.step(np.zeros(4, np.float32))[4]["diverged"] is False
+    with pytest.warns(UserWarning, match="an action is not finite"):
+        obs, reward, terminated, _, info = env.unwrapped.step(nonsense)
+    assert info["diverged"] is True and terminated and reward == 0 and not obs.any()
+    for mode in AutoresetMode:
+        envs = MarathonVectorEnv("hopper", 3, autoreset_mode=mode)
+        envs.reset(seed=1)
+        infos = envs.step(np.zeros((3, 4)))[4]
+        assert infos["diverged"].tolist() == [False] * 3 and infos["_diverged"].all()
+        with pytest.warns(UserWarning, match="an action is not finite"):
+            _, _, terminated, _, infos = envs.step(np.stack([np.zeros(4), nonsense, np.zeros(4)]))
+        assert terminated.tolist() == [False, True, False]
+        told = infos["final_info"] if mode is AutoresetMode.SAME_STEP else infos
+        assert told["diverged"].tolist() == [False, True, False] and told["_diverged"][1]
+        if mode is not AutoresetMode.DISABLED:
+            assert not envs.step(np.zeros((3, 4)))[4]["diverged"].any()
+
+
+def test_infos_without_dictionaries() -> None:
+    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, reward_terms=False, max_episode_steps=2)
+    env = gymnasium.make("marathon_envs/Hopper-v5", reward_terms=False)
+    assert "reward_terms" not in envs.reset(seed=1)[1] | env.reset(seed=1)[1]
+    for _ in range(3):
+        assert not any(isinstance(value, dict) for value in envs.step(np.zeros((2, 4)))[4].values())
+        info = env.step(np.zeros(3))[4]
+        assert not any(isinstance(value, dict) for value in info.values()) and "reward_forward" in info
+
+
+AGAIN = [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]  # noqa: S301
+
+
+class Worm(marathon_envs.MarathonAgent):
+    """A class in place of a name."""
+
+    mjcf = Path(__file__).parents[2] / "assets/agents/hopper.xml"
+
+    def observations(self) -> np.ndarray:
+        return np.concatenate([self.sim.qpos, self.sim.qvel], axis=1)
+
+    def step_reward(self) -> dict[str, np.ndarray]:
+        return {"speed": self.sim.qvel[:, 0]}
+
+
+@pytest.mark.parametrize("task", ["Hopper-v0", "Hopper-v5", Worm])
+def test_one_environment_goes_on_from_a_snapshot_or_as_a_copy(task) -> None:
+    env = MarathonEnv(task, render_mode="rgb_array", width=32, height=24, max_episode_steps=12)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset must be called before save"):
+        env.save()
+    env.reset(seed=3)
+    rng = np.random.default_rng(0)
+    given = rng.uniform(-0.3, 0.3, (30, *env.action_space.shape)).astype(np.float32)
+    for action in given[:5]:
+        obs = env.step(action)[0]
+    env.render()
+    snapshot = env.save()
+    others = [again(env) for again in AGAIN]
+    loaded = MarathonEnv(task, max_episode_steps=12)
+    assert np.array_equal(loaded.load(snapshot), obs) and loaded.save() == snapshot
+    others.append(loaded)
+    for action in given[5:]:
+        want = env.step(action)
+        for other in others:
+            got = other.step(action)
+            assert np.array_equal(got[0], want[0]) and got[1:] == want[1:]
+        if want[2] or want[3]:
+            assert np.array_equal(env.reset()[0], [other.reset()[0] for other in others][0])
+    assert np.array_equal(env.reset()[0], others[1].reset()[0])
+    with pytest.raises(ValueError, match="snapshot: it is damaged, or not one of"):
+        loaded.load(snapshot[: len(snapshot) // 2])
+    with pytest.raises(ValueError, match="snapshot"):
+        MarathonEnv("ant").load(snapshot)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("task", ["Ant-v1", "Hopper-v5", Worm])
+def test_many_agents_go_on_from_a_snapshot_or_as_a_copy(task, mode: AutoresetMode) -> None:
+    made = {"autoreset_mode": mode, "max_episode_steps": 7}
+    env = MarathonVectorEnv(task, 5, **made)
+    env.action_space.seed(1)
+    obs, _ = env.reset(seed=[5, 4, 3, 2, 1])
+    while not env._ended.any():
+        obs = env.step(env.action_space.sample() * 0.3)[0]
+    snapshot = env.save()
+    others = [again(env) for again in AGAIN]
+    others.append(MarathonVectorEnv(task, 5, **made))
+    assert np.array_equal(others[-1].load(snapshot), obs) and others[-1].save() == snapshot
+    for other in others:
+        if mode is AutoresetMode.DISABLED:
+            with pytest.raises(gymnasium.error.ResetNeeded):
+                other.step(env.action_space.sample())
+    for _ in range(20):
+        if env._ended.any() and mode is AutoresetMode.DISABLED:
+            begun = {"reset_mask": env._ended.copy()}
+            first = env.reset(options=begun)[0]
+            assert all(np.array_equal(other.reset(options=begun)[0], first) for other in others)
+        actions = env.action_space.sample() * 0.3
+        want = env.step(actions)
+        for other in others:
+            got = other.step(actions)
+            assert all(np.array_equal(x, y) for x, y in zip(got[:4], want[:4], strict=True))
+            assert same(got[4], want[4], np.ones(5, bool))
 
 
 def test_masks_of_resets_are_checked() -> None:

@@ -1,6 +1,9 @@
 """The native trainer from Python: the same bits as the command's, stopped by callbacks and Ctrl-C, resumed exactly."""
 
+import copy
 import os
+import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from arm import Arm
 
 import marathon_envs
 from marathon_envs import MarathonEnv, Policy, evaluate, load_policy, train
@@ -66,6 +70,49 @@ def test_configurations() -> None:
     wrong = {"behaviors": {"Hopper": {**CONFIG["behaviors"]["Hopper"], "time_horizn": 3}}}
     with pytest.raises(ValueError, match=r"config:\d+: behaviors.Hopper.time_horizn: .*time_horizon"):
         train("hopper", wrong)
+
+
+def test_what_is_wrong_is_said_in_pythons_terms(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="config is of type int, expected a path or a dictionary"):
+        train("hopper", 5)
+    with pytest.raises(ValueError, match="seed is -1, expected a whole number"):
+        train("hopper", seed=-1)
+    with pytest.raises(ValueError, match="threads is -2, expected a whole number"):
+        evaluate(load_policy(ROOT / "assets/policies/hopper.safetensors"), threads=-2)
+    folder = tmp_path / "run"
+    train("hopper", steps=4096, out=folder, **SMALL)
+    for wrong, message in [
+        (lambda: train("hopper", steps=4096, out=folder), f"out {folder} holds a run already .* by train(resume="),
+        (lambda: train(resume=folder), "the run is complete with 4,096 steps; .* such as steps 8,192"),
+        (lambda: train(resume=folder, steps=100), "steps is 100, but 4,096 steps are done"),
+        (lambda: train(resume=tmp_path), "resume"),
+    ]:
+        with pytest.raises((ValueError, OSError)) as raised:
+            wrong()
+        text = str(raised.value)
+        assert re.search(re.escape(message).replace(r"\.\*", ".*"), text) and "--" not in text and "`" not in text, text
+
+
+def test_policies_can_be_copied(obs: np.ndarray) -> None:
+    policy = load_policy(ROOT / "assets/policies/hopper.safetensors")
+    for other in (copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))):  # noqa: S301
+        assert np.array_equal(other(obs), policy(obs)) and other.meta == policy.meta
+
+
+@pytest.mark.parametrize("answer", [None, 0, True, "no", np.True_])
+def test_only_false_stops(answer: object, tmp_path: Path) -> None:
+    seen = []
+    result = train("hopper", steps=8192, callback=lambda row: seen.append(row) or answer, **SMALL)
+    assert len(seen) == 2 and not result.interrupted
+    seen.clear()
+    settings = {"agents": 16, "horizon": 16, "minibatches": 1, "epochs": 1, "total_steps": 512}
+    Arm.learn(tmp_path / "policy", **settings, callback=lambda row: seen.append(row) or answer)
+    assert len(seen) == 2
+    for no in (False, np.False_):
+        seen.clear()
+        assert train("hopper", steps=8192, callback=lambda row, no=no: seen.append(row) or no, **SMALL).interrupted
+        Arm.learn(tmp_path / "policy", **settings, callback=lambda row, no=no: seen.append(row) or no)
+        assert len(seen) == 2
 
 
 def test_what_is_wrong_is_said() -> None:
@@ -147,7 +194,7 @@ def test_policies_are_functions_of_arrays(tmp_path: Path, obs: np.ndarray) -> No
     policy.save(tmp_path / "copy.safetensors")
     assert np.array_equal(load_policy(tmp_path / "copy.safetensors")(obs), actions)
     for wrong in (obs[:, :30], obs[None], np.float32(1)):
-        with pytest.raises(ValueError, match=r"expected \[31\] or \[n, 31\]"):
+        with pytest.raises(ValueError, match=r"expected \(31,\) or \(n, 31\)"):
             policy(wrong)
 
 

@@ -1,5 +1,12 @@
 """The native vector environment: the same bits as Rust's, arrays that are not copied, no GIL while it steps."""
 
+import copy
+import inspect
+import os
+import pickle
+import re
+import select
+import signal
 import threading
 import time
 
@@ -188,13 +195,30 @@ def test_other_threads_run_while_it_steps() -> None:
         (lambda: VecEnv("hopper", autoreset="never"), "autoreset is 'never', expected one of"),
         (lambda: VecEnv("hopper", max_episode_steps=0), "max_episode_steps is 0, expected at least 1"),
         (lambda: VecEnv("hopper").step(np.zeros((1, 4))), "reset must be called before the first step"),
-        (lambda: ready().step(np.zeros((3, 4))), r"actions have the shape \[3, 4\], expected \[2, 4\]"),
-        (lambda: ready().reset(mask=[True]), "mask has 1 values, expected 2"),
+        (lambda: ready().step(np.zeros((3, 4))), r"actions have the shape \(3, 4\), expected \(2, 4\)"),
+        (lambda: ready().step(np.zeros(4)), r"actions have the shape \(4,\), expected \(2, 4\)"),
+        (lambda: ready().step([[0, 0, 0, 0], [0, 0]]), "inhomogeneous"),
+        (lambda: ready().reset(mask=[True]), r"mask has the shape \(1,\), expected \(2,\)"),
+        (lambda: ready().reset(mask=True), r"mask has the shape \(\), expected \(2,\)"),
+        (lambda: ready().reset(seed=-1), r"seed is -1, expected a whole number from 0 to 2\*\*64 - 1"),
+        (lambda: ready().reset(seed=[1, -2]), "seed is -2, expected a whole number"),
+        (lambda: VecEnv("hopper", -1), "num_envs is -1, expected a whole number"),
+        (lambda: VecEnv("hopper", threads=-1), "threads is -1, expected a whole number"),
+        (lambda: VecEnv("hopper", seed=2**64), f"seed is {2**64}, expected a whole number"),
+        (
+            lambda: VecEnv("Hopper-v5", reset_noise_scale=-1),
+            "option reset_noise_scale is -1, expected a finite number, 0 or more",
+        ),
+        (
+            lambda: VecEnv("Hopper-v5", healthy_z_range=(2, 1)),
+            r"option healthy_z_range is \(2, 1\), expected two numbers, the lower one first",
+        ),
         (lambda: ready().reset(seed=[1]), "seed has 1 numbers, expected 2"),
         (
             lambda: ready().set_state(np.zeros((2, 7)), np.zeros((2, 1))),
-            r"qvel has the shape \[2, 1\], expected \[2, 7\]",
+            r"qvel has the shape \(2, 1\), expected \(2, 7\)",
         ),
+        (lambda: ready().set_state(np.zeros(7), np.zeros(7)), r"qpos has the shape \(7,\), expected \(2, 7\)"),
         (lambda: ready().set_state(np.full((2, 7), np.nan), np.zeros((2, 7))), "the state of agent 0 is not finite"),
         (lambda: VecEnv("hopper", 2).reset(mask=[True, False]), "the first reset must be of all agents"),
     ],
@@ -202,6 +226,104 @@ def test_other_threads_run_while_it_steps() -> None:
 def test_errors_say_what_was_found_and_what_was_expected(wrong, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         wrong()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: ready().reset(seed="3"), "seed is of type str, expected a whole number"),
+        (lambda: ready().reset(seed=1.5), "seed is of type float, expected a whole number"),
+        (lambda: VecEnv("hopper", 2.0), "num_envs is of type float, expected a whole number"),
+        (
+            lambda: VecEnv("Hopper-v5", default_camera_config={}),
+            "unexpected keyword argument 'default_camera_config': agent 'Hopper-v5' takes no option",
+        ),
+        (
+            lambda: VecEnv("Hopper-v5", ctrl_cost_weight={}),
+            "option ctrl_cost_weight is of type dict, expected a number",
+        ),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_named(wrong, message: str) -> None:
+    with pytest.raises(TypeError, match=re.escape(message)):
+        wrong()
+
+
+def test_gymnasiums_names_work_too() -> None:
+    assert VecEnv("marathon_envs/Hopper-v0").spec.id == marathon_envs.spec("marathon_envs/Hopper-v0").id == "Hopper-v0"
+
+
+def test_a_damaged_snapshot_is_refused() -> None:
+    env = ready()
+    snapshot = bytearray(env.save())
+    for at in range(0, len(snapshot), 7):
+        snapshot[at] ^= 4
+        with pytest.raises(ValueError, match="snapshot"):
+            env.load(bytes(snapshot))
+        snapshot[at] ^= 4
+    env.load(bytes(snapshot))
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])  # noqa: S301
+def test_a_copy_goes_on_as_the_original_does(again, dtype: str) -> None:
+    made = {"threads": 2, "autoreset": "next_step", "max_episode_steps": 9, "dtype": dtype, "isa": "f32", "copy": True}
+    env = VecEnv("Hopper-v5", 18, seed=2, reset_noise_scale=0.1, **made)
+    fresh = again(env)
+    assert np.array_equal(fresh.reset(), env.reset())
+    for step in range(5):
+        env.step(actions(env, step))
+    other = again(env)
+    assert np.array_equal(other.obs, env.obs) and other.obs.dtype == dtype
+    assert other.spec.options == env.spec.options and other.spec.options["reset_noise_scale"] == 0.1
+    assert (other.threads, other.autoreset, other.spec.max_episode_steps, other.copy) == (2, "next_step", 9, True)
+    for step in range(5, 20):
+        for x, y in zip(env.step(actions(env, step)), other.step(actions(env, step)), strict=True):
+            assert np.array_equal(x, y)
+
+
+def test_facts_can_be_copied() -> None:
+    for facts in (VecEnv("Hopper-v5", max_episode_steps=7, frame_skip=2).spec, marathon_envs.spec("ant")):
+        for other in (copy.deepcopy(facts), pickle.loads(pickle.dumps(facts))):  # noqa: S301
+            names = [name for name in dir(facts) if not name.startswith("_")]
+            assert len(names) > 10 and all(getattr(other, name) == getattr(facts, name) for name in names)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_forked_process_steps_with_threads_of_its_own() -> None:
+    env = VecEnv("hopper", 64, threads=2)
+    env.reset(seed=1)
+    given = actions(env)
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.write(writer, env.step(given)[1].tobytes())
+        os._exit(0)
+    os.close(writer)
+    try:
+        # the threads of the parent are not there: a child that waits for them does so for ever
+        assert select.select([reader], [], [], 60)[0], "the child hangs"
+        rewards = np.frombuffer(os.read(reader, 1 << 16), np.float32)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(reader)
+    assert np.array_equal(rewards, env.step(given)[1]) and rewards.any()
+
+
+def test_everything_is_explained_in_pythons_terms() -> None:
+    explained = 0
+    for name in marathon_envs.__all__:
+        thing = getattr(marathon_envs, name)
+        members = [thing] if callable(thing) else []
+        if getattr(thing, "__module__", "") == "marathon_envs" and isinstance(thing, type):
+            members += [getattr(thing, member) for member in dir(thing) if not member.startswith("_")]
+        for member in members:
+            text = inspect.getdoc(member)
+            assert text, f"{name}: {member} has no documentation"
+            assert "](" not in text and "[`" not in text and "::" not in text, f"{name}: {text}"
+            explained += 1
+    assert explained > 100
 
 
 def ready() -> VecEnv:

@@ -3,8 +3,9 @@
 use crate::error;
 use marathon_envs::{EnvError, ObsNumber, Spec, StepMut, VecEnv};
 use numpy::{
-    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike1, PyArrayMethods, PyReadonlyArray2,
-    PyReadwriteArray, PyUntypedArrayMethods, ndarray::Dimension,
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike, PyArrayMethods, PyReadonlyArray2,
+    PyReadwriteArray, PyUntypedArrayMethods,
+    ndarray::{Dimension, Ix1},
 };
 use pyo3::prelude::*;
 use std::borrow::Cow;
@@ -206,11 +207,41 @@ pub fn rows<'a, T: Element + Copy>(array: &'a PyReadonlyArray2<'_, T>) -> Cow<'a
     }
 }
 
-/// A mask of `n` agents as a list; all agents without one.
-pub fn mask(mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>, n: usize) -> PyResult<Vec<bool>> {
-    let Some(mask) = mask else { return Ok(vec![true; n]) };
-    if mask.len() != n {
-        return Err(error::value(format!("mask has {} values, expected {n}", mask.len())));
+/// What `value` is as an array of this shape; `name` with its verb is for the error if it is none.
+pub fn of_shape<'py, T, D, const N: usize>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    expected: [usize; N],
+) -> PyResult<PyArrayLike<'py, T, D, AllowTypeChange>>
+where
+    T: Element + 'py,
+    D: Dimension + 'py,
+    Vec<T>: for<'a> FromPyObject<'a, 'py>,
+{
+    match value.extract::<PyArrayLike<'py, T, D, AllowTypeChange>>() {
+        Ok(array) if array.shape() == expected => Ok(array),
+        other => {
+            // what is no array at all has no shape either, and an error of NumPy's own
+            let found: Vec<usize> = value.py().import("numpy")?.call_method1("shape", (value,))?.extract()?;
+            if found == expected {
+                return other;
+            }
+            Err(error::value(format!("{name} the shape {}, expected {}", tuple(&found), tuple(&expected))))
+        }
     }
+}
+
+/// A shape as Python writes it.
+pub fn tuple(shape: &[usize]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// A mask of `n` agents as a list; all agents without one.
+pub fn mask(mask: Option<&Bound<'_, PyAny>>, n: usize) -> PyResult<Vec<bool>> {
+    let Some(mask) = mask else { return Ok(vec![true; n]) };
+    let mask = of_shape::<bool, Ix1, 1>("mask has", mask, [n])?;
     Ok(mask.as_array().to_vec())
 }

@@ -117,6 +117,11 @@ pub fn run<R: Send>(py: Python<'_>, crowd: Option<&Lockstep>, f: impl FnOnce() -
     })
 }
 
+/// Whether training goes on after a callback's answer. Only False stops it: a callback may return nothing, or a number.
+pub fn goes_on(answer: &Bound<'_, PyAny>) -> bool {
+    answer.extract::<bool>().unwrap_or(true)
+}
+
 /// Trains a policy for a Python object with the interface of `VecEnv` and writes it to a file.
 ///
 /// `config` is the JSON of the trainer's settings; their number of agents is that of the environment. `callback` is called
@@ -143,8 +148,7 @@ pub fn learn(
         let go_on = Python::attach(|py| -> PyResult<bool> {
             py.check_signals()?;
             let Some(callback) = &callback else { return Ok(true) };
-            let answer = callback.bind(py).call1((dictionary(py, stats)?,))?;
-            Ok(answer.is_none() || answer.is_truthy()?)
+            Ok(goes_on(&callback.bind(py).call1((dictionary(py, stats)?,))?))
         });
         match go_on {
             Ok(true) => Control::Continue,

@@ -8,6 +8,7 @@ mod arrays;
 mod crowd;
 mod error;
 mod model;
+mod number;
 mod options;
 mod players;
 mod policy;
@@ -26,9 +27,9 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        crowd::learn, main, model::Model, players::Player, policy::Policy, policy::evaluate, policy::load_policy,
-        renderer::Renderer, simulation::Simulation, spec::Spec, spec::ids, spec::spec, train::TrainResult,
-        train::train, vec_env::VecEnv,
+        crowd::learn, main, model::Model, players::Player, policy::_policy, policy::Policy, policy::evaluate,
+        policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec, spec::Spec, spec::ids,
+        spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
     };
     use pyo3::prelude::*;
 

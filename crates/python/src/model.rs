@@ -35,6 +35,7 @@ impl Model {
         Self::of(py.detach(|| marathon_physics::Model::from_xml_str(xml, name)))
     }
 
+    /// Name of the model.
     #[getter]
     fn name(&self) -> &str {
         &self.inner.name
@@ -64,31 +65,37 @@ impl Model {
         self.inner.nu
     }
 
+    /// Names of the bodies, the first being the world.
     #[getter]
     fn body_names(&self) -> Vec<&str> {
         self.inner.bodies.iter().map(|x| x.name.as_str()).collect()
     }
 
+    /// Names of the geoms.
     #[getter]
     fn geom_names(&self) -> Vec<&str> {
         self.inner.geoms.iter().map(|x| x.name.as_str()).collect()
     }
 
+    /// Names of the joints.
     #[getter]
     fn joint_names(&self) -> Vec<&str> {
         self.inner.joints.iter().map(|x| x.name.as_str()).collect()
     }
 
+    /// Names of the actuators.
     #[getter]
     fn actuator_names(&self) -> Vec<&str> {
         self.inner.actuators.iter().map(|x| x.name.as_str()).collect()
     }
 
+    /// Names of the sensors.
     #[getter]
     fn sensor_names(&self) -> Vec<&str> {
         self.inner.sensors.iter().map(|x| x.name.as_str()).collect()
     }
 
+    /// Names of the keyframes.
     #[getter]
     fn keyframe_names(&self) -> Vec<&str> {
         self.inner.keyframes.iter().map(|x| x.name.as_str()).collect()

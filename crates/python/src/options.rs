@@ -1,7 +1,9 @@
 //! Arguments of agents as keyword arguments.
 
-use marathon_envs::Options;
+use crate::error;
 use marathon_envs::options::Value;
+use marathon_envs::{EnvError, Options, registry};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -21,18 +23,32 @@ enum Given {
     Path(PathBuf),
 }
 
-/// Arguments by name.
-pub fn read(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
+/// Arguments of a task by name.
+pub fn read(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
     let mut options = Options::new();
     for (name, value) in given.into_iter().flatten() {
-        let value = match value.extract::<Given>()? {
-            Given::Bool(x) => Value::Bool(x),
-            Given::Number(x) => Value::Number(x),
-            Given::Pair(x) => Value::Pair(x),
-            Given::Text(x) => Value::Text(x),
-            Given::Path(x) => Value::Text(x.display().to_string()),
+        let name: String = name.extract()?;
+        let value = match value.extract::<Given>() {
+            Ok(Given::Bool(x)) => Value::Bool(x),
+            Ok(Given::Number(x)) => Value::Number(x),
+            Ok(Given::Pair(x)) => Value::Pair(x),
+            Ok(Given::Text(x)) => Value::Text(x),
+            Ok(Given::Path(x)) => Value::Text(x.display().to_string()),
+            Err(_) => {
+                // whether there is such an argument comes first
+                let tried = registry::global().agent_with(task, &Options::new().with(&name, false));
+                let expected = match tried.map(|_| ()) {
+                    Err(EnvError::OptionValue { expected, .. }) => expected,
+                    Err(error) => return Err(error::env(error)),
+                    Ok(()) => "true or false",
+                };
+                let found = value.get_type().name()?;
+                return Err(PyTypeError::new_err(format!(
+                    "agent '{task}': option {name} is of type {found}, expected {expected}"
+                )));
+            }
         };
-        options.set(&name.extract::<String>()?, value);
+        options.set(&name, value);
     }
     Ok(options)
 }

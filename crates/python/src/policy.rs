@@ -1,14 +1,15 @@
 //! Policies as functions of NumPy arrays.
 
+use crate::arrays::tuple;
 use crate::task::{self, Task};
-use crate::{crowd, error};
+use crate::{crowd, error, number};
 use marathon_cli::session;
 use marathon_envs::{BLOCK, registry};
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
 /// Most agents that play side by side.
@@ -64,7 +65,8 @@ impl Policy {
         let mut shape = obs.shape().to_vec();
         if !(1..=2).contains(&shape.len()) || shape.last() != Some(&meta.obs) {
             let n = meta.obs;
-            return Err(error::value(format!("observations have the shape {shape:?}, expected [{n}] or [n, {n}]")));
+            let found = tuple(&shape);
+            return Err(error::value(format!("observations have the shape {found}, expected ({n},) or (n, {n})")));
         }
         *shape.last_mut().expect("there are one or two") = meta.act;
         let mut action = vec![0.0_f32; shape.iter().product()];
@@ -79,10 +81,22 @@ impl Policy {
         session::save_policy(&self.0, &path).map_err(error::cli)
     }
 
+    /// For `copy` and `pickle`: the bytes of a file.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let make = py.import("marathon_envs._native")?.getattr("_policy")?;
+        Ok((make, (PyBytes::new(py, &self.0.to_bytes()),)))
+    }
+
     fn __repr__(&self) -> String {
         let meta = self.0.meta();
         format!("Policy({:?}, obs_size={}, act_size={}, hidden={:?})", meta.agent, meta.obs, meta.act, meta.hidden)
     }
+}
+
+/// A policy from the bytes of a file.
+#[pyfunction]
+pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
+    marathon_learn::Policy::from_bytes("policy".as_ref(), bytes).map(Policy).map_err(error::learn)
 }
 
 /// Reads a policy from a file, `.safetensors` or `.onnx`, or from the folder of a run. Without `task`, it is for the one that
@@ -103,10 +117,10 @@ pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResul
 pub fn evaluate<'py>(
     py: Python<'py>,
     policy: &Policy,
-    episodes: usize,
+    #[pyo3(from_py_with = number::episodes)] episodes: usize,
     task: Option<Task>,
-    seed: u64,
-    threads: usize,
+    #[pyo3(from_py_with = number::seed)] seed: u64,
+    #[pyo3(from_py_with = number::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let options = EvalOptions { episodes, seed, threads };
     let result = match &task {
@@ -116,7 +130,7 @@ pub fn evaluate<'py>(
             crowd::run(py, Some(&crowd), || play(&crowd, Isa::best(), &policy.0, &options))?
         }
         other => {
-            let name = if let Some(Task::Name(name)) = other { name } else { policy.task() };
+            let name = if let Some(Task::Name(name)) = other { task::plain(name) } else { policy.task() };
             let factory = registry::factory(name, Isa::best()).map_err(error::env)?;
             py.detach(|| play(&*factory, Isa::best(), &policy.0, &options))
         }

@@ -1,7 +1,7 @@
 //! Pictures of agents as arrays.
 
 use crate::model::Model;
-use crate::{error, options};
+use crate::{error, options, task};
 use marathon_envs::registry;
 use marathon_render::{Follow, Scene};
 use numpy::{AllowTypeChange, PyArray1, PyArray3, PyArrayLike2, PyArrayMethods};
@@ -27,7 +27,8 @@ impl Renderer {
         agents: usize,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let options = options::read(options)?;
+        let id = task::plain(id);
+        let options = options::read(id, options)?;
         let agent = registry::global().agent_with(id, &options).map_err(error::env)?;
         Self::with(&agent.model().map_err(error::env)?, width, height, agents)
     }

@@ -1,10 +1,11 @@
 //! The bare physics of many agents as a Python object: controls in, readings out, no task.
 
-use crate::arrays::{mask, rows};
-use crate::error;
+use crate::arrays::{mask, of_shape, rows};
 use crate::model::Model;
+use crate::{error, number};
 use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity};
-use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::ndarray::Ix2;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::basic::CompareOp;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -42,7 +43,13 @@ pub struct Simulation {
 impl Simulation {
     #[new]
     #[pyo3(signature = (model, num_agents = 1, *, threads = 0, isa = None))]
-    fn new(py: Python<'_>, model: Py<Model>, num_agents: usize, threads: usize, isa: Option<&str>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        model: Py<Model>,
+        #[pyo3(from_py_with = number::num_agents)] num_agents: usize,
+        #[pyo3(from_py_with = number::threads)] threads: usize,
+        isa: Option<&str>,
+    ) -> PyResult<Self> {
         if num_agents == 0 {
             return Err(error::value("num_agents is 0, expected at least 1"));
         }
@@ -59,6 +66,7 @@ impl Simulation {
         Ok(Simulation { batch: Mutex::new(batch), model, num_agents, threads, read: Vec::new() })
     }
 
+    /// The model.
     #[getter]
     fn model(&self, py: Python<'_>) -> Py<Model> {
         self.model.clone_ref(py)
@@ -84,16 +92,13 @@ impl Simulation {
     fn step<'py>(
         &mut self,
         py: Python<'py>,
-        ctrl: PyArrayLike2<'_, f64, AllowTypeChange>,
-        substeps: usize,
+        ctrl: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = number::substeps)] substeps: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         if substeps == 0 {
             return Err(error::value("substeps is 0, expected at least 1"));
         }
-        let expected = [self.num_agents, self.model.get().inner.nu];
-        if ctrl.shape() != expected {
-            return Err(error::value(format!("ctrl has the shape {:?}, expected {expected:?}", ctrl.shape())));
-        }
+        let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [self.num_agents, self.model.get().inner.nu])?;
         self.read.clear();
         let (ctrl, n) = (rows(&ctrl), self.num_agents);
         let batch = self.batch();
@@ -110,18 +115,14 @@ impl Simulation {
     #[pyo3(signature = (qpos, qvel, mask = None))]
     fn reset(
         &mut self,
-        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
-        qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
-        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+        qpos: &Bound<'_, PyAny>,
+        qvel: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let mask = self::mask(mask, self.num_agents)?;
         let model = &self.model.get().inner;
-        for (name, array, columns) in [("qpos", &qpos, model.nq), ("qvel", &qvel, model.nv)] {
-            let expected = [self.num_agents, columns];
-            if array.shape() != expected {
-                return Err(error::value(format!("{name} has the shape {:?}, expected {expected:?}", array.shape())));
-            }
-        }
+        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [self.num_agents, model.nq])?;
+        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [self.num_agents, model.nv])?;
         let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
         let chosen = || (0..mask.len()).filter(|i| mask[*i]);
         if let Some(i) = chosen().find(|i| !qpos.row(*i).iter().chain(qvel.row(*i)).all(|x| x.is_finite())) {
@@ -160,7 +161,7 @@ impl Simulation {
         Ok(PyBytes::new(py, &json.map_err(|e| error::value(e.to_string()))?))
     }
 
-    /// Restores what [`save`](Simulation::save) returned for the same model and number of agents.
+    /// Restores what `save` returned for the same model and number of agents.
     fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
         let states: Vec<AgentState> =
             serde_json::from_slice(snapshot).map_err(|e| error::value(format!("snapshot: {e}")))?;

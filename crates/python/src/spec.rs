@@ -1,6 +1,6 @@
 //! Facts of a task.
 
-use crate::{error, options};
+use crate::{error, options, task};
 use marathon_envs::{Options, registry};
 use marathon_physics::lanes::Isa;
 use pyo3::prelude::*;
@@ -63,12 +63,27 @@ impl Spec {
         options::show(py, &self.options)
     }
 
+    /// For `copy` and `pickle`: what the facts follow from.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Arguments<'py>)> {
+        let make = py.import("marathon_envs._native")?.getattr("_spec")?;
+        Ok((make, (self.id.clone(), options::show(py, &self.options)?, self.max_episode_steps)))
+    }
+
     fn __repr__(&self) -> String {
         let Spec { id, obs_size, act_size, dt, max_episode_steps, .. } = self;
         format!(
             "Spec(id={id:?}, obs_size={obs_size}, act_size={act_size}, dt={dt}, max_episode_steps={max_episode_steps})"
         )
     }
+}
+
+/// Name, arguments and limit of a task.
+type Arguments<'py> = (String, Bound<'py, PyDict>, usize);
+
+/// Facts of a task with a limit of its own.
+#[pyfunction]
+pub fn _spec(id: &str, options: &Bound<'_, PyDict>, max_episode_steps: usize) -> PyResult<Spec> {
+    Ok(Spec { max_episode_steps, ..spec(id, Some(options))? })
 }
 
 /// Names of all registered tasks.
@@ -81,7 +96,8 @@ pub fn ids() -> Vec<String> {
 #[pyfunction]
 #[pyo3(signature = (id, /, **options))]
 pub fn spec(id: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
-    let options = options::read(options)?;
+    let id = task::plain(id);
+    let options = options::read(id, options)?;
     Spec::of(registry::factory_with(id, &options, Isa::F32).map_err(error::env)?.spec())
 }
 

@@ -20,6 +20,14 @@ pub enum Task {
     Agent(Py<PyAny>),
 }
 
+/// Gymnasium's namespace of the tasks, which may stand before a name.
+const NAMESPACE: &str = "marathon_envs/";
+
+/// A task's name, without Gymnasium's namespace.
+pub fn plain(name: &str) -> &str {
+    name.strip_prefix(NAMESPACE).unwrap_or(name)
+}
+
 /// What became of an agent that a run was begun with.
 #[derive(Default)]
 pub struct Made {
@@ -32,7 +40,7 @@ impl Task {
     /// Facts of the task.
     pub fn spec(&self, py: Python<'_>) -> PyResult<Spec> {
         match self {
-            Task::Name(name) => Ok(registry::factory(name, Isa::best()).map_err(error::env)?.spec().clone()),
+            Task::Name(name) => Ok(registry::factory(plain(name), Isa::best()).map_err(error::env)?.spec().clone()),
             Task::Agent(agent) => crowd::spec(&vec_env(agent.bind(py), 1, 1)?),
         }
     }
@@ -40,7 +48,7 @@ impl Task {
     /// The task of a run; `made` learns of a crowd that is made for it.
     pub fn of_run<'a>(&'a self, py: Python<'a>, threads: usize, made: &'a mut Made) -> PyResult<session::Task<'a>> {
         let agent = match self {
-            Task::Name(name) => return session::Task::named(name).map_err(error::cli),
+            Task::Name(name) => return session::Task::named(plain(name)).map_err(error::cli),
             Task::Agent(agent) => agent.bind(py),
         };
         check(agent)?;

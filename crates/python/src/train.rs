@@ -3,24 +3,34 @@
 use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use crate::task::{Made, Task};
-use crate::{crowd, error};
+use crate::{crowd, error, number};
 use marathon_cli::session::{self, Session, TrainArgs};
 use marathon_learn::{Control, Players};
-use pyo3::exceptions::PyUserWarning;
+use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 /// Where the configuration comes from.
-#[derive(FromPyObject)]
 pub enum Config {
     /// A file.
-    #[pyo3(transparent)]
     Path(PathBuf),
     /// A dictionary in the schema of the files.
-    #[pyo3(transparent)]
     Table(Py<PyDict>),
+}
+
+fn config(value: &Bound<'_, PyAny>) -> PyResult<Option<Config>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    if let Ok(table) = value.cast::<PyDict>() {
+        return Ok(Some(Config::Table(table.clone().unbind())));
+    }
+    value.extract().map(|path| Some(Config::Path(path))).map_err(|_| match value.get_type().name() {
+        Ok(found) => PyTypeError::new_err(format!("config is of type {found}, expected a path or a dictionary")),
+        Err(error) => error,
+    })
 }
 
 /// What a run has led to.
@@ -81,12 +91,12 @@ impl TrainResult {
 pub fn train(
     py: Python<'_>,
     task: Option<Task>,
-    config: Option<Config>,
+    #[pyo3(from_py_with = self::config)] config: Option<Config>,
     callback: Option<Py<PyAny>>,
-    seed: Option<u64>,
-    steps: Option<u64>,
-    agents: Option<usize>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = number::seed)] seed: Option<u64>,
+    #[pyo3(from_py_with = number::steps)] steps: Option<u64>,
+    #[pyo3(from_py_with = number::agents)] agents: Option<usize>,
+    #[pyo3(from_py_with = number::threads)] threads: Option<usize>,
     out: Option<PathBuf>,
     resume: Option<PathBuf>,
     players: Option<Py<PyAny>>,
@@ -147,9 +157,7 @@ pub fn train(
                 for (name, value) in session::metrics(stats, rate, &terms) {
                     metrics.set_item(name, value)?;
                 }
-                let answer = callback.bind(py).call1((metrics,))?;
-                // only False stops: a callback that returns nothing goes on
-                Ok(answer.extract::<bool>().unwrap_or(true))
+                Ok(crowd::goes_on(&callback.bind(py).call1((metrics,))?))
             };
             match Python::attach(ask) {
                 Ok(true) => Control::Continue,

@@ -1,11 +1,13 @@
 //! Many agents of one kind as a Python object.
 
-use crate::arrays::{Arrays, ObsMut, mask, rows};
+use crate::arrays::{Arrays, ObsMut, mask, of_shape, rows};
+use crate::number::{self, Seeds};
 use crate::spec::Spec;
-use crate::{error, options};
+use crate::{error, options, task};
 use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
 use marathon_physics::lanes::Isa;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::ndarray::Ix2;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::sync::Mutex;
@@ -32,15 +34,14 @@ pub struct VecEnv {
     autoreset: Autoreset,
     copy: bool,
     ready: bool,
+    made: Made,
 }
 
-/// Seeds of a reset.
-#[derive(FromPyObject)]
-enum Seeds {
-    #[pyo3(transparent)]
-    One(u64),
-    #[pyo3(transparent)]
-    Each(Vec<Option<u64>>),
+/// Arguments that an environment was made with, as far as it does not tell them.
+struct Made {
+    seed: u64,
+    threads: usize,
+    isa: Option<Isa>,
 }
 
 #[pymethods]
@@ -54,12 +55,12 @@ impl VecEnv {
     fn new(
         py: Python<'_>,
         id: &str,
-        num_envs: usize,
-        seed: u64,
-        threads: usize,
+        #[pyo3(from_py_with = number::num_envs)] num_envs: usize,
+        #[pyo3(from_py_with = number::seed)] seed: u64,
+        #[pyo3(from_py_with = number::threads)] threads: usize,
         isa: Option<&str>,
         autoreset: &str,
-        max_episode_steps: Option<usize>,
+        #[pyo3(from_py_with = number::max_episode_steps)] max_episode_steps: Option<usize>,
         copy: bool,
         dtype: &str,
         options: Option<&Bound<'_, PyDict>>,
@@ -67,13 +68,14 @@ impl VecEnv {
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
         let autoreset = parse_autoreset(autoreset)?;
         let double = parse_dtype(dtype)?;
-        let agents = num_envs;
-        let options = options::read(options)?;
+        let (agents, made) = (num_envs, Made { seed, threads, isa });
+        let id = task::plain(id);
+        let options = options::read(id, options)?;
         let options = VecEnvOptions { agents, seed, threads, isa, autoreset, max_episode_steps, options };
         let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
         let arrays = Arrays::new(py, num_envs, env.spec(), double);
         let spec = Py::new(py, Spec::of(env.spec())?)?;
-        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false })
+        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made })
     }
 
     /// Facts of the task, with this environment's `max_episode_steps`.
@@ -173,8 +175,8 @@ impl VecEnv {
     fn reset(
         &mut self,
         py: Python<'_>,
-        seed: Option<Seeds>,
-        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+        #[pyo3(from_py_with = number::seeds)] seed: Option<Seeds>,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Py<PyAny>> {
         let mask = self::mask(mask, self.num_envs)?;
         if !self.ready && mask.contains(&false) {
@@ -209,14 +211,11 @@ impl VecEnv {
     ///
     /// Returns `(obs, reward, terminated, truncated)`, of shapes `(num_envs, obs_size)` and three times `(num_envs,)`;
     /// more is in `final_obs`, `reward_terms`, `forward` and `diverged`. A C-contiguous float32 array is read in place.
-    fn step(&mut self, py: Python<'_>, actions: PyArrayLike2<'_, f32, AllowTypeChange>) -> PyResult<StepResult> {
+    fn step(&mut self, py: Python<'_>, actions: &Bound<'_, PyAny>) -> PyResult<StepResult> {
         if !self.ready {
             return Err(error::value("reset must be called before the first step"));
         }
-        let expected = [self.num_envs, self.spec.get().act_size];
-        if actions.shape() != expected {
-            return Err(error::value(format!("actions have the shape {:?}, expected {expected:?}", actions.shape())));
-        }
+        let actions = of_shape::<f32, Ix2, 2>("actions have", actions, [self.num_envs, self.spec.get().act_size])?;
         if self.copy {
             let env = self.env.get_mut().expect("no thread panics with the lock");
             self.arrays.renew(py, self.num_envs, env.spec());
@@ -242,24 +241,20 @@ impl VecEnv {
         Ok((array(qpos, spec.get().nq)?, array(qvel, spec.get().nv)?))
     }
 
-    /// Puts agents, all or those of a mask, into states as [`get_state`](VecEnv::get_state) returns them, as if their
+    /// Puts agents, all or those of a mask, into states as `get_state` returns them, as if their
     /// episodes had begun there. Returns the observations, `(num_envs, obs_size)`.
     #[pyo3(signature = (qpos, qvel, mask = None))]
     fn set_state(
         &mut self,
         py: Python<'_>,
-        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
-        qvel: PyArrayLike2<'_, f64, AllowTypeChange>,
-        mask: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
+        qpos: &Bound<'_, PyAny>,
+        qvel: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Py<PyAny>> {
         let mask = self::mask(mask, self.num_envs)?;
         let spec = self.spec.get();
-        for (name, array, columns) in [("qpos", &qpos, spec.nq), ("qvel", &qvel, spec.nv)] {
-            if array.shape() != [self.num_envs, columns] {
-                let expected = [self.num_envs, columns];
-                return Err(error::value(format!("{name} has the shape {:?}, expected {expected:?}", array.shape())));
-            }
-        }
+        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [self.num_envs, spec.nq])?;
+        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [self.num_envs, spec.nv])?;
         let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
         if let Some(i) = (0..self.num_envs).find(|i| mask[*i] && !all_finite([qpos.row(*i), qvel.row(*i)])) {
             return Err(error::value(format!("the state of agent {i} is not finite")));
@@ -281,11 +276,50 @@ impl VecEnv {
         PyBytes::new(py, &self.env().save())
     }
 
-    /// Restores what [`save`](VecEnv::save) returned for the same task and number of agents. Observations are those of
+    /// Restores what `save` returned for the same task and number of agents. Observations are those of
     /// the next step.
     fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
         self.env().load(snapshot).map_err(error::env)?;
         self.ready = true;
+        Ok(())
+    }
+
+    /// For `copy` and `pickle`: the arguments.
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((String, usize), Bound<'py, PyDict>)> {
+        let (spec, Made { seed, threads, isa }) = (self.spec.get(), &self.made);
+        let keywords = options::show(py, &spec.options)?;
+        keywords.set_item("seed", seed)?;
+        keywords.set_item("threads", threads)?;
+        keywords.set_item("isa", isa.map(Isa::name))?;
+        keywords.set_item("autoreset", self.autoreset())?;
+        keywords.set_item("max_episode_steps", spec.max_episode_steps)?;
+        keywords.set_item("copy", self.copy)?;
+        keywords.set_item("dtype", self.dtype())?;
+        Ok(((spec.id.clone(), self.num_envs), keywords))
+    }
+
+    /// For `copy` and `pickle`: a snapshot, unless nothing has begun, and the observations.
+    fn __getstate__<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let state = PyDict::new(py);
+        let snapshot = if self.ready { Some(self.save(py)) } else { None };
+        state.set_item("snapshot", snapshot)?;
+        state.set_item("obs", self.obs(py).call_method0(py, "copy")?)?;
+        Ok(state)
+    }
+
+    /// Goes on from a snapshot and its observations.
+    fn __setstate__(&mut self, py: Python<'_>, state: &Bound<'_, PyDict>) -> PyResult<()> {
+        let part = |name| state.get_item(name)?.ok_or_else(|| error::value(format!("the state has no {name}")));
+        let (snapshot, obs) = (part("snapshot")?, part("obs")?);
+        if !snapshot.is_none() {
+            let obs = of_shape::<f64, Ix2, 2>("obs has", &obs, [self.num_envs, self.spec.get().obs_size])?;
+            self.load(snapshot.cast::<PyBytes>()?.as_bytes())?;
+            let obs = rows(&obs).into_owned();
+            self.arrays.write_obs(py, self.copy, |to| match to {
+                ObsMut::Single(to) => to.iter_mut().zip(&obs).for_each(|(to, x)| *to = *x as f32),
+                ObsMut::Double(to) => to.copy_from_slice(&obs),
+            })?;
+        }
         Ok(())
     }
 

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from marathon_envs import _native, _spaces, _tasks
 from marathon_envs._spaces import FloatArray
 from marathon_envs._tasks import Task
+from marathon_envs.registration import NAMESPACE
 
 
 class Sb3VecEnv(VecEnv):
@@ -18,8 +19,9 @@ class Sb3VecEnv(VecEnv):
 
         model = PPO("MlpPolicy", VecMonitor(Sb3VecEnv("Hopper-v0", num_envs=64)))
 
-    The infos of agents whose episode ended have `terminal_observation` and `TimeLimit.truncated`; the others are empty,
-    because a dictionary per agent and step costs more than the physics.
+    The infos of agents whose episode ended have `terminal_observation`, `TimeLimit.truncated`, and what `MarathonEnv`
+    reports, such as `x_position`; the others are empty, because a dictionary per agent and step costs more than the
+    physics.
     """
 
     def __init__(
@@ -48,6 +50,9 @@ class Sb3VecEnv(VecEnv):
             **options,
         )
         self.task_spec = self._env.spec
+        self.spec = gymnasium.registry.get(f"{NAMESPACE}/{self.task_spec.id}") if isinstance(task, str) else None
+        self._info, self._add_x = _spaces.info_names(self.task_spec)
+        self._x: FloatArray | None = None
         self.render_mode = render_mode
         self._renderers: list[_native.Renderer] | None = None
         self._task, self._size, self._options_of_task = task, (width, height), options
@@ -61,6 +66,7 @@ class Sb3VecEnv(VecEnv):
     def reset(self) -> VecEnvObs:
         """Start episodes of all agents; agent `i` has the seed `seed + i` of the last call of `seed`."""
         obs = self._env.reset(None if None in self._seeds else [_spaces.native_seed(s) for s in self._seeds])
+        self._x = self._env.x_position if self._add_x else None
         self._reset_seeds()
         self._reset_options()
         return self._observed(obs)
@@ -73,13 +79,23 @@ class Sb3VecEnv(VecEnv):
         """Make the decisions."""
         if self._actions is None:
             raise RuntimeError("step_wait() is called without step_async()")
-        obs, reward, terminated, truncated = self._env.step(self._actions)
-        self._actions = None
+        env = self._env
+        obs, reward, terminated, truncated = env.step(self._actions)
         dones = terminated | truncated
+        if env.diverged.any():
+            _spaces.warn_of_divergence(self._actions)
+        before, self._x = self._x, env.x_position if self._add_x else None
+        self._actions = None
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(dones):
-            infos[i]["terminal_observation"] = self._env.final_obs[i].astype(self._dtype)
-            infos[i]["TimeLimit.truncated"] = bool(truncated[i])
+            info = infos[i] = dict(zip(self._info, env.info[i].tolist(), strict=True))
+            if before is not None:
+                distance = float(env.forward[i])
+                info["x_position"], info["x_velocity"] = float(before[i]) + distance, distance / self.task_spec.dt
+            info["reward_terms"] = dict(zip(self.task_spec.reward_terms, env.reward_terms[i].tolist(), strict=True))
+            info["diverged"] = bool(env.diverged[i])
+            info["terminal_observation"] = env.final_obs[i].astype(self._dtype)
+            info["TimeLimit.truncated"] = bool(truncated[i])
         return self._observed(obs), reward, dones, infos
 
     def _observed(self, obs: FloatArray) -> FloatArray:

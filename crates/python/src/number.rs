@@ -1,0 +1,74 @@
+//! Whole numbers as arguments: those that cannot be are refused with their names.
+
+use crate::error;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyInt;
+
+/// A number that an argument can be.
+pub trait Whole: Sized {
+    fn read(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
+}
+
+impl Whole for u64 {
+    fn read(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match value.extract() {
+            Ok(number) => Ok(number),
+            Err(_) if value.is_instance_of::<PyInt>() || value.hasattr("__index__")? => {
+                Err(error::value(format!("{name} is {}, expected a whole number from 0 to 2**64 - 1", value.str()?)))
+            }
+            Err(_) => {
+                let found = value.get_type().name()?;
+                Err(PyTypeError::new_err(format!("{name} is of type {found}, expected a whole number")))
+            }
+        }
+    }
+}
+
+impl Whole for usize {
+    fn read(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let number = u64::read(name, value)?;
+        number.try_into().map_err(|_| error::value(format!("{name} is {number}, which is too large")))
+    }
+}
+
+impl<N: Whole> Whole for Option<N> {
+    fn read(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if value.is_none() { Ok(None) } else { N::read(name, value).map(Some) }
+    }
+}
+
+/// A function per argument, for `from_py_with`.
+macro_rules! arguments {
+    ($($name:ident),*) => {
+        $(pub fn $name<N: Whole>(value: &Bound<'_, PyAny>) -> PyResult<N> {
+            N::read(stringify!($name), value)
+        })*
+    };
+}
+
+arguments!(seed, num_envs, threads, max_episode_steps, steps, agents, episodes, num_agents, substeps);
+
+/// Seeds of a reset.
+pub enum Seeds {
+    One(u64),
+    Each(Vec<Option<u64>>),
+}
+
+/// One seed for all, or one or none for each.
+pub fn seeds(value: &Bound<'_, PyAny>) -> PyResult<Option<Seeds>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    if value.is_instance_of::<PyInt>() || value.hasattr("__index__")? && !value.hasattr("__len__")? {
+        return Ok(Some(Seeds::One(seed(value)?)));
+    }
+    let Ok(each) = value.try_iter() else {
+        let found = value.get_type().name()?;
+        return Err(PyTypeError::new_err(format!(
+            "seed is of type {found}, expected a whole number, a sequence with one or None for each agent, or None"
+        )));
+    };
+    let each = each.map(|one| seed(&one?)).collect::<PyResult<_>>()?;
+    Ok(Some(Seeds::Each(each)))
+}
