@@ -58,6 +58,16 @@ pub fn broken(agents: u64) -> Option<String> {
     Some(format!("note: {times} the simulation of an agent broke down (its state was not finite)"))
 }
 
+/// What to say of minibatches that were left out; nothing if there were none.
+pub fn skipped(minibatches: u64) -> Option<String> {
+    let were = match minibatches {
+        0 => return None,
+        1 => "1 minibatch was".into(),
+        n => format!("{} minibatches were", thousands(n)),
+    };
+    Some(format!("note: {were} left out because the gradient was not finite; a smaller learning rate or network helps"))
+}
+
 /// Zero for a number that would be written as `-0.0` with so many decimals.
 pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }

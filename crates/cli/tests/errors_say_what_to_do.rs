@@ -179,6 +179,34 @@ fn a_lost_checkpoint_is_told() {
     assert_eq!(std::fs::read(temp.path().join("a/policy.safetensors")).unwrap(), policy);
 }
 
+/// Learning rates beyond all measure: what cannot be a policy is none, and what was left out is told.
+#[test]
+fn a_training_that_diverges_says_so() {
+    let temp = tempfile::tempdir().unwrap();
+    let config = |rate: &str| {
+        let text = format!(
+            "behaviors:\n  Hopper:\n    trainer_type: ppo\n    max_steps: 100000\n    hyperparameters:\n      \
+             batch_size: 512\n      buffer_size: 4096\n      learning_rate: {rate}\n"
+        );
+        std::fs::write(temp.path().join("rate.yaml"), text).unwrap();
+    };
+    config("1.0e38");
+    let text = fail(temp.path(), 1, &["train", "hopper", "--config", "rate.yaml", "--out", "a"]);
+    for part in ["error: training has diverged", "parameters are not finite", "a smaller learning rate (lr is 1e38"] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert!(!temp.path().join("a/policy.safetensors").exists());
+    config("1.0e39");
+    says(&fail(temp.path(), 1, &["train", "hopper", "--config", "rate.yaml"]), &["lr is 1", "a positive number"]);
+
+    config("1.0e3");
+    let output = run(temp.path(), &["train", "hopper", "--config", "rate.yaml", "--out", "b"]);
+    assert!(output.status.success(), "{}", common::stderr(&output));
+    let skipped = common::read_json(&temp.path().join("b/summary.json"))["skipped_minibatches"].as_u64().unwrap();
+    let note = format!("note: {skipped} minibatches were left out because the gradient was not finite");
+    assert!(skipped > 1 && common::stderr(&output).contains(&note), "{skipped}: {}", common::stderr(&output));
+}
+
 /// The longest names that there can be.
 #[test]
 fn names_may_be_as_long_as_names_can_be() {

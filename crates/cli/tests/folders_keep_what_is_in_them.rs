@@ -80,6 +80,38 @@ fn a_failed_start_leaves_nothing() {
     succeed(path, &train("mine"));
 }
 
+/// More memory than there is, by a limit or by numbers that no computer has.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_does_not_fit_into_memory_is_an_error_and_leaves_nothing() {
+    let temp = tempfile::tempdir().unwrap();
+    let wide = "
+behaviors:
+  Hopper:
+    trainer_type: ppo
+    network_settings: { hidden_units: 65536, num_layers: 2 }
+";
+    std::fs::write(temp.path().join("wide.yaml"), wide).unwrap();
+    let limited = ["train", "hopper", "--agents", "65536", "--steps", "1", "--threads", "1", "--out", "a"];
+    for (limit, words, part) in [
+        ("-v 800000", &limited[..], "fewer agents (now 65536)"),
+        (
+            "-v unlimited",
+            &["train", "hopper", "--config", "wide.yaml", "--out", "a"],
+            "narrower networks (now [65536, 65536]",
+        ),
+    ] {
+        let mut shell = std::process::Command::new("bash");
+        let script = format!("ulimit {limit}; exec \"$0\" \"$@\"");
+        let output = shell.args(["-c", &script, program()]).args(words).current_dir(temp.path()).output().unwrap();
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.contains("GB of memory, more than can be had") && text.contains(part), "{text}");
+        assert!(!temp.path().join("a").exists());
+    }
+    succeed(temp.path(), &train("a"));
+}
+
 /// A program that could not even clean up, such as one killed before its first iteration, blocks nobody either.
 #[test]
 fn a_run_without_an_iteration_is_begun_anew() {

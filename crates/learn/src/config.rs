@@ -398,7 +398,8 @@ impl PpoConfig {
             ("statistics_cap", self.statistics_cap),
         ];
         for (field, x) in positive {
-            if !(x.is_finite() && x > 0.0) {
+            // in single precision, too, in which most of them are used
+            if !((x as f32).is_finite() && x > 0.0) {
                 return Err(Error::config(field, x, "a positive number"));
             }
         }

@@ -18,6 +18,31 @@ pub enum Error {
     /// The instruction set is not one that networks run on, or not there.
     #[error("instruction set {0} cannot train networks on this processor; use {1}")]
     Isa(&'static str, &'static str),
+    /// A run needs more memory than there is.
+    #[error("this run needs about {gigabytes:.1} GB of memory, more than can be had; {less} need less")]
+    Memory {
+        /// What it needs.
+        gigabytes: f64,
+        /// What would need less.
+        less: String,
+    },
+    /// Learning has led to parameters that are not finite.
+    #[error(
+        "training has diverged: {count} of {parameters} parameters are not finite after {steps} steps; a smaller learning rate \
+         (lr is {lr:e}, value_lr {value_lr:e}) keeps them finite"
+    )]
+    Diverged {
+        /// Parameters that are not finite.
+        count: usize,
+        /// All parameters.
+        parameters: usize,
+        /// Agent-steps done.
+        steps: u64,
+        /// Learning rate of the policy, as configured.
+        lr: f64,
+        /// Learning rate of the value function.
+        value_lr: f64,
+    },
     /// A file cannot be read or written.
     #[error("{}: {action}: {source}", path.display())]
     Io {

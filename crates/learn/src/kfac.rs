@@ -50,7 +50,14 @@ impl Kfac {
     }
     /// Numbers that [`Kfac::moments`] fills, a multiple of sixteen.
     pub fn moments_len(&self) -> usize {
-        (self.policy.moments_len() + self.value.moments_len()).next_multiple_of(BLOCK)
+        Self::moments_of_nets(&self.policy, &self.value)
+    }
+    /// The same for networks yet to be made.
+    pub fn moments_of(layout: &Layout) -> usize {
+        Self::moments_of_nets(&layout.actor, &layout.critic)
+    }
+    fn moments_of_nets(policy: &Mlp, value: &Mlp) -> usize {
+        (policy.moments_len() + value.moments_len()).next_multiple_of(BLOCK)
     }
 
     /// Sums over samples of what the factors are means of, after the forward passes of both networks (their parameters,

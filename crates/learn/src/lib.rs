@@ -65,6 +65,7 @@ mod init;
 pub mod kfac;
 mod learner;
 pub mod loss;
+mod memory;
 mod mirror;
 pub mod mlp;
 mod noise;

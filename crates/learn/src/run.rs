@@ -23,7 +23,7 @@ use crate::rollout::{Actor, Rollout};
 use crate::signal::MAX_SIGNALS;
 use crate::sync::Barrier;
 use crate::update::{Means, Partial, Slice, Update, Workspace, group_count};
-use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, ppo, sac};
+use crate::{Algorithm, BLOCK, Checkpoint, Error, Policy, PpoConfig, Schedule, a2c, acktr, clock, memory, ppo, sac};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::{Isa, Real};
 use std::ops::Range;
@@ -50,7 +50,8 @@ pub struct TrainOutput {
 /// policy for any number of threads and any instruction set.
 ///
 /// # Errors
-/// If the configuration is invalid, or the checkpoint belongs to another task, network or number of agents.
+/// If the configuration is invalid, the checkpoint belongs to another task, network or number of agents, the run needs more
+/// memory than there is, or a parameter is no longer finite.
 ///
 /// # Panics
 /// If an environment or the observer panics; all workers end.
@@ -86,6 +87,7 @@ pub fn train_with(
     if players.is_some() {
         check_algorithm(config)?;
     }
+    memory::check(factory.spec(), config)?;
     let (mut run, mut learner) = Run::new(factory, isa, config);
     let mut remote = players.map(|players| Remote::new(players, config));
     run.elsewhere = remote.is_some();
@@ -95,17 +97,21 @@ pub fn train_with(
     }
 
     let replicas: Vec<Learner> = (1..run.workers()).map(|_| learner.clone()).collect();
-    let last = std::thread::scope(|scope| {
+    let (last, diverged) = std::thread::scope(|scope| {
         for (id, replica) in (1..).zip(replicas) {
             let run = &run;
             scope.spawn(move || run.work(id, replica, None));
         }
         let remote = remote.as_mut();
-        let mut head = Head { observer, clocks: &mut clocks, learner: &mut learner, remote, last: None };
+        let mut head =
+            Head { observer, clocks: &mut clocks, learner: &mut learner, remote, last: None, diverged: None };
         let replica = head.learner.clone();
         run.work(0, replica, Some(&mut head));
-        head.last
+        (head.last, head.diverged)
     });
+    if let Some(error) = diverged {
+        return Err(error);
+    }
     if let Some(error) = remote.and_then(|remote| remote.error) {
         return Err(error);
     }
@@ -129,6 +135,8 @@ struct Head<'a, 'p> {
     learner: &'a mut Learner,
     remote: Option<&'a mut Remote<'p>>,
     last: Option<IterationStats>,
+    /// Why there is nothing more to learn.
+    diverged: Option<Error>,
 }
 
 /// What the workers share.
@@ -349,6 +357,14 @@ impl<'a> Run<'a> {
         head.clocks.wall += wall;
         head.clocks.cpu += seconds.cpu;
         head.learner.clone_from(learner);
+        let count = learner.params.iter().filter(|x| !x.is_finite()).count();
+        if count > 0 {
+            let PpoConfig { lr, value_lr, .. } = *self.config;
+            let parameters = learner.params.len();
+            head.diverged = Some(Error::Diverged { count, parameters, steps: learner.steps, lr, value_lr });
+            self.stop.store(true, Ordering::Release);
+            return;
+        }
 
         let (sums, gaussian) = (&totals.sums, learner.gaussian(&self.layout));
         let per_episode = |x: f64| (sums.episodes > 0.0).then(|| x / sums.episodes);

@@ -49,6 +49,9 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     if let Some(line) = text::broken(outcome.summary.diverged) {
         console::note(format!("{line}; see the column `diverged` of progress.csv"));
     }
+    if let Some(line) = text::skipped(outcome.summary.skipped_minibatches) {
+        console::note(line);
+    }
     if json {
         print_json(&outcome.summary);
     }

@@ -30,6 +30,9 @@ pub struct Summary {
     /// Times that the state of an agent was not finite while it learned; it was then made whole.
     #[serde(default)]
     pub diverged: u64,
+    /// Minibatches that were left out because their gradient was not finite.
+    #[serde(default)]
+    pub skipped_minibatches: u64,
     /// Whether the run was stopped before its last step.
     pub interrupted: bool,
     /// How the policy does; none for an interrupted run.
@@ -49,6 +52,7 @@ impl Summary {
             cpu_seconds,
             steps_per_cpu_second: if cpu_seconds > 0.0 { steps as f64 / cpu_seconds } else { 0.0 },
             diverged: history.column("diverged").into_iter().flatten().sum::<f64>() as u64,
+            skipped_minibatches: history.column("skipped_minibatches").last().copied().flatten().unwrap_or(0.0) as u64,
             interrupted: eval.is_none(),
             eval,
         }
