@@ -20,6 +20,8 @@ __all__ = [
     "TrainResult",
     "VecEnv",
     "__version__",
+    "_policy",
+    "_spec",
     "evaluate",
     "ids",
     "learn",
@@ -210,6 +212,9 @@ class VecEnv:
         """
     def load(self, snapshot: bytes) -> None:
         """Restore what `save` returned for the same task and number of agents."""
+    def __getnewargs_ex__(self) -> tuple[tuple[str, int], dict[str, Any]]: ...
+    def __getstate__(self) -> dict[str, Any]: ...
+    def __setstate__(self, state: dict[str, Any], /) -> None: ...
     def __len__(self) -> int: ...
 
 @final
@@ -331,6 +336,8 @@ class Player:
         The same orders and state give the same bits, whatever was played before.
         """
 
+def _policy(bytes: bytes) -> Policy: ...
+def _spec(id: str, options: dict[str, Any], max_episode_steps: int) -> Spec: ...
 def load_policy(path: str | PathLike[str], task: str | type[MarathonAgent] | MarathonAgent | None = None) -> Policy:
     """Read a policy from a file, ``.safetensors`` or ``.onnx``, or from the folder of a run.
 

@@ -14,7 +14,8 @@ Array = npt.NDArray[Any]
 def pack(bytes_: bytes, arrays: Mapping[str, Array]) -> bytes:
     """Bytes and arrays as one."""
     file = io.BytesIO()
-    np.savez(file, simulation=np.frombuffer(bytes_, np.uint8), **arrays)
+    named: dict[str, Any] = {"simulation": np.frombuffer(bytes_, np.uint8), **arrays}
+    np.savez(file, **named)
     return file.getvalue()
 
 

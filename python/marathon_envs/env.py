@@ -150,7 +150,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._seeded = True
         # the camera jumps
         self._seconds += 2.0
-        return saved["obs"][0].astype(self._dtype)
+        obs: FloatArray = saved["obs"][0].astype(self._dtype)
+        return obs
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy is made of. A renderer is made anew, a window cannot be copied."""

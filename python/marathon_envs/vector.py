@@ -26,8 +26,8 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     All three autoreset modes of Gymnasium work. With `SAME_STEP`, `infos["final_obs"]` and `infos["final_info"]` belong
     to the episodes that ended. With `DISABLED`, ended episodes are reset by `reset(options={"reset_mask": mask})`.
 
-    An action that is not finite, or a simulation that breaks down, ends the episode of its agent; `infos["diverged"]` says
-    which.
+    An action that is not finite, or a simulation that breaks down, ends the episode of its agent; `infos["diverged"]`
+    says which.
 
     A seed is for all agents together: agent `i` has random streams of its own, made of the seed and `i`. A list of
     seeds makes agent `i` live as a `MarathonEnv` with the seed `seeds[i]`.
@@ -72,8 +72,8 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
                 overwritten by the next step: faster, for code that uses them up before.
             width: width of a picture, pixels.
             height: height of a picture, pixels.
-            reward_terms: whether `infos` have the dictionary `reward_terms`. There are libraries that take no dictionary
-                within the infos.
+            reward_terms: whether `infos` have the dictionary `reward_terms`. There are libraries that take no
+                dictionary within the infos.
             **options: arguments of the task, see `marathon_envs.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, self.metadata)

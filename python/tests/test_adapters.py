@@ -64,7 +64,6 @@ class TestStableBaselines3:
         assert env.render().shape == (4 * 24, 4 * 32, 3)
         SAC("MlpPolicy", Sb3VecEnv("hopper", 4), learning_starts=20, seed=1, device="cpu").learn(60)
 
-
     def test_a_monitor_can_keep_what_a_task_reports(self) -> None:
         from stable_baselines3.common.vec_env import VecMonitor  # noqa: PLC0415
 

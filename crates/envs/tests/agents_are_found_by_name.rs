@@ -148,9 +148,10 @@ mod with_arguments {
 
     #[test]
     fn a_value_of_the_wrong_type_is_refused() {
-        let cases: [(&str, Value, &str); 4] = [
+        let cases: [(&str, Value, &str); 5] = [
             ("effort_weight", true.into(), "option effort_weight is true, expected a number"),
-            ("range", 1.0.into(), "option range is 1, expected two numbers"),
+            ("range", 1.0.into(), "option range is 1, expected two numbers, the lower one first"),
+            ("range", [2.0, 1.0].into(), "option range is (2, 1), expected two numbers, the lower one first"),
             ("frame_skip", 2.5.into(), "option frame_skip is 2.5, expected a whole number, 0 or more"),
             ("see_position", "yes".into(), "option see_position is 'yes', expected true or false"),
         ];
