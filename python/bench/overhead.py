@@ -32,7 +32,7 @@ class Standin:
 
     def __init__(self, env: marathon_envs.VecEnv, results: tuple[np.ndarray, ...]) -> None:
         self._env, self._results = env, results
-        for name in ("spec", "copy", "reward_terms", "info", "forward", "final_obs"):
+        for name in ("spec", "copy", "reward_terms", "info", "forward", "diverged", "final_obs"):
             setattr(self, name, getattr(env, name))
         self.read_info = env.read_info
 

@@ -77,16 +77,15 @@ impl Agents {
             }
             let start = if i == 0 { 0 } else { self.env_ends[i - 1] };
             let bytes = self.env.get(start as usize..self.env_ends[i] as usize);
-            let wrong = |found: String| Error::Mismatch {
+            let size = bytes.map_or("no".into(), |bytes| bytes.len().to_string());
+            let wrong = |why: &str| Error::Mismatch {
                 what: format!("{what}: environment"),
-                found: format!("{found} of block {block}"),
+                found: format!("{size} bytes of block {block}'s environment{why}"),
                 expected: "what this version of the task saves".into(),
             };
-            let bytes = bytes.ok_or_else(|| wrong("no bytes".into()))?;
-            let size = bytes.len();
-            let rest = actor.shard_mut().load(b, bytes).map_err(|e| wrong(format!("{size} bytes ({e})")))?;
-            if !rest.is_empty() {
-                return Err(wrong(format!("{size} bytes, the last {} of them too many,", rest.len())));
+            let loaded = actor.shard_mut().load(b, bytes.ok_or_else(|| wrong(""))?);
+            if !loaded.map_err(|error| wrong(&format!(" ({error})")))?.is_empty() {
+                return Err(wrong(""));
             }
         }
         Ok(())

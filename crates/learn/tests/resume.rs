@@ -217,7 +217,7 @@ fn truncated_environments_are_refused() {
             self.0.save(block, bytes);
             bytes.pop();
         }
-        fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], marathon_envs::EnvError> {
             self.0.load(block, bytes)
         }
     }
