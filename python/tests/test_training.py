@@ -82,7 +82,7 @@ def test_what_is_wrong_is_said_in_pythons_terms(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     train("hopper", steps=4096, out=folder, **SMALL)
     for wrong, message in [
-        (lambda: train("hopper", steps=4096, out=folder), f"out {folder} holds a run already .* by train(resume="),
+        (lambda: train("hopper", steps=4096, out=folder), f"out {folder} holds a run already.* by train(resume="),
         (lambda: train(resume=folder), "the run is complete with 4,096 steps; .* such as steps 8,192"),
         (lambda: train(resume=folder, steps=100), "steps is 100, but 4,096 steps are done"),
         (lambda: train(resume=tmp_path), "resume"),
