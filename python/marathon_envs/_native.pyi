@@ -204,6 +204,39 @@ class VecEnv:
 
         Shapes are those of `get_state`. Returns the observations, ``(num_envs, obs_size)``.
         """
+    @property
+    def model(self) -> Model:
+        """The compiled model: what the indices of bodies, actuators and height fields mean."""
+    def vary(
+        self,
+        *,
+        mass: npt.ArrayLike | None = None,
+        friction: npt.ArrayLike | None = None,
+        strength: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Give agents, all or those of a mask, constants of their own, for domain randomization.
+
+        They last over resets, until changed, and belong to snapshots. What is not given is the model's own.
+
+        Args:
+            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
+            friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
+            strength: factors of the actuators' forces, ``(num_envs, nu)``.
+            gravity: gravity, m/s^2, ``(num_envs, 3)``.
+            mask: the agents, ``(num_envs,)``; None means all.
+        """
+    def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:
+        """Push a body of an agent until told otherwise or until its next episode.
+
+        Force, N, and torque, N m, are in world axes at the body's center of mass; `model.body` knows the bodies' indices.
+        """
+    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
+        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
+
+        The first row has the smallest y. The ground lasts over resets, until changed.
+        """
     def save(self) -> bytes:
         """Everything that the future depends on.
 

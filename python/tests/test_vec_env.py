@@ -282,6 +282,42 @@ def test_a_copy_goes_on_as_the_original_does(again, dtype: str) -> None:
             assert np.array_equal(x, y)
 
 
+def test_agents_can_differ_and_be_pushed() -> None:
+    env, plain = VecEnv("hopper", 4, autoreset="disabled"), VecEnv("hopper", 4, autoreset="disabled")
+    model = env.model
+    assert model.body_names[0] == "world" and model.nu == 4 and env.model is model
+    strength = np.ones((4, 4))
+    strength[1] = 0.1
+    gravity = np.tile([0.0, 0.0, -9.81], (4, 1))
+    gravity[2, 2] = -1.62
+    env.vary(strength=strength, gravity=gravity, mask=[False, True, True, True])
+    for each in (env, plain):
+        each.reset(seed=1)
+    env.push(3, model.body("torso"), (80, 0, 0))
+    snapshot = env.save()
+    given = actions(env)
+    for _ in range(4):
+        obs, expected = env.step(given)[0].copy(), plain.step(given)[0]
+    assert np.array_equal(obs[0], expected[0])
+    assert not any(np.array_equal(obs[i], expected[i]) for i in (1, 2, 3))
+    plain.load(snapshot)
+    for _ in range(4):
+        again = plain.step(given)[0]
+    assert np.array_equal(again, obs), "a snapshot holds all of it"
+    before = env.save()
+    for wrong, message in [
+        (lambda: env.vary(mass=np.ones(4)), r"mass has the shape \(4,\), expected \(4, \d+\)"),
+        (lambda: env.vary(friction=[1, 1, -1, 1]), "agent 2: friction is -1, expected a factor of 0 or more"),
+        (lambda: env.push(4, 1, (1, 0, 0)), "agent is 4, expected less"),
+        (lambda: env.push(0, 99, (1, 0, 0)), "body is 99, expected less"),
+        (lambda: env.push(-1, 1, (1, 0, 0)), "agent is -1, expected a whole number"),
+        (lambda: env.set_ground(0, 0, [0.0]), "field is 0, expected less than the number of the model's height fields"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            wrong()
+    assert env.save() == before, "nothing is half done"
+
+
 def test_facts_can_be_copied() -> None:
     for facts in (VecEnv("Hopper-v5", max_episode_steps=7, frame_skip=2).spec, marathon_envs.spec("ant")):
         for other in (copy.deepcopy(facts), pickle.loads(pickle.dumps(facts))):  # noqa: S301

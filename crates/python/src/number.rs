@@ -47,7 +47,20 @@ macro_rules! arguments {
     };
 }
 
-arguments!(seed, num_envs, threads, max_episode_steps, steps, agents, episodes, num_agents, substeps);
+arguments!(
+    agent,
+    body,
+    field,
+    seed,
+    num_envs,
+    threads,
+    max_episode_steps,
+    steps,
+    agents,
+    episodes,
+    num_agents,
+    substeps
+);
 
 /// Seeds of a reset.
 pub enum Seeds {

@@ -1,16 +1,17 @@
 //! Many agents of one kind as a Python object.
 
 use crate::arrays::{Arrays, ObsMut, mask, of_shape, rows};
+use crate::model::Model;
 use crate::number::{self, Seeds};
 use crate::spec::Spec;
 use crate::{error, options, task};
-use marathon_envs::{AgentState, Autoreset, VecEnvOptions};
+use marathon_envs::{AgentState, Autoreset, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
-use numpy::ndarray::Ix2;
+use numpy::ndarray::{Ix1, Ix2};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// Names of the autoreset modes; those of Gymnasium's `AutoresetMode` work too.
 const AUTORESET: [(&str, Autoreset); 3] =
@@ -35,6 +36,7 @@ pub struct VecEnv {
     copy: bool,
     ready: bool,
     made: Made,
+    model: Option<Py<Model>>,
 }
 
 /// Arguments that an environment was made with, as far as it does not tell them.
@@ -75,7 +77,7 @@ impl VecEnv {
         let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
         let arrays = Arrays::new(py, num_envs, env.spec(), double);
         let spec = Py::new(py, Spec::of(env.spec())?)?;
-        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made })
+        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None })
     }
 
     /// Facts of the task, with this environment's `max_episode_steps`.
@@ -268,6 +270,89 @@ impl VecEnv {
             ObsMut::Single(obs) => env.observe(&mask, obs),
             ObsMut::Double(obs) => env.observe(&mask, obs),
         })
+    }
+
+    /// The compiled model: what the indices of bodies, actuators and height fields mean.
+    #[getter]
+    fn model(&mut self, py: Python<'_>) -> PyResult<Py<Model>> {
+        if self.model.is_none() {
+            let spec = self.spec.get();
+            let agent = registry::global().agent_with(&spec.id, &spec.options).map_err(error::env)?;
+            let inner = Arc::new(agent.model().map_err(error::env)?);
+            self.model = Some(Py::new(py, Model { inner })?);
+        }
+        Ok(self.model.as_ref().expect("it was made").clone_ref(py))
+    }
+
+    /// Gives agents, all or those of a mask, constants of their own: factors of the bodies' masses and inertias,
+    /// `(num_envs, nbody)`, of all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`;
+    /// gravity, m/s^2, `(num_envs, 3)`. What is not given is the model's own. They last over resets, until changed.
+    #[pyo3(signature = (*, mass = None, friction = None, strength = None, gravity = None, mask = None))]
+    fn vary(
+        &mut self,
+        mass: Option<&Bound<'_, PyAny>>,
+        friction: Option<&Bound<'_, PyAny>>,
+        strength: Option<&Bound<'_, PyAny>>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (n, mask) = (self.num_envs, self::mask(mask, self.num_envs)?);
+        let none = self.env().unvaried().clone();
+        let table = |name: &str, given: Option<&Bound<'_, PyAny>>, columns: usize| -> PyResult<Option<Vec<f64>>> {
+            let Some(given) = given else { return Ok(None) };
+            let given = of_shape::<f64, Ix2, 2>(&format!("{name} has"), given, [n, columns])?;
+            Ok(Some(rows(&given).into_owned()))
+        };
+        let mass = table("mass", mass, none.mass.len())?;
+        let strength = table("strength", strength, none.strength.len())?;
+        let gravity = table("gravity", gravity, 3)?;
+        let friction = match friction {
+            Some(given) => Some(of_shape::<f64, Ix1, 1>("friction has", given, [n])?.as_array().to_vec()),
+            None => None,
+        };
+        let before = self.env().save();
+        for agent in (0..n).filter(|i| mask[*i]) {
+            let mut own = none.clone();
+            let parts = [(&mass, &mut own.mass[..]), (&strength, &mut own.strength), (&gravity, &mut own.gravity)];
+            for (given, to) in parts {
+                if let Some(given) = given {
+                    to.copy_from_slice(&given[agent * to.len()..][..to.len()]);
+                }
+            }
+            if let Some(friction) = &friction {
+                own.friction = friction[agent];
+            }
+            if let Err(error) = self.env().vary(agent, &own) {
+                // all or nothing
+                self.env().load(&before).map_err(error::env)?;
+                return Err(error::value(format!("agent {agent}: {error}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
+    /// the body's center of mass. Bodies are those of `model`.
+    #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]
+    fn push(
+        &mut self,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+        #[pyo3(from_py_with = number::body)] body: usize,
+        force: [f64; 3],
+        torque: [f64; 3],
+    ) -> PyResult<()> {
+        self.env().push(agent, body, force, torque).map_err(error::env)
+    }
+
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
+    /// first of which has the smallest y. It lasts over resets, until changed.
+    fn set_ground(
+        &mut self,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+        #[pyo3(from_py_with = number::field)] field: usize,
+        elevations: Vec<f32>,
+    ) -> PyResult<()> {
+        self.env().set_ground(agent, field, &elevations).map_err(error::env)
     }
 
     /// Everything that the future depends on. Loaded, the environment continues with the same bits, whatever the number
