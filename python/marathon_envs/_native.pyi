@@ -230,7 +230,7 @@ class VecEnv:
     def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:
         """Push a body of an agent until told otherwise or until its next episode.
 
-        Force, N, and torque, N m, are in world axes at the body's center of mass; `model.body` knows the bodies' indices.
+        Force, N, and torque, N m, are in world axes at the body's center of mass. `model.body` knows the indices.
         """
     def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
         """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
