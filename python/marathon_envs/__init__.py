@@ -32,7 +32,6 @@ from marathon_envs._native import (
     TrainResult,
     VecEnv,
     __version__,
-    evaluate,
     ids,
     load_policy,
     spec,
@@ -40,6 +39,7 @@ from marathon_envs._native import (
 )
 from marathon_envs.agents import MarathonAgent, ResetNoise
 from marathon_envs.env import MarathonEnv
+from marathon_envs.evaluation import evaluate
 from marathon_envs.tolerance import Tolerance
 from marathon_envs.vector import MarathonVectorEnv
 

@@ -93,6 +93,28 @@ def test_what_is_wrong_is_said_in_pythons_terms(tmp_path: Path) -> None:
         assert re.search(re.escape(message).replace(r"\.\*", ".*"), text) and "--" not in text and "`" not in text, text
 
 
+def test_any_function_can_be_evaluated() -> None:
+    policy = load_policy(ROOT / "assets/policies/hopper.safetensors")
+    for episodes in (5, 40):
+        native, ours = evaluate(policy, episodes), evaluate(policy.__call__, episodes, task="hopper")
+        assert native.keys() == ours.keys()
+        assert all(ours[name] == pytest.approx(native[name], rel=1e-9) for name in native)
+    # more episodes than agents, arguments of the task, a class in place of a name
+    native = evaluate(policy, 1030, task="hopper", max_episode_steps=3)
+    assert (native["episodes"], native["length_mean"], native["falls"]) == (1030, 3, 0)
+    assert evaluate(lambda obs: np.zeros((len(obs), 1)), 3, task=Arm)["length_mean"] == Arm.max_episode_steps
+    broken = evaluate(lambda obs: np.full((len(obs), 3), np.nan), 4, task="Hopper-v5", frame_skip=2)
+    assert (broken["diverged"], broken["falls"], broken["length_mean"], broken["return_mean"]) == (4, 4, 1, 0)
+    for wrong, message in [
+        (lambda: evaluate(lambda obs: obs), "task is missing"),
+        (lambda: evaluate("policy", task="hopper"), "policy is of type str, expected a Policy or a function"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            wrong()
+    with pytest.raises(ValueError, match=r"actions have the shape \(2, 31\), expected \(2, 4\)"):
+        evaluate(lambda obs: obs, 2, task="hopper")
+
+
 def test_policies_can_be_copied(obs: np.ndarray) -> None:
     policy = load_policy(ROOT / "assets/policies/hopper.safetensors")
     for other in (copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))):  # noqa: S301

@@ -1,0 +1,84 @@
+"""How good a policy is: whole episodes of a native policy, or of any function from observations to actions."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from marathon_envs import _native, _tasks
+from marathon_envs._native import Policy
+from marathon_envs._tasks import Task
+
+# most agents that play side by side, and the default seed: those of the native evaluation
+MOST_AGENTS = 1024
+SEED = 1_000_003
+
+
+def evaluate(
+    policy: Policy | Callable[[npt.NDArray[np.float32]], npt.ArrayLike],
+    episodes: int = 100,
+    *,
+    task: Task | None = None,
+    seed: int = SEED,
+    threads: int = 0,
+    **options: Any,
+) -> dict[str, float]:
+    """Play whole episodes with a policy's best actions, or with those of a function.
+
+    Agents play side by side, and each plays a number of episodes that is fixed before the start: to count whatever ends
+    first would favor short episodes.
+
+    Args:
+        policy: a `Policy`, or a function from observations, `(n, obs_size)`, float32, to actions, `(n, act_size)`, in
+            the units of the task.
+        episodes: number of episodes.
+        task: name of the task or a `MarathonAgent` class; without, it is the policy's own. A function has none.
+        seed: seed of the environments.
+        threads: number of threads; 0 means one per processor core. The result does not depend on it.
+        **options: arguments of the task, and `max_episode_steps`.
+
+    Returns:
+        `return_mean`, `return_std`, `return_min`, `return_max`, `length_mean` (decisions), `distance_mean` (m),
+        `speed_mean` (m/s), `falls`, `diverged` and `episodes`.
+    """
+    if isinstance(policy, Policy) and not options:
+        return _native.evaluate(policy, episodes, task=task, seed=seed, threads=threads)
+    if not callable(policy):
+        raise TypeError(f"policy is of type {type(policy).__name__}, expected a Policy or a function")
+    if episodes < 1:
+        raise ValueError(f"episodes is {episodes}, expected at least 1")
+    if task is None:
+        if not isinstance(policy, Policy):
+            raise TypeError("task is missing: a function does not tell which task it is for")
+        task = policy.task
+    agents = min(episodes, MOST_AGENTS)
+    env = _tasks.vec_env(task, agents, threads=threads, autoreset="same_step", **options)
+    # agent i plays episodes i, i + agents, ...
+    quota = np.arange(episodes - 1, episodes - 1 - agents, -1) // agents + 1
+    total, length, distance = np.zeros((3, agents))
+    played: list[list[tuple[float, float, float, bool, bool]]] = [[] for _ in range(agents)]
+    missing, obs = episodes, env.reset(seed)
+    while missing:
+        obs, reward, terminated, truncated = env.step(np.asarray(policy(obs), np.float32))
+        total += reward
+        length += 1
+        distance += env.forward
+        for i in np.flatnonzero(terminated | truncated):
+            if len(played[i]) < quota[i]:
+                played[i].append((total[i], length[i], distance[i], bool(terminated[i]), bool(env.diverged[i])))
+                missing -= 1
+            total[i] = length[i] = distance[i] = 0
+    returns, lengths, distances, falls, diverged = np.array([one for each in played for one in each], float).T
+    return {
+        "episodes": episodes,
+        "return_mean": float(returns.mean()),
+        "return_std": float(returns.std()),
+        "return_min": float(returns.min()),
+        "return_max": float(returns.max()),
+        "length_mean": float(lengths.mean()),
+        "distance_mean": float(distances.mean()),
+        "speed_mean": float((distances / (lengths * env.spec.dt)).mean()),
+        "falls": int(falls.sum()),
+        "diverged": int(diverged.sum()),
+    }
