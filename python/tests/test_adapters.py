@@ -146,7 +146,7 @@ class TestPettingZoo:
                 i = int(name[6:])
                 assert np.array_equal(obs[name], expected[i]) and rewards[name] == reward[i]
                 assert sum(infos[name]["reward_terms"].values()) == pytest.approx(rewards[name], abs=1e-4)
-                assert dead[name] == terminated[i]
+                assert dead[name] == terminated[i] and infos[name]["diverged"] is False
             alive &= ~terminated
             assert [int(name[6:]) for name in env.agents] == np.flatnonzero(alive).tolist()
         assert env.state().shape == (6, 31)

@@ -97,8 +97,13 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
 
         terms, speeds = env.reward_terms.tolist(), (env.forward.astype(np.float64) / self.task_spec.dt).tolist()
         names = self.task_spec.reward_terms
+        broken = env.diverged.tolist()
         infos = {
-            name: {"x_velocity": speeds[i], "reward_terms": dict(zip(names, terms[i], strict=True))}
+            name: {
+                "x_velocity": speeds[i],
+                "reward_terms": dict(zip(names, terms[i], strict=True)),
+                "diverged": broken[i],
+            }
             for name, i in zip(self.agents, rows, strict=True)
         }
         flags = of_each(terminated.tolist()), of_each(truncated.tolist())
