@@ -220,6 +220,10 @@ def test_other_threads_run_while_it_steps() -> None:
         ),
         (lambda: ready().set_state(np.zeros(7), np.zeros(7)), r"qpos has the shape \(7,\), expected \(2, 7\)"),
         (lambda: ready().set_state(np.full((2, 7), np.nan), np.zeros((2, 7))), "the state of agent 0 is not finite"),
+        (
+            lambda: marathon_envs.Renderer("hopper", 8, 8).render(np.zeros(7)),
+            r"qpos has the shape \(7,\), expected \(1, 7\)",
+        ),
         (lambda: VecEnv("hopper", 2).reset(mask=[True, False]), "the first reset must be of all agents"),
     ],
 )

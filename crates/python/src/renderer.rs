@@ -1,10 +1,12 @@
 //! Pictures of agents as arrays.
 
+use crate::arrays::of_shape;
 use crate::model::Model;
 use crate::{error, options, task};
 use marathon_envs::registry;
 use marathon_render::{Follow, Scene};
-use numpy::{AllowTypeChange, PyArray1, PyArray3, PyArrayLike2, PyArrayMethods};
+use numpy::ndarray::Ix2;
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -14,6 +16,8 @@ pub struct Renderer {
     scene: Scene,
     renderer: marathon_render::Renderer,
     camera: Follow,
+    /// Agents, and length of a configuration.
+    shape: [usize; 2],
 }
 
 #[pymethods]
@@ -46,9 +50,10 @@ impl Renderer {
     fn render<'py>(
         &mut self,
         py: Python<'py>,
-        qpos: PyArrayLike2<'_, f64, AllowTypeChange>,
+        qpos: &Bound<'py, PyAny>,
         elapsed: f64,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, self.shape)?;
         let poses: Vec<Vec<f64>> = qpos.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
         let frame = self.scene.frame(&poses).map_err(error::any)?;
         let camera = self.camera.update(&frame, elapsed);
@@ -62,6 +67,6 @@ impl Renderer {
         let scene = Scene::new(model);
         let renderer = marathon_render::Renderer::new(width, height).map_err(error::any)?;
         let camera = Follow::new(&scene, agents, width, height);
-        Ok(Renderer { scene, renderer, camera })
+        Ok(Renderer { scene, renderer, camera, shape: [agents, model.nq] })
     }
 }
