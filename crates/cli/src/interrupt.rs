@@ -1,5 +1,5 @@
-//! Ctrl-C: the first asks, the second ends the program at once. A signal that the program was started to ignore, as by
-//! `nohup`, stays ignored.
+//! Ctrl-C: the first asks, the second ends the program at once. So do SIGTERM and SIGHUP; but SIGHUP stays ignored if the
+//! program was started to ignore it, as `nohup` does.
 //!
 //! Files are written under temporary names and renamed, so even the second leaves none half-written.
 
@@ -27,50 +27,41 @@ pub fn install(message: &'static str) -> Result<(), CliError> {
     listen(handler)
 }
 
-/// Calls `handler` at every Ctrl-C, SIGTERM and SIGHUP that is not ignored.
+/// Calls `handler` at every Ctrl-C, SIGTERM, and SIGHUP unless that is ignored.
 ///
 /// # Errors
 /// If the system refuses.
 pub fn listen(handler: impl Fn() + Send + 'static) -> Result<(), CliError> {
-    let ignored = ignored::now();
+    let ignored = hangups_are_ignored();
     let set = ctrlc::set_handler(handler);
-    ignored::again(&ignored);
+    if ignored {
+        ignore_hangups();
+    }
     set.map_err(|e| CliError::Process(format!("cannot listen for Ctrl-C: {e}")))
 }
 
 #[cfg(unix)]
-mod ignored {
-    use libc::c_int;
-
-    /// Those that the handler takes over.
-    const TAKEN: [c_int; 3] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP];
-
-    /// Signals that are ignored.
-    pub fn now() -> Vec<c_int> {
-        let is_ignored = |signal: &c_int| {
-            // SAFETY: all bits zero are an action, and without a new one the call only writes the old one
-            unsafe {
-                let mut action: libc::sigaction = std::mem::zeroed();
-                libc::sigaction(*signal, std::ptr::null(), &mut action) == 0 && action.sa_sigaction == libc::SIG_IGN
-            }
-        };
-        TAKEN.into_iter().filter(is_ignored).collect()
+fn hangups_are_ignored() -> bool {
+    // SAFETY: all bits zero are an action, and without a new one the call only writes the old one
+    unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(libc::SIGHUP, std::ptr::null(), &mut action) == 0 && action.sa_sigaction == libc::SIG_IGN
     }
+}
 
-    /// Ignores signals.
-    pub fn again(signals: &[c_int]) {
-        for signal in signals {
-            // SAFETY: ignoring a signal runs nothing
-            unsafe { libc::signal(*signal, libc::SIG_IGN) };
-        }
-    }
+#[cfg(unix)]
+fn ignore_hangups() {
+    // SAFETY: ignoring a signal runs nothing
+    unsafe { libc::signal(libc::SIGHUP, libc::SIG_IGN) };
 }
 
 #[cfg(not(unix))]
-mod ignored {
-    pub fn now() {}
-    pub fn again((): &()) {}
+fn hangups_are_ignored() -> bool {
+    false
 }
+
+#[cfg(not(unix))]
+fn ignore_hangups() {}
 
 /// Whether the user wants to stop.
 pub fn requested() -> bool {

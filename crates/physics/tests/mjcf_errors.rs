@@ -396,3 +396,29 @@ fn includes() {
     check("<mujoco><include file='a.xml'/></mujoco>", &["a model given as text has no other files"]);
     check("<mujoco><include/></mujoco>", &["the attribute 'file' is missing"]);
 }
+
+/// A device or a pipe may never end; nobody waits for it.
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_not_read() {
+    let folder = std::env::temp_dir().join(format!("marathon-mjcf-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("folder")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status().unwrap();
+    assert!(made.success());
+    let main = folder.join("main.xml");
+    for name in ["pipe", "folder", "/dev/null"] {
+        for text in [
+            format!("<mujoco><include file='{name}'/></mujoco>"),
+            format!("<mujoco><asset><hfield name='h' file='{name}' size='1 1 1 1'/></asset></mujoco>"),
+        ] {
+            std::fs::write(&main, &text).unwrap();
+            let (done, wait) = std::sync::mpsc::channel();
+            let path = main.clone();
+            std::thread::spawn(move || done.send(Model::from_xml_file(path).map(|_| ()).map_err(|e| e.to_string())));
+            let result = wait.recv_timeout(std::time::Duration::from_secs(20)).expect("it does not wait for ever");
+            let message = result.expect_err("an error");
+            assert!(message.contains("found a folder, device or pipe, expected a file"), "{text}: {message}");
+        }
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -60,8 +60,8 @@ impl Model {
             kind: MjcfErrorKind::Read(reason),
         })?;
         let dir: PathBuf = path.parent().map(Path::to_owned).unwrap_or_default();
-        let root = document::parse(&text, &shown, &|file| read(&dir.join(file)))?;
-        assemble::compile(&root, &|file| std::fs::read(dir.join(file)).map_err(|e| e.to_string()))
+        let root = document::parse(&text, &shown, &|file| utf8(named(&dir.join(file))?))?;
+        assemble::compile(&root, &|file| named(&dir.join(file)))
     }
 
     /// Compiles a model given as text, without other files. `name` stands for the file in messages.
@@ -91,6 +91,15 @@ impl Model {
 
 fn read(path: &Path) -> Result<String, String> {
     utf8(std::fs::read(path).map_err(|e| e.to_string())?)
+}
+
+/// The bytes of a file that a model names: a device or pipe may never end.
+fn named(path: &Path) -> Result<Vec<u8>, String> {
+    match std::fs::metadata(path) {
+        Ok(about) if !about.is_file() => Err("found a folder, device or pipe, expected a file".to_owned()),
+        Ok(_) => std::fs::read(path).map_err(|e| e.to_string()),
+        Err(e) => Err(e.to_string()),
+    }
 }
 
 fn utf8(bytes: Vec<u8>) -> Result<String, String> {
