@@ -8,6 +8,7 @@
 
 mod common;
 
+use common::numbers::largest;
 use common::{Noise, oracle, package};
 use marathon_envs::{AgentState, Autoreset, Options, Step, Value, VecEnv, VecEnvOptions};
 use marathon_physics::lanes::Isa;
@@ -227,16 +228,16 @@ impl Differences {
         // forces and torques of contacts come last; a small one is the difference of large ones
         let forces =
             if spec.options.get("include_cfrc_ext_in_observation") == Some(&true.into()) { BODIES * 6 } else { 0 };
-        let largest = numbers[spec.obs - forces..].iter().fold(0.0, |max: f64, x| max.max(x.abs()));
-        let size = |i: usize| if i < spec.obs - forces { numbers[i].abs() } else { largest };
+        let force = largest(numbers[spec.obs - forces..].iter().map(|x| x.abs()));
+        let size = |i: usize| if i < spec.obs - forces { numbers[i].abs() } else { force };
         let far = |(i, x): (usize, &f32)| (f64::from(*x) - numbers[i]).abs() / (1.0 + size(i));
-        self.obs.push(ours.iter().enumerate().map(far).fold(0.0, f64::max));
+        self.obs.push(largest(ours.iter().enumerate().map(far)));
         let mut worst = apart(f64::from(step.reward[agent]), theirs["reward"].as_f64().unwrap());
         let info = theirs["info"].as_object().unwrap();
         let named = spec.reward_terms.iter().zip(row(&step.terms, spec.reward_terms.len()));
         for (name, ours) in named.chain(spec.info.iter().zip(row(&step.info, spec.info.len()))) {
             match info.get(name) {
-                Some(theirs) => worst = worst.max(apart(f64::from(ours), theirs.as_f64().unwrap())),
+                Some(theirs) => worst = largest([worst, apart(f64::from(ours), theirs.as_f64().unwrap())]),
                 // the one term that Gymnasium does not report
                 None => assert_eq!((spec.id.as_str(), name.as_str()), ("HumanoidStandup-v5", "reward_alive")),
             }
@@ -281,7 +282,7 @@ fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
             let state = env.state(i).unwrap();
             let expected = [numbers(&theirs["qpos"]), numbers(&theirs["qvel"])].concat();
             for (x, y) in [state.qpos, state.qvel].concat().iter().zip(&expected) {
-                found.state = found.state.max(apart(*x, *y));
+                found.state = largest([found.state, apart(*x, *y)]);
             }
         }
     }
@@ -453,9 +454,8 @@ fn starts_have_the_same_distribution() {
             assert!((var_a - var_b).abs() < 0.25 * var_b + 1e-10, "{place}");
             if k < env.spec().nq + env.spec().nv {
                 // uniform draws have an end, normal ones have not
-                let widest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-                let reach_a = widest(&mut a.map(|x| (x - mean_b).abs())) / var_b.sqrt();
-                let reach_b = widest(&mut b.map(|x| (x - mean_b).abs())) / var_b.sqrt();
+                let reach_a = largest(a.map(|x| (x - mean_b).abs())) / var_b.sqrt();
+                let reach_b = largest(b.map(|x| (x - mean_b).abs())) / var_b.sqrt();
                 let uniform = [reach_a < 1.9, reach_b < 1.9];
                 assert_eq!(uniform[0], uniform[1], "{place}: reaches {reach_a} and {reach_b} standard deviations");
             }

@@ -145,7 +145,8 @@ fn bodies_block<T: Real>(
 ) {
     let (z, one) = (T::zero(), T::lit(1.0));
     let links = [points[0].link, points[1].link];
-    if links[0] == links[1] {
+    // points of one link keep their distance, but not the direction of the gap between them
+    if links == [None; 2] {
         return;
     }
     let tree = |link: Option<usize>| link.map(|l| sim.links[l].tree);

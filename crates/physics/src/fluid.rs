@@ -28,7 +28,8 @@ pub(crate) struct Drag<C> {
     linear: [C; 3],
 }
 
-/// Prepares the compensation of gravity, one force per link.
+/// Prepares the compensation of gravity: one force per link, and another for bodies that are made heavier. As in MuJoCo,
+/// those count only in a model that makes some body lighter.
 pub(crate) fn lifts<T: Real>(
     model: &Model,
     mounts: &[crate::rigid::BodyMount],
@@ -36,13 +37,13 @@ pub(crate) fn lifts<T: Real>(
     link_of: &[Option<usize>],
 ) -> Vec<Lift<T::Scalar>> {
     let mut out = Vec::new();
-    if !model.opt.flags.gravity {
+    if !model.opt.flags.gravity || !model.bodies.iter().any(|b| b.gravcomp > 0.0) {
         return out;
     }
-    for link in 0..links.len() {
+    for (link, sign) in (0..links.len()).flat_map(|l| [(l, 1.0), (l, -1.0)]) {
         let (mut weight, mut moment) = (0.0, [0.0; 3]);
         for (b, body) in model.bodies.iter().enumerate() {
-            if link_of[mounts[b].body] != Some(link) || body.gravcomp == 0.0 {
+            if link_of[mounts[b].body] != Some(link) || !(body.gravcomp * sign > 0.0) {
                 continue;
             }
             let w = body.mass * body.gravcomp;

@@ -36,19 +36,20 @@ pub(crate) fn is_identity(r: &[Vec3; 3]) -> bool {
     (0..3).all(|i| (0..3).all(|j| (r[i][j] - f64::from(i == j)).abs() < 1e-14))
 }
 
-/// Frame of a body in the frame of the body it is welded to.
+/// Frame of a body in the frame of the body it is welded to, or in the world if that stands still.
 pub(crate) struct BodyMount {
     pub body: usize,
     pub pos: Vec3,
     pub rot: [Vec3; 3],
 }
 
-/// Where every body sits on its `weld_id`: the identity for bodies that move, world frames for static bodies.
+/// Where every body sits on its `weld_id`: the identity for bodies that move, world frames for static bodies and for
+/// mocap bodies with what is welded to them.
 pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut out: Vec<BodyMount> = Vec::with_capacity(model.bodies.len());
     for (i, body) in model.bodies.iter().enumerate() {
-        let mount = if i == 0 || body.weld_id == i {
+        let mount = if i == 0 || body.dof_count > 0 {
             BodyMount { body: i, pos: [0.0; 3], rot: identity }
         } else {
             let parent = &out[body.parent];

@@ -63,6 +63,8 @@ pub(crate) struct Link<C> {
     pub sibling: Option<usize>,
     /// A free joint whose six diagonal entries are equal in pairs: solved as one 6x6 block.
     pub free_block: bool,
+    /// A free body with nothing that moves on it.
+    pub alone: bool,
 }
 
 /// A joint.
@@ -227,10 +229,12 @@ impl<T: Real> Sim<T> {
                 last_child: None,
                 sibling: None,
                 free_block: free && lossless,
+                alone: free,
             });
             if let Some(p) = parent {
                 let me = links.len() - 1;
                 links[me].sibling = links[p].last_child.replace(me);
+                links[p].alone = false;
             }
         }
 
@@ -240,10 +244,10 @@ impl<T: Real> Sim<T> {
             .iter()
             .map(|j| {
                 let aligned = (0..3).find(|&a| j.axis[a].abs() > 1.0 - 1e-12).map(|a| (a, j.axis[a] < 0.0));
-                let width = if j.kind == JointType::Ball { 4 } else { 1 };
+                let width = if matches!(j.kind, JointType::Ball | JointType::Free) { 4 } else { 1 };
                 let mut spring = [c(0.0); 4];
                 let offset = if j.kind == JointType::Free { 3 } else { 0 };
-                for (s, q) in spring.iter_mut().zip(&model.qpos_spring[j.qpos_adr + offset..]).take(width.max(1)) {
+                for (s, q) in spring.iter_mut().zip(&model.qpos_spring[j.qpos_adr + offset..]).take(width) {
                     *s = c(*q);
                 }
                 LinkJoint {

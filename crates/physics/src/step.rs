@@ -316,6 +316,76 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     work.stale.fill(true);
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
+    if sim.implicit_fast {
+        for l in 0..sim.links.len() {
+            if sim.links[l].alone {
+                gyroscope(sim, work, l);
+            }
+        }
+    }
+}
+
+/// Solves for the acceleration of a free body, into `next`, with the bias force too taken at the end of the step.
+///
+/// With the first moment m c and the inertia J about the body's origin, the bias is `w x (w x m c)` and `w x J w`; its
+/// derivative is not symmetric, so this body is solved for on its own (MuJoCo documentation, "Integrators").
+#[inline(always)]
+fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
+    let (d, dt) = (sim.links[l].dofs.start, T::splat(sim.dt));
+    let [m, x, y, z, jxx, jyy, jzz, jxy, jxz, jyz] = work.inertia[l];
+    let (moment, w) = ([x, y, z], ang(&work.vel[l]));
+    // symmetric, so rows are columns
+    let inertia = [[jxx, jxy, jxz], [jxy, jyy, jyz], [jxz, jyz, jzz]];
+    let spin = rotate(&inertia, &w);
+    let mut wrench = work.bias_force[l];
+    if work.in_contact[l] {
+        for i in 0..6 {
+            wrench[i] -= work.wrench[l][i];
+        }
+    }
+    // torques are given along the body's axes
+    let axes = [ang(&work.axis[d + 3]), ang(&work.axis[d + 4]), ang(&work.axis[d + 5])];
+    let torque = sub3(&rotate(&axes, &[work.rhs[d + 3], work.rhs[d + 4], work.rhs[d + 5]]), &ang(&wrench));
+    let force = sub3(&[work.rhs[d], work.rhs[d + 1], work.rhs[d + 2]], &lin(&wrench));
+    let (mass, along) = ((m + work.diag[d]).recip(), dot(&w, &moment));
+    // what turning by `w` changes, column by column: the force, and the torque about the origin
+    let mut columns = [[T::zero(); 3]; 3];
+    let mut pulls = [[T::zero(); 3]; 3];
+    for k in 0..3 {
+        let mut e = [T::zero(); 3];
+        e[k] = T::lit(1.0);
+        // e x m c, and the derivative of w x (w x m c)
+        let mut pull = cross(&e, &moment);
+        let mut column = inertia[k];
+        let bend = sub3(&cross(&w, &inertia[k]), &cross(&spin, &e));
+        for i in 0..3 {
+            let lean = w[i].mul_add(moment[k], T::lit(-2.0) * (moment[i] * w[k]));
+            pull[i] = lean.mul_add(dt, pull[i]);
+            column[i] = bend[i].mul_add(dt, column[i]);
+        }
+        pull[k] = along.mul_add(dt, pull[k]);
+        column[k] += work.diag[d + 3 + k];
+        // the origin gives way
+        let arm = cross(&moment, &pull);
+        for i in 0..3 {
+            column[i] = (arm[i] * mass).neg_mul_add(T::lit(1.0), column[i]);
+        }
+        (columns[k], pulls[k]) = (column, pull);
+    }
+    let arm = cross(&moment, &force);
+    let mut rest = torque;
+    for i in 0..3 {
+        rest[i] = (arm[i] * mass).neg_mul_add(T::lit(1.0), rest[i]);
+    }
+    // Cramer's rule
+    let across = [cross(&columns[1], &columns[2]), cross(&columns[2], &columns[0]), cross(&columns[0], &columns[1])];
+    let inverse = dot(&columns[0], &across[0]).recip();
+    let turn = [dot(&across[0], &rest) * inverse, dot(&across[1], &rest) * inverse, dot(&across[2], &rest) * inverse];
+    let held = rotate(&pulls, &turn);
+    for i in 0..3 {
+        work.next[d + i] = (force[i] - held[i]) * mass;
+        work.next[d + 3 + i] = dot(&axes[i], &turn);
+    }
 }
 
 /// `qpos` moved along `qvel` for `h` seconds; quaternions stay normalized.

@@ -10,6 +10,7 @@
 
 mod common;
 
+use common::numbers::{distance, largest};
 use marathon_physics::mjcf::{MjcfError, MjcfErrorKind};
 use marathon_physics::{Group, Model, Readings, Sim, SimError, SimOptions, Work};
 use serde::Deserialize;
@@ -98,21 +99,12 @@ struct Agreement {
 impl Agreement {
     fn add(&mut self, what: &str, got: &[f64], want: &[f64], floor: f64) {
         let error = self.errors.entry(what.to_owned()).or_default();
-        // NaN is an error too
-        let d = distance(got, want, floor);
-        *error = if d.is_nan() { f64::INFINITY } else { error.max(d) };
+        *error = error.max(distance(got, want, floor));
     }
 
     fn worst(&self) -> f64 {
-        self.errors.values().copied().fold(0.0, f64::max)
+        largest(self.errors.values().copied())
     }
-}
-
-/// Distance of two vectors, relative to the second or to `floor` if that is larger.
-fn distance(a: &[f64], b: &[f64], floor: f64) -> f64 {
-    assert_eq!(a.len(), b.len(), "both sides have the same layout");
-    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
-    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied()).max(floor)
 }
 
 /// Loads a file and prepares its simulation.

@@ -8,12 +8,11 @@
 
 mod common;
 
+use common::compiled::differ;
 use common::{oracle, package, workspace};
 use marathon_physics::Model;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-const TOLERANCE: f64 = 1e-9;
 
 /// XML files of a folder, in order; none if there is no such folder.
 fn xml_files(folder: &Path) -> Vec<PathBuf> {
@@ -45,44 +44,6 @@ fn compare(files: &[PathBuf]) {
         }
     }
     assert!(report.is_empty(), "{}", report.join("\n"));
-}
-
-/// Walks what the oracle says: `null` is not compared, `"none"` stands for an absent value.
-fn differ(path: &str, ours: &Value, theirs: &Value, out: &mut Vec<String>) {
-    match (ours, theirs) {
-        (_, Value::Null) => {}
-        (Value::Null, Value::String(none)) if none == "none" => {}
-        // q and -q are the same rotation
-        (Value::Array(a), Value::Array(b)) if path.ends_with("quat") && a.len() == 4 && b.len() == 4 => {
-            let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
-            let far =
-                |sign: f64| a.iter().zip(b).map(|(x, y)| (number(x) - sign * number(y)).abs()).fold(0.0, f64::max);
-            if !(far(1.0).min(far(-1.0)) <= TOLERANCE) {
-                out.push(format!("{path} is {ours}, MuJoCo has {theirs}"));
-            }
-        }
-        (Value::Array(a), Value::Array(b)) => {
-            if a.len() != b.len() {
-                out.push(format!("{path} has length {}, MuJoCo has {}", a.len(), b.len()));
-            }
-            a.iter().zip(b).enumerate().for_each(|(i, (a, b))| differ(&format!("{path}[{i}]"), a, b, out));
-        }
-        (Value::Object(a), Value::Object(b)) => {
-            for (key, value) in b {
-                differ(&format!("{path}.{key}"), a.get(key).unwrap_or(&Value::Null), value, out);
-            }
-        }
-        (Value::Number(a), Value::Number(b)) => {
-            let (a, b) = (a.as_f64().expect("a number"), b.as_f64().expect("a number"));
-            let single = ["rgba", "diffuse", ".data"].iter().any(|name| path.contains(name));
-            let tolerance = if single { 1e-6 } else { TOLERANCE };
-            if !((a - b).abs() <= tolerance * a.abs().max(b.abs()) + 1e-13) {
-                out.push(format!("{path} is {a}, MuJoCo has {b}"));
-            }
-        }
-        (ours, theirs) if ours == theirs => {}
-        _ => out.push(format!("{path} is {ours}, MuJoCo has {theirs}")),
-    }
 }
 
 #[test]

@@ -8,6 +8,7 @@
 
 mod common;
 
+use common::numbers::{distance, largest, numbers};
 use marathon_physics::lanes::Real;
 use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Variation, Work, with_lanes};
 use serde::Deserialize;
@@ -16,16 +17,6 @@ use std::path::{Path, PathBuf};
 
 /// States per model.
 const STATES: usize = 500;
-
-fn numbers(v: &Value) -> Vec<f64> {
-    v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
-}
-
-/// Distance of two vectors, relative to the second or to `floor` if that is larger.
-fn distance(a: &[f64], b: &[f64], floor: f64) -> f64 {
-    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
-    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied()).max(floor)
-}
 
 /// Models under test: shipped ones, those of two installed packages, and features that neither uses.
 fn models() -> Vec<PathBuf> {
@@ -64,7 +55,7 @@ impl Errors {
         v[v.len() / 2]
     }
     fn max(&self) -> f64 {
-        self.0.iter().copied().fold(0.0, f64::max)
+        largest(self.0.iter().copied())
     }
 }
 
@@ -166,7 +157,7 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
                 let w = &data[*adr..*adr + values.len()];
                 let scale = w.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
                 let got = lane(values, i);
-                let error = got.iter().zip(w).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max);
+                let error = largest(got.iter().zip(w).map(|(a, b)| (a - b).abs() / scale));
                 out.sensors.0.push(error);
             }
             let next = [lane(&group.qpos, i), lane(&group.qvel, i), lane(&group.act, i)].concat();

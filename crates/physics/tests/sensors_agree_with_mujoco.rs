@@ -6,6 +6,7 @@
 
 mod common;
 
+use common::numbers::{largest, numbers};
 use marathon_physics::lanes::Real;
 use marathon_physics::model::{Cone, SensorType};
 use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Work, with_lanes};
@@ -14,10 +15,6 @@ use std::path::PathBuf;
 
 /// States per model.
 const STATES: usize = 300;
-
-fn numbers(v: &Value) -> Vec<f64> {
-    v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
-}
 
 fn models() -> Vec<PathBuf> {
     let folder = common::workspace().join("crates/physics/tests/models/sensors");
@@ -86,7 +83,7 @@ fn compare<T: Real>(model: &Model, states: &[Value]) -> Vec<Vec<f64>> {
                 let want = &data[sensor.adr..sensor.adr + sensor.dim];
                 let scale = scale(sensor.kind, exact, want, &data);
                 let worst = got.iter().zip(want).map(|(a, b)| (T::widen(a.get(i)) - b).abs() / scale);
-                errors[k].push(worst.fold(0.0, |a: f64, x| if x > a || x.is_nan() { x } else { a }));
+                errors[k].push(largest(worst));
             }
         }
     }

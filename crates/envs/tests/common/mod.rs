@@ -1,6 +1,9 @@
 //! Shared by the contract tests.
 #![allow(dead_code)]
 
+#[path = "../../../physics/tests/common/numbers.rs"]
+pub mod numbers;
+
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

@@ -74,7 +74,7 @@ pub(crate) fn contacts<T: Real>(
             if floor::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor) {
                 continue;
             }
-            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.pairs) {
+            if !pairs::add::<T>(model, [a, b], [link(a), link(b)], &params, &mut out.pairs) {
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),

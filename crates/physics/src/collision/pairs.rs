@@ -4,7 +4,6 @@ use super::params::ContactParams;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow;
-use crate::rigid::BodyMount;
 use crate::solver::block::Cost;
 use crate::solver::softness::{Softness, softness};
 
@@ -111,7 +110,6 @@ impl<C> PairSpec<C> {
 /// Adds a pair of geoms. Returns false if their contacts are not simulated.
 pub(super) fn add<T: Real>(
     model: &Model,
-    mounts: &[BodyMount],
     geoms: [usize; 2],
     links: [Option<usize>; 2],
     params: &ContactParams,
@@ -121,7 +119,7 @@ pub(super) fn add<T: Real>(
     let [a, b] = geoms.map(|g| &model.geoms[g]);
     let Some(test) = Test::of(a.kind, b.kind) else { return false };
     // planes and fields that move are not simulated
-    if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && mounts[a.body].body != 0 {
+    if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
     }
     let invweight = model.bodies[a.body].invweight0[0] + model.bodies[b.body].invweight0[0];

@@ -63,8 +63,8 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
         for (name, values) in
             [("qpos", &mut key.qpos), ("qvel", &mut key.qvel), ("act", &mut key.act), ("ctrl", &mut key.ctrl)]
         {
-            let length = values.len();
-            attrs.overlay(name, length, values)?;
+            // as in MuJoCo, what a short list leaves out stays as it is
+            attrs.overlay(name, 1, values)?;
         }
         let mut places = key.mpos.concat();
         let length = places.len();

@@ -119,10 +119,18 @@ pub(crate) fn from_z_axis(to: Vec3) -> Quat {
 
 /// Rotation with the given right-handed orthonormal axes.
 pub(crate) fn from_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat {
-    // take the root of the largest of the four squared components: no cancellation
     let squares =
         [1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]];
-    let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    // the root of a large component has no cancellation; MuJoCo's choice of it decides the sign of the quaternion
+    let largest = if x[0] + y[1] + z[2] > 0.0 {
+        0
+    } else if x[0] > y[1] && x[0] > z[2] {
+        1
+    } else if y[1] > z[2] {
+        2
+    } else {
+        3
+    };
     let r = squares[largest].max(0.0).sqrt();
     let (s, h) = (0.5 / r, 0.5 * r);
     normalized(match largest {
