@@ -704,7 +704,7 @@ def answer(model, data, state, rng):
     if dynamics.deep_in_field(model, data):
         return "deep in a height field"
     after = step(model, data, state)
-    if warned(data):
+    if warned(data) or not np.abs(after).max() < LARGEST_ACCELERATION:
         return "too fast"
 
     def changes(by):
@@ -733,6 +733,10 @@ def answer(model, data, state, rng):
     forward(model, data, state)
     mujoco.mj_rnePostConstraint(model, data)
     jumps = [np.abs(s - data.sensordata) > CHANGE * (1 + np.abs(s)) for s in sensors]
+    if any(c.exclude for c in data.contact):
+        # contacts without force are counted by MuJoCo's sensors and not by ours
+        for kind, start, count in zip(model.sensor_type, model.sensor_adr, model.sensor_dim):
+            jumps[0][start : start + count] |= kind == mujoco.mjtSensor.mjSENS_CONTACT
     q, v, u, act, push = state
     nq, nv = model.nq, model.nv
     return {

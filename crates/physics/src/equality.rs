@@ -74,11 +74,11 @@ pub(crate) fn equalities<T: Real>(
         let tendon_weight = |t: usize| model.tendons[t].invweight0;
         let (tie, diag) = match &e.kind {
             EqualityKind::Connect { bodies, anchors, .. } => {
-                (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), body_weights(model, bodies))
+                (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), body_weights::<T>(model, mounts, bodies))
             }
             EqualityKind::Weld { bodies, anchors, quats, torquescale, .. } => {
                 let tie = tie_bodies::<T>(mounts, link_of, bodies, anchors, Some((quats, *torquescale)));
-                (tie, body_weights(model, bodies))
+                (tie, body_weights::<T>(model, mounts, bodies))
             }
             EqualityKind::Joint { joint1, joint2, polycoef } => (
                 Tie::Lengths { follower: joint(*joint1), leader: joint2.map(joint), poly: polycoef.map(c) },
@@ -95,8 +95,9 @@ pub(crate) fn equalities<T: Real>(
     out
 }
 
-fn body_weights(model: &Model, bodies: &[usize; 2]) -> [f64; 2] {
-    [0, 1].map(|k| bodies.iter().map(|b| model.bodies[*b].invweight0[k]).sum())
+fn body_weights<T: Real>(model: &Model, mounts: &[BodyMount], bodies: &[usize; 2]) -> [f64; 2] {
+    let turning = bodies.iter().map(|b| model.bodies[*b].invweight0[1]).sum();
+    [rigid::inverse_weight::<T>(model, mounts, *bodies), turning]
 }
 
 fn tie_bodies<T: Real>(

@@ -1,5 +1,6 @@
 //! Rigid transforms and lumped inertias in double precision, for preparing a model.
 
+use crate::lanes::Real;
 use crate::model::{Model, Quat, Vec3};
 
 /// Position and rotation (columns) of one frame in another.
@@ -41,6 +42,9 @@ pub(crate) struct BodyMount {
     pub body: usize,
     pub pos: Vec3,
     pub rot: [Vec3; 3],
+    /// Mean moment of inertia, about their center of mass, of all bodies that are welded together, by their mass: the
+    /// square of a length. Zero for what has no mass.
+    pub spread: f64,
 }
 
 /// Where every body sits on its `weld_id`: the identity for bodies that move, world frames for static bodies and for
@@ -50,15 +54,50 @@ pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
     let mut out: Vec<BodyMount> = Vec::with_capacity(model.bodies.len());
     for (i, body) in model.bodies.iter().enumerate() {
         let mount = if i == 0 || body.dof_count > 0 {
-            BodyMount { body: i, pos: [0.0; 3], rot: identity }
+            BodyMount { body: i, pos: [0.0; 3], rot: identity, spread: 0.0 }
         } else {
             let parent = &out[body.parent];
             let (pos, rot) = compose(&(parent.pos, parent.rot), &(body.pos, quat_to_rot(&body.quat)));
-            BodyMount { body: body.weld_id, pos, rot }
+            BodyMount { body: body.weld_id, pos, rot, spread: 0.0 }
         };
         out.push(mount);
     }
+    let spreads = spreads(model, &out);
+    out.iter_mut().for_each(|m| m.spread = spreads[m.body]);
     out
+}
+
+/// See [`BodyMount::spread`]; by `weld_id`.
+fn spreads(model: &Model, mounts: &[BodyMount]) -> Vec<f64> {
+    // mass, first moment, and trace of the inertia about the origin
+    let mut sums = vec![(0.0, [0.0; 3], 0.0); mounts.len()];
+    for (m, b) in mounts.iter().zip(&model.bodies) {
+        let at = rotate(&m.rot, &b.ipos);
+        let (mass, moment, trace) = &mut sums[m.body];
+        *mass += b.mass;
+        *trace += b.inertia.iter().sum::<f64>();
+        for i in 0..3 {
+            let x = at[i] + m.pos[i];
+            moment[i] += b.mass * x;
+            *trace += 2.0 * b.mass * x * x;
+        }
+    }
+    let spread = |(mass, moment, trace): &(f64, Vec3, f64)| {
+        let square: f64 = moment.iter().map(|x| x * x).sum();
+        if *mass > 0.0 { ((trace - 2.0 * square / mass) / (3.0 * mass)).max(0.0) } else { 0.0 }
+    };
+    sums.iter().map(spread).collect()
+}
+
+/// Inverse inertia that two bodies have against being moved apart: the sum of MuJoCo's translational inverse weights.
+///
+/// A body that turns about its center of mass has none, and MuJoCo takes 1e-15 for it: a constraint on a point of it
+/// is so hard that rounding decides. What is taken here is a fraction of what a point of the body weighs when it turns: the
+/// root of the rounding, at which the constraint's softness and its rounding are errors of a size.
+pub(crate) fn inverse_weight<T: Real>(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> f64 {
+    let sliding: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
+    let turning: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[1] * mounts[*b].spread).sum();
+    if sliding < 1e-6 * turning { sliding.max(4.0 * T::EPSILON.sqrt() * turning) } else { sliding }
 }
 
 /// Mass, center and inertia (about the center, xx yy zz xy xz yz) of a body with all bodies welded to it.

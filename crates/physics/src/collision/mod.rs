@@ -66,6 +66,8 @@ pub(crate) fn contacts<T: Real>(
             let Some(params) = ContactParams::of(model, mounts, i, j) else { continue };
             match (link(i), link(j)) {
                 (None, None) => continue,
+                // what a declared pair of one link exerts on one geom it takes from the other
+                (Some(a), Some(b)) if a == b => continue,
                 (Some(_), Some(_)) if options.ground_contacts_only => continue,
                 _ => {}
             }
@@ -74,7 +76,7 @@ pub(crate) fn contacts<T: Real>(
             if floor::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor) {
                 continue;
             }
-            if !pairs::add::<T>(model, [a, b], [link(a), link(b)], &params, &mut out.pairs) {
+            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.pairs) {
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),

@@ -4,6 +4,7 @@ use super::params::ContactParams;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow;
+use crate::rigid::{BodyMount, inverse_weight};
 use crate::solver::block::Cost;
 use crate::solver::softness::{Softness, softness};
 
@@ -110,6 +111,7 @@ impl<C> PairSpec<C> {
 /// Adds a pair of geoms. Returns false if their contacts are not simulated.
 pub(super) fn add<T: Real>(
     model: &Model,
+    mounts: &[BodyMount],
     geoms: [usize; 2],
     links: [Option<usize>; 2],
     params: &ContactParams,
@@ -122,7 +124,7 @@ pub(super) fn add<T: Real>(
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
     }
-    let invweight = model.bodies[a.body].invweight0[0] + model.bodies[b.body].invweight0[0];
+    let invweight = inverse_weight::<T>(model, mounts, [a.body, b.body]);
     let (impratio, friction) = (model.opt.impratio, params.friction);
     let mu = friction[0] / impratio.sqrt();
     let mut ratios = [1.0; 6];

@@ -49,6 +49,8 @@ impl<T: Real> Readings<'_, T> {
             (S::TendonLimitPos | S::TendonLimitVel | S::TendonLimitFrc, O::Tendon(t)) => {
                 limit_value(s.kind, &self.tendon_limit(t))
             }
+            // as in MuJoCo, the velocity is not computed
+            (S::ActuatorVel, _) if !self.sim.model.opt.flags.actuation => vec![T::zero()],
             (S::ActuatorPos | S::ActuatorVel, O::Actuator(a)) => {
                 vec![self.transmission(a)[usize::from(s.kind == S::ActuatorVel)]]
             }
