@@ -10,7 +10,7 @@ and prints a line of JSON per model:
      "states": [..], "skipped": draws that were left out}
 or, where MuJoCo does not compile the model, {"seed": s, "xml": text, "error": why}. A seed's model does not depend on
 the others. States are such that MuJoCo's answer is well defined, as in foreign_models.py; "single" tells whether it is
-so for the rounding of single precision too.
+so for the rounding of single precision too, "weightless" that it is not so of what constraints do.
 
 With {"judge": [{"seed": s, "state": index, "states": as above, "qacc": [..]}]} instead, prints per entry how far from the
 minimum of MuJoCo's own problem both accelerations are: {"ours": .., "mujoco": ..}, as norms of the gradient relative to
@@ -695,6 +695,19 @@ def moved(model, state, rng, by):
     return [q, *state[1:]]
 
 
+def weightless(model, data):
+    """Whether a constraint acts on bodies that only turn about their centers of mass: MuJoCo has 1e-15 for their inverse
+    weight, and rounding decides what such a constraint does."""
+    pairs = [model.geom_bodyid[c.geom] for c in data.contact if not c.exclude]
+    for i in np.flatnonzero(data.eq_active):
+        ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
+        if mujoco.mjtEq(model.eq_type[i]) in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+            sites = mujoco.mjtObj(model.eq_objtype[i]) == mujoco.mjtObj.mjOBJ_SITE
+            pairs.append(model.site_bodyid[ends] if sites else ends)
+    weights = model.body_invweight0
+    return any(sum(weights[b, 0] for b in p) < 1e-8 < sum(weights[b, 1] for b in p) for p in pairs)
+
+
 def answer(model, data, state, rng):
     """What MuJoCo makes of a state, or why it has no definite answer."""
     forward(model, data, state)
@@ -736,11 +749,12 @@ def answer(model, data, state, rng):
     if any(c.exclude for c in data.contact):
         # contacts without force are counted by MuJoCo's sensors and not by ours
         for kind, start, count in zip(model.sensor_type, model.sensor_adr, model.sensor_dim):
-            jumps[0][start : start + count] |= kind == mujoco.mjtSensor.mjSENS_CONTACT
+            jumps[0][start : start + count] |= mujoco.mjtSensor(kind) == mujoco.mjtSensor.mjSENS_CONTACT
     q, v, u, act, push = state
     nq, nv = model.nq, model.nv
     return {
         "qpos": q, "qvel": v, "ctrl": u, "act": act, "xfrc": push.ravel(), "single": bool(single),
+        "weightless": weightless(model, data),
         "qacc": data.qacc, "qfrc_constraint": data.qfrc_constraint, "qfrc_bias": data.qfrc_bias,
         "qfrc_applied": data.qfrc_passive + data.qfrc_actuator + dynamics.pushed(model, data),
         "qfrc_actuator": data.qfrc_actuator, "qM": dynamics.full_mass_matrix(model, data).ravel(),

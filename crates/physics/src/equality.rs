@@ -74,11 +74,11 @@ pub(crate) fn equalities<T: Real>(
         let tendon_weight = |t: usize| model.tendons[t].invweight0;
         let (tie, diag) = match &e.kind {
             EqualityKind::Connect { bodies, anchors, .. } => {
-                (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), body_weights::<T>(model, mounts, bodies))
+                (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), body_weights(model, mounts, bodies))
             }
             EqualityKind::Weld { bodies, anchors, quats, torquescale, .. } => {
                 let tie = tie_bodies::<T>(mounts, link_of, bodies, anchors, Some((quats, *torquescale)));
-                (tie, body_weights::<T>(model, mounts, bodies))
+                (tie, body_weights(model, mounts, bodies))
             }
             EqualityKind::Joint { joint1, joint2, polycoef } => (
                 Tie::Lengths { follower: joint(*joint1), leader: joint2.map(joint), poly: polycoef.map(c) },
@@ -95,9 +95,9 @@ pub(crate) fn equalities<T: Real>(
     out
 }
 
-fn body_weights<T: Real>(model: &Model, mounts: &[BodyMount], bodies: &[usize; 2]) -> [f64; 2] {
+fn body_weights(model: &Model, mounts: &[BodyMount], bodies: &[usize; 2]) -> [f64; 2] {
     let turning = bodies.iter().map(|b| model.bodies[*b].invweight0[1]).sum();
-    [rigid::inverse_weight::<T>(model, mounts, *bodies), turning]
+    [rigid::inverse_weight(model, mounts, *bodies), turning]
 }
 
 fn tie_bodies<T: Real>(
@@ -232,7 +232,8 @@ fn bodies_block<T: Real>(
     block.on = T::not(T::none());
     block.coupled = links[0].is_some() && links[1].is_some();
     for i in 0..dim {
-        block.d[i] = ratio.div(T::splat(spec.diag[i / 3]));
+        // MuJoCo's bound, for what cannot turn at all
+        block.d[i] = ratio.div(T::splat(spec.diag[i / 3])).min(T::lit(1e15));
         block.u0[i] = rate[i].mul_add(b, k.mul_add(error[i], drift[i]));
     }
     // rows measure the first body against the second; the side that moves comes second

@@ -1,6 +1,5 @@
 //! Rigid transforms and lumped inertias in double precision, for preparing a model.
 
-use crate::lanes::Real;
 use crate::model::{Model, Quat, Vec3};
 
 /// Position and rotation (columns) of one frame in another.
@@ -89,15 +88,21 @@ fn spreads(model: &Model, mounts: &[BodyMount]) -> Vec<f64> {
     sums.iter().map(spread).collect()
 }
 
+/// Below this fraction of a body's inverse inertia against being turned, that against being moved is nothing.
+const NOTHING: f64 = 1e-6;
+
+/// What is taken then, as such a fraction: the root of the rounding of single precision, where the softness of the
+/// constraint and its rounding are errors of a size.
+const LEAST: f64 = 1e-3;
+
 /// Inverse inertia that two bodies have against being moved apart: the sum of MuJoCo's translational inverse weights.
 ///
-/// A body that turns about its center of mass has none, and MuJoCo takes 1e-15 for it: a constraint on a point of it
-/// is so hard that rounding decides. What is taken here is a fraction of what a point of the body weighs when it turns: the
-/// root of the rounding, at which the constraint's softness and its rounding are errors of a size.
-pub(crate) fn inverse_weight<T: Real>(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> f64 {
+/// A body that turns about its center of mass has none, and MuJoCo takes 1e-15 for it. A constraint on a point of the body
+/// is so hard then that rounding decides, in MuJoCo too. Here it is as hard as single precision can hold.
+pub(crate) fn inverse_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> f64 {
     let sliding: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
     let turning: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[1] * mounts[*b].spread).sum();
-    if sliding < 1e-6 * turning { sliding.max(4.0 * T::EPSILON.sqrt() * turning) } else { sliding }
+    if sliding < NOTHING * turning { LEAST * turning } else { sliding }
 }
 
 /// Mass, center and inertia (about the center, xx yy zz xy xz yz) of a body with all bodies welded to it.

@@ -124,7 +124,7 @@ pub(super) fn add<T: Real>(
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
     }
-    let invweight = inverse_weight::<T>(model, mounts, [a.body, b.body]);
+    let invweight = inverse_weight(model, mounts, [a.body, b.body]);
     let (impratio, friction) = (model.opt.impratio, params.friction);
     let mu = friction[0] / impratio.sqrt();
     let mut ratios = [1.0; 6];
