@@ -73,12 +73,13 @@ pub(crate) fn equalities<T: Real>(
         let dof_weight = |j: usize| model.dofs[model.joints[j].dof_adr].invweight0;
         let tendon_weight = |t: usize| model.tendons[t].invweight0;
         let (tie, diag) = match &e.kind {
-            EqualityKind::Connect { bodies, anchors, .. } => {
-                (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), body_weights(model, mounts, bodies))
-            }
+            EqualityKind::Connect { bodies, anchors, .. } => (
+                tie_bodies::<T>(mounts, link_of, bodies, anchors, None),
+                rigid::inverse_weights(model, mounts, *bodies),
+            ),
             EqualityKind::Weld { bodies, anchors, quats, torquescale, .. } => {
                 let tie = tie_bodies::<T>(mounts, link_of, bodies, anchors, Some((quats, *torquescale)));
-                (tie, body_weights(model, mounts, bodies))
+                (tie, rigid::inverse_weights(model, mounts, *bodies))
             }
             EqualityKind::Joint { joint1, joint2, polycoef } => (
                 Tie::Lengths { follower: joint(*joint1), leader: joint2.map(joint), poly: polycoef.map(c) },
@@ -93,11 +94,6 @@ pub(crate) fn equalities<T: Real>(
         out.push(EqualitySpec { index, tie, soft, diag: diag.map(|x| c(x.max(1e-15))) });
     }
     out
-}
-
-fn body_weights(model: &Model, mounts: &[BodyMount], bodies: &[usize; 2]) -> [f64; 2] {
-    let turning = bodies.iter().map(|b| model.bodies[*b].invweight0[1]).sum();
-    [rigid::inverse_weight(model, mounts, *bodies), turning]
 }
 
 fn tie_bodies<T: Real>(
@@ -232,8 +228,7 @@ fn bodies_block<T: Real>(
     block.on = T::not(T::none());
     block.coupled = links[0].is_some() && links[1].is_some();
     for i in 0..dim {
-        // MuJoCo's bound, for what cannot turn at all
-        block.d[i] = ratio.div(T::splat(spec.diag[i / 3])).min(T::lit(1e15));
+        block.d[i] = ratio.div(T::splat(spec.diag[i / 3]));
         block.u0[i] = rate[i].mul_add(b, k.mul_add(error[i], drift[i]));
     }
     // rows measure the first body against the second; the side that moves comes second

@@ -28,6 +28,11 @@ pub(crate) struct Drag<C> {
     linear: [C; 3],
 }
 
+/// Whether there are passive forces at all: as in MuJoCo, none where both springs and dampers are off.
+fn passive(model: &Model) -> bool {
+    model.opt.flags.spring || model.opt.flags.damper
+}
+
 /// Prepares the compensation of gravity: one force per link, and another for bodies that are made heavier. As in MuJoCo,
 /// those count only in a model that makes some body lighter.
 pub(crate) fn lifts<T: Real>(
@@ -37,7 +42,7 @@ pub(crate) fn lifts<T: Real>(
     link_of: &[Option<usize>],
 ) -> Vec<Lift<T::Scalar>> {
     let mut out = Vec::new();
-    if !model.opt.flags.gravity || !model.bodies.iter().any(|b| b.gravcomp > 0.0) {
+    if !passive(model) || !model.opt.flags.gravity || !model.bodies.iter().any(|b| b.gravcomp > 0.0) {
         return out;
     }
     for (link, sign) in (0..links.len()).flat_map(|l| [(l, 1.0), (l, -1.0)]) {
@@ -69,7 +74,7 @@ pub(crate) fn drags<T: Real>(
 ) -> Vec<Drag<T::Scalar>> {
     let c = T::scalar;
     let (density, viscosity) = (model.opt.density, model.opt.viscosity);
-    if density == 0.0 && viscosity == 0.0 {
+    if !passive(model) || (density == 0.0 && viscosity == 0.0) {
         return Vec::new();
     }
     let mut out = Vec::new();

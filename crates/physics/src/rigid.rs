@@ -88,21 +88,33 @@ fn spreads(model: &Model, mounts: &[BodyMount]) -> Vec<f64> {
     sums.iter().map(spread).collect()
 }
 
-/// Below this fraction of a body's inverse inertia against being turned, that against being moved is nothing.
+/// Below this fraction of a body's other inverse inertia, one is nothing.
 const NOTHING: f64 = 1e-6;
 
 /// What is taken then, as such a fraction: the root of the rounding of single precision, where the softness of the
 /// constraint and its rounding are errors of a size.
 const LEAST: f64 = 1e-3;
 
-/// Inverse inertia that two bodies have against being moved apart: the sum of MuJoCo's translational inverse weights.
+/// Inverse inertias that two bodies have against being moved apart and against being turned: the sums of MuJoCo's inverse
+/// weights.
 ///
-/// A body that turns about its center of mass has none, and MuJoCo takes 1e-15 for it. A constraint on a point of the body
-/// is so hard then that rounding decides, in MuJoCo too. Here it is as hard as single precision can hold.
-pub(crate) fn inverse_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> f64 {
-    let sliding: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
-    let turning: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[1] * mounts[*b].spread).sum();
-    if sliding < NOTHING * turning { LEAST * turning } else { sliding }
+/// A body that turns about its center of mass has no translational one, a body that slides no rotational one, and MuJoCo
+/// takes 1e-15 for them. Such a constraint is so hard that rounding decides, in MuJoCo too. Here it is as hard as single
+/// precision can hold.
+pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> [f64; 2] {
+    let sum = |k: usize| bodies.iter().map(|b| model.bodies[*b].invweight0[k]).sum();
+    // what each would be of bodies that move in the other way as if they were free
+    let alike = |k: usize| -> f64 {
+        let share = |b: &usize| {
+            let (weight, spread) = (model.bodies[*b].invweight0[1 - k], mounts[*b].spread);
+            if k == 0 || spread == 0.0 { weight * spread } else { weight / spread }
+        };
+        bodies.iter().map(share).sum()
+    };
+    [0, 1].map(|k| {
+        let (own, other): (f64, f64) = (sum(k), alike(k));
+        if own < NOTHING * other { LEAST * other } else { own }
+    })
 }
 
 /// Mass, center and inertia (about the center, xx yy zz xy xz yz) of a body with all bodies welded to it.

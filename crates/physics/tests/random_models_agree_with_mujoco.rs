@@ -5,7 +5,7 @@
 //! MuJoCo's numbers. On random states, double precision has MuJoCo's mass matrix, bias, applied and constraint forces,
 //! accelerations, contacts, sensors and next state to 1e-5, and mostly to 1e-12; single precision has those of double
 //! precision to 1e-2. One thing is left out (`docs/physics.md` names it): what constraints do, in MuJoCo, on bodies that
-//! can only turn about their centers of mass. Where an acceleration differs, the oracle says who is nearer to the minimum of MuJoCo's own problem:
+//! can only turn about their centers of mass, and welds on those that can only slide. Where an acceleration differs, the oracle says who is nearer to the minimum of MuJoCo's own problem:
 //! it is MuJoCo's error if that is us, and by far.
 //!
 //! By default few models are drawn. A long run, which prints a table of what differs, and writes those models to a folder:
@@ -69,7 +69,8 @@ struct State {
     xfrc: Vec<f64>,
     /// The rounding of single precision does not change the answer much.
     single: bool,
-    /// A constraint acts on bodies that only turn about their centers of mass: rounding decides what MuJoCo makes of it.
+    /// A constraint acts on bodies that only turn about their centers of mass, or a weld on those that only slide: rounding
+    /// decides what MuJoCo makes of it.
     weightless: bool,
     qacc: Vec<f64>,
     qfrc_constraint: Vec<f64>,
@@ -307,7 +308,14 @@ fn random_models_agree_with_mujoco() {
     println!(
         "{} models, {} states ({} with contacts, {} weightless, {} in single precision), {} draws left out; within the bounds at most \
          {:.0e} in double precision and {:.0e} in single",
-        report.models, report.states, report.contacts, report.weightless, report.single, report.skipped, report.worst[0], report.worst[1]
+        report.models,
+        report.states,
+        report.contacts,
+        report.weightless,
+        report.single,
+        report.skipped,
+        report.worst[0],
+        report.worst[1]
     );
     let verdicts = common::oracle("random_models.py", &json!({"judge": report.judge}));
     for (entry, verdict) in report.judge.iter().zip(verdicts.as_array().expect("a list")) {

@@ -60,7 +60,7 @@ pub(super) fn add<T: Real>(
     }
 
     let mu = if params.condim == 1 { [0.0; 2] } else { [params.friction[0], params.friction[1]] };
-    let invweight = rigid::inverse_weight(model, mounts, [moving.body, fixed.body]);
+    let [invweight, _] = rigid::inverse_weights(model, mounts, [moving.body, fixed.body]);
     // pyramid edges share R = 2 mu^2 (1 + mu^2) / invweight-scaled impedance (MuJoCo's mj_makeImpedance)
     let diag = if params.condim == 1 {
         // four coinciding edges of a flat pyramid carry a quarter each

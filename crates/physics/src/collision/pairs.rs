@@ -4,7 +4,7 @@ use super::params::ContactParams;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow;
-use crate::rigid::{BodyMount, inverse_weight};
+use crate::rigid::{BodyMount, inverse_weights};
 use crate::solver::block::Cost;
 use crate::solver::softness::{Softness, softness};
 
@@ -124,7 +124,7 @@ pub(super) fn add<T: Real>(
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
     }
-    let invweight = inverse_weight(model, mounts, [a.body, b.body]);
+    let [invweight, _] = inverse_weights(model, mounts, [a.body, b.body]);
     let (impratio, friction) = (model.opt.impratio, params.friction);
     let mu = friction[0] / impratio.sqrt();
     let mut ratios = [1.0; 6];
