@@ -20,6 +20,8 @@ pub(crate) struct EqualitySpec<C> {
     soft: Softness<C>,
     /// Approximate inverse inertia seen by the rows of positions and by those of orientations.
     diag: [C; 2],
+    /// See [`rigid::is_hard`].
+    pub hard: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -91,7 +93,13 @@ pub(crate) fn equalities<T: Real>(
             ),
         };
         let soft = softness::<T>(model, &e.solref, &e.solimp, 0.0, diag[0]);
-        out.push(EqualitySpec { index, tie, soft, diag: diag.map(|x| c(x.max(1e-15))) });
+        let hard = match &e.kind {
+            EqualityKind::Connect { bodies, .. } | EqualityKind::Weld { bodies, .. } => {
+                rigid::is_hard(model, mounts, *bodies, diag[0])
+            }
+            _ => false,
+        };
+        out.push(EqualitySpec { index, hard, tie, soft, diag: diag.map(|x| c(x.max(1e-15))) });
     }
     out
 }

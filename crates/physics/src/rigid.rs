@@ -91,9 +91,12 @@ fn spreads(model: &Model, mounts: &[BodyMount]) -> Vec<f64> {
 /// Below this fraction of a body's other inverse inertia, one is nothing.
 const NOTHING: f64 = 1e-6;
 
-/// What is taken then, as such a fraction: the root of the rounding of single precision, where the softness of the
-/// constraint and its rounding are errors of a size.
-const LEAST: f64 = 1e-3;
+/// What is taken then, as such a fraction: where the softness of the constraint and its rounding in single precision are
+/// errors of a size.
+const LEAST: f64 = 1e-2;
+
+/// A constraint this much harder than what it acts on is hard for single precision.
+const HARD: f64 = 3e-3;
 
 /// Inverse inertias that two bodies have against being moved apart and against being turned: the sums of MuJoCo's inverse
 /// weights.
@@ -102,19 +105,27 @@ const LEAST: f64 = 1e-3;
 /// takes 1e-15 for them. Such a constraint is so hard that rounding decides, in MuJoCo too. Here it is as hard as single
 /// precision can hold.
 pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> [f64; 2] {
-    let sum = |k: usize| bodies.iter().map(|b| model.bodies[*b].invweight0[k]).sum();
-    // what each would be of bodies that move in the other way as if they were free
-    let alike = |k: usize| -> f64 {
-        let share = |b: &usize| {
-            let (weight, spread) = (model.bodies[*b].invweight0[1 - k], mounts[*b].spread);
-            if k == 0 || spread == 0.0 { weight * spread } else { weight / spread }
-        };
-        bodies.iter().map(share).sum()
-    };
     [0, 1].map(|k| {
-        let (own, other): (f64, f64) = (sum(k), alike(k));
+        let own: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[k]).sum();
+        let other = other_weight(model, mounts, bodies, k);
         if own < NOTHING * other { LEAST * other } else { own }
     })
+}
+
+/// What an inverse weight would be of bodies that move in the other way as if they were free.
+fn other_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], k: usize) -> f64 {
+    let share = |b: &usize| {
+        let (weight, spread) = (model.bodies[*b].invweight0[1 - k], mounts[*b].spread);
+        if k == 0 || spread == 0.0 { weight * spread } else { weight / spread }
+    };
+    bodies.iter().map(share).sum()
+}
+
+/// Whether a constraint on points of two bodies is much harder, by the inverse weight `diag` of its rows, than what a
+/// point of them weighs that moves and turns.
+pub(crate) fn is_hard(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], diag: f64) -> bool {
+    let own: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
+    diag < HARD * (own + other_weight(model, mounts, bodies, 0))
 }
 
 /// Mass, center and inertia (about the center, xx yy zz xy xz yz) of a body with all bodies welded to it.

@@ -129,6 +129,9 @@ pub struct Sim<T: Real> {
     pub(crate) implicit_damping: bool,
     /// So are the actuators' forces that depend on velocity.
     pub(crate) implicit_fast: bool,
+    /// Some rows are so hard that single precision does not resolve their forces, though it does the accelerations: the
+    /// velocities follow from those.
+    pub(crate) hard: bool,
     pub(crate) limits: Vec<LimitSpec<T::Scalar>>,
     pub(crate) dry: Vec<DryFriction<T::Scalar>>,
     pub(crate) motors: Vec<Motor<T::Scalar>>,
@@ -326,6 +329,7 @@ impl<T: Real> Sim<T> {
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
             implicit_damping: implicit_fast || (damped && flags.eulerdamp && !rk4),
             implicit_fast,
+            hard: contacts.hard || equalities.iter().any(|e| e.hard),
             damping,
             limits,
             dry,

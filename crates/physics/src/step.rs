@@ -1,6 +1,6 @@
 //! One step, stage by stage.
 
-use crate::articulated::{accelerate, factorize};
+use crate::articulated::{accelerate, bring_inward, factorize};
 use crate::collision::{collide_floor, collide_pairs};
 use crate::equality::equality_blocks;
 use crate::fluid::external_forces;
@@ -316,12 +316,35 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     work.stale.fill(true);
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
+    if sim.hard {
+        damp::<T, S>(sim, work);
+    }
     if sim.implicit_fast {
         for l in 0..sim.links.len() {
             if sim.links[l].alone {
                 gyroscope(sim, work, l);
             }
         }
+    }
+}
+
+/// The same from the accelerations, without the forces, with the factors at hand: `(M + dt B) (a' - a) = -dt B a`. Of what
+/// [`gyroscope`] does anew, the forces stay in `rhs`.
+#[inline(always)]
+fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
+    let dt = T::splat(sim.dt);
+    for (l, link) in sim.links.iter().enumerate() {
+        work.link_force[l] = [T::zero(); 6];
+        if !(sim.implicit_fast && link.alone) {
+            for d in link.dofs.clone() {
+                work.rhs[d] = -(work.rate[d] * dt * work.acc[d]);
+            }
+        }
+    }
+    bring_inward::<T, S>(sim, work);
+    accelerate::<T, S>(sim, work);
+    for (x, a) in work.next.iter_mut().zip(&work.acc) {
+        *x += *a;
     }
 }
 

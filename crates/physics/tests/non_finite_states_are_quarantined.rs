@@ -3,21 +3,25 @@
 mod common;
 
 use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions};
+use std::path::Path;
 
+/// Every shipped model, with the contacts that its environment has.
 #[test]
 fn a_broken_agent_is_reset_and_its_neighbors_are_untouched() {
-    let path = common::workspace().join("assets/agents/walker2d.xml");
-    let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
-    let options = BatchOptions {
-        agents: 16,
-        sim: SimOptions { ground_contacts_only: true, ..Default::default() },
-        ..Default::default()
-    };
+    for path in common::shipped() {
+        break_one(&path);
+    }
+}
+
+fn break_one(path: &Path) {
+    let model = Model::from_xml_file(path).unwrap_or_else(|e| panic!("{e}"));
+    let options = BatchOptions { agents: 16, ..Default::default() };
     let (mut sick, mut healthy) = (Batch::new(&model, &options).unwrap(), Batch::new(&model, &options).unwrap());
     let ctrl = vec![0.3; 16 * model.nu];
     for (name, value) in [("infinite", f64::INFINITY), ("not a number", f64::NAN), ("huge", 1e30)] {
+        let name = format!("{}: {name}", path.display());
         let mut qvel = vec![0.0; model.nv];
-        qvel[2] = value;
+        qvel[model.nv - 1] = value;
         let before = sick.quarantined();
         sick.reset(5, &model.qpos0, &qvel);
         healthy.reset(5, &model.qpos0, &vec![0.0; model.nv]);

@@ -3,6 +3,7 @@
 //! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
 //! corners. Each is a [`Candidate`]; all lanes walk the same list, and a lane that does not touch gets stiffness zero.
 
+use super::Contacts;
 use super::params::ContactParams;
 use super::slots::pyramid_share;
 use crate::lanes::Real;
@@ -44,7 +45,7 @@ pub(super) fn add<T: Real>(
     (fixed, geom): (usize, usize),
     link: Option<usize>,
     params: &ContactParams,
-    out: &mut Vec<Candidate<T::Scalar>>,
+    contacts: &mut Contacts<T::Scalar>,
 ) -> bool {
     let (plane_geom, fixed, moving) = (fixed, &model.geoms[fixed], &model.geoms[geom]);
     let Some(link) = link else { return false };
@@ -68,6 +69,8 @@ pub(super) fn add<T: Real>(
     } else {
         2.0 * mu[0] * mu[0] / model.opt.impratio * invweight * (1.0 + mu[0] * mu[0])
     };
+    contacts.hard |= rigid::is_hard(model, mounts, [moving.body, fixed.body], diag);
+    let out = &mut contacts.floor;
     let soft = softness::<T>(model, &params.solref, &params.solimp, params.margin, diag);
 
     let on_link = &mounts[moving.body];

@@ -32,6 +32,8 @@ pub(crate) struct Contacts<C> {
     pub pairs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
     pub paired: Vec<Paired<C>>,
+    /// Some are [hard](crate::rigid::is_hard).
+    pub hard: bool,
 }
 
 /// A geom that meets others.
@@ -45,7 +47,7 @@ pub(crate) struct Paired<C> {
 impl<C> Contacts<C> {
     /// No contacts.
     pub fn none() -> Self {
-        Contacts { floor: Vec::new(), pairs: Vec::new(), paired: Vec::new() }
+        Contacts { floor: Vec::new(), pairs: Vec::new(), paired: Vec::new(), hard: false }
     }
 }
 
@@ -73,10 +75,10 @@ pub(crate) fn contacts<T: Real>(
             }
             // in the order of MuJoCo's shape types
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
-            if floor::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor) {
+            if floor::add::<T>(model, mounts, (a, b), link(b), &params, &mut out) {
                 continue;
             }
-            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.pairs) {
+            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out) {
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),

@@ -1,10 +1,11 @@
 //! Pairs of geoms that may touch: moving bodies with each other, and with terrain.
 
+use super::Contacts;
 use super::params::ContactParams;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow;
-use crate::rigid::{BodyMount, inverse_weights};
+use crate::rigid::{BodyMount, inverse_weights, is_hard};
 use crate::solver::block::Cost;
 use crate::solver::softness::{Softness, softness};
 
@@ -115,7 +116,7 @@ pub(super) fn add<T: Real>(
     geoms: [usize; 2],
     links: [Option<usize>; 2],
     params: &ContactParams,
-    out: &mut Vec<PairSpec<T::Scalar>>,
+    contacts: &mut Contacts<T::Scalar>,
 ) -> bool {
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
@@ -146,7 +147,8 @@ pub(super) fn add<T: Real>(
     };
     let radius = |g: &Geom| narrow::bounding_radius(g.kind, &g.size);
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
-    out.push(PairSpec {
+    contacts.hard |= is_hard(model, mounts, [a.body, b.body], diag);
+    contacts.pairs.push(PairSpec {
         geoms,
         links,
         sizes: [sizes(a).map(c), sizes(b).map(c)],

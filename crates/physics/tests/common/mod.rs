@@ -49,3 +49,17 @@ pub fn package(name: &str) -> PathBuf {
     assert!(output.status.success(), "package {name} is not installed: run ./test.sh");
     PathBuf::from(String::from_utf8(output.stdout).expect("a path").trim())
 }
+
+/// Every model file that is shipped: those of Marathon's agents, and its own of Gymnasium's and dm_control's tasks.
+#[allow(dead_code)]
+pub fn shipped() -> Vec<PathBuf> {
+    let mut paths: Vec<PathBuf> = ["agents", "gymnasium", "dm_control"]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(workspace().join("assets").join(folder)).expect("the folder exists"))
+        .map(|entry| entry.expect("readable").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "xml"))
+        .collect();
+    paths.sort();
+    assert!(paths.len() >= 17, "models are missing");
+    paths
+}
