@@ -5,16 +5,17 @@
 
 use libfuzzer_sys::arbitrary::{self, Arbitrary};
 use libfuzzer_sys::fuzz_target;
-use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions, Snapshot};
+use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions, Snapshot, Variation};
 use std::sync::OnceLock;
 
 /// Name, text, and whether only the ground collides.
-const MODELS: [(&str, &str, bool); 5] = [
+const MODELS: [(&str, &str, bool); 6] = [
     ("arm", include_str!("../../crates/physics/tests/models/arm.xml"), true),
     ("tumbler", include_str!("../../crates/physics/tests/models/tumbler.xml"), true),
     ("hopper", include_str!("../../assets/agents/hopper.xml"), true),
     ("ant", include_str!("../../assets/agents/ant.xml"), true),
     ("pile", include_str!("../models/pile.xml"), false),
+    ("terrain", include_str!("../../crates/physics/tests/models/full/terrain.xml"), false),
 ];
 
 const MOST_AGENTS: u8 = 20;
@@ -90,6 +91,22 @@ enum Operation {
     },
     Sensors {
         agent: u8,
+    },
+    Push {
+        agent: u8,
+        body: u8,
+        wrench: [Number; 6],
+    },
+    Vary {
+        agent: u8,
+        mass: Vec<Number>,
+        friction: Number,
+        strength: Vec<Number>,
+        gravity: [Number; 3],
+    },
+    SetGround {
+        agent: u8,
+        elevations: Vec<Number>,
     },
 }
 
@@ -200,6 +217,32 @@ fuzz_target!(|script: Script| {
                 let agent = usize::from(*agent) % agents;
                 let values: usize = model.sensors.iter().map(|s| s.dim).sum();
                 assert_eq!(batch.sensors(agent).len(), values, "one number per component");
+            }
+            Operation::Push { agent, body, wrench } => {
+                let (agent, body) = (usize::from(*agent) % agents, usize::from(*body) % model.bodies.len());
+                let [fx, fy, fz, tx, ty, tz] = wrench.map(Number::value);
+                batch.push(agent, body, [fx, fy, fz], [tx, ty, tz]);
+                twin.push(agent, body, [fx, fy, fz], [tx, ty, tz]);
+            }
+            Operation::Vary { agent, mass, friction, strength, gravity } => {
+                let own = Variation {
+                    mass: fill(mass, &vec![1.0; model.bodies.len()]),
+                    friction: friction.value(),
+                    strength: fill(strength, &vec![1.0; model.nu]),
+                    gravity: gravity.map(Number::value),
+                };
+                let agent = usize::from(*agent) % agents;
+                batch.vary(agent, &own);
+                twin.vary(agent, &own);
+            }
+            Operation::SetGround { agent, elevations } => {
+                let agent = usize::from(*agent) % agents;
+                if let Some(field) = model.hfields.first() {
+                    let rest = vec![0.0; field.nrow * field.ncol];
+                    let ground: Vec<f32> = fill(elevations, &rest).into_iter().map(|x| x as f32).collect();
+                    batch.set_ground(agent, 0, &ground);
+                    twin.set_ground(agent, 0, &ground);
+                }
             }
         }
         assert!(same(&batch.snapshot(), &twin.snapshot()), "lane width and threads do not change a bit");

@@ -96,7 +96,7 @@ const NOTHING: f64 = 1e-6;
 const LEAST: f64 = 1e-2;
 
 /// A constraint this much harder than what it acts on is hard for single precision.
-const HARD: f64 = 3e-3;
+const HARD: f64 = 1e-2;
 
 /// Inverse inertias that two bodies have against being moved apart and against being turned: the sums of MuJoCo's inverse
 /// weights.
@@ -166,4 +166,32 @@ pub(crate) fn lump(model: &Model, mounts: &[BodyMount], link: usize) -> Lump {
         }
     }
     Lump { mass, com, inertia }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Model, Sim, SimOptions};
+
+    #[test]
+    fn constraints_of_shipped_models_are_not_hard() {
+        for folder in ["agents", "gymnasium", "dm_control"] {
+            let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").join(folder);
+            for file in std::fs::read_dir(folder).expect("the folder exists") {
+                let path = file.expect("readable").path();
+                let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+                let sim = Sim::<f32>::new(&model, SimOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+                assert!(!sim.hard, "{}", path.display());
+            }
+        }
+    }
+
+    #[test]
+    fn a_constraint_on_a_body_that_only_turns_about_its_center_is_hard() {
+        let text = r#"<mujoco><worldbody><geom type="plane" size="1 1 1"/><body><joint/><geom size=".1"/></body></worldbody>
+            </mujoco>"#;
+        let model = Model::from_xml_str(text, "turning").expect("a model");
+        assert!(model.bodies[1].invweight0[0] < 1e-12);
+        let sim = Sim::<f32>::new(&model, SimOptions::default()).expect("a simulation");
+        assert!(sim.contacts.floor[0].soft.diag > 1e-3);
+    }
 }

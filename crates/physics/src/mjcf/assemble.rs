@@ -216,8 +216,10 @@ fn add_body(
         add_joint(model, index, joint);
     }
     for geom in &spec.geoms {
-        if geom.shape.kind == GeomType::Plane && weld != 0 {
-            return Err(geom.element.invalid("a plane must belong to the world or to a body fixed in it"));
+        if geom.shape.kind == GeomType::Plane && weld != 0 && !model.bodies[weld].mocap {
+            return Err(geom
+                .element
+                .invalid("a plane must belong to the world, to a body fixed in it, or to a mocap body"));
         }
         model.geoms.push(convert_geom(geom, index, materials)?);
     }
