@@ -31,7 +31,10 @@ fn actions(follow_statistics: bool) -> Vec<Vec<f32>> {
 }
 
 fn furthest(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |worst, x| if x.is_nan() { f32::INFINITY } else { x.max(worst) })
 }
 
 #[test]

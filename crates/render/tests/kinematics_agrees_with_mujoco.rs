@@ -44,7 +44,10 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 fn difference(a: impl IntoIterator<Item = f64>, b: &[f64]) -> f64 {
-    a.into_iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.into_iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |worst, x| if x.is_nan() { f64::INFINITY } else { x.max(worst) })
 }
 
 #[test]
