@@ -107,6 +107,37 @@ fn both_engines_run_the_same_workload() {
 }
 
 #[test]
+fn one_agent_of_a_crowd_is_timed_from_its_first_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("crates.xml");
+    // a stack of crates; motors would throw them about
+    let body = |k: usize| {
+        let z = 0.1 + 0.2 * k as f64;
+        format!(r#"<body pos="0 0 {z}"><joint name="x{k}" type="free"/><geom type="box" size=".2 .2 .1"/></body>"#)
+    };
+    let stack: String = (0..6).map(body).collect();
+    let motor = |k: usize| format!(r#"<motor joint="x{k}" gear="9000 0 9000 0 0 0" ctrlrange="-1 1"/>"#);
+    let motors: String = (0..6).map(motor).collect();
+    let model = format!(
+        r#"<mujoco><worldbody><geom type="plane" size="9 9 1"/>{stack}</worldbody>
+           <actuator>{motors}</actuator></mujoco>"#
+    );
+    std::fs::write(&file, model).unwrap();
+    let args = ["--model", file.to_str().unwrap(), "--isa", "f32", "--json", "--contacts", "all", "--limp"];
+    let args = [&args[..], &["--agents", "1", "--warmup", "0"]].concat();
+    let out = against_mujoco(&python(), &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    assert_eq!((&document["agents"], &document["warmup"], &document["limp"]), (&1.into(), &0.into(), &true.into()));
+    for engine in ["mujoco", "marathon"] {
+        let side = &document["rows"][0][engine];
+        // five turns of 64 agents take as many steps at the least; all crates stay on each other
+        assert!(side["steps"].as_u64().unwrap() < 5 * 64 * 400, "{engine}: {side}");
+        assert!((20.0..=32.0).contains(&side["contacts"].as_f64().unwrap()), "{engine}: {side}");
+    }
+}
+
+#[test]
 fn contacts_between_bodies_count_on_both_sides() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("pair.xml");

@@ -11,6 +11,7 @@ use crate::lanes::Real;
 use crate::model::{Cone, Integrator, JointType, Model};
 use crate::narrow::height::HeightField;
 use crate::rigid;
+use crate::solver::crowd::MOST_ROWS;
 use crate::solver::softness::{Softness, softness};
 use crate::support;
 use crate::tendon::{BallLimit, TendonSpec, ball_limits, tendons};
@@ -39,6 +40,9 @@ pub struct SimOptions {
     pub ground_contacts_only: bool,
     /// Overrides the model's cap on Newton iterations.
     pub max_newton: Option<usize>,
+    /// Overrides the number of rows between moving bodies beyond which an agent is solved as a crowd (24). It changes
+    /// the time of a step, and its results to rounding.
+    pub most_coupled_rows: Option<usize>,
 }
 
 /// A body that moves.
@@ -159,6 +163,8 @@ pub struct Sim<T: Real> {
     pub(crate) elliptic: bool,
     pub(crate) warmstart: bool,
     pub(crate) max_newton: usize,
+    /// Rows between moving bodies beyond which an agent is solved as a [crowd](crate::solver::crowd).
+    pub(crate) most_rows: usize,
     pub(crate) max_line_search: usize,
     /// Newton decrement at which a lane counts as converged.
     pub(crate) tolerance: T::Scalar,
@@ -308,7 +314,8 @@ impl<T: Real> Sim<T> {
             Vec::new()
         };
         let contacts = if flags.contact && flags.constraint {
-            contacts::<T>(model, &mounts, &link_of, &options)?
+            let tree_of: Vec<usize> = links.iter().map(|l| l.tree).collect();
+            contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?
         } else {
             Contacts::none()
         };
@@ -354,6 +361,7 @@ impl<T: Real> Sim<T> {
             elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
             max_newton: options.max_newton.unwrap_or(model.opt.iterations),
+            most_rows: options.most_coupled_rows.unwrap_or(MOST_ROWS),
             max_line_search: model.opt.ls_iterations,
             tolerance: c(tolerance),
             model: model.clone(),

@@ -1,6 +1,6 @@
 //! State of a lane group and the scratch memory of a step.
 
-use crate::collision::Clearances;
+use crate::collision::{Clearances, Sweep};
 use crate::lanes::Real;
 use crate::model::JointType;
 use crate::narrow::field_capsule::Gaps;
@@ -9,6 +9,7 @@ use crate::narrow::{Touch, Touches};
 use crate::sim::{Mount, Sim};
 use crate::solver::block::Block;
 use crate::solver::coupled::Coupling;
+use crate::solver::crowd::Crowd;
 use crate::solver::floor::FloorRow;
 use crate::solver::joint::{DryRow, LimitRow};
 use crate::spatial::*;
@@ -192,6 +193,10 @@ pub struct Work<T: Real> {
     /// Rows of the last evaluation, if the present one [continues](Work::continues) it; else none.
     pub(crate) past: Past<T>,
     pub(crate) coupling: Coupling<T>,
+    /// Per lane, once one has had a crowd: its factorization.
+    pub(crate) crowds: Vec<Crowd<T::Scalar>>,
+    /// Lanes that are solved by it in the present step.
+    pub(crate) crowded: T::Mask,
     /// Per geom: lanes that touch the static world at the last physics step, and at any step of the last `step` call.
     pub(crate) touching: Vec<T::Mask>,
     pub(crate) touched: Vec<T::Mask>,
@@ -205,6 +210,8 @@ pub struct Work<T: Real> {
     /// Their third axes: of a plane its normal, of a capsule its direction.
     pub(crate) directions: Vec<V3<T>>,
     pub(crate) clearances: Clearances<T>,
+    /// Pairs that may touch, if there are so many that a broad phase chooses them.
+    pub(crate) sweep: Sweep<T::Scalar>,
     /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
     pub(crate) tree_com: Vec<V3<T>>,
     /// Per body: torque and force from outside, about the center of mass of its tree.
@@ -305,6 +312,12 @@ pub struct SolverStats {
     pub contacts: u64,
     /// Contacts in the union of a group's lanes.
     pub contact_rows: u64,
+    /// Pairs of geoms looked at, of lane groups.
+    pub pairs: u64,
+    /// Factorizations of single agents in which much touches much, instead of by lane groups.
+    pub crowded: u64,
+    /// Entries of the factors that they computed: what they cost.
+    pub entries: u64,
 }
 
 impl<T: Real> Work<T> {
@@ -354,6 +367,8 @@ impl<T: Real> Work<T> {
             blocks: Blocks::new(),
             past: Past { contacts: Vec::new(), limits: Vec::new(), dry: Vec::new(), blocks: Blocks::new() },
             coupling: Coupling::new(nl, nv),
+            crowds: Vec::new(),
+            crowded: T::none(),
             touching: vec![T::none(); sim.geoms.len()],
             touched: vec![T::none(); sim.geoms.len()],
             ground_contacts: vec![z; sim.geoms.len()],
@@ -361,7 +376,11 @@ impl<T: Real> Work<T> {
             touching_bodies: vec![T::none(); sim.geoms.len()],
             centers: vec![[z; 3]; sim.geoms.len()],
             directions: vec![[z; 3]; sim.geoms.len()],
-            clearances: Clearances::new(sim.geoms.len(), sim.contacts.pairs.len()),
+            clearances: match sim.contacts.broad {
+                None => Clearances::new(sim.geoms.len(), sim.contacts.pairs.len()),
+                Some(_) => Clearances::new(0, 0),
+            },
+            sweep: Sweep::new(if sim.contacts.broad.is_some() { sim.geoms.len() } else { 0 }),
             tree_com: vec![[z; 3]; sim.model.bodies.len()],
             body_force: vec![[z; 6]; sim.model.bodies.len()],
             actuation: vec![z; nv],
@@ -433,6 +452,9 @@ impl SolverStats {
         self.unconverged += other.unconverged;
         self.contacts += other.contacts;
         self.contact_rows += other.contact_rows;
+        self.pairs += other.pairs;
+        self.crowded += other.crowded;
+        self.entries += other.entries;
     }
 
     /// Takes earlier counts away (the largest iteration count stays).
@@ -443,5 +465,8 @@ impl SolverStats {
         self.unconverged -= earlier.unconverged;
         self.contacts -= earlier.contacts;
         self.contact_rows -= earlier.contact_rows;
+        self.pairs -= earlier.pairs;
+        self.crowded -= earlier.crowded;
+        self.entries -= earlier.entries;
     }
 }

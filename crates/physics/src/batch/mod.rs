@@ -29,7 +29,7 @@ pub struct BatchOptions {
     pub agents: usize,
     /// Number of threads that step them, at least 1.
     pub threads: usize,
-    /// Instruction set; the best of this processor by default.
+    /// Instruction set; the best of this processor by default. A single agent takes one lane of it.
     pub isa: Isa,
     /// Simulation options.
     pub sim: SimOptions,
@@ -73,14 +73,16 @@ impl Batch {
     pub fn new(model: &Model, options: &BatchOptions) -> Result<Batch, SimError> {
         assert!(options.isa.supported(), "this processor has no {}", options.isa.name());
         let (agents, threads) = (options.agents.max(1), options.threads.max(1));
-        let inner = with_lanes!(options.isa, T => {
+        // the bits are the same, and nobody waits for lanes that nobody needs
+        let isa = if agents == 1 && options.isa != Isa::F64 { Isa::F32 } else { options.isa };
+        let inner = with_lanes!(isa, T => {
             let sim = Sim::<T>::new(model, options.sim.clone())?;
             Box::new(LaneBatch::new(sim, agents, threads)) as Box<dyn Lanes>
         });
         Ok(Batch {
             inner,
             agents,
-            isa: options.isa,
+            isa,
             home: model.qpos0.clone(),
             model: Arc::new(model.clone()),
             quarantined: 0,

@@ -1,9 +1,11 @@
 //! Contacts of pairs of geoms.
 //!
-//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::narrow`].
+//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::narrow`]. Of pairs
+//! by the thousand, the broad phase ([`broad`]) first chooses those that may be near.
 
+use super::broad;
 use super::clearance::clearance;
-use super::pairs::{Cull, PairSpec, Test};
+use super::pairs::{Cull, PairOf, Test};
 use super::slots::{Place, Slots, write_contact};
 use crate::lanes::{MAX_LANES, Real};
 use crate::narrow::height::Terrain;
@@ -26,15 +28,26 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
     work.touching_bodies.fill(T::none());
     place_geoms(sim, work);
     let mut slots = Slots::new();
-    for (index, pair) in sim.contacts.pairs.iter().enumerate() {
-        if work.clearances.apart(index, pair.geoms) {
+    let count = match &sim.contacts.broad {
+        None => sim.contacts.pairs.len(),
+        Some(broad) => {
+            broad::find(sim, work, broad);
+            work.sweep.found.len()
+        }
+    };
+    work.stats.pairs += count as u64;
+    let few = sim.contacts.broad.is_none();
+    for k in 0..count {
+        let index = if few { k } else { work.sweep.found[k] as usize };
+        let pair = &sim.contacts.pair(&sim.geoms, index);
+        if few && work.clearances.apart(index, pair.geoms) {
             continue;
         }
         slots.turn_to(pair.class(), work.blocks.len());
         // everything relative to the reference point of one of the moving geoms' trees
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
-        let (near, within) = (near(sim, group, work, pair, &centers), within_tree(sim, pair));
+        let (near, within) = (near(sim, group, work, pair, &centers), few && within_tree(sim, pair));
         let clearance = if T::any(near) {
             let meeting = Meeting { place: Place { index, base }, centers, near };
             touch_pair(sim, group, work, &mut slots, &meeting)
@@ -52,14 +65,14 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
 
 /// Whether both geoms move and belong to one tree.
 #[inline(always)]
-fn within_tree<T: Real>(sim: &Sim<T>, pair: &PairSpec<T::Scalar>) -> bool {
+fn within_tree<T: Real>(sim: &Sim<T>, pair: &PairOf<T::Scalar>) -> bool {
     matches!(pair.links, [Some(a), Some(b)] if sim.links[a].tree == sim.links[b].tree)
 }
 
 /// Centers and axes of the geoms that meet others, and how far they have moved.
 #[inline(always)]
 fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
-    if !work.continues {
+    if !work.continues && sim.contacts.broad.is_none() {
         work.clearances.forget();
     }
     for paired in &sim.contacts.paired {
@@ -68,7 +81,7 @@ fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
             None => (splat3(&mount.pos), splat3(&mount.rot[2])),
             Some(l) => (work.arm(mount, l), rotate(&work.rot[l], &splat3(&mount.rot[2]))),
         };
-        if work.continues {
+        if work.continues && sim.contacts.broad.is_none() {
             let (shift, turn) = (sub3(&center, &work.centers[g]), sub3(&axis, &work.directions[g]));
             work.clearances.follow(g, &shift, &turn, T::splat(paired.half));
         }
@@ -83,7 +96,7 @@ fn near<T: Real>(
     sim: &Sim<T>,
     group: &Group<T>,
     work: &Work<T>,
-    pair: &PairSpec<T::Scalar>,
+    pair: &PairOf<T::Scalar>,
     centers: &[V3<T>; 2],
 ) -> T::Mask {
     let reach = T::splat(pair.reach);
@@ -122,7 +135,7 @@ fn touch_pair<T: Real>(
     slots: &mut Slots<T>,
     meeting: &Meeting<T>,
 ) -> Option<T> {
-    let pair = &sim.contacts.pairs[meeting.place.index];
+    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
     let [a, b] = pair.geoms;
     let (mb, [ca, cb]) = (&sim.geoms[b], meeting.centers);
     let margin = T::splat(pair.margin);
@@ -209,7 +222,7 @@ fn touch_field<T: Real>(
     slots: &mut Slots<T>,
     meeting: &Meeting<T>,
 ) {
-    let pair = &sim.contacts.pairs[meeting.place.index];
+    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
     let fields = group.all_grounds(sim, pair.field);
     let terrain = Terrain { fields, center: meeting.centers[0], axes: work.axes(&sim.geoms[pair.geoms[0]]) };
     let capsule = capsule(work, pair.geoms[1], meeting.centers[1], splat3(&pair.sizes[1]));
@@ -224,7 +237,7 @@ fn touch_field<T: Real>(
 /// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
 #[inline(always)]
 fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
-    let pair = &sim.contacts.pairs[meeting.place.index];
+    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
     let axes = pair.geoms.map(|g| work.axes(&sim.geoms[g]));
     let mut found = std::mem::take(&mut work.touches);
     let mut own = std::mem::take(&mut work.lane_touches);

@@ -6,6 +6,7 @@ use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 use crate::narrow;
 use crate::rigid::{BodyMount, inverse_weights, is_hard};
+use crate::sim::Mount;
 use crate::solver::block::Cost;
 use crate::solver::softness::{Softness, softness};
 
@@ -62,12 +63,28 @@ pub(crate) enum Cull {
     Field,
 }
 
-/// Two geoms that may touch.
-#[derive(Clone, Debug)]
-pub(crate) struct PairSpec<C> {
+/// Two geoms that may touch: there can be millions of these.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair {
     /// In MuJoCo's order: the normal points from the first to the second.
+    pub geoms: [u32; 2],
+    /// Number of its [`PairSpec`].
+    pub spec: u32,
+}
+
+/// A pair with everything that belongs to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairOf<'a, C> {
     pub geoms: [usize; 2],
     pub links: [Option<usize>; 2],
+    spec: &'a PairSpec<C>,
+}
+
+/// What pairs of equal geoms have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct PairSpec<C> {
+    /// Both geoms move.
+    pub coupled: bool,
     /// In MJCF's order, and zero where there is none: a sphere is a capsule without length.
     pub sizes: [[C; 3]; 2],
     pub test: Test,
@@ -87,29 +104,44 @@ pub(crate) struct PairSpec<C> {
     pub ratios: [C; 6],
 }
 
-impl<C> PairSpec<C> {
-    /// Contacts of a class share slots.
-    pub fn class(&self) -> (bool, usize) {
-        (self.coupled(), self.dim)
+impl<C> Contacts<C> {
+    /// A pair by its number.
+    #[inline(always)]
+    pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> PairOf<'a, C> {
+        let pair = &self.pairs[index];
+        let ends = pair.geoms.map(|g| g as usize);
+        PairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
     }
+}
 
+impl<C> PairOf<'_, C> {
     /// The geom that moves, of a pair with the static world.
     pub fn moving(&self) -> usize {
         self.geoms[if self.links[1].is_some() { 1 } else { 0 }]
+    }
+}
+
+impl<C> std::ops::Deref for PairOf<'_, C> {
+    type Target = PairSpec<C>;
+    #[inline(always)]
+    fn deref(&self) -> &PairSpec<C> {
+        self.spec
+    }
+}
+
+impl<C> PairSpec<C> {
+    /// Contacts of a class share slots.
+    pub fn class(&self) -> (bool, usize) {
+        (self.coupled, self.dim)
     }
 
     /// Both are spheres or capsules.
     pub fn round(&self) -> bool {
         matches!(self.test, Test::SphereSphere | Test::SphereCapsule | Test::CapsuleCapsule)
     }
-
-    /// Both geoms move.
-    pub fn coupled(&self) -> bool {
-        self.links[0].is_some() && self.links[1].is_some()
-    }
 }
 
-/// Adds a pair of geoms. Returns false if their contacts are not simulated.
+/// Adds what pairs like this pair of geoms have in common. Returns false if their contacts are not simulated.
 pub(super) fn add<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
@@ -148,9 +180,8 @@ pub(super) fn add<T: Real>(
     let radius = |g: &Geom| narrow::bounding_radius(g.kind, &g.size);
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
     contacts.hard |= is_hard(model, mounts, [a.body, b.body], diag);
-    contacts.pairs.push(PairSpec {
-        geoms,
-        links,
+    contacts.specs.push(PairSpec {
+        coupled: links[0].is_some() && links[1].is_some(),
         sizes: [sizes(a).map(c), sizes(b).map(c)],
         test,
         field: a.hfield.unwrap_or(0),

@@ -2,6 +2,7 @@
 
 use crate::model::{Geom, Model, Pair};
 use crate::rigid::BodyMount;
+use std::collections::BTreeSet;
 
 /// Smallest friction coefficient (MuJoCo's `mjMINMU`).
 const LEAST_FRICTION: f64 = 1e-5;
@@ -18,13 +19,11 @@ pub(super) struct ContactParams {
 }
 
 impl ContactParams {
-    /// Parameters of the contacts of geoms `i` and `j`, or `None` if they never collide.
-    pub fn of(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> Option<Self> {
-        let declared = model.pairs.iter().find(|p| p.geoms == [i, j] || p.geoms == [j, i]);
-        let mut params = match declared {
+    /// Parameters of the contacts of geoms `i` and `j`, which collide.
+    pub fn of(model: &Model, i: usize, j: usize) -> Self {
+        let mut params = match declared(model, i, j) {
             Some(pair) => ContactParams::declared(pair),
-            None if may_collide(model, mounts, i, j) => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
-            None => return None,
+            None => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
         };
         if let Some(all) = &model.opt.contact_override {
             params.margin = all.margin;
@@ -33,7 +32,7 @@ impl ContactParams {
             params.friction = all.friction;
         }
         params.friction = params.friction.map(|f| f.max(LEAST_FRICTION));
-        Some(params)
+        params
     }
 
     /// MuJoCo's combination rule: the geom of higher priority decides, equals are mixed.
@@ -85,8 +84,19 @@ fn spread(f: &[f64; 3]) -> [f64; 5] {
     [f[0], f[0], f[1], f[2], f[2]]
 }
 
-/// MuJoCo's filters: masks, same body, parent and child, excluded bodies.
-fn may_collide(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> bool {
+/// The declaration of a pair, which holds whatever the filters say.
+pub(super) fn declared(model: &Model, i: usize, j: usize) -> Option<&Pair> {
+    model.pairs.iter().find(|p| p.geoms == [i, j] || p.geoms == [j, i])
+}
+
+/// MuJoCo's filters: masks, same body, parent and child, `excluded` bodies.
+pub(super) fn may_collide(
+    model: &Model,
+    mounts: &[BodyMount],
+    excluded: &BTreeSet<[usize; 2]>,
+    i: usize,
+    j: usize,
+) -> bool {
     let (a, b) = (&model.geoms[i], &model.geoms[j]);
     if a.contype & b.conaffinity == 0 && b.contype & a.conaffinity == 0 {
         return false;
@@ -100,7 +110,7 @@ fn may_collide(model: &Model, mounts: &[BodyMount], i: usize, j: usize) -> bool 
         return false;
     }
     let pair = [a.body.min(b.body), a.body.max(b.body)];
-    !model.excludes.contains(&pair)
+    !excluded.contains(&pair)
 }
 
 /// "'name'", or the number of a nameless geom.

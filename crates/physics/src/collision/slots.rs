@@ -1,7 +1,7 @@
 //! Where contacts of pairs go: a contact takes the next free slot of its own lane, in the order of the pairs, so that
 //! the rows of a lane depend on that lane alone.
 
-use super::pairs::PairSpec;
+use super::pairs::{PairOf, PairSpec};
 use crate::lanes::{Real, kernel_fn};
 use crate::narrow::Touch;
 use crate::sim::Sim;
@@ -20,6 +20,19 @@ pub(super) struct Slots<T: Real> {
 impl<T: Real> Slots<T> {
     pub(super) fn new() -> Self {
         Slots { class: (false, 0), first: 0, filled: T::zero() }
+    }
+
+    /// A slot, and its number in its class, that no lane of `lanes` has free before it; `blocks` are there.
+    #[inline(always)]
+    fn least(&self, lanes: T::Mask, blocks: usize) -> (usize, T) {
+        // few are looked through faster
+        if blocks < self.first + 8 {
+            return (self.first, T::zero());
+        }
+        let bits = T::bits(lanes);
+        let filled = |lane: usize| T::widen(self.filled.get(lane)) as usize;
+        let least = (0..T::LANES).filter(|l| bits >> l & 1 == 1).map(filled).min().unwrap_or(0);
+        (self.first + least, T::lit(least as f64))
     }
 
     /// Pairs of this class follow; slots of a new class begin at block `next`.
@@ -60,8 +73,8 @@ kernel_fn! {
         place: Place,
         touch: &'a Touch<T>,
     ) {
-        let pair = &sim.contacts.pairs[place.index];
-        let (zero, one) = (T::zero(), T::lit(1.0));
+        let pair = &sim.contacts.pair(&sim.geoms, place.index);
+        let one = T::lit(1.0);
         work.stats.contacts += T::bits(touch.on).count_ones() as u64;
         report(pair, work, touch.on);
         let mut links = pair.links;
@@ -76,8 +89,7 @@ kernel_fn! {
 
         // every lane's next free slot
         let mut left = touch.on;
-        let mut slot = slots.first;
-        let mut number = zero;
+        let (mut slot, mut number) = slots.least(touch.on, work.blocks.len());
         while T::any(left) {
             let here = T::and(left, slots.filled.lt(number + T::lit(0.5)));
             if T::any(here) {
@@ -113,7 +125,7 @@ fn rows<T: Real>(
     links: &[Option<usize>; 2],
     frame: [V3<T>; 3],
 ) -> Rows<T> {
-    let pair = &sim.contacts.pairs[place.index];
+    let pair = &sim.contacts.pair(&sim.geoms, place.index);
     let zero = T::zero();
     let mut points = [touch.pos; 2];
     let mut velocity = [[zero; 3]; 2];
@@ -159,8 +171,8 @@ pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
 
 /// Marks who touches what.
 #[inline(always)]
-fn report<T: Real>(pair: &PairSpec<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
-    if pair.coupled() {
+fn report<T: Real>(pair: &PairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
+    if pair.coupled {
         for g in pair.geoms {
             work.touching_bodies[g] = T::or(work.touching_bodies[g], on);
         }
@@ -186,7 +198,7 @@ fn join<T: Real>(entries: &mut Vec<(usize, T::Mask)>, key: usize, lanes: T::Mask
 fn open<T: Real>(block: &mut Block<T>, pair: &PairSpec<T::Scalar>, slot: usize) {
     let z = [T::zero(); 3];
     block.reset(Source::Contacts, pair.cost, pair.dim);
-    block.coupled = pair.coupled();
+    block.coupled = pair.coupled;
     block.slot = slot;
     block.tie_points([z; 3], [z; 3], [(None, z); 2], T::none());
 }

@@ -98,7 +98,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn pair_contact(&self, block: &Block<T>, index: usize, on: T::Mask) -> Option<ContactForce<T>> {
         let Jacobian::Points { sides, lin: frame, .. } = &block.jacobian else { return None };
-        let pair = &self.sim.contacts.pairs[index];
+        let pair = &self.sim.contacts.pair(&self.sim.geoms, index);
         // the second side of a block moves
         let second = pair.moving();
         let first = if pair.geoms[0] == second { pair.geoms[1] } else { pair.geoms[0] };

@@ -90,6 +90,8 @@ pub(crate) struct Block<T: Real> {
     pub hold: T,
     /// Which edges push; or (bottom, middle) zone of an elliptic cone; or (below the bound, positive).
     pub zones: [T::Mask; 10],
+    /// Lanes whose stiffness has changed since [`crowd`](super::crowd) took note of it.
+    pub moved: T::Mask,
     /// Lanes whose zones are those of the evaluation before.
     pub recalled: T::Mask,
     /// Of contacts: which slot of those with as many rows.
@@ -126,6 +128,7 @@ impl<T: Real> Block<T> {
             stiffness: [z; 21],
             hold: z,
             zones: [T::none(); 10],
+            moved: T::none(),
             recalled: T::none(),
             slot: 0,
             members: Vec::new(),
@@ -151,20 +154,19 @@ impl<T: Real> Block<T> {
         self.members.clear();
     }
 
-    /// Takes over the zones of the same slot of the evaluation before, in the lanes where both hold the same contact. Not
-    /// of an elliptic cone, whose linear model follows the acceleration.
+    /// Takes over the zones of the same slot of the evaluation before, in the lanes where both hold the same contact.
+    /// Contacts come last in `past`, by class and slot, and `at` walks along them. Not of an elliptic cone, whose linear model follows the acceleration.
     #[inline(always)]
-    pub fn recall(&mut self, past: &[Block<T>]) {
+    pub fn recall(&mut self, past: &[Block<T>], at: &mut usize) {
         match (self.source, self.cost) {
             (_, Cost::Equal) => self.recalled = self.on,
             (Source::Contacts, Cost::Push | Cost::Pyramid) => {
-                for former in past {
-                    if former.source == Source::Contacts
-                        && (former.slot, former.coupled, former.dim) == (self.slot, self.coupled, self.dim)
-                    {
-                        self.recall_contacts(former);
-                        break;
-                    }
+                let slot = |b: &Block<T>| (b.source == Source::Contacts, b.coupled, b.dim, b.slot);
+                while past.get(*at).is_some_and(|former| slot(former) < slot(self)) {
+                    *at += 1;
+                }
+                if let Some(former) = past.get(*at).filter(|former| slot(former) == slot(self)) {
+                    self.recall_contacts(former);
                 }
             }
             _ => {}

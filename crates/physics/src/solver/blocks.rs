@@ -19,13 +19,14 @@ kernel_fn! {
     pub(crate) fn recall<'a, T>(work: &'a mut Work<T>) -> bool {
         let Work { blocks, past, in_contact, .. } = work;
         let mut known = true;
+        let mut at = 0;
         for b in blocks.iter_mut() {
             if let Jacobian::Points { sides, .. } = &b.jacobian {
                 for (link, _) in sides.iter().flat_map(|s| &s.links) {
                     in_contact[*link] = true;
                 }
             }
-            b.recall(&past.blocks);
+            b.recall(&past.blocks, &mut at);
             known &= !T::any(T::and(b.on, T::not(b.recalled)));
         }
         known
@@ -133,6 +134,7 @@ kernel_fn! {
             if !T::any(changed) {
                 continue;
             }
+            b.moved = T::or(b.moved, changed);
             match &b.jacobian {
                 Jacobian::Points { sides, .. } if !b.coupled => {
                     for (link, lanes) in &sides[1].links {
@@ -212,7 +214,7 @@ kernel_fn! {
     pub(crate) fn report_forces<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
         for b in work.blocks.iter().filter(|b| !b.coupled) {
             for (pair, lanes) in &b.members {
-                let geom = sim.contacts.pairs[*pair].moving();
+                let geom = sim.contacts.pair(&sim.geoms, *pair).moving();
                 work.normal_force[geom] += T::masked(*lanes, b.force[0]);
             }
         }

@@ -1,7 +1,8 @@
 //! Blocks that tie branches of the tree together.
 //!
 //! The articulated-body factors are those of `H0 = M + (what fits the tree)`. Blocks between moving bodies add
-//! `B' W B`, with few rows B (three per contact, and an agent has one or two such contacts). With `W = R' R` the
+//! `B' W B`, with few rows B (three per contact, and an agent has one or two such contacts; beyond
+//! [`MOST_ROWS`](super::crowd::MOST_ROWS) another factorization takes over, lane by lane). With `W = R' R` the
 //! matrix identity of Sherman, Morrison and Woodbury gives the exact Newton point from the factors of `H0`:
 //!
 //! `f = -R' (1 + R B inv(H0) B' R')^-1 R (B inv(H0) b + u0)`,  `a = inv(H0) (b + B' f)`.
@@ -72,7 +73,10 @@ kernel_fn! {
 fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool) {
     let nv = sim.model.nv;
     let mut c = std::mem::replace(&mut work.coupling, Coupling::new(0, 0));
-    c.rows = work.blocks.iter().filter(|b| b.coupled).map(|b| b.dim).sum();
+    // blocks of crowded lanes alone are left out: in the other lanes they are zero
+    let trees = T::not(work.crowded);
+    let corrects = |b: &Block<T>| b.coupled && (T::all(trees) || T::any(T::and(b.on, trees)));
+    c.rows = work.blocks.iter().filter(|b| corrects(b)).map(|b| b.dim).sum();
     let (n, z) = (c.rows, T::zero());
     c.columns.resize(n * nv, z);
     c.scaled.resize(n * nv, z);
@@ -81,7 +85,7 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
     c.factor.resize(n * (n + 1) / 2, z);
     let mut first = 0;
     for b in 0..work.blocks.len() {
-        if !work.blocks[b].coupled {
+        if !corrects(&work.blocks[b]) {
             continue;
         }
         let dim = work.blocks[b].dim;

@@ -5,7 +5,8 @@
 //! rows, the minimizer solves `(M + J' D J) a = tau - bias + J' D aref`. A contact with something that stands still adds
 //! to its own link alone, so that system has the structure of the mass matrix and is solved by the articulated-body
 //! recursion ([`crate::articulated`]) in linear time. Contacts of moving bodies with each other, equality constraints
-//! and tendons are a correction of low rank on top of it ([`coupled`]).
+//! and tendons are a correction of low rank on top of it ([`coupled`]). Agents with many of those are solved by a sparse
+//! factorization instead ([`crowd`]).
 //!
 //! Two identities keep the iteration in the space of rows, without ever multiplying by M:
 //! * after a solve with active set A the accelerations obey `M a - (tau - bias) = J' f`, with the linear forces
@@ -22,6 +23,7 @@ pub(crate) mod block;
 mod blocks;
 mod cone;
 pub(crate) mod coupled;
+pub(crate) mod crowd;
 pub(crate) mod floor;
 pub(crate) mod joint;
 mod search;
@@ -48,13 +50,20 @@ pub(crate) trait Row<T: Real> {
 pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     start::<T, S>(sim, group, work);
     let free = work.contacts.is_empty() && work.limits.is_empty() && work.dry.is_empty() && work.blocks.is_empty();
-    let coupled = blocks::any_coupled(work);
+    let any_coupled = blocks::any_coupled(work);
+    work.crowded = if any_coupled { crowd::start(sim, work) } else { T::none() };
+    // lanes whose tree is corrected for its coupled blocks, and those beside them
+    let (crowd, trees) = (T::any(work.crowded), !T::all(work.crowded));
+    let coupled = any_coupled && trees;
     let mut done = T::none();
     // lanes that stopped at a Newton point of their own active set
     let mut arrived = T::none();
     let mut iteration = 0;
     loop {
         assemble::<T, S>(sim, work);
+        if crowd {
+            crowd::factorize(sim, work, T::and(work.crowded, T::not(done)));
+        }
         if coupled {
             // links that are not stale keep their inward pass, without the correction of the last iteration
             let fresh = work.stale.contains(&true);
@@ -63,11 +72,16 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
             work.tree_drive.copy_from_slice(&work.drive);
             coupled::factorize(sim, work, fresh);
             coupled::correct(sim, work, true);
-        } else {
+        } else if trees {
             factorize::<T, S>(sim, work, true);
         }
         work.stale.fill(false);
-        accelerate::<T, S>(sim, work);
+        if trees {
+            accelerate::<T, S>(sim, work);
+        }
+        if crowd {
+            crowd::solve(sim, work, T::and(work.crowded, T::not(done)), false);
+        }
         iteration += 1;
         if free {
             work.acc.copy_from_slice(&work.next);
@@ -315,11 +329,16 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
         }
         work.link_force[l] = f;
     }
-    bring_inward::<T, S>(sim, work);
-    if coupled {
-        coupled::correct(sim, work, false);
+    if !T::all(work.crowded) {
+        bring_inward::<T, S>(sim, work);
+        if coupled {
+            coupled::correct(sim, work, false);
+        }
+        accelerate::<T, S>(sim, work);
     }
-    accelerate::<T, S>(sim, work);
+    if T::any(work.crowded) {
+        crowd::solve(sim, work, work.crowded, true);
+    }
     for (a, x) in work.acc.iter_mut().zip(&work.next) {
         *a += T::masked(arrived, *x);
     }

@@ -52,6 +52,10 @@ struct Document<'a> {
     against: &'static str,
     mujoco_version: &'a str,
     seconds: f64,
+    /// Agents of each thread, and steps before those that are timed.
+    agents: usize,
+    warmup: usize,
+    limp: bool,
     contacts: Which,
     rows: &'a [Row],
 }
@@ -79,6 +83,9 @@ pub fn run(plan: &Plan, subjects: &[Subject], head: Head, json: bool) -> Result<
             against: "mujoco",
             mujoco_version: &mujoco.version,
             seconds: plan.seconds,
+            agents: plan.agents,
+            warmup: plan.warmup,
+            limp: plan.limp,
             contacts: plan.contacts,
             rows: &rows,
         });
@@ -178,11 +185,12 @@ fn print_head(plan: &Plan, version: &str) {
         Which::Ground => "contacts with the ground only",
         Which::All => "all contacts",
     };
-    let threads = plan.threads;
+    let (threads, agents) = (plan.threads, plan.agents);
     say(format!(
-        "MuJoCo {version} in double precision and Marathon by instruction set, in turns on {threads} thread(s):"
+        "MuJoCo {version} in double precision and Marathon by instruction set, in turns on {threads} thread(s), {agents} \
+         agent(s) each:"
     ));
-    say(format!("one physics step of one agent under random torques, nobody reset, {contacts}; medians\n"));
+    say(format!("one physics step of one agent {}, nobody reset, {contacts}; medians\n", plan.load()));
     let (theirs, ours) = ("MuJoCo", "Marathon");
     say(format!(
         "{:23}  {:^26}  {:^26}  {:^18}",

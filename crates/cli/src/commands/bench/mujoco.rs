@@ -1,6 +1,6 @@
 //! MuJoCo in a Python process of its own: finding one, and talking to it.
 
-use super::physics::{AGENTS, Plan, STEPS, Source, Subject, WARMUP};
+use super::physics::{Plan, STEPS, Source, Subject};
 use super::row::Sample;
 use crate::error::CliError;
 use crate::python::{self, VARIABLE};
@@ -97,11 +97,12 @@ impl Mujoco {
     /// If MuJoCo cannot read the model, or the process has ended.
     pub fn load(&mut self, plan: &Plan, subject: &Subject) -> Result<(), CliError> {
         let mut job = json!({
-            "agents": AGENTS * plan.threads,
+            "agents": plan.agents * plan.threads,
             "threads": plan.threads,
-            "warmup": WARMUP,
+            "warmup": plan.warmup,
             "steps": STEPS,
             "hold": HOLD,
+            "limp": plan.limp,
             "contacts": plan.contacts,
         });
         match &subject.source {

@@ -3,7 +3,7 @@
 The command runs this text with `python -c` and talks to it in lines of JSON, a request and an answer each:
 
     (start)                                         {"mujoco": version}, or {"missing": why}
-    {"xml": text or "path": file, "agents": n, "threads": t, "warmup": s, "steps": s, "hold": s,
+    {"xml": text or "path": file, "agents": n, "threads": t, "warmup": s, "steps": s, "hold": s, "limp": bool,
      "contacts": "ground" or "all"}                 {}
     {"seconds": s}                                  {"steps": n, "cpu": s, "wall": s, "contacts": x, "broken": n}
 
@@ -59,6 +59,8 @@ class Workload:
         if job["contacts"] == "ground":
             ground_contacts_only(self.model)
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+        if job["limp"]:
+            self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
         self.agents, self.threads, self.hold = job["agents"], job["threads"], job["hold"]
         self.warmup, self.steps = job["warmup"], job["steps"]
         self.kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -88,8 +90,10 @@ class Workload:
 
     def repeat(self):
         """One repetition: processor seconds, seconds passed, contacts of an agent, agents that broke down."""
-        states, _ = self.runner.rollout(self.model, self.datas, self.starts(), self.controls(self.warmup))
-        warm = np.ascontiguousarray(states[:, -1])
+        warm = self.starts()
+        if self.warmup:
+            states, _ = self.runner.rollout(self.model, self.datas, warm, self.controls(self.warmup))
+            warm = np.ascontiguousarray(states[:, -1])
         controls = self.controls(self.steps)
         cpu, wall = time.process_time(), time.perf_counter()
         self.runner.rollout(self.model, self.datas, warm, controls, state=self.out)

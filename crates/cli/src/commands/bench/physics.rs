@@ -7,16 +7,14 @@ use crate::error::CliError;
 use clap::ValueEnum;
 use marathon_envs::{EnvError, ModelSource, registry};
 use marathon_physics::lanes::Isa;
-use marathon_physics::workload::{Report, Workload};
+use marathon_physics::workload::{HOLD, Report, Workload};
 use marathon_physics::{Model, SimError, SimOptions, SolverStats};
 use serde::Serialize;
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Agents of each thread, and steps of a repetition before and under the clock.
-pub const AGENTS: usize = 64;
-pub const WARMUP: usize = 200;
+/// Steps of a repetition under the clock.
 pub const STEPS: usize = 400;
 
 /// Options of `bench physics`.
@@ -37,6 +35,15 @@ pub struct PhysicsArgs {
     /// Processor seconds of each thread for every row, more or less.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
+    /// Agents of each thread, rounded up to whole groups of lanes.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=65536))]
+    pub agents: u64,
+    /// Steps of a repetition before those that are timed, rounded up to a multiple of the four that a control is held.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    pub warmup: u64,
+    /// Leave the actuators out, so that bodies only fall and pile up.
+    #[arg(long)]
+    pub limp: bool,
     /// Contacts to simulate.
     #[arg(long, value_name = "WHICH", default_value = "ground")]
     pub contacts: Which,
@@ -80,6 +87,12 @@ pub enum Source {
 /// What a run of the benchmark has in common.
 pub struct Plan {
     pub threads: usize,
+    /// Agents of each thread.
+    pub agents: usize,
+    /// Steps before those under the clock.
+    pub warmup: usize,
+    /// Without actuators.
+    pub limp: bool,
     pub contacts: Which,
     pub seconds: f64,
     pub isas: Vec<Isa>,
@@ -120,14 +133,21 @@ impl Figures for Physics {
 /// If a model cannot be read or simulated, or there is nothing to compare with.
 pub fn run(args: &PhysicsArgs, json: bool) -> Result<(), CliError> {
     let subjects = subjects(args)?;
-    let plan =
-        Plan { threads: args.common.threads(), contacts: args.contacts, seconds: args.seconds, isas: isas(&args.isa) };
+    let plan = Plan {
+        threads: args.common.threads(),
+        agents: args.agents as usize,
+        warmup: (args.warmup as usize).next_multiple_of(HOLD),
+        limp: args.limp,
+        contacts: args.contacts,
+        seconds: args.seconds,
+        isas: isas(&args.isa),
+    };
     let head = Head::new("physics", plan.threads);
     if args.against == Some(Engine::Mujoco) {
         return against::run(&plan, &subjects, head, json);
     }
-    let step = "one physics step of one agent under random torques, nobody reset";
-    let mut table = Table::new(json, head, args.seconds, step);
+    let step = format!("one physics step of one agent {}, nobody reset", plan.load());
+    let mut table = Table::new(json, head, args.seconds, &step);
     for subject in &subjects {
         for isa in &plan.isas {
             table.push(measure(&plan, subject, *isa).map_err(|e| subject.refused(e))?);
@@ -154,7 +174,15 @@ fn subjects(args: &PhysicsArgs) -> Result<Vec<Subject>, CliError> {
         let name = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
         subjects.push(Subject { name, model: Model::from_xml_file(file)?, source: Source::File(file.clone()) });
     }
+    subjects.iter_mut().for_each(|s| s.model.opt.flags.actuation &= !args.limp);
     Ok(subjects)
+}
+
+impl Plan {
+    /// What moves the agents.
+    pub fn load(&self) -> &'static str {
+        if self.limp { "without actuators" } else { "under random torques" }
+    }
 }
 
 impl Subject {
@@ -177,7 +205,7 @@ fn measure(plan: &Plan, subject: &Subject, isa: Isa) -> Result<Row<Physics>, Sim
         newton: counts.stats.newton as f64 / counts.stats.solves.max(1) as f64,
         non_finite: counts.non_finite,
     };
-    let agents = AGENTS.next_multiple_of(isa.lanes()) * plan.threads;
+    let agents = plan.agents.next_multiple_of(isa.lanes()) * plan.threads;
     Ok(Row::new(&subject.name, isa, (plan.threads, agents), &samples, figures))
 }
 
@@ -189,7 +217,7 @@ pub fn repeat(plan: &Plan, model: &Model, isa: Isa, seed: u64, counts: &mut Coun
     let work = |thread: usize, _: &mut ()| {
         let sim = SimOptions { ground_contacts_only: plan.contacts == Which::Ground, ..Default::default() };
         let seed = seed * plan.threads as u64 + thread as u64;
-        let workload = Workload { isa, agents: AGENTS, warmup: WARMUP, steps: STEPS, seed, sim };
+        let workload = Workload { isa, agents: plan.agents, warmup: plan.warmup, steps: STEPS, seed, sim };
         let ticks = RefCell::new(Vec::new());
         let clock = || {
             ticks.borrow_mut().push(Instant::now());

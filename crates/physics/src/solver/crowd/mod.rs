@@ -1,0 +1,234 @@
+//! Agents in which much touches much: a sparse factorization instead of a correction of low rank.
+//!
+//! The correction of [`coupled`](super::coupled) costs the square of its rows for every degree of freedom. A pile of
+//! bodies has hundreds of rows and few of them say anything new: what counts is which links touch. Beyond
+//! [`MOST_ROWS`] rows an agent is solved by a factorization of the whole matrix `H = M + J' D J`.
+//!
+//! It generalizes the articulated-body recursion. That recursion eliminates the joints of a link and hands to the
+//! parent a 6x6 matrix over the parent's spatial acceleration. Here the matrix of a link, its front, is also over the
+//! accelerations of the links that it touches: they are carried inward as they are, until the elimination reaches them
+//! (Duff and Reid's multifrontal method, with links for variables). Rows over several joints, such as tendons, are carried
+//! along in the same way, as the sum of their terms that are still to come. A link that touches nothing costs what it
+//! costs in the recursion, islands never meet, and a contact costs by the links between it and the root, not by the other
+//! contacts. Trees are eliminated by minimum degree ([`order`]), the links of a tree from the tips to the root.
+//!
+//! Which links touch differs between agents, and so do order and fronts: a crowded agent is factorized in scalar
+//! arithmetic, whatever lanes it shares. The choice, the order and every sum depend on that agent alone. The other stages
+//! of the solver take no notice, and neither do the lanes beside it: see [`coupled`](super::coupled).
+
+mod assembly;
+mod front;
+mod order;
+mod plan;
+
+use crate::lanes::{Real, kernel_fn};
+use crate::sim::Sim;
+use crate::solver::block::{Block, Jacobian};
+use crate::spatial::*;
+use crate::work::Work;
+use assembly::Tie;
+use front::{JointRow, Numbers};
+use plan::{NONE, Plan, RowTerms};
+
+/// Rows between moving links (and over several joints) up to which the correction of low rank is used. Eight contacts
+/// with friction: more than a figure has with itself but in rare heaps.
+pub(crate) const MOST_ROWS: usize = 24;
+
+/// The factorization of one agent.
+#[derive(Clone, Debug)]
+pub(crate) struct Crowd<S> {
+    plan: Plan<S>,
+    numbers: Numbers<S>,
+}
+
+impl<S: Real> Crowd<S> {
+    fn new() -> Self {
+        Crowd { plan: Plan::new(), numbers: Numbers::new() }
+    }
+}
+
+kernel_fn! {
+    /// Finds the lanes with more than [`MOST_ROWS`] coupled rows and prepares their factorization.
+    pub(crate) fn start<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) -> T::Mask {
+        let most = sim.most_rows;
+        let coupled = || work.blocks.iter().filter(|b| b.coupled);
+        if coupled().map(|b| b.dim).sum::<usize>() <= most {
+            return T::none();
+        }
+        let mut rows = [0; crate::lanes::MAX_LANES];
+        for b in coupled() {
+            let bits = T::bits(b.on);
+            for (lane, n) in rows.iter_mut().enumerate().take(T::LANES) {
+                *n += if bits >> lane & 1 == 1 { b.dim } else { 0 };
+            }
+        }
+        let mut crowded = 0;
+        for (lane, n) in rows.iter().enumerate().take(T::LANES) {
+            if *n > most {
+                crowded |= 1 << lane;
+            }
+        }
+        if crowded != 0 && work.crowds.is_empty() {
+            work.crowds = vec![Crowd::new(); T::LANES];
+        }
+        for lane in (0..T::LANES).filter(|lane| crowded >> lane & 1 == 1) {
+            prepare(sim, work, lane);
+        }
+        T::from_bits(crowded)
+    }
+}
+
+/// Lists what ties the links of a lane together, and plans the factorization.
+#[inline(always)]
+fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
+    let Work { crowds, blocks, axis, .. } = work;
+    let Crowd { plan, numbers } = &mut crowds[lane];
+    numbers.resize(sim.links.len(), sim.model.nv);
+    for (to, from) in numbers.axis.iter_mut().zip(axis.iter()) {
+        *to = from.map(|x| x.get(lane));
+    }
+    numbers.ties.clear();
+    numbers.rows.clear();
+    plan.row_terms.clear();
+    plan.terms.clear();
+    let on_lane = |mask: T::Mask| T::bits(mask) >> lane & 1 == 1;
+    for (index, b) in blocks.iter_mut().enumerate() {
+        b.moved = T::not(T::none());
+        if !b.coupled || !on_lane(b.on) {
+            continue;
+        }
+        match &b.jacobian {
+            Jacobian::Points { sides, lin, ang } => {
+                let link = |s: usize| sides[s].links.iter().find(|(_, lanes)| on_lane(*lanes)).map(|(l, _)| *l);
+                let [Some(first), Some(second)] = [link(0), link(1)] else { continue };
+                let v3 = |v: &V3<T>| v.map(|x| x.get(lane));
+                let one = T::scalar(1.0);
+                numbers.ties.push(Tie {
+                    block: index,
+                    links: [first, second],
+                    slot: 0,
+                    next: NONE,
+                    dim: b.dim,
+                    lin: [v3(&lin[0]), v3(&lin[1]), v3(&lin[2])],
+                    ang: [v3(&ang[0]), v3(&ang[1]), v3(&ang[2])],
+                    r: [v3(&sides[0].r), v3(&sides[1].r)],
+                    sign: [-one, one],
+                    w: [T::scalar(0.0); 21],
+                    force: [T::scalar(0.0); 6],
+                });
+            }
+            Jacobian::Joints(terms) => {
+                let start = plan.terms.len();
+                plan.terms.extend(terms.iter().map(|(dof, c)| (*dof, sim.dof_link[*dof], c.get(lane))));
+                plan.row_terms.push(RowTerms { start, end: plan.terms.len(), enters: NONE, next: NONE });
+                numbers.rows.push(JointRow { block: index, w: T::scalar(0.0), u0: b.u0[0].get(lane) });
+            }
+        }
+    }
+    plan.order(&sim.links, sim.trees, numbers.ties.iter().map(|t| t.links));
+    for (i, tie) in numbers.ties.iter_mut().enumerate().rev() {
+        // the link that is eliminated first comes first
+        if plan.position[tie.links[1]] < plan.position[tie.links[0]] {
+            tie.links.swap(0, 1);
+            tie.r.swap(0, 1);
+            tie.sign.swap(0, 1);
+        }
+        tie.next = std::mem::replace(&mut plan.fronts[tie.links[0]].tie, i);
+    }
+    plan.find_fronts(&sim.links, &mut numbers.ties);
+    numbers.follow(plan);
+    numbers.stale.fill(true);
+}
+
+kernel_fn! {
+    /// Factorizes the system of the lanes `lanes`: what changed of it since their last factorization, by
+    /// [`Work::stale`](crate::work::Work::stale) and [`Block::moved`].
+    pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
+        let bits = T::bits(lanes);
+        for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let Work { crowds, blocks, stale, in_contact, inertia, stiffness, diag, stats, .. } = work;
+            let Crowd { plan, numbers } = &mut crowds[lane];
+            for (l, link) in sim.links.iter().enumerate().filter(|(l, _)| stale[*l]) {
+                let rigid = sym6_of_inertia(&inertia[l].map(|x| x.get(lane)));
+                numbers.stiffness[l] = rigid;
+                if in_contact[l] {
+                    for (sum, x) in numbers.stiffness[l].iter_mut().zip(&stiffness[l]) {
+                        *sum += x.get(lane);
+                    }
+                }
+                for d in link.dofs.clone() {
+                    numbers.diag[d] = diag[d].get(lane);
+                }
+                numbers.stale[l] = true;
+            }
+            let moved = |b: &Block<T>| T::bits(b.moved) >> lane & 1 == 1;
+            for tie in &mut numbers.ties {
+                let b = &blocks[tie.block];
+                if moved(b) {
+                    for (w, x) in tie.w.iter_mut().zip(&b.stiffness).take(b.dim * (b.dim + 1) / 2) {
+                        *w = x.get(lane);
+                    }
+                    tie.force = b.linear_force(&b.u0).map(|x| x.get(lane));
+                    numbers.stale[tie.links[0]] = true;
+                }
+            }
+            for (row, terms) in numbers.rows.iter_mut().zip(&plan.row_terms) {
+                let b = &blocks[row.block];
+                if moved(b) {
+                    row.w = b.stiffness[0].get(lane);
+                    if terms.enters != NONE {
+                        numbers.stale[terms.enters] = true;
+                    }
+                }
+            }
+            stats.crowded += 1;
+            stats.entries += front::factorize(&sim.links, plan, numbers);
+        }
+        for b in work.blocks.iter_mut() {
+            b.moved = T::none();
+        }
+    }
+}
+
+kernel_fn! {
+    /// Solves for the forces of the present system in the lanes `lanes`, into [`Work::next`](crate::work::Work::next)
+    /// and [`Work::link_acc`](crate::work::Work::link_acc); without the blocks' and the motion's forces for a residual,
+    /// whose forces on links are in [`Work::link_force`](crate::work::Work::link_force).
+    pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
+        let bits = T::bits(lanes);
+        for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let Work { crowds, in_contact, bias_force, wrench, link_force, rhs, next, link_acc, .. } = work;
+            let Crowd { plan, numbers } = &mut crowds[lane];
+            for (to, from) in numbers.rhs.iter_mut().zip(rhs.iter()) {
+                *to = from.get(lane);
+            }
+            for l in 0..sim.links.len() {
+                let from = if residual { &link_force[l] } else { &bias_force[l] };
+                numbers.force[l] = from.map(|x| x.get(lane));
+                if !residual && in_contact[l] {
+                    for (f, w) in numbers.force[l].iter_mut().zip(&wrench[l]) {
+                        *f += -w.get(lane);
+                    }
+                }
+            }
+            let zero = T::scalar(0.0);
+            if !residual {
+                for tie in &numbers.ties {
+                    tie.exert(&mut numbers.force);
+                }
+            }
+            for (force, row) in numbers.row_force.iter_mut().zip(&numbers.rows) {
+                *force = if residual { zero } else { row.w * row.u0 };
+            }
+            front::solve(&sim.links, plan, numbers);
+            for (to, from) in next.iter_mut().zip(&numbers.next) {
+                to.set(lane, *from);
+            }
+            for (to, from) in link_acc.iter_mut().zip(&numbers.acc) {
+                for (x, y) in to.iter_mut().zip(from) {
+                    x.set(lane, *y);
+                }
+            }
+        }
+    }
+}
