@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests everything but the game; `./test.sh --all` tests the game as well, which compiles Bevy once.
+# Tests everything but the game and the packing of the wheel; `./test.sh --all` tests those as well, and compiles Bevy once.
 #
 # Sets up by itself what the tests need: Python environments with the oracles (MuJoCo, Gymnasium, dm_control, PyTorch) in
 # .venv and with ML-Agents in .venv-mlagents; with --all and as root the Debian packages of the game. Needs a Rust toolchain
@@ -14,7 +14,7 @@ esac
 if [ -n "$game" ]; then
   crates/game/tests/packages.sh
 fi
-export MARATHON_TEST_GAME="$game"
+export MARATHON_TEST_GAME="$game" MARATHON_TEST_WHEEL="$game"
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Builds the wheel, installs it into a clean environment as a user would, and tests it. Part of ./test.sh; the Python of
-# MARATHON_PYTHON (or .venv) needs python/tests/requirements*.txt. Arguments go to pytest.
+# Tests the Python package. Part of ./test.sh; the Python of MARATHON_PYTHON (or .venv) needs python/tests/requirements*.txt.
+# MARATHON_TEST_WHEEL=1 builds the wheel as well and installs it into a clean environment, as a user would. Arguments go to
+# pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python="${MARATHON_PYTHON:-$PWD/.venv/bin/python}"
@@ -13,18 +14,28 @@ wheels="$target/wheels" clean="$target/clean-venv" site="$target/python-site"
 
 "$python" -m ruff check python examples/python
 "$python" -m ruff format --check python examples/python
-rm -rf "$wheels" "$clean" "$site"
-"$python" -m maturin build --quiet --release --out "$wheels"
 
-# a user's environment: the wheel and what it asks for
-python3 -m venv "$clean"
-"$clean/bin/pip" install --quiet --disable-pip-version-check "$wheels"/*.whl
-(cd "$clean" && bin/python -c "import marathon_envs; marathon_envs.VecEnv('hopper', 2).reset()")
-"$clean/bin/marathon" --json list > /dev/null
-
-# the tests' environment stays as it is: the wheel is unpacked beside it
-"$python" -m pip install --quiet --disable-pip-version-check --no-deps --target "$site" "$wheels"/*.whl
+# the native module that ./test.sh has built: `--workspace` and a test among the targets keep the features of dependencies
+packages=(--workspace --exclude marathon-game --exclude avian_props)
+if [ -n "${MARATHON_TEST_GAME:-}" ]; then
+  packages=(--workspace)
+fi
+cargo build --release "${packages[@]}" --lib --test errors_say_what_to_do
+rm -rf "$site"
+mkdir -p "$site"
+cp -R python/marathon_envs "$site"
+cp "$target/release/libmarathon_python.so" "$site/marathon_envs/_native.abi3.so"
 export PYTHONPATH="$site"
 "$python" -m mypy python/marathon_envs
 (cd "$site" && "$python" -m mypy.stubtest marathon_envs._native)
 "$python" -m pytest --quiet "$@"
+
+if [ -n "${MARATHON_TEST_WHEEL:-}" ]; then
+  unset PYTHONPATH
+  rm -rf "$wheels" "$clean"
+  "$python" -m maturin build --quiet --release --out "$wheels"
+  python3 -m venv "$clean"
+  "$clean/bin/pip" install --quiet --disable-pip-version-check "$wheels"/*.whl
+  (cd "$clean" && bin/python -c "import marathon_envs; marathon_envs.VecEnv('hopper', 2).reset()")
+  "$clean/bin/marathon" --json list > /dev/null
+fi

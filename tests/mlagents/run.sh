@@ -18,12 +18,12 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   "$python" tests/oracle/install_torch.py torch==2.1.2
   touch .venv-mlagents/complete
 fi
-targets=(--bin marathon-player --bin marathon) packages=(--workspace --exclude marathon-game --exclude avian_props)
+# `--workspace` and a test among the targets keep the features of dependencies, and with them what ./test.sh has built
+targets=(--bin marathon-player --bin marathon --test errors_say_what_to_do)
+packages=(--workspace --exclude marathon-game --exclude avian_props)
 if [ -n "${MARATHON_TEST_GAME:-}" ]; then
-  # a test among the targets: Bevy has the features that it has in `cargo test`, and is not compiled again
-  targets+=(--bin marathon-game --test a_window_under_xvfb) packages=(--workspace)
+  targets+=(--bin marathon-game) packages=(--workspace)
 fi
-# `--workspace` keeps the features of dependencies, and with them what is built already
 cargo build --release "${packages[@]}" "${targets[@]}"
 bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
 export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon" MARATHON_GAME="$bin/marathon-game"
