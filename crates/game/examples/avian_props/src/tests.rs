@@ -4,7 +4,8 @@ use super::*;
 use bevy::time::TimeUpdateStrategy;
 use std::time::Duration;
 
-/// Where each box ends and how far it has gone, m, in the order of their starts; and the hopper along its track; `hit` counts contacts between them.
+/// Where each box ends and how far it has gone, m, in the order of their starts, and the hopper along its track; `hit` counts
+/// contacts between them.
 struct Outcome {
     boxes: Vec<(Vec3, f32)>,
     hopper: Option<f64>,
