@@ -48,6 +48,20 @@ def vertical_coordinate(model):
     return None
 
 
+def draw_joint(model, j, q, rng, reach):
+    """Turns a ball joint at random, draws a joint within its limits and a little beyond, or moves it by up to `reach`."""
+    a = model.jnt_qposadr[j]
+    if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+        q[a : a + 4] = rng.normal(size=4)
+        q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
+    elif model.jnt_limited[j]:
+        low, high = model.jnt_range[j]
+        slack = 0.05 * (high - low)
+        q[a] = rng.uniform(low - slack, high + slack)
+    else:
+        q[a] += rng.uniform(-reach, reach)
+
+
 def random_state(model, rng, near_floor, spread=None):
     q = model.qpos0.copy()
     v = rng.normal(size=model.nv)
@@ -62,15 +76,8 @@ def random_state(model, rng, near_floor, spread=None):
             q[a : a + 2] += rng.normal(size=2)
             q[a + 3 : a + 7] = rng.normal(size=4)
             q[a + 3 : a + 7] /= np.linalg.norm(q[a + 3 : a + 7])
-        elif kind == mujoco.mjtJoint.mjJNT_BALL:
-            q[a : a + 4] = rng.normal(size=4)
-            q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
-        elif model.jnt_limited[j]:
-            low, high = model.jnt_range[j]
-            slack = 0.05 * (high - low)
-            q[a] = rng.uniform(low - slack, high + slack)
         else:
-            q[a] += rng.uniform(-1.5, 1.5)
+            draw_joint(model, j, q, rng, 1.5)
     z = vertical_coordinate(model)
     if near_floor and z is not None:
         data = mujoco.MjData(model)
