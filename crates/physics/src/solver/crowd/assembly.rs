@@ -28,6 +28,16 @@ pub(super) struct Tie<S> {
     pub force: Rows<S>,
 }
 
+impl<S> Tie<S> {
+    /// Sides of the blocks that a tie adds to its front, rows and columns: of both links' blocks the one above the diagonal.
+    /// Two points of one link meet on the diagonal, which needs both.
+    #[inline(always)]
+    fn blocks(&self) -> impl Iterator<Item = (usize, usize)> + use<S> {
+        let both = self.slot == 0;
+        [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().filter(move |sides| both || *sides != (1, 0))
+    }
+}
+
 /// Rows and columns of a packed symmetric matrix.
 const PACKED: [[usize; 6]; 6] = [
     [0, 3, 4, 6, 7, 8],
@@ -98,7 +108,7 @@ fn add_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
     // moments of the columns: entry [c] is r x column c
     let moments = [0, 1].map(|s| [0, 1, 2].map(|c| cross(&tie.r[s], &world[c])));
     let place = [0, tie.slot];
-    for (s, t) in [(0, 0), (0, 1), (1, 1)] {
+    for (s, t) in tie.blocks() {
         let (rows, columns) = (place[s], place[t]);
         let negative = s != t;
         let mut add = |i: usize, j: usize, x: S| {
@@ -128,7 +138,7 @@ fn add_turning_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
         }
     }
     let place = [0, tie.slot];
-    for (s, t) in [(0, 0), (0, 1), (1, 1)] {
+    for (s, t) in tie.blocks() {
         for k in 0..tie.dim {
             let mut h = [S::zero(); 6];
             for m in 0..tie.dim {
