@@ -7,14 +7,15 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 case "${1:-}" in
-  '') game='' packages=(--workspace --exclude marathon-game --exclude avian_props) ;;
-  --all) game=yes packages=(--workspace) ;;
+  '') game='' ;;
+  --all) game=yes ;;
   *) echo "usage: ./test.sh [--all], found '$1'" >&2 && exit 2 ;;
 esac
 if [ -n "$game" ]; then
   crates/game/tests/packages.sh
 fi
 export MARATHON_TEST_GAME="$game" MARATHON_TEST_WHEEL="$game"
+. tests/packages.sh
 if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv

@@ -16,10 +16,7 @@ wheels="$target/wheels" clean="$target/clean-venv" site="$target/python-site"
 "$python" -m ruff format --check python examples/python
 
 # the native module that ./test.sh has built: `--workspace` and a test among the targets keep the features of dependencies
-packages=(--workspace --exclude marathon-game --exclude avian_props)
-if [ -n "${MARATHON_TEST_GAME:-}" ]; then
-  packages=(--workspace)
-fi
+. tests/packages.sh
 cargo build --release "${packages[@]}" --lib --test errors_say_what_to_do
 rm -rf "$site"
 mkdir -p "$site"

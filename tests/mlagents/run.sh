@@ -20,9 +20,9 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
 fi
 # `--workspace` and a test among the targets keep the features of dependencies, and with them what ./test.sh has built
 targets=(--bin marathon-player --bin marathon --test errors_say_what_to_do)
-packages=(--workspace --exclude marathon-game --exclude avian_props)
+. tests/packages.sh
 if [ -n "${MARATHON_TEST_GAME:-}" ]; then
-  targets+=(--bin marathon-game) packages=(--workspace)
+  targets+=(--bin marathon-game)
 fi
 cargo build --release "${packages[@]}" "${targets[@]}"
 bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
