@@ -3,7 +3,6 @@
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::ragdoll::{EpisodeBegan, EpisodeEnded, FootContact, Push, RestartNow, TargetReached};
 use crate::simulate::{self, Marathon};
-use crate::stage;
 use bevy::prelude::*;
 
 /// Ragdolls for any Bevy app.
@@ -53,7 +52,7 @@ impl Plugin for MarathonPlugin {
                     (simulate::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
                 ),
             )
-            .add_systems(RunFixedMainLoop, stage::show.in_set(MarathonSystems::Show))
+            .add_systems(RunFixedMainLoop, simulate::show.in_set(MarathonSystems::Show))
             .add_observer(simulate::dismiss);
     }
 }

@@ -6,8 +6,8 @@ use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
-    Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Physique, Policy, Push, Ragdoll, Restart,
-    RestartNow, Target, TargetReached, Unfit,
+    Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Part, Physique, Policy, Push, Ragdoll,
+    Restart, RestartNow, Target, TargetReached, Unfit,
 };
 use crate::stage;
 use bevy::ecs::lifecycle::Remove;
@@ -363,5 +363,18 @@ pub(crate) fn face_targets(
             arrived.push((entity, episode.number));
             reached.write(TargetReached { ragdoll: entity, target: *target });
         }
+    }
+}
+
+/// Writes the transforms of all parts at the time that a frame shows.
+pub(crate) fn show(
+    marathon: Res<Marathon>,
+    time: Res<Time<Fixed>>,
+    ragdolls: Query<(&RagdollState, &Anatomy)>,
+    mut parts: Query<&mut Transform, With<Part>>,
+) {
+    let now = time.elapsed() + time.overstep();
+    for (ragdoll, anatomy) in &ragdolls {
+        stage::put(anatomy, marathon.places(ragdoll, now), &mut parts);
     }
 }

@@ -1,25 +1,11 @@
-//! Frames: the transforms of all parts at the time that a frame shows.
+//! The parts of ragdolls on the stage: their entities, and the transforms that a configuration gives them.
 
 use crate::axes::place_to_game;
 use crate::ragdoll::{Anatomy, Part};
-use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use marathon_render::Scene;
-
-/// Writes the transforms of all parts.
-pub(crate) fn show(
-    marathon: Res<Marathon>,
-    time: Res<Time<Fixed>>,
-    ragdolls: Query<(&RagdollState, &Anatomy)>,
-    mut parts: Query<&mut Transform, With<Part>>,
-) {
-    let now = time.elapsed() + time.overstep();
-    for (ragdoll, anatomy) in &ragdolls {
-        put(anatomy, marathon.places(ragdoll, now), &mut parts);
-    }
-}
 
 /// Where the bodies of a model are in a configuration; none if the numbers are not sound.
 pub fn places(model: &Model, qpos: &[f64]) -> Option<Vec<Transform>> {

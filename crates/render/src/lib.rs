@@ -29,6 +29,7 @@ mod font;
 mod ground;
 mod image;
 mod kinematics;
+mod light;
 mod mp4;
 mod palette;
 mod recorder;

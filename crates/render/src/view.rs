@@ -5,8 +5,8 @@ use glam::DVec3;
 use crate::bins::{Bins, Rect};
 use crate::camera::{Basis, Camera};
 use crate::ground::Ground;
+use crate::light::Light;
 use crate::scene::Frame;
-use crate::shade::Light;
 use crate::shape::Solid;
 
 /// Side of a screen tile, pixels.
