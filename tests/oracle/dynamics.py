@@ -14,7 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "crates/cli/src/commands/bench"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "crates/cli/src/bench"))
 from mujoco_side import ground_contacts_only  # the benchmark's: what is compared and what is timed are the same contacts
 
 

@@ -1,8 +1,9 @@
 //! The command line.
 
-use crate::commands::bench::BenchArgs;
-use crate::commands::study::StudyArgs;
+use crate::bench::BenchArgs;
+use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
+use marathon_runs::{FilmOptions, PolicySource, RunOptions};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -80,42 +81,15 @@ pub struct TrainArgs {
     /// Agent to train, such as hopper, walker, humanoid, ant or Hopper-v1; see `marathon list`.
     #[arg(required_unless_present = "resume")]
     pub agent: Option<String>,
-    /// Configuration in the YAML schema of ML-Agents; without it, the agent's own fast one.
-    #[arg(long, value_name = "F.yaml", conflicts_with = "resume")]
-    pub config: Option<PathBuf>,
-    /// Algorithm, with the settings that it starts from in place of the agent's own; in a configuration file it is
-    /// `trainer_type`.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["resume", "config"], value_parser = marathon_learn::Algorithm::NAMES)]
-    pub algo: Option<String>,
-    /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
-    #[arg(long, value_name = "N", conflicts_with = "resume")]
-    pub agents: Option<usize>,
-    /// Agent-steps of the whole run.
-    #[arg(long, value_name = "N", value_parser = parse_steps)]
-    pub steps: Option<u64>,
-    /// Seed of everything random.
-    #[arg(long, value_name = "S", conflicts_with = "resume")]
-    pub seed: Option<u64>,
-    /// Threads; 0 means one per processor. The result does not depend on it.
-    #[arg(long, value_name = "T")]
-    pub threads: Option<usize>,
-    /// Processes that play, each with a share of the agents, while this one learns; 0: it plays itself, on its threads. The
-    /// result does not depend on it. Not with sac.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub processes: usize,
-    /// Folder for the results, new or empty [default: runs/AGENT-N].
-    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
-    pub out: Option<PathBuf>,
-    /// Go on with the run in this folder; --steps may extend it.
-    #[arg(long, value_name = "DIR")]
-    pub resume: Option<PathBuf>,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
 /// Options of `eval`.
 #[derive(Debug, clap::Args)]
 pub struct EvalArgs {
-    /// Policy file, or folder of a run.
-    pub policy: PathBuf,
+    #[command(flatten)]
+    pub source: PolicySource,
     /// Episodes to play.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub episodes: u64,
@@ -125,28 +99,21 @@ pub struct EvalArgs {
     /// Threads; 0 means one per processor. The result does not depend on it.
     #[arg(long, value_name = "T", default_value_t = 0)]
     pub threads: usize,
-    /// Agent that the policy must be for [default: the one it was trained for].
-    #[arg(long, value_name = "AGENT")]
-    pub agent: Option<String>,
 }
 
 /// Options of `render`.
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
-    /// Policy file, or folder of a run.
-    pub policy: PathBuf,
+    #[command(flatten)]
+    pub source: PolicySource,
     /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Length of the scene [default: 2 for .png, 8 otherwise].
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub seconds: Option<f64>,
+    #[command(flatten)]
+    pub film: FilmOptions,
     /// Frames of a .png strip [default: 8].
     #[arg(long, value_name = "N")]
     pub frames: Option<usize>,
-    /// Frames per second of a .gif or .mp4 [default: 25 and 50].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub fps: Option<f64>,
     /// Width of a frame, pixels [default: 240 for .png, 480 for .gif, 960 for .mp4].
     #[arg(long, value_name = "PIXELS")]
     pub width: Option<usize>,
@@ -156,15 +123,9 @@ pub struct RenderArgs {
     /// Agents side by side.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub agents: usize,
-    /// Seconds that the agents run before the scene begins.
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
-    pub start: f64,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,
-    /// Agent that the policy must be for [default: the one it was trained for].
-    #[arg(long, value_name = "AGENT")]
-    pub agent: Option<String>,
 }
 
 const EXPORT_HELP: &str = "\
@@ -206,8 +167,8 @@ pub struct ImportArgs {
 /// Options of `record-demo`.
 #[derive(Debug, clap::Args)]
 pub struct RecordDemoArgs {
-    /// Policy file, or folder of a run.
-    pub policy: PathBuf,
+    #[command(flatten)]
+    pub source: PolicySource,
     /// File to write; its name ends in .demo.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -217,9 +178,6 @@ pub struct RecordDemoArgs {
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,
-    /// Agent that the policy must be for [default: the one it was trained for].
-    #[arg(long, value_name = "AGENT")]
-    pub agent: Option<String>,
 }
 
 /// Options of `play`.
@@ -231,23 +189,6 @@ pub struct PlayArgs {
     pub words: Vec<std::ffi::OsString>,
 }
 
-/// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.
-fn parse_steps(text: &str) -> Result<u64, String> {
-    let bad = || "expected a positive number of steps such as 4000000, 4_000_000, 4M, 500k or 4e6".to_string();
-    let digits: String = text.chars().filter(|c| !matches!(c, '_' | ',')).collect();
-    if let Ok(n) = digits.parse::<u64>() {
-        return if n > 0 { Ok(n) } else { Err(bad()) };
-    }
-    let (number, factor) = match digits.chars().last() {
-        Some('k' | 'K') => (&digits[..digits.len() - 1], 1e3),
-        Some('m' | 'M') => (&digits[..digits.len() - 1], 1e6),
-        Some('g' | 'G') => (&digits[..digits.len() - 1], 1e9),
-        _ => (&digits[..], 1.0),
-    };
-    let steps = number.parse::<f64>().map_err(|_| bad())? * factor;
-    if (1.0..=1e15).contains(&steps) { Ok(steps.round() as u64) } else { Err(bad()) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -256,16 +197,5 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
-    }
-
-    #[test]
-    fn steps_have_short_forms() {
-        for (text, steps) in [("4000000", 4_000_000), ("4_000_000", 4_000_000), ("2.5M", 2_500_000), ("1e6", 1_000_000)]
-        {
-            assert_eq!(parse_steps(text), Ok(steps));
-        }
-        for text in ["0", "-3", "many", "", "inf", "nan", "k"] {
-            assert!(parse_steps(text).is_err(), "{text}");
-        }
     }
 }

@@ -1,50 +1,38 @@
 //! What ends a command early.
 
-use crate::config::ConfigError;
+use crate::program;
+use marathon_config::ConfigError;
 use marathon_envs::EnvError;
 use marathon_learn::Error;
 use marathon_physics::mjcf::MjcfError;
 use marathon_render::RenderError;
-use std::path::{Path, PathBuf};
+use marathon_runs::RunError;
+use std::path::Path;
 
 /// An error with a text for the user: which file or option, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// Of the environments: an unknown agent, most likely.
-    #[error(transparent)]
-    Env(#[from] EnvError),
-    /// Of the trainer; or of a file, whose errors are worded there.
-    #[error(transparent)]
-    Learn(#[from] Error),
-    /// Of a configuration file.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
+    /// Of a run, a policy or a film.
+    #[error("{}", program::spelled(|flags| .0.spelled(flags)))]
+    Run(#[from] RunError),
     /// Of a model file.
     #[error(transparent)]
     Model(#[from] MjcfError),
     /// Of the pictures.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A picture of the results cannot be drawn.
-    #[error("{}: {reason}", path.display())]
-    Draw {
-        /// The picture.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// Training stopped because its results could no longer be written.
+    /// A process that plays is lost; what was learned is saved.
     #[error("{cause}\n{advice}")]
-    Stopped {
+    Lost {
         /// What failed first.
-        cause: Box<CliError>,
+        cause: RunError,
         /// What is left and how to go on.
         advice: String,
     },
     /// A Python program cannot be asked.
     #[error("{0}")]
     Python(String),
-    /// A process of this program has failed.
+    /// The system refuses something.
     #[error("{0}")]
     Process(String),
     /// The game cannot be started, or failed.
@@ -61,21 +49,39 @@ pub enum CliError {
 impl CliError {
     /// For `map_err` after something was tried on a file.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
-        move |source| Error::Io { path: path.into(), action, source }.into()
+        move |source| RunError::io(path, action)(source).into()
     }
 
     /// A file with wrong contents.
     pub fn file(path: &Path, place: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
-        let (place, found, expected) = (place.to_string(), found.to_string(), expected.to_string());
-        Error::File { path: path.into(), place, found, expected }.into()
+        RunError::file(path, place, found, expected).into()
     }
 
     /// Exit code of the program.
     pub fn exit_code(&self) -> u8 {
         match self {
             CliError::Usage(_) => 2,
+            CliError::Run(error) if error.is_usage() => 2,
             CliError::Interrupted(_) => 130,
             _ => 1,
         }
+    }
+}
+
+impl From<EnvError> for CliError {
+    fn from(error: EnvError) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+impl From<Error> for CliError {
+    fn from(error: Error) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+impl From<ConfigError> for CliError {
+    fn from(error: ConfigError) -> Self {
+        RunError::from(error).into()
     }
 }

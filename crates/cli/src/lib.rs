@@ -3,21 +3,19 @@
 //! What a person reads goes to stdout, progress and errors to stderr. With `--json`, stdout carries exactly one JSON
 //! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C. What
 //! stdout does not take is a failure, but for a reader that has left.
+//!
+//! The modules from bottom to top: `program` (its name), `error`, `console`, `interrupt`, `python`, [`bench`], [`study`],
+//! [`args`], [`commands`]. What makes a run is in `marathon-runs`.
 
 mod args;
+mod bench;
 mod commands;
-mod config;
 mod console;
 mod error;
-mod folder;
 mod interrupt;
-mod policy_file;
-mod processes;
+mod program;
 mod python;
-mod report;
-pub mod session;
-mod task;
-mod text;
+mod study;
 
 use args::{Args, Command};
 use clap::Parser;
@@ -26,11 +24,11 @@ use std::ffi::OsString;
 
 /// Runs the command with the words of a command line, the first being the program's own name, and returns its exit code.
 ///
-/// It is a function so that other programs can bring the command along, as the Python package does. It belongs at the
+/// It is a function because the Python package brings the command along; nothing else uses this library. It belongs at the
 /// end of a process: commands that take long replace the handler of Ctrl-C.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
-    text::set_program(words.first());
+    program::set_name(words.first());
     let code = match Args::try_parse_from(&words) {
         Ok(args) => match dispatch(&args) {
             Ok(()) => 0,
@@ -75,8 +73,8 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::Play(play) => commands::play::run(play),
         Command::List => commands::list::run(args.json),
-        Command::Bench(bench) => commands::bench::run(bench, args.json),
-        Command::RolloutWorker => processes::serve(),
-        Command::Study(study) => commands::study::run(study, args.json),
+        Command::Bench(bench) => bench::run(bench, args.json),
+        Command::RolloutWorker => commands::rollout_worker::run(),
+        Command::Study(study) => study::run(study, args.json),
     }
 }

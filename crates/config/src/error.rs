@@ -24,14 +24,6 @@ impl fmt::Display for Place {
 /// Why a configuration file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{}: cannot be read: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
     /// The file is not YAML, or uses what no configuration needs.
     #[error("{}:{line}:{column}: {problem}", path.display())]
     Syntax {

@@ -1,4 +1,6 @@
-//! Configuration files of the trainer, in the schema of ML-Agents.
+//! Configuration files of the trainer, in the schema of ML-Agents: bytes in, the trainer's configuration and notes out.
+//!
+//! Nothing here reads a file or knows a command line, so that a browser can use it, too.
 //!
 //! The way of a file: [`document`] makes a tree of the YAML text, [`current`] or [`legacy`] finds the agent's sections in
 //! it ([`behavior`], [`names`]) and refuses what is misspelled or missing here ([`features`]), [`settings`] reads
@@ -24,11 +26,10 @@ use marathon_learn::PpoConfig;
 use std::path::Path;
 
 /// For Gymnasium's own tasks.
-const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../../assets/configs/gymnasium-fast.yaml"));
+const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../assets/configs/gymnasium-fast.yaml"));
 
 /// For dm_control's suite.
-const DM_CONTROL: (&str, &str) =
-    ("dm_control-fast.yaml", include_str!("../../../../assets/configs/dm_control-fast.yaml"));
+const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../../assets/configs/dm_control-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
 const FAST: [(&str, (&str, &str)); 18] = [
@@ -46,10 +47,10 @@ const FAST: [(&str, (&str, &str)); 18] = [
     ("humanoid-walk", DM_CONTROL),
     ("humanoid-run", DM_CONTROL),
     ("cheetah-run", DM_CONTROL),
-    ("Hopper", ("hopper-fast.yaml", include_str!("../../../../assets/configs/hopper-fast.yaml"))),
-    ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../../assets/configs/walker2d-fast.yaml"))),
-    ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../../assets/configs/humanoid-fast.yaml"))),
-    ("Ant", ("ant-fast.yaml", include_str!("../../../../assets/configs/ant-fast.yaml"))),
+    ("Hopper", ("hopper-fast.yaml", include_str!("../../../assets/configs/hopper-fast.yaml"))),
+    ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../assets/configs/walker2d-fast.yaml"))),
+    ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../assets/configs/humanoid-fast.yaml"))),
+    ("Ant", ("ant-fast.yaml", include_str!("../../../assets/configs/ant-fast.yaml"))),
 ];
 
 /// What a file says about the training of an agent.
@@ -84,20 +85,11 @@ impl Default for Loaded {
     }
 }
 
-/// Reads what a file says about an agent, which may go by any of its names.
+/// Reads what the bytes of a file say about an agent, which may go by any of its names; the path is for messages.
 ///
 /// # Errors
-/// If the file cannot be read, is no configuration, says nothing about the agent, or asks for what there is not. Messages
-/// name file, line and key, what was found and what was expected.
-pub fn load(path: &Path, agent: &str) -> Result<Loaded, ConfigError> {
-    let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
-    parse(path, &bytes, agent)
-}
-
-/// As [`load`], from bytes; the path is for messages.
-///
-/// # Errors
-/// As [`load`].
+/// If the file is no configuration, says nothing about the agent, or asks for what there is not. Messages name file, line and
+/// key, what was found and what was expected.
 pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigError> {
     let map = document::parse(path, bytes)?;
     let agent = names::id(agent);

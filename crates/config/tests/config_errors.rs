@@ -1,11 +1,7 @@
 //! A file that is wrong is refused with file, line, key, what was found and what was expected; harmless settings without
 //! effect are noted.
 
-#[allow(dead_code, reason = "the program uses the rest")]
-#[path = "../src/config/mod.rs"]
-mod config;
-
-use config::{ConfigError, parse};
+use marathon_config::{ConfigError, parse};
 use std::path::Path;
 
 fn error(text: &str) -> ConfigError {
@@ -26,12 +22,6 @@ fn refuse_with(text: &str, part: &str) {
     let error = error(text).to_string();
     let start: String = text.chars().take(500).collect();
     assert!(error.starts_with("a/test.yaml:") && error.contains(part), "{start}: {error}");
-}
-
-#[test]
-fn missing_files_are_named() {
-    let error = config::load(Path::new("no/such.yaml"), "hopper").unwrap_err().to_string();
-    assert!(error.starts_with("no/such.yaml: cannot be read: "), "{error}");
 }
 
 #[test]

@@ -1,10 +1,6 @@
 //! Every key of a configuration file reaches the trainer, in both formats of ML-Agents.
 
-#[allow(dead_code, reason = "the program uses the rest")]
-#[path = "../src/config/mod.rs"]
-mod config;
-
-use config::{Loaded, default_for, parse};
+use marathon_config::{Loaded, default_for, parse};
 use marathon_learn::{Acktr, Activation, Algorithm, Init, PpoConfig, Ratio, Sac, Schedule, Signal, SignalKind};
 use std::path::{Path, PathBuf};
 
@@ -14,6 +10,11 @@ fn read(text: &str, agent: &str) -> Loaded {
 
 fn asset(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/configs").join(name)
+}
+
+fn load(path: &Path, agent: &str) -> Loaded {
+    let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    parse(path, &bytes, agent).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A behavior in the present format with some lines.
@@ -333,14 +334,13 @@ Hopper-v0: {max_steps: 1e6, buffer_size: 5120, batch_size: 16, time_horizon: 100
 #[test]
 fn appendix_b_of_the_paper_loads_for_all_its_agents() {
     let file = asset("paper-appendix-b.yaml");
-    let load = |agent: &str| config::load(&file, agent).unwrap_or_else(|e| panic!("{e}"));
     for (agent, widths, lr, beta, gamma, buffer, steps) in [
         ("hopper", vec![90; 2], 1e-3, 1e-2, 0.99, 10240, 4_800_000),
         ("walker", vec![41; 3], 1e-3, 1e-2, 0.99, 10240, 4_800_000),
         ("ant", vec![53; 3], 1e-3, 5e-3, 0.99, 10240, 4_800_000),
         ("humanoid", vec![512; 2], 3e-4, 1e-2, 0.995, 20480, 32_000_000),
     ] {
-        let Loaded { ppo, notes, .. } = load(agent);
+        let Loaded { ppo, notes, .. } = load(&file, agent);
         assert_eq!(
             (ppo.actor_hidden.clone(), ppo.lr, ppo.entropy_coef, ppo.gamma),
             (widths, lr, beta, gamma),
@@ -356,7 +356,7 @@ fn appendix_b_of_the_paper_loads_for_all_its_agents() {
 
 #[test]
 fn appendix_c_of_the_paper_loads() {
-    let loaded = config::load(&asset("paper-appendix-c.yaml"), "hopper").unwrap_or_else(|e| panic!("{e}"));
+    let loaded = load(&asset("paper-appendix-c.yaml"), "hopper");
     let ppo = loaded.ppo;
     assert_eq!((ppo.lr, ppo.epochs, ppo.actor_hidden, ppo.total_steps), (3e-3, 10, vec![64, 64], 1_000_000));
     assert_eq!((ppo.agents * ppo.horizon, ppo.minibatches, ppo.entropy_coef), (10240, 5, 5e-3));

@@ -1,10 +1,6 @@
 //! No bytes make the reader of configurations panic, and what it accepts is valid.
 
-#[allow(dead_code, reason = "the program uses the rest")]
-#[path = "../src/config/mod.rs"]
-mod config;
-
-use config::parse;
+use marathon_config::parse;
 use proptest::prelude::*;
 use std::path::Path;
 

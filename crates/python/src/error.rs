@@ -1,11 +1,12 @@
 //! Errors as Python knows them. The texts are those of the Rust crates.
 
-use marathon_cli::session::CliError;
 use marathon_envs::EnvError;
 use marathon_learn::Error;
+use marathon_runs::{RunError, Spelling};
 use pyo3::PyErr;
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyTypeError, PyValueError};
 use std::io::ErrorKind;
+use std::path::Path;
 
 /// `TypeError` for an argument that there is not, `ValueError` for all else: it comes from an argument's value.
 pub fn env(error: EnvError) -> PyErr {
@@ -21,46 +22,36 @@ pub fn env(error: EnvError) -> PyErr {
 /// `OSError` for files that cannot be read or written, `ValueError` for all else of the trainer.
 pub fn learn(error: Error) -> PyErr {
     let text = error.to_string();
-    of_learn(&error, text)
-}
-
-fn of_learn(error: &Error, text: String) -> PyErr {
-    match error {
+    match &error {
         Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
         Error::Io { .. } => PyOSError::new_err(text),
         _ => PyValueError::new_err(text),
     }
 }
 
-/// The same for what the command line shares with Python.
-pub fn cli(error: CliError) -> PyErr {
+/// The same for a run, with options as keyword arguments.
+pub fn run(error: RunError) -> PyErr {
     match error {
-        CliError::Learn(error) => of_learn(&error, in_python(&error.to_string())),
-        CliError::Env(error) => env(error),
-        CliError::Stopped { .. } => PyOSError::new_err(in_python(&error.to_string())),
-        _ => PyValueError::new_err(in_python(&error.to_string())),
+        RunError::Env(error) => env(error),
+        RunError::Learn(error) => learn(error),
+        RunError::Stopped { .. } => PyOSError::new_err(error.spelled(&Keywords)),
+        _ => PyValueError::new_err(error.spelled(&Keywords)),
     }
 }
 
-/// Arguments of `train` that the command line has as flags.
-const FLAGS: [&str; 7] = ["config", "seed", "steps", "agents", "threads", "out", "resume"];
+/// Options as keyword arguments, advice as calls.
+struct Keywords;
 
-/// What is said to users of the command line, said to users of Python.
-fn in_python(text: &str) -> String {
-    let mut told = String::new();
-    for (i, part) in text.split('`').enumerate() {
-        match part.split_once(" train --resume ") {
-            Some((_, folder)) if i % 2 == 1 => told += &format!("train(resume={:?})", folder.trim_matches('\'')),
-            _ if i % 2 == 1 => told += &format!("`{part}`"),
-            _ => told += part,
-        }
+impl Spelling for Keywords {
+    fn option(&self, name: &str) -> String {
+        name.into()
     }
-    for flag in FLAGS {
-        told = told
-            .replace(&format!("--{flag} "), &format!("{flag} "))
-            .replace(&format!("--{flag}:"), &format!("{flag}:"));
+    fn with_value(&self, name: &str, value: &str) -> String {
+        format!("{name}={}", value.replace(',', "_"))
     }
-    told
+    fn resume(&self, folder: &Path) -> String {
+        format!("train(resume={:?})", folder.to_string_lossy())
+    }
 }
 
 /// `ValueError` for another error that comes from an argument.

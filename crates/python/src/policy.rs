@@ -3,10 +3,10 @@
 use crate::arrays::tuple;
 use crate::task::{self, Task};
 use crate::{crowd, error, number};
-use marathon_cli::session;
 use marathon_envs::{BLOCK, registry};
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
+use marathon_runs::policy_file;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -78,7 +78,7 @@ impl Policy {
 
     /// Writes the policy to a file: `.safetensors`, or `.onnx` by the contract of ML-Agents' models.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        session::save_policy(&self.0, &path).map_err(error::cli)
+        policy_file::save(&self.0, &path).map_err(error::run)
     }
 
     /// For `copy` and `pickle`: the bytes of a file.
@@ -106,7 +106,7 @@ pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
 #[pyo3(signature = (path, task = None))]
 pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResult<Policy> {
     let spec = task.map(|task| task.spec(py)).transpose()?;
-    Ok(Policy(session::read_policy(&path, spec.as_ref()).map_err(error::cli)?))
+    Ok(Policy(policy_file::read(&path, spec.as_ref()).map_err(error::run)?))
 }
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,

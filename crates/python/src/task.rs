@@ -1,9 +1,9 @@
 //! What stands for a task in Python: its name, or an agent that is written in Python.
 
 use crate::{crowd, error};
-use marathon_cli::session::{self, CliError};
 use marathon_envs::{Lockstep, ShardFactory, Spec, registry};
 use marathon_physics::lanes::Isa;
+use marathon_runs::RunError;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -46,15 +46,20 @@ impl Task {
     }
 
     /// The task of a run; `made` learns of a crowd that is made for it.
-    pub fn of_run<'a>(&'a self, py: Python<'a>, threads: usize, made: &'a mut Made) -> PyResult<session::Task<'a>> {
+    pub fn of_run<'a>(
+        &'a self,
+        py: Python<'a>,
+        threads: usize,
+        made: &'a mut Made,
+    ) -> PyResult<marathon_runs::Task<'a>> {
         let agent = match self {
-            Task::Name(name) => return session::Task::named(plain(name)).map_err(error::cli),
+            Task::Name(name) => return marathon_runs::Task::named(plain(name)).map_err(error::run),
             Task::Agent(agent) => agent.bind(py),
         };
         check(agent)?;
         let id: String = agent.call_method0("task_id")?.extract()?;
         let text = id.clone();
-        Ok(session::Task::made(id, move |agents| match lockstep(agent, agents, threads) {
+        Ok(marathon_runs::Task::made(id, move |agents| match lockstep(agent, agents, threads) {
             Ok(crowd) => {
                 let crowd = Arc::new(crowd);
                 made.crowd = Some(crowd.clone());
@@ -62,7 +67,7 @@ impl Task {
             }
             Err(error) => {
                 made.error = Some(error);
-                Err(CliError::Usage(format!("{text} cannot be made")))
+                Err(RunError::option("task", format!("{text} cannot be made")))
             }
         }))
     }

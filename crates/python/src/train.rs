@@ -4,8 +4,9 @@ use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use crate::task::{Made, Task};
 use crate::{crowd, error, number};
-use marathon_cli::session::{self, Session, TrainArgs};
 use marathon_learn::{Control, Players};
+use marathon_runs::report::csv::columns;
+use marathon_runs::{LearnOptions, RunError, RunOptions, Session};
 use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -101,41 +102,34 @@ pub fn train(
     resume: Option<PathBuf>,
     players: Option<Py<PyAny>>,
 ) -> PyResult<TrainResult> {
-    let (dry, path) = (out.is_none(), resume.clone());
-    let mut notes = Vec::new();
-    let mut args =
-        TrainArgs { agent: None, config: None, algo: None, agents, steps, seed, threads, processes: 0, out, resume };
+    let mut options = RunOptions {
+        learn: LearnOptions { config: None, algo: None, steps, seed, threads },
+        agents,
+        processes: 0,
+        out,
+        resume,
+    };
     let mut made = Made::default();
     let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), &mut made)).transpose()?;
-    let begun = match (path, config) {
-        (Some(_), Some(_)) => return Err(error::value("config and resume exclude each other: a run keeps its own")),
-        (Some(_), None) if seed.is_some() || agents.is_some() || args.out.is_some() => {
-            return Err(error::value("seed, agents and out belong to a new run, not to one that resume goes on with"));
+    let mut loaded = None;
+    match config {
+        None => {}
+        Some(Config::Path(file)) => options.learn.config = Some(file),
+        Some(Config::Table(_)) if options.resume.is_some() => {
+            return Err(error::run(RunError::NewRunOnly { name: "config" }));
         }
-        (Some(path), None) => Session::resume_with(task, &args, &path),
-        (None, config) => {
-            let task = task.ok_or_else(|| error::value("task is missing, expected a task or resume"))?;
-            let loaded = match config {
-                None => None,
-                Some(Config::Path(file)) => {
-                    args.config = Some(file);
-                    None
-                }
-                Some(Config::Table(table)) => {
-                    // YAML reads JSON
-                    let options = PyDict::new(py);
-                    options.set_item("indent", 1)?;
-                    let text: String = py.import("json")?.call_method("dumps", (table,), Some(&options))?.extract()?;
-                    Some(session::configuration(Path::new("config"), text.as_bytes(), &task).map_err(error::cli)?)
-                }
-            };
-            Session::begin_with(task, &args, loaded, dry).map(|(session, told)| {
-                notes = told;
-                session
-            })
+        Some(Config::Table(table)) => {
+            // YAML reads JSON
+            let words = PyDict::new(py);
+            words.set_item("indent", 1)?;
+            let text: String = py.import("json")?.call_method("dumps", (table,), Some(&words))?.extract()?;
+            let parse = |id: &str| marathon_config::parse(Path::new("config"), text.as_bytes(), id);
+            loaded = task.as_ref().map(|task| parse(task.id())).transpose().map_err(error::any)?;
         }
-    };
-    let session = begun.map_err(|e| made.error.take().unwrap_or_else(|| error::cli(e)))?;
+    }
+    let dry = options.out.is_none();
+    let opened = Session::open(task, &options, loaded, dry);
+    let (session, notes) = opened.map_err(|e| made.error.take().unwrap_or_else(|| error::run(e)))?;
     for note in notes {
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)?;
     }
@@ -154,7 +148,7 @@ pub fn train(
                 py.check_signals()?;
                 let Some(callback) = &callback else { return Ok(true) };
                 let metrics = PyDict::new(py);
-                for (name, value) in session::metrics(stats, rate, &terms) {
+                for (name, value) in columns(stats, rate, &terms) {
                     metrics.set_item(name, value)?;
                 }
                 Ok(crowd::goes_on(&callback.bind(py).call1((metrics,))?))
@@ -173,7 +167,7 @@ pub fn train(
     if let Some(error) = failure.or(players.and_then(|players| players.failure)) {
         return Err(error);
     }
-    let outcome = result.map_err(error::cli)?;
+    let outcome = result.map_err(error::run)?;
     Ok(TrainResult {
         policy: Py::new(py, Policy(outcome.policy))?,
         steps: outcome.steps,

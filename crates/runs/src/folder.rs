@@ -1,7 +1,8 @@
 //! The folder of a run: what is in it, who may write to it, and how files get there whole.
 
-use crate::error::CliError;
+use crate::error::RunError;
 use crate::text;
+use marathon_config::Loaded;
 use marathon_learn::{Checkpoint, PpoConfig, read_description, write_atomic, write_description};
 use serde::{Deserialize, Serialize};
 use std::ffi::{OsStr, OsString};
@@ -41,7 +42,7 @@ pub struct RunFile {
 
 impl RunFile {
     /// Of a new run.
-    pub fn new(agent: &str, loaded: &crate::config::Loaded) -> Self {
+    pub fn new(agent: &str, loaded: &Loaded) -> Self {
         Self {
             format: FORMAT.into(),
             version: VERSION,
@@ -54,19 +55,19 @@ impl RunFile {
     }
 
     /// Reads a description and looks at every value.
-    fn read(path: &Path) -> Result<Self, CliError> {
+    fn read(path: &Path) -> Result<Self, RunError> {
         let run: RunFile = read_description(path, FORMAT, VERSION)?;
         run.config.validate().map_err(|e| e.in_file(path, "config"))?;
         for (key, n) in [("summary_freq", run.summary_freq), ("checkpoint_interval", run.checkpoint_interval)] {
             if n == 0 {
-                return Err(CliError::file(path, key, n, "at least 1"));
+                return Err(RunError::file(path, key, n, "at least 1"));
             }
         }
         Ok(run)
     }
 
     /// Refuses a configuration that is not the one of a checkpoint of the run: only steps and threads may differ.
-    fn check(&self, path: &Path, checkpoint: &Checkpoint) -> Result<(), CliError> {
+    fn check(&self, path: &Path, checkpoint: &Checkpoint) -> Result<(), RunError> {
         let known = checkpoint.config();
         let PpoConfig { total_steps, threads, .. } = self.config;
         let known = PpoConfig { total_steps, threads, ..known.clone() };
@@ -77,7 +78,7 @@ impl RunFile {
             None => Ok(()),
             Some((key, found)) => {
                 let expected = format!("{}, as in checkpoint/checkpoint.json", expected[key.as_str()]);
-                Err(CliError::file(path, format!("config.{key}"), found, expected))
+                Err(RunError::file(path, format!("config.{key}"), found, expected))
             }
         }
     }
@@ -97,13 +98,13 @@ impl RunFolder {
     ///
     /// # Errors
     /// If `out` holds anything, but for a run without an iteration, or the folder cannot be made or written to.
-    pub fn create(out: Option<&Path>, agent: &str) -> Result<Self, CliError> {
+    pub fn create(out: Option<&Path>, agent: &str) -> Result<Self, RunError> {
         let (path, made) = match out {
             Some(out) => {
                 refuse(out)?;
                 let missing = out.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
                 let made = missing.map(Path::to_path_buf).collect();
-                fs::create_dir_all(out).map_err(CliError::io(out, "create folder"))?;
+                fs::create_dir_all(out).map_err(RunError::io(out, "create folder"))?;
                 (out.to_path_buf(), made)
             }
             None => free_folder(agent)?,
@@ -119,11 +120,11 @@ impl RunFolder {
     ///
     /// # Errors
     /// If it holds no run, or another process is writing to it.
-    pub fn open(path: &Path) -> Result<(Self, RunFile), CliError> {
+    pub fn open(path: &Path) -> Result<(Self, RunFile), RunError> {
         let file = path.join(RUN);
         if !file.is_file() {
             let found = if path.is_dir() { "no run.json" } else { "no such folder" };
-            return Err(CliError::file(path, "--resume", found, format!("the folder of a run{}", nearest_run(path))));
+            return Err(RunError::NoRun { folder: path.into(), found, nearest: nearest_run(path) });
         }
         let folder = Self::lock(path.into())?;
         let run = RunFile::read(&file)?;
@@ -131,12 +132,12 @@ impl RunFolder {
         Ok((folder, run))
     }
 
-    fn lock(path: PathBuf) -> Result<Self, CliError> {
+    fn lock(path: PathBuf) -> Result<Self, RunError> {
         let name = path.join(LOCK);
-        let lock = File::create(&name).map_err(CliError::io(&path, "write to folder"))?;
+        let lock = File::create(&name).map_err(RunError::io(&path, "write to folder"))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => {
-                Err(CliError::file(&path, "run", "another process that is writing to it", "no other"))
+                Err(RunError::file(&path, "run", "another process that is writing to it", "no other"))
             }
             // some network file systems know no locks; then nobody else can have one
             Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path, made: None, _lock: lock }),
@@ -147,7 +148,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// If it is damaged, of another run, or lost.
-    pub fn last_checkpoint(&self, run: &RunFile) -> Result<Option<Checkpoint>, CliError> {
+    pub fn last_checkpoint(&self, run: &RunFile) -> Result<Option<Checkpoint>, RunError> {
         let file = self.checkpoint().join("checkpoint.json");
         if file.exists() {
             let checkpoint = Checkpoint::load(&self.checkpoint())?;
@@ -161,7 +162,7 @@ impl RunFolder {
                 let name = later.file_name().unwrap_or_default().to_string_lossy();
                 let expected =
                     format!("the checkpoint that was written before {name}; without it, train in another folder");
-                Err(CliError::file(&file, "checkpoint", "no such file", expected))
+                Err(RunError::file(&file, "checkpoint", "no such file", expected))
             }
         }
     }
@@ -220,8 +221,8 @@ impl RunFolder {
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub fn events(&self) -> Result<Vec<PathBuf>, CliError> {
-        let read = |e| CliError::io(&self.path, "read folder")(e);
+    pub fn events(&self) -> Result<Vec<PathBuf>, RunError> {
+        let read = |e| RunError::io(&self.path, "read folder")(e);
         let mut files = Vec::new();
         for entry in fs::read_dir(&self.path).map_err(read)? {
             let entry = entry.map_err(read)?;
@@ -237,7 +238,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// If that fails.
-    pub fn write_run(&self, run: &RunFile) -> Result<(), CliError> {
+    pub fn write_run(&self, run: &RunFile) -> Result<(), RunError> {
         Ok(write_description(&self.path.join(RUN), run)?)
     }
 
@@ -254,17 +255,12 @@ impl RunFolder {
 }
 
 /// Refuses a folder that holds anything but a run without an iteration, which is as good as empty.
-fn refuse(out: &Path) -> Result<(), CliError> {
+fn refuse(out: &Path) -> Result<(), RunError> {
     if is_blank(out) {
         return Ok(());
     }
-    let folder = text::path_word(out);
     if RunFile::read(&out.join(RUN)).is_ok() {
-        let program = text::program();
-        return Err(CliError::Usage(format!(
-            "--out {folder} holds a run already; go on with it by `{program} train --resume {folder}`, or choose another \
-             folder"
-        )));
+        return Err(RunError::HoldsRun(out.into()));
     }
     let mut names: Vec<OsString> = fs::read_dir(out).into_iter().flatten().flatten().map(|e| e.file_name()).collect();
     names.retain(|name| name != LOCK);
@@ -274,9 +270,10 @@ fn refuse(out: &Path) -> Result<(), CliError> {
         0 | 1 => String::new(),
         n => format!(" and {} more", n - 1),
     };
-    Err(CliError::Usage(format!(
-        "--out {folder} holds '{first}'{more}, expected a new or empty folder; choose another, or move that away"
-    )))
+    let folder = text::path_word(out);
+    let problem =
+        format!("{folder} holds '{first}'{more}, expected a new or empty folder; choose another, or move that away");
+    Err(RunError::option("out", problem))
 }
 
 /// Whether a folder has nothing to lose: it is not there, or empty, or holds a run that has not made an iteration.
@@ -312,10 +309,10 @@ fn is_leftover(name: &OsStr) -> bool {
 }
 
 /// Claims the first free `runs/<agent>-<n>`; also the folders that were made for it.
-fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), CliError> {
+fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), RunError> {
     let runs = Path::new(RUNS);
     let first = !runs.exists();
-    fs::create_dir_all(runs).map_err(CliError::io(runs, "create folder"))?;
+    fs::create_dir_all(runs).map_err(RunError::io(runs, "create folder"))?;
     let base = text::short_name(agent);
     let mut n = 1;
     loop {
@@ -327,13 +324,13 @@ fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), CliError> {
                 return Ok((path, made));
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => n += 1,
-            Err(e) => return Err(CliError::io(&path, "create folder")(e)),
+            Err(e) => return Err(RunError::io(&path, "create folder")(e)),
         }
     }
 }
 
-/// `; did you mean 'runs/hopper-3'?` if there is a run whose folder is called almost like `path`.
-pub fn nearest_run(path: &Path) -> String {
+/// The folder of a run that is called almost like `path`, such as `runs/hopper-3`.
+pub fn nearest_run(path: &Path) -> Option<String> {
     let asked = path.display().to_string();
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut near: Vec<(usize, String)> = Vec::new();
@@ -348,30 +345,31 @@ pub fn nearest_run(path: &Path) -> String {
         }
     }
     near.sort();
-    let close = near.first().filter(|(distance, name)| *distance <= 3 || name.ends_with(&asked));
-    close.map_or(String::new(), |(_, name)| format!("; did you mean '{name}'?"))
+    let close = near.into_iter().next().filter(|(distance, name)| *distance <= 3 || name.ends_with(&asked));
+    close.map(|(_, name)| name)
 }
 
 /// The policy that a user means: the file, or the one in a run's folder.
 ///
 /// # Errors
 /// If there is neither.
-pub fn policy_path(given: &Path) -> Result<PathBuf, CliError> {
+pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
     let path = if given.is_dir() { given.join("policy.safetensors") } else { given.to_path_buf() };
     if path.exists() {
         return Ok(path);
     }
     let found = if given.is_dir() { "no policy.safetensors" } else { "no such file" };
-    let expected = format!("a policy file or the folder of a run{}", nearest_run(given));
-    Err(CliError::file(given, "policy", found, expected))
+    let near = nearest_run(given).map(|run| format!("; did you mean '{run}'?")).unwrap_or_default();
+    let expected = format!("a policy file or the folder of a run{near}");
+    Err(RunError::file(given, "policy", found, expected))
 }
 
 /// Writes a JSON document.
 ///
 /// # Errors
 /// If that fails.
-pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), CliError> {
-    let bad = |e: serde_json::Error| CliError::file(path, "JSON", e, "plain data");
+pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), RunError> {
+    let bad = |e: serde_json::Error| RunError::file(path, "JSON", e, "plain data");
     let mut json = serde_json::to_string_pretty(document).map_err(bad)?;
     json.push('\n');
     Ok(write_atomic(path, json.as_bytes())?)
@@ -386,7 +384,7 @@ mod tests {
     fn a_flipped_bit_of_a_description_is_refused_or_changes_nothing() {
         let temp = tempfile::tempdir().unwrap();
         let path = temp.path().join(RUN);
-        let run = RunFile::new("Hopper-v0", &crate::config::default_for("Hopper-v0"));
+        let run = RunFile::new("Hopper-v0", &marathon_config::default_for("Hopper-v0"));
         write_description(&path, &run).unwrap();
         assert_eq!(RunFile::read(&path).unwrap(), run);
         let bytes = fs::read(&path).unwrap();

@@ -1,6 +1,6 @@
 //! Policies on disk: Marathon's own files, and ONNX.
 
-use crate::error::CliError;
+use crate::error::RunError;
 use crate::folder::policy_path;
 use marathon_envs::{ShardFactory, Spec, registry};
 use marathon_learn::{Policy, write_atomic};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// If there is no such file, it is no policy, or it is for another agent.
-pub fn load(given: &Path, agent: Option<&str>) -> Result<(Policy, Arc<dyn ShardFactory>), CliError> {
+pub fn load(given: &Path, agent: Option<&str>) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
     let factory = match agent {
         Some(agent) => registry::factory(agent, Isa::best())?,
         None => registry::factory(&read(given, None)?.meta().agent, Isa::best())?,
@@ -25,10 +25,10 @@ pub fn load(given: &Path, agent: Option<&str>) -> Result<(Policy, Arc<dyn ShardF
 ///
 /// # Errors
 /// If there is no such file, it is no policy, or it is for another agent.
-pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, CliError> {
+pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, RunError> {
     let path = policy_path(given)?;
     if is_onnx(&path) {
-        let bytes = std::fs::read(&path).map_err(CliError::io(&path, "read"))?;
+        let bytes = std::fs::read(&path).map_err(RunError::io(&path, "read"))?;
         return Ok(Policy::from_onnx(&path, &bytes, spec)?);
     }
     Ok(match spec {
@@ -41,11 +41,11 @@ pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, CliError> {
 ///
 /// # Errors
 /// If it is not `.safetensors` or `.onnx`, or the file cannot be written.
-pub fn save(policy: &Policy, path: &Path) -> Result<(), CliError> {
+pub fn save(policy: &Policy, path: &Path) -> Result<(), RunError> {
     match extension(path).as_str() {
         "onnx" => Ok(write_atomic(path, &policy.to_onnx())?),
         "safetensors" => Ok(policy.save(path)?),
-        found => Err(CliError::file(path, "extension", format!("'{found}'"), ".safetensors or .onnx")),
+        found => Err(RunError::file(path, "extension", format!("'{found}'"), ".safetensors or .onnx")),
     }
 }
 

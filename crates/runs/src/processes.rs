@@ -1,17 +1,17 @@
 //! Rollouts played by processes of this program, a slice of the agents each: `marathon train --processes N`.
 //!
-//! A process is `marathon rollout-worker`. It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
+//! A process is the program with the word `rollout-worker` ([`serve`]). It reads a line of JSON, which says what it plays ([`Part`]), then for every rollout two
 //! messages of the learner ([`Players::play`]), and answers with one; before each stands its length, 8 bytes, little-endian. It
 //! leaves when its input ends. The policy has the same bits as without processes. A process that is lost ends the run, which
 //! can be gone on with.
 
-use crate::error::CliError;
-use crate::{interrupt, text};
+use crate::error::RunError;
 use marathon_envs::registry;
 use marathon_learn::{Algorithm, Control, Deliver, Player, Players, PpoConfig};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,7 @@ struct Part {
 pub struct Processes {
     workers: Vec<Worker>,
     /// Why the run could not go on.
-    pub error: Option<CliError>,
+    pub error: Option<RunError>,
 }
 
 struct Worker {
@@ -47,28 +47,30 @@ impl Processes {
     ///
     /// # Errors
     /// If the algorithm is SAC.
-    pub fn check(config: &PpoConfig, count: usize) -> Result<(), CliError> {
+    pub fn check(config: &PpoConfig, count: usize) -> Result<(), RunError> {
         match config.algorithm {
-            Algorithm::Sac(_) if count > 0 => Err(CliError::Usage(format!(
-                "--processes is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
-            ))),
+            Algorithm::Sac(_) if count > 0 => Err(RunError::option(
+                "processes",
+                format!(
+                    "is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
+                ),
+            )),
             _ => Ok(()),
         }
     }
 
-    /// Starts so many processes for a run, at most one for every sixteen agents.
+    /// Starts so many processes of a program for a run, at most one for every sixteen agents.
     ///
     /// # Errors
     /// If one cannot be started.
-    pub fn start(agent: &str, config: &PpoConfig, count: usize) -> Result<Self, CliError> {
+    pub fn start(program: &Path, agent: &str, config: &PpoConfig, count: usize) -> Result<Self, RunError> {
         Self::check(config, count)?;
         let slices = count.clamp(1, config.blocks());
-        let failed = |e: &dyn std::fmt::Display| CliError::Process(format!("a process cannot be started: {e}"));
-        let program = text::program_file();
+        let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));
         // those that have been started leave with it
         let mut all = Processes { workers: Vec::new(), error: None };
         for slice in 0..slices {
-            let mut worker = Worker::start(Command::new(&program).arg("rollout-worker")).map_err(|e| failed(&e))?;
+            let mut worker = Worker::start(Command::new(program).arg("rollout-worker")).map_err(|e| failed(&e))?;
             let part = Part { agent: agent.into(), config: config.clone(), slice, slices };
             let part = serde_json::to_string(&part).map_err(|e| failed(&e))?;
             let told = worker.pipes.as_mut().map_or(Ok(()), |(requests, _)| writeln!(requests, "{part}"));
@@ -123,7 +125,7 @@ impl Players for Processes {
             Err((i, why)) => {
                 let which = i + 1;
                 self.error =
-                    Some(CliError::Process(format!("process {which} of {count}, which plays, has ended: {why}")));
+                    Some(RunError::Process(format!("process {which} of {count}, which plays, has ended: {why}")));
                 Control::Stop
             }
         }
@@ -146,19 +148,18 @@ impl Drop for Processes {
     }
 }
 
-/// Plays what the learner on the other side of stdin and stdout asks for, until stdin ends.
+/// Plays what the learner on the other side of stdin and stdout asks for, until stdin ends. The program lets Ctrl-C pass: it
+/// is for the learner, which finishes its iteration.
 ///
 /// # Errors
 /// If what is asked for makes no sense.
-pub fn serve() -> Result<(), CliError> {
-    // Ctrl-C is for the learner, which finishes its iteration
-    interrupt::listen(|| {})?;
-    let broken = |e: io::Error| CliError::Process(format!("the learner cannot be talked to: {e}"));
+pub fn serve() -> Result<(), RunError> {
+    let broken = |e: io::Error| RunError::Process(format!("the learner cannot be talked to: {e}"));
     let (mut requests, mut answers) = (io::stdin().lock(), io::stdout().lock());
     let mut line = String::new();
     requests.read_line(&mut line).map_err(broken)?;
     let part: Part = serde_json::from_str(&line)
-        .map_err(|e| CliError::Usage(format!("stdin: {e}; expected what `marathon train --processes` sends")))?;
+        .map_err(|e| RunError::Process(format!("stdin: {e}; expected what a run with processes sends")))?;
     let factory = registry::factory(&part.agent, Isa::best())?;
     let mut player = Player::new(&*factory, Isa::best(), &part.config, (part.slice, part.slices))?;
     while let Some(orders) = receive(&mut requests).map_err(broken)? {

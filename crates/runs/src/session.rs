@@ -1,22 +1,16 @@
-//! A training run: begun or gone on with, carried out, written to its folder. The command and the Python package share it.
+//! A training run: begun or gone on with, carried out, written to its folder.
 
-pub use crate::args::TrainArgs;
-pub use crate::config::Loaded;
-pub use crate::error::CliError;
-pub use crate::folder::{RunFile, RunFolder};
-pub use crate::policy_file::{read as read_policy, save as save_policy};
-pub use crate::report::Watch;
-pub use crate::report::csv::columns as metrics;
-pub use crate::report::summary::Summary;
-pub use crate::task::Task;
-
-use crate::config;
-use crate::folder::write_json;
+use crate::configuration;
+use crate::error::RunError;
+use crate::folder::{RunFile, RunFolder, write_json};
+use crate::options::RunOptions;
 use crate::processes::Processes;
 use crate::report::csv::History;
-use crate::report::summary::EPISODES;
-use crate::report::{Reporter, curve, save};
-use crate::text;
+use crate::report::summary::{EPISODES, Summary};
+use crate::report::{Reporter, Watch, curve, save};
+use crate::task::Task;
+use crate::text::thousands;
+use marathon_config::{Loaded, default_for, default_of};
 use marathon_envs::ShardFactory;
 use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput, evaluate,
@@ -25,14 +19,6 @@ use marathon_learn::{
 use marathon_physics::lanes::Isa;
 use std::path::Path;
 use std::sync::Arc;
-
-/// What the text of a configuration file says about a task; the path is for messages.
-///
-/// # Errors
-/// If it is no configuration for the task; the text names the line and the key.
-pub fn configuration(path: &Path, text: &[u8], task: &Task<'_>) -> Result<Loaded, CliError> {
-    Ok(config::parse(path, text, task.id())?)
-}
 
 /// A run about to begin or to go on.
 pub struct Session {
@@ -61,54 +47,62 @@ pub struct Outcome {
 }
 
 impl Session {
-    /// The run that a command line asks for: with the configuration given, or the one of its file, or the agent's own fast
-    /// one; with a folder of its own unless `dry`.
+    /// A new run, or the run in the folder that `resume` names, from its last checkpoint. A new run has the configuration
+    /// `loaded`, or the one of the options' file, or the agent's own fast one, and a folder of its own unless `dry`. A run that
+    /// goes on knows its task; only one that a front end has made is to be given again. Returns what the user should know of
+    /// the configuration, too.
     ///
     /// # Errors
-    /// If there is no such agent, its configuration is not usable, or the folder cannot be made.
-    pub fn begin(args: &TrainArgs, loaded: Option<Loaded>, dry: bool) -> Result<(Self, Vec<String>), CliError> {
-        // the command line requires it unless resuming
-        Self::begin_with(Task::named(args.agent.as_deref().unwrap_or_default())?, args, loaded, dry)
-    }
-
-    /// The same for a given task.
-    ///
-    /// # Errors
-    /// The same, or if the task cannot be made.
-    pub fn begin_with(
-        task: Task<'_>,
-        args: &TrainArgs,
+    /// If the options or the configuration are not usable, the task or the folder cannot be made, or there is no such run, or
+    /// it is of another task, complete or damaged.
+    pub fn open(
+        task: Option<Task<'_>>,
+        options: &RunOptions,
         loaded: Option<Loaded>,
         dry: bool,
-    ) -> Result<(Self, Vec<String>), CliError> {
+    ) -> Result<(Self, Vec<String>), RunError> {
+        options.validate()?;
+        match (&options.resume, task) {
+            (Some(_), _) if loaded.is_some() => Err(RunError::NewRunOnly { name: "config" }),
+            (Some(path), task) => Ok((Self::resume(task, options, path)?, Vec::new())),
+            (None, Some(task)) => Self::begin(task, options, loaded, dry),
+            (None, None) => Err(RunError::option("task", "is missing, expected a task or a run to resume")),
+        }
+    }
+
+    fn begin(
+        task: Task<'_>,
+        options: &RunOptions,
+        loaded: Option<Loaded>,
+        dry: bool,
+    ) -> Result<(Self, Vec<String>), RunError> {
+        let learn = &options.learn;
         let agent = task.id().to_string();
-        let mut loaded = match (loaded, &args.config) {
-            (Some(loaded), _) => loaded,
-            (None, Some(path)) => config::load(path, &agent)?,
-            (None, None) => match &args.algo {
-                Some(name) => config::default_of(name),
-                None => config::default_for(&agent),
-            },
+        let mut loaded = match (loaded, &learn.config, &learn.algo) {
+            (Some(loaded), ..) => loaded,
+            (None, Some(path), _) => configuration::load(path, &agent)?,
+            (None, None, Some(name)) => default_of(name),
+            (None, None, None) => default_for(&agent),
         };
         let ppo = &mut loaded.ppo;
-        if let Some(agents) = args.agents {
+        if let Some(agents) = options.agents {
             ppo.agents = agents;
             if let Some(buffer) = loaded.buffer {
                 ppo.horizon = (buffer as usize).div_ceil(agents.max(1));
             }
         }
-        ppo.total_steps = args.steps.unwrap_or(ppo.total_steps);
-        ppo.seed = args.seed.unwrap_or(ppo.seed);
-        ppo.threads = args.threads.unwrap_or(ppo.threads);
+        ppo.total_steps = learn.steps.unwrap_or(ppo.total_steps);
+        ppo.seed = learn.seed.unwrap_or(ppo.seed);
+        ppo.threads = learn.threads.unwrap_or(ppo.threads);
         ppo.validate()?;
-        Processes::check(ppo, args.processes)?;
+        Processes::check(ppo, options.processes)?;
         let factory = task.factory(ppo.agents)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let run = RunFile::new(&agent, &loaded);
         let mut folder = None;
         if !dry {
-            let made = RunFolder::create(args.out.as_deref(), &agent)?;
+            let made = RunFolder::create(options.out.as_deref(), &agent)?;
             if let Err(error) = made.write_run(&run) {
                 made.discard();
                 return Err(error);
@@ -118,51 +112,33 @@ impl Session {
         Ok((Session { run, folder, factory, checkpoint: None }, loaded.notes))
     }
 
-    /// The run in a folder, from its last checkpoint.
-    ///
-    /// # Errors
-    /// If it is complete, or not the run that the command line means, or cannot be read.
-    pub fn resume(args: &TrainArgs, path: &Path) -> Result<Self, CliError> {
-        Self::resume_with(args.agent.as_deref().map(Task::named).transpose()?, args, path)
-    }
-
-    /// The same for a given task.
-    ///
-    /// # Errors
-    /// The same, or if the task cannot be made.
-    pub fn resume_with(task: Option<Task<'_>>, args: &TrainArgs, path: &Path) -> Result<Self, CliError> {
+    fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<Self, RunError> {
+        let learn = &options.learn;
         let (folder, mut run) = RunFolder::open(path)?;
         let task = match task {
             Some(task) if task.id() != run.agent => {
-                return Err(CliError::file(path, "agent", &run.agent, task.id()));
+                return Err(RunError::file(path, "agent", &run.agent, task.id()));
             }
             Some(task) => task,
             None => Task::named(&run.agent)?,
         };
-        Processes::check(&run.config, args.processes)?;
+        Processes::check(&run.config, options.processes)?;
         // a run that ended before its first checkpoint begins again, which gives the same bits
         let checkpoint = folder.last_checkpoint(&run)?;
         let done = checkpoint.as_ref().map_or(0, Checkpoint::steps);
 
-        if let Some(steps) = args.steps {
+        if let Some(steps) = learn.steps {
             if steps < done {
-                let done = text::thousands(done);
-                return Err(CliError::Usage(format!(
-                    "--steps is {}, but {done} steps are done",
-                    text::thousands(steps)
-                )));
+                let problem = format!("is {}, but {} steps are done", thousands(steps), thousands(done));
+                return Err(RunError::option("steps", problem));
             }
             run.config.total_steps = steps;
         }
         run.config.validate()?;
         if done >= run.config.total_steps && is_finished(&folder, done)? {
-            let (done, more) = (text::thousands(done), text::thousands(done * 2));
-            return Err(CliError::Usage(format!(
-                "{}: the run is complete with {done} steps; to let it learn on, give it more, such as --steps {more}",
-                path.display()
-            )));
+            return Err(RunError::Complete { folder: path.into(), steps: done });
         }
-        run.config.threads = args.threads.unwrap_or(run.config.threads);
+        run.config.threads = learn.threads.unwrap_or(run.config.threads);
         let factory = task.factory(run.config.agents)?;
         folder.write_run(&run)?;
         Ok(Session { folder: Some(folder), run, factory, checkpoint })
@@ -185,7 +161,7 @@ impl Session {
     ///
     /// # Errors
     /// If files cannot be written; the text says what is left and how to go on.
-    pub fn carry_out(self, show: bool, watch: &mut Watch) -> Result<Outcome, CliError> {
+    pub fn carry_out(self, show: bool, watch: &mut Watch) -> Result<Outcome, RunError> {
         self.carry_out_with(None, show, watch)
     }
 
@@ -198,12 +174,12 @@ impl Session {
         players: Option<&mut dyn Players>,
         show: bool,
         watch: &mut Watch,
-    ) -> Result<Outcome, CliError> {
+    ) -> Result<Outcome, RunError> {
         let resume = self.checkpoint.take();
         let TrainOutput { mut policy, checkpoint, .. } = match self.learn(players, resume, show, watch) {
             Ok(output) => output,
             // it says how to go on
-            Err(error @ CliError::Stopped { .. }) => return Err(error),
+            Err(error @ RunError::Stopped { .. }) => return Err(error),
             Err(error) => {
                 self.abandon();
                 return Err(error);
@@ -249,7 +225,7 @@ impl Session {
         resume: Option<Checkpoint>,
         show: bool,
         watch: &mut Watch,
-    ) -> Result<TrainOutput, CliError> {
+    ) -> Result<TrainOutput, RunError> {
         let Session { run, factory, .. } = self;
         let train = |resume, observer: &mut dyn Observer| {
             train_with(players, &**factory, Isa::best(), &run.config, resume, observer)
@@ -277,34 +253,20 @@ impl Session {
 
 /// Whether a run has done the last thing that it does with so many steps: its summary has an evaluation, and its curve is
 /// there.
-fn is_finished(folder: &RunFolder, steps: u64) -> Result<bool, CliError> {
+fn is_finished(folder: &RunFolder, steps: u64) -> Result<bool, RunError> {
     let path = folder.summary();
     if !path.exists() || !folder.curve().exists() {
         return Ok(false);
     }
-    let text = std::fs::read_to_string(&path).map_err(CliError::io(&path, "read"))?;
+    let text = std::fs::read_to_string(&path).map_err(RunError::io(&path, "read"))?;
     Ok(serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.eval.is_some() && s.steps == steps))
 }
 
 /// The error of a run whose files could no longer be written.
-fn stopped(folder: &RunFolder, cause: CliError, saved: bool, steps: u64) -> CliError {
-    let command = resume_command(folder.path());
-    let advice = if saved {
-        format!("training stopped; its {} steps are saved: mend that and go on by `{command}`", text::thousands(steps))
-    } else {
-        match Checkpoint::load(&folder.checkpoint()) {
-            Ok(old) => format!(
-                "training stopped; the last whole checkpoint has {} of {} steps: mend that and go on by `{command}`",
-                text::thousands(old.steps()),
-                text::thousands(steps)
-            ),
-            Err(_) => format!("training stopped before its first checkpoint: mend that and start again by `{command}`"),
-        }
+fn stopped(folder: &RunFolder, cause: RunError, saved: bool, steps: u64) -> RunError {
+    let saved = match saved {
+        true => Some(steps),
+        false => Checkpoint::load(&folder.checkpoint()).ok().map(|old| old.steps()),
     };
-    CliError::Stopped { cause: Box::new(cause), advice }
-}
-
-/// How to go on with a run.
-pub fn resume_command(folder: &Path) -> String {
-    format!("{} train --resume {}", text::program(), text::path_word(folder))
+    RunError::Stopped { cause: Box::new(cause), folder: folder.path().into(), steps, saved }
 }

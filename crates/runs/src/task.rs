@@ -1,11 +1,11 @@
-//! The task of a run: one of the registry, or one that the program which uses this library has made.
+//! The task of a run: one of the registry, or one that a front end has made.
 
-use crate::error::CliError;
+use crate::error::RunError;
 use marathon_envs::{ShardFactory, registry};
 use marathon_physics::lanes::Isa;
 use std::sync::Arc;
 
-type Make<'a> = Box<dyn FnOnce(usize) -> Result<Arc<dyn ShardFactory>, CliError> + 'a>;
+type Make<'a> = Box<dyn FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a>;
 
 /// A task whose environments are yet to be made.
 pub struct Task<'a> {
@@ -18,7 +18,7 @@ impl<'a> Task<'a> {
     ///
     /// # Errors
     /// If there is none; the text names the nearest.
-    pub fn named(name: &str) -> Result<Self, CliError> {
+    pub fn named(name: &str) -> Result<Self, RunError> {
         let id = registry::agent(name)?.facts().id;
         let make = {
             let id = id.clone();
@@ -28,7 +28,7 @@ impl<'a> Task<'a> {
     }
 
     /// Another one. `make` is told with how many agents the run is.
-    pub fn made(id: String, make: impl FnOnce(usize) -> Result<Arc<dyn ShardFactory>, CliError> + 'a) -> Self {
+    pub fn made(id: String, make: impl FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a) -> Self {
         Task { id, make: Box::new(make) }
     }
 
@@ -41,7 +41,7 @@ impl<'a> Task<'a> {
     ///
     /// # Errors
     /// If they cannot be made.
-    pub fn factory(self, agents: usize) -> Result<Arc<dyn ShardFactory>, CliError> {
+    pub fn factory(self, agents: usize) -> Result<Arc<dyn ShardFactory>, RunError> {
         (self.make)(agents)
     }
 }

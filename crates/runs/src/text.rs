@@ -1,12 +1,7 @@
-//! Numbers and commands as people read them.
+//! Numbers and paths as people read them.
 
 use serde::Serializer;
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-
-static PROGRAM: OnceLock<String> = OnceLock::new();
-static CALLED: OnceLock<PathBuf> = OnceLock::new();
+use std::path::Path;
 
 /// `12345678` as `12,345,678`.
 pub fn thousands(n: u64) -> String {
@@ -73,28 +68,6 @@ pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
 }
 
-/// Notes the name that the program was called by.
-pub fn set_program(called: Option<&OsString>) {
-    if let Some(called) = called {
-        CALLED.get_or_init(|| called.into());
-    }
-    let called = called.map(|name| name.to_string_lossy()).unwrap_or_default();
-    // a bare name was found by the shell and will be found again
-    PROGRAM.get_or_init(|| if called.is_empty() { "marathon".into() } else { word(&called) });
-}
-
-/// The program as the user called it, so that a printed command can be pasted into the same shell.
-pub fn program() -> String {
-    PROGRAM.get().cloned().unwrap_or_else(|| "marathon".into())
-}
-
-/// The program, to be started again: this file, or what the user called where this is a part of another program, as in the
-/// Python package.
-pub fn program_file() -> PathBuf {
-    let own = std::env::current_exe().ok().filter(|file| file.file_stem().is_some_and(|stem| stem == "marathon"));
-    own.or_else(|| CALLED.get().cloned()).unwrap_or_else(|| "marathon".into())
-}
-
 /// A path in JSON, which has no other text: bytes that are not UTF-8 become replacement characters.
 pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
@@ -116,7 +89,8 @@ pub fn path_word(path: &Path) -> String {
     }
 }
 
-fn word(text: &str) -> String {
+/// A text as a word of a shell command.
+pub fn word(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/\\._-+:~=,".contains(c);
     if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

@@ -6,8 +6,8 @@ use super::physics::{Counts, Plan, Subject, Which, repeat};
 use super::row::{Sample, spread};
 use crate::console::{note, print_json, say};
 use crate::error::CliError;
-use crate::text::broken;
 use marathon_physics::lanes::Isa;
+use marathon_runs::text::broken;
 use serde::Serialize;
 
 /// Turns of each engine.

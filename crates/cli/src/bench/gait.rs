@@ -2,13 +2,14 @@
 //! evaluation that is off the clock, until all the episodes of one meet the demand.
 
 use super::options::{Common, Head, for_networks};
-use crate::config;
 use crate::console::{note, print_json, say};
 use crate::error::CliError;
-use crate::text::{broken, short};
+use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
 use marathon_physics::lanes::Isa;
+use marathon_runs::configuration;
+use marathon_runs::text::{broken, short};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -128,7 +129,7 @@ fn one(args: &GaitArgs, threads: usize, id: &str, seed: u64) -> Result<Run, CliE
     let isa = args.isa.unwrap_or_else(Isa::best);
     let factory = registry::factory(id, isa)?;
     let loaded = match &args.config {
-        Some(path) => config::load(path, id)?,
+        Some(path) => configuration::load(path, id)?,
         None => config::default_for(id),
     };
     let config = PpoConfig { seed, threads, ..loaded.ppo };

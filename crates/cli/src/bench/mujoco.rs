@@ -84,7 +84,7 @@ impl Mujoco {
             return Ok(side);
         }
         let found = hello["missing"].as_str().unwrap_or("no MuJoCo");
-        let python = crate::text::path_word(&side.python);
+        let python = marathon_runs::text::path_word(&side.python);
         Err(CliError::Python(format!(
             "{python}: found {found}, expected the package mujoco (tests run with 4.0); install it by `{python} -m pip \
              install mujoco`, or let the variable {VARIABLE} name a Python that has it"

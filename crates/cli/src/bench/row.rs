@@ -2,8 +2,8 @@
 
 use super::options::{Head, Machine};
 use crate::console::{note, print_json, say};
-use crate::text::short;
 use marathon_physics::lanes::Isa;
+use marathon_runs::text::short;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -165,7 +165,7 @@ impl<F: Figures> Table<F> {
         if self.json {
             print_json(&Document { head: &self.head, seconds: self.seconds, rows: &self.rows });
         }
-        if let Some(line) = crate::text::broken(self.rows.iter().map(|row| row.figures.broken()).sum()) {
+        if let Some(line) = marathon_runs::text::broken(self.rows.iter().map(|row| row.figures.broken()).sum()) {
             note(line);
         }
     }

@@ -2,13 +2,14 @@
 
 use super::options::{Common, Head, for_networks, seconds};
 use super::row::{Figures, Row, Sample, Table};
-use crate::config;
 use crate::error::CliError;
-use crate::processes::Processes;
-use crate::text::short;
+use crate::program;
+use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::{Control, IterationStats, Players, PpoConfig, Snapshot, train_with};
 use marathon_physics::lanes::Isa;
+use marathon_runs::processes::Processes;
+use marathon_runs::text::short;
 use serde::Serialize;
 
 /// Repetitions of a row, each with a seed of its own.
@@ -108,12 +109,12 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
         };
         let mut processes = match args.processes {
             0 => None,
-            n => Some(Processes::start(id, &config, n)?),
+            n => Some(Processes::start(&program::file(), id, &config, n)?),
         };
         let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
         let last = train_with(players, &*factory, isa, &config, None, &mut observer)?.last;
         if let Some(error) = processes.and_then(|mut processes| processes.error.take()) {
-            return Err(error);
+            return Err(error.into());
         }
         if let (Some(first), Some(last)) = (first, last) {
             samples.push(Sample {

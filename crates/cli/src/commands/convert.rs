@@ -1,12 +1,11 @@
 //! `marathon export` and `marathon import`: policies to and from ONNX.
 
 use crate::args::{ExportArgs, ImportArgs};
-use crate::console::say;
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::policy_file;
-use crate::report::print_json;
-use crate::text::path_word;
 use marathon_learn::Policy;
+use marathon_runs::policy_file;
+use marathon_runs::text::path_word;
 use std::path::Path;
 
 /// Writes a policy as ONNX.
@@ -52,7 +51,7 @@ fn save(policy: &Policy, input: &Path, out: &Path) -> Result<(), CliError> {
         let found = path_word(out);
         return Err(CliError::Usage(format!("--out is {found}, the file that is read; expected another")));
     }
-    policy_file::save(policy, out)
+    Ok(policy_file::save(policy, out)?)
 }
 
 fn tell(policy: &Policy, out: &Path, json: bool) {

@@ -1,8 +1,7 @@
 //! `marathon list`: the agents.
 
-use crate::console::say;
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::report::print_json;
 use marathon_envs::{OptionInfo, registry};
 use marathon_physics::lanes::Isa;
 use serde::Serialize;

@@ -1,15 +1,13 @@
 //! `marathon record-demo`: a policy's decisions as a demonstration for ML-Agents' imitation learning.
 
 use crate::args::RecordDemoArgs;
-use crate::console::say;
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::policy_file;
-use crate::report::print_json;
-use crate::text;
 use marathon_envs::{VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy, write_atomic};
 use marathon_mlagents::{Demonstration, Episode};
 use marathon_physics::lanes::Isa;
+use marathon_runs::text;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -39,7 +37,7 @@ pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
             "--out is {out}, expected a name that ends in .demo: ML-Agents looks for it"
         )));
     }
-    let (policy, factory) = policy_file::load(&args.policy, args.agent.as_deref())?;
+    let (policy, factory) = args.source.load()?;
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy();
     let mut demo = Demonstration::new(&name, factory.spec());
     let episodes = play(&policy, args.episodes as usize, args.seed)?;

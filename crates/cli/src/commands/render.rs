@@ -1,14 +1,14 @@
 //! `marathon render`: a policy in pictures.
 
 use crate::args::RenderArgs;
-use crate::console::say;
+use crate::console::{print_json, say};
 use crate::error::CliError;
-use crate::report::print_json;
-use crate::text::unsigned_zero;
-use crate::{interrupt, policy_file, text};
+use crate::interrupt;
 use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::Policy;
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene, status_line};
+use marathon_runs::text;
+use marathon_runs::text::unsigned_zero;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ struct Report {
 /// If there is no such policy, an option makes no sense, or the picture cannot be written.
 pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = Shot::new(args)?;
-    let (policy, factory) = policy_file::load(&args.policy, args.agent.as_deref())?;
+    let (policy, factory) = args.source.load()?;
     let spec = factory.spec();
     interrupt::install("leaving without a picture")?;
     let scene = Scene::new(&registry::agent(&spec.id)?.model()?);
@@ -62,7 +62,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let mut recorder = Recorder::create(&args.out, shot.fps, shot.columns())?;
 
     let mut stage = Stage::new(&policy, args)?;
-    for _ in 0..(args.start / spec.dt).round() as usize {
+    for _ in 0..(args.film.start / spec.dt).round() as usize {
         stage.step()?;
     }
     let (begun, from) = (stage.seconds(), stage.distance());
@@ -124,18 +124,10 @@ impl Shot {
             // video encoders want even sides
             _ => width * 9 / 16 / 2 * 2,
         });
-        let (length, fps) = (args.seconds.unwrap_or(seconds), args.fps.unwrap_or(fps));
+        let (length, fps) = (args.film.seconds.unwrap_or(seconds), args.film.fps.unwrap_or(fps));
         let frames = args.frames.unwrap_or(8);
         let usage = |text: String| Err(CliError::Usage(text));
-        if !(length > 0.0 && length <= 3600.0) {
-            return usage(format!("--seconds is {length}, expected a number above 0 and up to 3600"));
-        }
-        if !(0.0..=3600.0).contains(&args.start) {
-            return usage(format!("--start is {}, expected a number from 0 to 3600", args.start));
-        }
-        if !(fps > 0.0 && fps <= 1000.0) {
-            return usage(format!("--fps is {fps}, expected a number above 0 and up to 1000"));
-        }
+        args.film.validate()?;
         if !(1..=1000).contains(&frames) {
             return usage(format!("--frames is {frames}, expected 1 to 1000"));
         }
@@ -143,7 +135,7 @@ impl Shot {
             return usage(format!("--agents is {}, expected 1 to {MAX_AGENTS}", args.agents));
         }
         match format {
-            Format::Png if args.fps.is_some() => usage("--fps is for .gif and .mp4; a .png has --frames".into()),
+            Format::Png if args.film.fps.is_some() => usage("--fps is for .gif and .mp4; a .png has --frames".into()),
             Format::Gif | Format::Mp4 if args.frames.is_some() => {
                 usage("--frames is for .png; a film has --seconds and --fps".into())
             }

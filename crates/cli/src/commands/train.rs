@@ -1,15 +1,15 @@
 //! `marathon train`: from a configuration to a folder with a policy.
 
 use crate::args::TrainArgs;
-use crate::console::{self, say};
+use crate::console::{self, print_json, say};
 use crate::error::CliError;
-use crate::processes::Processes;
-use crate::report::print_json;
-use crate::report::summary::{EPISODES, evaluation_table};
-use crate::session::{Session, resume_command};
-use crate::{interrupt, text};
+use crate::interrupt;
+use crate::program::{self, resume_command};
 use marathon_learn::{Control, IterationStats, Players};
 use marathon_physics::lanes::Isa;
+use marathon_runs::processes::Processes;
+use marathon_runs::report::summary::{EPISODES, evaluation_table};
+use marathon_runs::{Session, Task, text};
 
 /// Trains, evaluates, writes everything.
 ///
@@ -17,34 +17,29 @@ use marathon_physics::lanes::Isa;
 /// If the command line, the configuration or the run to go on with is not usable, or files cannot be written;
 /// [`CliError::Interrupted`] after Ctrl-C.
 pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
-    let session = match &args.resume {
-        None => {
-            let (session, notes) = Session::begin(args, None, false)?;
-            notes.iter().for_each(|note| console::note(format!("note: {note}")));
-            session
-        }
-        Some(folder) => Session::resume(args, folder)?,
-    };
+    let task = args.agent.as_deref().map(Task::named).transpose()?;
+    let (session, notes) = Session::open(task, &args.run, None, false)?;
+    notes.iter().for_each(|note| console::note(format!("note: {note}")));
     let spec = session.factory.spec().clone();
     let (total_steps, agent) = (session.run.config.total_steps, session.run.agent.clone());
     interrupt::install("finishing this iteration and writing the results")?;
     announce(&session);
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
-    let mut processes = match args.processes {
+    let mut processes = match args.run.processes {
         0 => None,
-        n => match Processes::start(&agent, &session.run.config, n) {
+        n => match Processes::start(&program::file(), &agent, &session.run.config, n) {
             Ok(processes) => Some(processes),
             Err(error) => {
                 session.abandon();
-                return Err(error);
+                return Err(error.into());
             }
         },
     };
     let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
     let outcome = session.carry_out_with(players, true, &mut { stop })?;
     if let Some(cause) = processes.and_then(|mut processes| processes.error.take()) {
-        let advice = format!("what is done is saved; go on by `{}`", resume_command(&outcome.summary.folder));
-        return Err(CliError::Stopped { cause: Box::new(cause), advice });
+        let advice = format!("what is done is saved; go on by {}", resume_command(&outcome.summary.folder));
+        return Err(CliError::Lost { cause, advice });
     }
     if let Some(line) = text::broken(outcome.summary.diverged) {
         console::note(format!("{line}; see the column `diverged` of progress.csv"));
@@ -58,7 +53,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let path = &outcome.summary.folder;
     let Some(eval) = outcome.evaluation else {
         return Err(CliError::Interrupted(format!(
-            "{} of {} steps are done and saved; go on by `{}`",
+            "{} of {} steps are done and saved; go on by {}",
             text::thousands(outcome.steps),
             text::thousands(total_steps),
             resume_command(path)
@@ -67,7 +62,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     if json {
         return Ok(());
     }
-    let (program, path) = (text::program(), text::path_word(path));
+    let (program, path) = (program::name(), text::path_word(path));
     say(outcome.summary.training_line());
     say(format!("\nits best actions over {EPISODES} episodes:"));
     say(evaluation_table(&eval, spec.max_episode_steps, spec.dt));

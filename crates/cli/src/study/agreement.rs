@@ -4,15 +4,15 @@ use super::Options;
 use super::chart::Chart;
 use super::peers;
 use super::record::{Record, Run, mean_curve, train_one};
-use crate::config;
 use crate::error::CliError;
+use marathon_config as config;
 use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";
 /// Settings for both trainers: the paper's for this agent, and today's keys for its networks and rates.
 const FILES: [(&str, &[u8]); 2] = [
-    ("paper-appendix-c", include_bytes!("../../../../../assets/configs/paper-appendix-c.yaml")),
-    ("hopper-mlagents", include_bytes!("../../../../../assets/configs/hopper-mlagents.yaml")),
+    ("paper-appendix-c", include_bytes!("../../../../assets/configs/paper-appendix-c.yaml")),
+    ("hopper-mlagents", include_bytes!("../../../../assets/configs/hopper-mlagents.yaml")),
 ];
 const TIME_HORIZON: u64 = 128;
 /// Agents of the paper's scenes.

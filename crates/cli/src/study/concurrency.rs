@@ -3,8 +3,8 @@
 use super::Options;
 use super::chart::Chart;
 use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_one};
-use crate::config;
 use crate::error::CliError;
+use marathon_config as config;
 use marathon_learn::PpoConfig;
 
 const AGENT: &str = "Hopper-v0";

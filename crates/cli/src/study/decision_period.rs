@@ -3,13 +3,13 @@
 use super::Options;
 use super::chart::Chart;
 use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_on};
-use crate::commands::bench::env;
-use crate::config;
+use crate::bench::env;
 use crate::error::CliError;
-use crate::text::thousands;
+use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::PpoConfig;
 use marathon_physics::lanes::Isa;
+use marathon_runs::text::thousands;
 
 const AGENT: &str = "Hopper-v0";
 const AGENTS: [&str; 4] = ["Hopper-v0", "Walker2d-v0", "Ant-v0", "Humanoid-v0"];

@@ -4,9 +4,9 @@ use super::Options;
 use super::chart::Chart;
 use super::record::{Record, plus_minus, spread};
 use crate::error::CliError;
-use crate::text::thousands;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_render::{Follow, Renderer, Scene};
+use marathon_runs::text::thousands;
 use std::time::Instant;
 
 const AGENTS: [&str; 2] = ["Hopper-v0", "Humanoid-v0"];

@@ -3,12 +3,13 @@
 use super::Options;
 use super::chart::Chart;
 use super::record::{Record, Run, each_seed, plus_minus, spread, train_on};
-use crate::config;
 use crate::error::CliError;
-use crate::processes::Processes;
+use crate::program;
+use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_learn::{BLOCK, Players, PpoConfig};
 use marathon_physics::lanes::Isa;
+use marathon_runs::processes::Processes;
 use std::time::Instant;
 
 const AGENT: &str = "Hopper-v0";
@@ -60,9 +61,9 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             match processes {
                 0 => train_on(&*factory, &config, None),
                 n => {
-                    let mut players = Processes::start(AGENT, &config, n)?;
+                    let mut players = Processes::start(&program::file(), AGENT, &config, n)?;
                     let run = train_on(&*factory, &config, Some(&mut players as &mut dyn Players))?;
-                    players.error.take().map_or(Ok(run), Err)
+                    players.error.take().map_or(Ok(run), |error| Err(error.into()))
                 }
             }
         })?;

@@ -3,10 +3,10 @@
 use super::record::{EPISODES, Run};
 use crate::error::CliError;
 use crate::python::{self, VARIABLE};
-use crate::{policy_file, text};
 use marathon_envs::registry;
 use marathon_learn::{EvalOptions, Evaluation, PpoConfig, Schedule, evaluate, write_atomic};
 use marathon_physics::lanes::Isa;
+use marathon_runs::{policy_file, text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::io::Write;
@@ -258,11 +258,11 @@ fn trained(answer: Value) -> Result<Answer, CliError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config;
+    use marathon_config as config;
 
     #[test]
     fn a_configuration_survives_the_way_to_mlagents_and_back() {
-        let text = include_bytes!("../../../../../assets/configs/hopper-mlagents.yaml");
+        let text = include_bytes!("../../../../assets/configs/hopper-mlagents.yaml");
         let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().ppo;
         let written = file("Hopper-v0", &ppo, 128).to_string();
         let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().ppo;

@@ -4,13 +4,13 @@ use super::Options;
 use super::chart::Chart;
 use crate::console::note;
 use crate::error::CliError;
-use crate::text;
 use marathon_envs::ShardFactory;
 use marathon_envs::registry;
 use marathon_learn::{
     Control, EvalOptions, Evaluation, IterationStats, Players, PpoConfig, Snapshot, evaluate, train_with, write_atomic,
 };
 use marathon_physics::lanes::Isa;
+use marathon_runs::text;
 use serde::{Deserialize, Serialize};
 
 /// A table with a picture.

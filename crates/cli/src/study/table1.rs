@@ -3,13 +3,13 @@
 use super::chart::Chart;
 use super::record::{Record, each_seed, plus_minus, spread, train_one};
 use super::{Options, Peers, peers};
-use crate::config;
 use crate::error::CliError;
-use crate::text::thousands;
+use marathon_config as config;
+use marathon_runs::text::thousands;
 use std::path::Path;
 
 /// The paper's settings, and what it reports: agent-steps per second.
-const PAPER: &[u8] = include_bytes!("../../../../../assets/configs/paper-appendix-b.yaml");
+const PAPER: &[u8] = include_bytes!("../../../../assets/configs/paper-appendix-b.yaml");
 const AGENTS: [(&str, f64); 4] =
     [("Hopper-v0", 2190.0), ("Walker2d-v0", 2149.0), ("Ant-v0", 2359.0), ("Humanoid-v0", 1229.0)];
 /// Steps of ML-Agents, and updates in them at least.

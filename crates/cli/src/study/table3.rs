@@ -4,14 +4,14 @@ use super::chart::Chart;
 use super::peers::{self, Sb3};
 use super::record::{Record, Run, each_seed, mean_curve, plus_minus, spread, train_one};
 use super::{Options, Peers};
-use crate::config;
 use crate::error::CliError;
+use marathon_config as config;
 use marathon_learn::{PpoConfig, Schedule};
 use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";
 /// The settings of the paper's ML-Agents side.
-const PAPER: &[u8] = include_bytes!("../../../../../assets/configs/paper-appendix-c.yaml");
+const PAPER: &[u8] = include_bytes!("../../../../assets/configs/paper-appendix-c.yaml");
 
 /// Decisions of a stretch in the paper's file.
 const TIME_HORIZON: u64 = 128;

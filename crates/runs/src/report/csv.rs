@@ -1,6 +1,6 @@
 //! `progress.csv`: one row of numbers per iteration.
 
-use crate::error::CliError;
+use crate::error::RunError;
 use marathon_learn::{IterationStats, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -54,9 +54,9 @@ impl CsvLog {
     ///
     /// # Errors
     /// If the file cannot be read or written.
-    pub fn open(path: &Path, iteration: u64) -> Result<Self, CliError> {
+    pub fn open(path: &Path, iteration: u64) -> Result<Self, RunError> {
         let before = if path.exists() { cut(path, iteration)? } else { None };
-        let file = OpenOptions::new().create(true).append(true).open(path).map_err(CliError::io(path, "open"))?;
+        let file = OpenOptions::new().create(true).append(true).open(path).map_err(RunError::io(path, "open"))?;
         Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file), before })
     }
 
@@ -71,7 +71,7 @@ impl CsvLog {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn push(&mut self, row: &[(String, Option<f64>)]) -> Result<(), CliError> {
+    pub fn push(&mut self, row: &[(String, Option<f64>)]) -> Result<(), RunError> {
         let head = std::fs::metadata(&self.path).is_ok_and(|m| m.len() == 0);
         let mut write = || {
             if head {
@@ -97,7 +97,7 @@ impl History {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(path: &Path) -> Result<Self, CliError> {
+    pub fn read(path: &Path) -> Result<Self, RunError> {
         let mut reader = csv::Reader::from_path(path).map_err(|e| failed(path, "read", e))?;
         let names = reader.headers().map_err(|e| failed(path, "read", e))?.iter().map(String::from).collect();
         let cell = |x: &str| if x.is_empty() { Some(None) } else { x.parse().ok().map(Some) };
@@ -113,8 +113,8 @@ impl History {
 
 /// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too. Returns
 /// the head and the last row.
-fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, CliError> {
-    let text = std::fs::read_to_string(path).map_err(CliError::io(path, "read"))?;
+fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError> {
+    let text = std::fs::read_to_string(path).map_err(RunError::io(path, "read"))?;
     let mut kept = String::with_capacity(text.len());
     for (i, line) in text.split_inclusive('\n').enumerate() {
         let number = line.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
@@ -132,10 +132,10 @@ fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, CliError
     Ok(head.zip(lines.next_back()).map(|(head, last)| (head.into(), last.into())))
 }
 
-fn failed(path: &Path, action: &'static str, error: csv::Error) -> CliError {
+fn failed(path: &Path, action: &'static str, error: csv::Error) -> RunError {
     match error.into_kind() {
-        csv::ErrorKind::Io(source) => CliError::io(path, action)(source),
-        other => CliError::file(path, "table", format!("{other:?}"), "rows of equal length"),
+        csv::ErrorKind::Io(source) => RunError::io(path, action)(source),
+        other => RunError::file(path, "table", format!("{other:?}"), "rows of equal length"),
     }
 }
 

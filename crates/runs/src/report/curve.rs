@@ -1,33 +1,21 @@
 //! `curve.png`: return and speed against steps.
 
+use super::canvas::{
+    DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
+};
 use super::csv::History;
-use crate::error::CliError;
+use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder};
 use crate::text::{duration, short, thousands};
-use marathon_learn::write_atomic;
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
-use std::path::Path;
-use std::sync::Once;
+use plotters::style::FontStyle;
 
-/// Size of the picture, pixels.
-pub const SIZE: [u32; 2] = [960, 640];
-/// Drawn this much larger and averaged: plotters' thick lines have no soft edges of their own.
-pub const SCALE: u32 = 2;
 /// Most points of a line; longer runs are averaged in bins.
 const POINTS: usize = 400;
 
-/// Colors: text, lesser text, grid.
-pub const INK: RGBColor = RGBColor(38, 44, 52);
-pub const FAINT: RGBColor = RGBColor(112, 120, 130);
-pub const GRID: RGBColor = RGBColor(228, 232, 237);
 const RETURN: RGBColor = RGBColor(32, 99, 178);
 const SPEED: RGBColor = RGBColor(206, 92, 24);
-
-const FAMILY: &str = "Roboto";
-const REGULAR: &[u8] = include_bytes!("../../assets/fonts/Roboto-Regular-subset.ttf");
-const MEDIUM: &[u8] = include_bytes!("../../assets/fonts/Roboto-Medium-subset.ttf");
 
 /// A line of the picture: raw points, and their running mean.
 struct Series {
@@ -39,26 +27,13 @@ struct Series {
 ///
 /// # Errors
 /// If the picture cannot be written.
-pub fn draw(folder: &RunFolder, run: &RunFile, history: &History) -> Result<(), CliError> {
+pub fn draw(folder: &RunFolder, run: &RunFile, history: &History) -> Result<(), RunError> {
     let path = folder.curve();
-    let png = picture(history, run).map_err(|e| CliError::Draw { path: path.clone(), reason: e.to_string() })?;
+    let png = picture(history, run).map_err(|e| RunError::Draw { path: path.clone(), reason: e.to_string() })?;
     write_png(&path, &png)
 }
 
-/// What can go wrong while drawing.
-pub type DrawError = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
-
-/// Makes the fonts known, once.
-pub fn register_fonts() {
-    static FONTS: Once = Once::new();
-    FONTS.call_once(|| {
-        for (style, font) in [(FontStyle::Normal, REGULAR), (FontStyle::Bold, MEDIUM)] {
-            // an invalid font would show as an error when text is drawn
-            let _ = register_font(FAMILY, style, font);
-        }
-    });
-}
 
 fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
     register_fonts();
@@ -159,73 +134,4 @@ impl Series {
             .collect();
         Self { raw, smooth }
     }
-}
-
-/// `2500000` as `2.5 M`.
-pub fn axis_steps(x: f64) -> String {
-    if x == 0.0 {
-        return "0 steps".into();
-    }
-    let text = short(x);
-    match text.split_once(' ') {
-        Some((number, unit)) if number.contains('.') => {
-            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
-        }
-        _ => text,
-    }
-}
-
-/// A number of an axis.
-pub fn axis_number(y: f64) -> String {
-    match y.abs() {
-        a if a >= 99_950.0 => short(y),
-        a if a < 1e-12 => "0".into(),
-        a if a >= 10.0 => format!("{y:.0}"),
-        a if a >= 1.0 => format!("{y:.1}"),
-        _ => format!("{y:.2}"),
-    }
-}
-
-/// A place in the picture, in its own pixels.
-pub fn at(x: u32, y: u32) -> (i32, i32) {
-    ((x * SCALE) as i32, (y * SCALE) as i32)
-}
-
-/// A text style.
-pub fn style(size: u32, color: RGBColor, weight: FontStyle) -> TextStyle<'static> {
-    (FAMILY, size * SCALE, weight).into_font().color(&color)
-}
-
-/// Averages squares of `SCALE` pixels' side.
-pub fn reduce(rgb: &[u8]) -> Vec<u8> {
-    let (side, [width, height]) = (SCALE as usize, SIZE.map(|side| side as usize));
-    let mut out = Vec::with_capacity(3 * width * height);
-    for y in 0..height {
-        for x in 0..width {
-            for channel in 0..3 {
-                let square = (0..side * side).map(|i| {
-                    let (row, column) = (y * side + i / side, x * side + i % side);
-                    u32::from(rgb[3 * (row * width * side + column) + channel])
-                });
-                out.push((square.sum::<u32>() / (SCALE * SCALE)) as u8);
-            }
-        }
-    }
-    out
-}
-
-/// Writes a picture of [`SIZE`].
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_png(path: &Path, rgb: &[u8]) -> Result<(), CliError> {
-    let refused = |e: png::EncodingError| CliError::Draw { path: path.into(), reason: e.to_string() };
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, SIZE[0], SIZE[1]);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(refused)?;
-    writer.write_image_data(rgb).map_err(refused)?;
-    writer.finish().map_err(refused)?;
-    Ok(write_atomic(path, &bytes)?)
 }

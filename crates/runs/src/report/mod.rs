@@ -1,20 +1,19 @@
 //! What a run leaves behind: rows, events, checkpoints, the curve, the summary.
 
+pub mod canvas;
 pub mod csv;
 pub mod curve;
 pub mod progress;
 pub mod summary;
 pub mod tensorboard;
 
-use crate::error::CliError;
+use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder};
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot};
 use progress::Progress;
 use std::path::PathBuf;
 use tensorboard::EventLog;
-
-pub use crate::console::print_json;
 
 /// Asked after every iteration whether to go on.
 pub type Watch<'a> = dyn FnMut(&IterationStats) -> Control + 'a;
@@ -34,7 +33,7 @@ pub struct Reporter<'a> {
     /// Steps and wall-clock seconds of the last iteration.
     last: (u64, f64),
     /// Why the run was ended, if by an error.
-    pub error: Option<CliError>,
+    pub error: Option<RunError>,
     /// Whether all iterations have their rows and events.
     pub told: bool,
 }
@@ -51,7 +50,7 @@ impl<'a> Reporter<'a> {
         terms: &[String],
         resume: Option<&Checkpoint>,
         (show, watch): (bool, &'a mut Watch<'a>),
-    ) -> Result<Self, CliError> {
+    ) -> Result<Self, RunError> {
         let (iteration, steps) = resume.map_or((0, 0), |c| (c.iteration(), c.steps()));
         let csv = CsvLog::open(&folder.progress(), iteration)?;
         let events = EventLog::open(folder, steps)?;
@@ -85,7 +84,7 @@ impl<'a> Reporter<'a> {
         self.due = (steps / self.run.checkpoint_interval + 1).saturating_mul(self.run.checkpoint_interval);
     }
 
-    fn report(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Result<(), CliError> {
+    fn report(&mut self, stats: &IterationStats, snapshot: &Snapshot<'_>) -> Result<(), RunError> {
         let (steps, wall) = self.last;
         let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
         self.last = (stats.steps, stats.wall_seconds);
@@ -105,12 +104,12 @@ impl<'a> Reporter<'a> {
     }
 
     /// Keeps a policy in `policies/`.
-    fn keep(&self, policy: &Policy) -> Result<(), CliError> {
+    fn keep(&self, policy: &Policy) -> Result<(), RunError> {
         if self.run.keep_checkpoints == 0 {
             return Ok(());
         }
         let folder = self.folder.policies();
-        std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
+        std::fs::create_dir_all(&folder).map_err(RunError::io(&folder, "create folder"))?;
         let steps = policy.meta().training.as_ref().map_or(0, |t| t.steps);
         policy.save(&folder.join(format!("policy-{steps}.safetensors")))?;
         Ok(())
@@ -156,7 +155,7 @@ pub fn kept_policies(folder: &RunFolder) -> Vec<(u64, PathBuf)> {
 ///
 /// # Errors
 /// If one of them cannot be written; the old one is whole then.
-pub fn save(folder: &RunFolder, policy: &Policy, checkpoint: &Checkpoint) -> Result<(), CliError> {
+pub fn save(folder: &RunFolder, policy: &Policy, checkpoint: &Checkpoint) -> Result<(), RunError> {
     checkpoint.save(&folder.checkpoint())?;
     policy.save(&folder.policy())?;
     Ok(())

@@ -1,10 +1,9 @@
 //! What a person sees while a run goes on: a bar in a terminal, a line now and then elsewhere. Both go to stderr.
 
-use crate::console::note;
 use crate::text::{duration, short, thousands};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use marathon_learn::IterationStats;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
 
 /// Seconds between two looks at the speed of a run.
@@ -55,7 +54,7 @@ impl Rate {
 impl Progress {
     /// For a run of `total` steps of which `done` are done.
     pub fn new(total: u64, done: u64, every: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = stderr().is_terminal().then(|| {
             let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
             let style = ProgressStyle::with_template("{wide_bar:.cyan/dim} {percent:>3}%  {msg}");
             bar.set_style(style.expect("the template is a constant").progress_chars("━╸─"));
@@ -88,7 +87,8 @@ impl Progress {
                     self.shown = std::mem::take(&mut self.waiting);
                 }
                 let of = format!("{} of {}", thousands(stats.steps), thousands(self.total));
-                note(format!("{of:>25} steps  {}", self.line(stats.steps)));
+                // nobody may be listening
+                let _ = writeln!(stderr(), "{of:>25} steps  {}", self.line(stats.steps));
             }
             None => {}
         }

@@ -10,7 +10,7 @@
 //! SessionLog { SessionStatus status = 1 }   START = 1
 //! ```
 
-use crate::error::CliError;
+use crate::error::RunError;
 use crate::folder::{EVENTS, RunFolder};
 use crc::{CRC_32_ISCSI, Crc, Table};
 use marathon_learn::{IterationStats, SignalKind, write_atomic};
@@ -65,7 +65,7 @@ impl EventLog {
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub fn open(folder: &RunFolder, steps: u64) -> Result<Self, CliError> {
+    pub fn open(folder: &RunFolder, steps: u64) -> Result<Self, RunError> {
         let older = folder.events()?;
         for path in &older {
             cut(path, steps)?;
@@ -73,7 +73,7 @@ impl EventLog {
         // TensorBoard reads files in the order of their names
         let seconds = now() as u64;
         let path = folder.path().join(format!("{EVENTS}.{seconds:010}.marathon.{:04}", older.len()));
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(CliError::io(&path, "create"))?;
+        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(RunError::io(&path, "create"))?;
         let mut log = Self { path, file };
         let version = message(0, |event| event.text(3, "brain.Event:2"));
         let mut start = record(&version);
@@ -88,7 +88,7 @@ impl EventLog {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn push(&mut self, step: u64, scalars: &[(String, f64)]) -> Result<(), CliError> {
+    pub fn push(&mut self, step: u64, scalars: &[(String, f64)]) -> Result<(), RunError> {
         let mut summary = Message::default();
         for (tag, x) in scalars {
             let mut value = Message::default();
@@ -99,14 +99,14 @@ impl EventLog {
         self.write(&record(&message(step, |event| event.bytes(5, &summary.0))))
     }
 
-    fn write(&mut self, bytes: &[u8]) -> Result<(), CliError> {
-        self.file.write_all(bytes).map_err(CliError::io(&self.path, "write"))
+    fn write(&mut self, bytes: &[u8]) -> Result<(), RunError> {
+        self.file.write_all(bytes).map_err(RunError::io(&self.path, "write"))
     }
 }
 
 /// Drops records after a step, and a last one that a killed process left half-written.
-fn cut(path: &Path, steps: u64) -> Result<(), CliError> {
-    let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
+fn cut(path: &Path, steps: u64) -> Result<(), RunError> {
+    let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
     let mut kept = Vec::with_capacity(bytes.len());
     for (whole, data) in records(&bytes) {
         if step_of(data) <= steps {

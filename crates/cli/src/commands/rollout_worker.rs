@@ -1,0 +1,15 @@
+//! `marathon rollout-worker`: plays for `marathon train --processes`.
+
+use crate::error::CliError;
+use crate::interrupt;
+use marathon_runs::processes;
+
+/// Plays what the learner asks for, until it hangs up.
+///
+/// # Errors
+/// If what is asked for makes no sense.
+pub fn run() -> Result<(), CliError> {
+    // Ctrl-C is for the learner, which finishes its iteration
+    interrupt::listen(|| {})?;
+    Ok(processes::serve()?)
+}

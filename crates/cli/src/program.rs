@@ -1,0 +1,42 @@
+//! This program as the user called it, and how its command line spells what errors speak of.
+
+use marathon_runs::text::word;
+use marathon_runs::{Flags, Spelling};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+static PROGRAM: OnceLock<String> = OnceLock::new();
+static CALLED: OnceLock<PathBuf> = OnceLock::new();
+
+/// Notes the name that the program was called by.
+pub fn set_name(called: Option<&OsString>) {
+    if let Some(called) = called {
+        CALLED.get_or_init(|| called.into());
+    }
+    let called = called.map(|name| name.to_string_lossy()).unwrap_or_default();
+    // a bare name was found by the shell and will be found again
+    PROGRAM.get_or_init(|| if called.is_empty() { "marathon".into() } else { word(&called) });
+}
+
+/// The program as the user called it, so that a printed command can be pasted into the same shell.
+pub fn name() -> String {
+    PROGRAM.get().cloned().unwrap_or_else(|| "marathon".into())
+}
+
+/// The program, to be started again: this file, or what the user called where this is a part of another program, as in the
+/// Python package.
+pub fn file() -> PathBuf {
+    let own = std::env::current_exe().ok().filter(|file| file.file_stem().is_some_and(|stem| stem == "marathon"));
+    own.or_else(|| CALLED.get().cloned()).unwrap_or_else(|| "marathon".into())
+}
+
+/// How to go on with a run.
+pub fn resume_command(folder: &Path) -> String {
+    spelled(|flags| flags.resume(folder))
+}
+
+/// What errors speak of as this command line spells it.
+pub fn spelled(text: impl FnOnce(&dyn Spelling) -> String) -> String {
+    text(&Flags(&name()))
+}

@@ -1,0 +1,28 @@
+//! Training runs: what they are told, their folders and reports, the policies that they leave, and processes that play for
+//! them.
+//!
+//! The command, the game and the Python package are front ends of this crate. [`RunOptions`], [`PolicySource`] and
+//! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
+//! names of options; each front end spells them in its own way ([`Spelling`]).
+//!
+//! The modules from bottom to top: [`text`], [`error`], [`configuration`], [`folder`], [`policy_file`], [`task`], [`options`],
+//! [`report`], [`processes`], [`session`].
+
+pub mod configuration;
+pub mod error;
+pub mod folder;
+pub mod options;
+pub mod policy_file;
+pub mod processes;
+pub mod report;
+pub mod session;
+pub mod task;
+pub mod text;
+
+pub use error::{Flags, Plain, RunError, Spelling};
+pub use folder::{RunFile, RunFolder};
+pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
+pub use report::Watch;
+pub use report::summary::Summary;
+pub use session::{Outcome, Session};
+pub use task::Task;

@@ -1,0 +1,241 @@
+//! What runs, policies and films are told: plain structs that every front end fills. The feature `clap` makes them arguments
+//! of a command line, with these texts as its help.
+
+use crate::error::RunError;
+use crate::policy_file;
+use marathon_envs::ShardFactory;
+use marathon_learn::{Algorithm, Policy};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How a policy is learned.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct LearnOptions {
+    /// Configuration in the YAML schema of ML-Agents; without it, the agent's own fast one.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "F.yaml"))]
+    pub config: Option<PathBuf>,
+    /// Algorithm, with the settings that it starts from in place of the agent's own; in a configuration file it is
+    /// `trainer_type`.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_parser = Algorithm::NAMES))]
+    pub algo: Option<String>,
+    /// Agent-steps of the whole run.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = parse_steps))]
+    pub steps: Option<u64>,
+    /// Seed of everything random.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S"))]
+    pub seed: Option<u64>,
+    /// Threads; 0 means one per processor. The result does not depend on it.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
+    pub threads: Option<usize>,
+}
+
+/// What a training run is told. What is left out, the configuration says.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct RunOptions {
+    /// How the policy is learned.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub learn: LearnOptions,
+    /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    pub agents: Option<usize>,
+    /// Processes that play, each with a share of the agents, while this one learns; 0: it plays itself, on its threads. The
+    /// result does not depend on it. Not with sac.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 0))]
+    pub processes: usize,
+    /// Folder for the results, new or empty [default: runs/AGENT-N].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in this folder; more steps extend it.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub resume: Option<PathBuf>,
+}
+
+impl LearnOptions {
+    /// Refuses options that do not go together.
+    ///
+    /// # Errors
+    /// If there is no such algorithm, or a configuration beside it, which names its own.
+    pub fn validate(&self) -> Result<(), RunError> {
+        let Some(algo) = &self.algo else { return Ok(()) };
+        if !Algorithm::NAMES.contains(&algo.as_str()) {
+            let known = Algorithm::NAMES.join(", ");
+            return Err(RunError::option("algo", format!("is {algo}, expected one of {known}")));
+        }
+        match &self.config {
+            None => Ok(()),
+            Some(_) => {
+                Err(RunError::option("algo", "and a configuration exclude each other: the file's is trainer_type"))
+            }
+        }
+    }
+}
+
+impl RunOptions {
+    /// Refuses options that do not go together.
+    ///
+    /// # Errors
+    /// As [`LearnOptions::validate`], or if an option of new runs stands beside `resume`.
+    pub fn validate(&self) -> Result<(), RunError> {
+        self.learn.validate()?;
+        let of_new_runs = [
+            ("config", self.learn.config.is_some()),
+            ("algo", self.learn.algo.is_some()),
+            ("seed", self.learn.seed.is_some()),
+            ("agents", self.agents.is_some()),
+            ("out", self.out.is_some()),
+        ];
+        match of_new_runs.into_iter().find(|(_, given)| *given && self.resume.is_some()) {
+            Some((name, _)) => Err(RunError::NewRunOnly { name }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A policy, and the agent that it is to move.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct PolicySource {
+    /// Policy file, .safetensors or .onnx, or folder of a run.
+    pub policy: PathBuf,
+    /// Agent that the policy must be for [default: the one it was trained for].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "AGENT"))]
+    pub agent: Option<String>,
+}
+
+impl PolicySource {
+    /// Reads the policy and makes its task.
+    ///
+    /// # Errors
+    /// If there is no such file, it is no policy, or it is for another agent.
+    pub fn load(&self) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
+        policy_file::load(&self.policy, self.agent.as_deref())
+    }
+}
+
+/// Time of a film.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct FilmOptions {
+    /// Length of the film [default: 8, and 2 for a strip of frames].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S", allow_negative_numbers = true))]
+    pub seconds: Option<f64>,
+    /// Seconds that pass before the film begins.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true))]
+    pub start: f64,
+    /// Frames per second of a film.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", allow_negative_numbers = true))]
+    pub fps: Option<f64>,
+}
+
+impl FilmOptions {
+    /// Longest film, and most that may pass before it, seconds.
+    pub const MOST_SECONDS: f64 = 3600.0;
+    /// Most frames per second.
+    pub const MOST_FPS: f64 = 1000.0;
+
+    /// Refuses times that no film has.
+    ///
+    /// # Errors
+    /// Names the option, its value and what was expected.
+    pub fn validate(&self) -> Result<(), RunError> {
+        let above_zero = |name, value: Option<f64>, most: f64| match value {
+            Some(x) if !(x > 0.0 && x <= most) => {
+                Err(RunError::option(name, format!("is {x}, expected a number above 0 and up to {most}")))
+            }
+            _ => Ok(()),
+        };
+        above_zero("seconds", self.seconds, Self::MOST_SECONDS)?;
+        above_zero("fps", self.fps, Self::MOST_FPS)?;
+        match (0.0..=Self::MOST_SECONDS).contains(&self.start) {
+            true => Ok(()),
+            false => {
+                let problem = format!("is {}, expected a number from 0 to {}", self.start, Self::MOST_SECONDS);
+                Err(RunError::option("start", problem))
+            }
+        }
+    }
+}
+
+/// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.
+#[cfg(feature = "clap")]
+fn parse_steps(text: &str) -> Result<u64, String> {
+    let bad = || "expected a positive number of steps such as 4000000, 4_000_000, 4M, 500k or 4e6".to_string();
+    let digits: String = text.chars().filter(|c| !matches!(c, '_' | ',')).collect();
+    if let Ok(n) = digits.parse::<u64>() {
+        return if n > 0 { Ok(n) } else { Err(bad()) };
+    }
+    let (number, factor) = match digits.chars().last() {
+        Some('k' | 'K') => (&digits[..digits.len() - 1], 1e3),
+        Some('m' | 'M') => (&digits[..digits.len() - 1], 1e6),
+        Some('g' | 'G') => (&digits[..digits.len() - 1], 1e9),
+        _ => (&digits[..], 1.0),
+    };
+    let steps = number.parse::<f64>().map_err(|_| bad())? * factor;
+    if (1.0..=1e15).contains(&steps) { Ok(steps.round() as u64) } else { Err(bad()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(feature = "clap")]
+    #[test]
+    fn steps_have_short_forms() {
+        for (text, steps) in [("4000000", 4_000_000), ("4_000_000", 4_000_000), ("2.5M", 2_500_000), ("1e6", 1_000_000)]
+        {
+            assert_eq!(parse_steps(text), Ok(steps));
+        }
+        for text in ["0", "-3", "many", "", "inf", "nan", "k"] {
+            assert!(parse_steps(text).is_err(), "{text}");
+        }
+    }
+
+    /// What a refusal says with the names as they are.
+    #[track_caller]
+    fn refused(result: Result<(), RunError>) -> String {
+        let error = result.expect_err("a refusal");
+        assert!(error.is_usage());
+        error.to_string()
+    }
+
+    #[test]
+    fn options_that_do_not_go_together_are_refused_by_their_names() {
+        let learn = LearnOptions { algo: Some("ppp".into()), ..Default::default() };
+        assert_eq!(refused(learn.validate()), "algo is ppp, expected one of ppo, a2c, acktr, sac");
+        let learn = LearnOptions { algo: Some("a2c".into()), config: Some("a.yaml".into()), ..Default::default() };
+        assert!(refused(learn.validate()).starts_with("algo and a configuration exclude each other"));
+        let new = |set: fn(&mut RunOptions)| {
+            let mut options = RunOptions { resume: Some("runs/a".into()), ..Default::default() };
+            set(&mut options);
+            refused(options.validate())
+        };
+        for (text, name) in [
+            (new(|o| o.learn.config = Some("a.yaml".into())), "config"),
+            (new(|o| o.learn.algo = Some("sac".into())), "algo"),
+            (new(|o| o.learn.seed = Some(1)), "seed"),
+            (new(|o| o.agents = Some(16)), "agents"),
+            (new(|o| o.out = Some("b".into())), "out"),
+        ] {
+            assert_eq!(text, format!("{name} belongs to a new run, not to one that resume goes on with"));
+        }
+        let more = LearnOptions { steps: Some(9), threads: Some(2), ..Default::default() };
+        let options = RunOptions { learn: more, resume: Some("runs/a".into()), processes: 2, ..Default::default() };
+        assert!(options.validate().is_ok());
+    }
+
+    #[test]
+    fn films_have_a_length_and_a_rate() {
+        assert!(FilmOptions::default().validate().is_ok());
+        for (name, film) in [
+            ("seconds", FilmOptions { seconds: Some(-1.0), ..Default::default() }),
+            ("seconds", FilmOptions { seconds: Some(f64::NAN), ..Default::default() }),
+            ("fps", FilmOptions { fps: Some(0.0), ..Default::default() }),
+            ("start", FilmOptions { start: 1e9, ..Default::default() }),
+        ] {
+            let text = refused(film.validate());
+            assert!(text.starts_with(&format!("{name} is ")), "{text}");
+        }
+    }
+}
