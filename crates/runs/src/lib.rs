@@ -6,12 +6,13 @@
 //! names of options; each front end spells them in its own way ([`Spelling`]).
 //!
 //! The modules from bottom to top: [`text`], [`error`], [`configuration`], [`folder`], [`policy_file`], [`task`], [`options`],
-//! [`report`], [`processes`], [`session`].
+//! [`play`], [`report`], [`processes`], [`session`].
 
 pub mod configuration;
 pub mod error;
 pub mod folder;
 pub mod options;
+pub mod play;
 pub mod policy_file;
 pub mod processes;
 pub mod report;
@@ -22,6 +23,7 @@ pub mod text;
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
 pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
+pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;
 pub use session::{Outcome, Session};

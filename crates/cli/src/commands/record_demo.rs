@@ -3,11 +3,10 @@
 use crate::args::RecordDemoArgs;
 use crate::console::{print_json, say};
 use crate::error::CliError;
-use marathon_envs::{VecEnv, VecEnvOptions};
-use marathon_learn::{BlockPolicy, Policy, write_atomic};
+use marathon_envs::VecEnvOptions;
+use marathon_learn::{Policy, write_atomic};
 use marathon_mlagents::{Demonstration, Episode};
-use marathon_physics::lanes::Isa;
-use marathon_runs::text;
+use marathon_runs::{Play, text};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -71,21 +70,18 @@ pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
 /// would favor short episodes.
 fn play(policy: &Policy, episodes: usize, seed: u64) -> Result<Vec<Episode>, CliError> {
     let (n, meta) = (episodes.min(MAX_AGENTS), policy.meta());
-    let mut env = VecEnv::new(&meta.agent, &VecEnvOptions { agents: n, seed, ..Default::default() })?;
-    let mut step = env.buffers();
-    env.reset(None, &mut step.obs)?;
-    let mut pilot = BlockPolicy::new(policy, Isa::best());
-    let mut actions = vec![0.0; n * meta.act];
+    let mut play = Play::new(policy, &VecEnvOptions { agents: n, seed, ..Default::default() })?;
     let quota = |agent: usize| (episodes - agent).div_ceil(n);
     let mut done: Vec<Vec<Episode>> = vec![Vec::new(); n];
     let mut now = vec![Episode::default(); n];
     while (0..n).any(|agent| done[agent].len() < quota(agent)) {
-        pilot.act_rows(&step.obs, None, &mut actions);
-        for (agent, episode) in now.iter_mut().enumerate() {
-            episode.obs.extend(&step.obs[agent * meta.obs..(agent + 1) * meta.obs]);
-            episode.actions.extend(&actions[agent * meta.act..(agent + 1) * meta.act]);
+        for (episode, obs) in now.iter_mut().zip(play.last().obs.chunks_exact(meta.obs)) {
+            episode.obs.extend(obs);
         }
-        env.step(&actions, &mut step.as_mut())?;
+        for (episode, action) in now.iter_mut().zip(play.decide().chunks_exact(meta.act)) {
+            episode.actions.extend(action);
+        }
+        let step = play.step()?;
         for (agent, episode) in now.iter_mut().enumerate() {
             episode.rewards.push(step.reward[agent]);
             if step.terminated[agent] || step.truncated[agent] {

@@ -4,11 +4,11 @@ use crate::args::RenderArgs;
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::interrupt;
-use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions, registry};
+use marathon_envs::{Autoreset, VecEnvOptions, registry};
 use marathon_learn::Policy;
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene, status_line};
-use marathon_runs::text;
 use marathon_runs::text::unsigned_zero;
+use marathon_runs::{Play, text};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -165,10 +165,9 @@ impl Shot {
 
 /// Agents that play on after they fall, so that one sees how.
 struct Stage<'a> {
-    policy: &'a Policy,
-    env: VecEnv,
-    step: Step,
-    actions: Vec<f32>,
+    play: Play<'a>,
+    /// Seconds between decisions.
+    dt: f64,
     decisions: usize,
     /// Distance of each agent, m; it stands still after a fall.
     distances: Vec<f64>,
@@ -186,14 +185,9 @@ impl<'a> Stage<'a> {
             autoreset: Autoreset::Disabled,
             ..Default::default()
         };
-        let mut env = VecEnv::new(&policy.meta().agent, &options)?;
-        let mut step = env.buffers();
-        env.reset(None, &mut step.obs)?;
         Ok(Self {
-            policy,
-            env,
-            step,
-            actions: vec![0.0; args.agents * policy.meta().act],
+            play: Play::new(policy, &options)?,
+            dt: policy.meta().control_dt,
             decisions: 0,
             distances: vec![0.0; args.agents],
             recent: vec![0.0],
@@ -202,23 +196,19 @@ impl<'a> Stage<'a> {
     }
 
     fn step(&mut self) -> Result<(), CliError> {
-        let meta = self.policy.meta();
-        let rows = self.step.obs.chunks_exact(meta.obs).zip(self.actions.chunks_exact_mut(meta.act));
-        for (obs, action) in rows {
-            action.copy_from_slice(&self.policy.act(obs));
-        }
-        self.env.step(&self.actions, &mut self.step.as_mut())?;
+        self.play.decide();
+        let step = self.play.step()?;
         self.decisions += 1;
         for (i, fallen) in self.fallen.iter_mut().enumerate() {
-            if self.step.terminated[i] && fallen.is_none() {
+            if step.terminated[i] && fallen.is_none() {
                 *fallen = Some(self.decisions);
             }
             if fallen.is_none() {
-                self.distances[i] += f64::from(self.step.forward[i]);
+                self.distances[i] += f64::from(step.forward[i]);
             }
         }
         self.recent.push(self.distance());
-        let keep = (SPEED_WINDOW / self.policy.meta().control_dt).round() as usize + 1;
+        let keep = (SPEED_WINDOW / self.dt).round() as usize + 1;
         if self.recent.len() > keep {
             self.recent.remove(0);
         }
@@ -226,11 +216,11 @@ impl<'a> Stage<'a> {
     }
 
     fn poses(&self) -> Result<Vec<Vec<f64>>, CliError> {
-        (0..self.fallen.len()).map(|i| Ok(self.env.state(i)?.qpos)).collect()
+        (0..self.fallen.len()).map(|i| Ok(self.play.qpos(i)?)).collect()
     }
 
     fn seconds(&self) -> f64 {
-        self.decisions as f64 * self.policy.meta().control_dt
+        self.decisions as f64 * self.dt
     }
 
     /// Mean distance of the agents, m.
@@ -240,7 +230,7 @@ impl<'a> Stage<'a> {
 
     /// Mean speed of late, m/s.
     fn speed(&self) -> f64 {
-        let seconds = (self.recent.len() - 1) as f64 * self.policy.meta().control_dt;
+        let seconds = (self.recent.len() - 1) as f64 * self.dt;
         if seconds > 0.0 { (self.distance() - self.recent[0]) / seconds } else { 0.0 }
     }
 
@@ -250,7 +240,7 @@ impl<'a> Stage<'a> {
         let fallen = self.fallen.iter().filter(|f| f.is_some()).count();
         match (&self.fallen[..], fallen) {
             (_, 0) => {}
-            ([Some(at)], _) => lines.push(format!("fell at {:.2} s", *at as f64 * self.policy.meta().control_dt)),
+            ([Some(at)], _) => lines.push(format!("fell at {:.2} s", *at as f64 * self.dt)),
             (all, n) => lines.push(format!("{n} of {} fallen", all.len())),
         }
         lines
@@ -258,7 +248,7 @@ impl<'a> Stage<'a> {
 
     fn all_fallen_for(&self, seconds: f64) -> bool {
         let since = self.fallen.iter().try_fold(0, |last, at| at.map(|at| last.max(at)));
-        since.is_some_and(|at| (self.decisions - at) as f64 * self.policy.meta().control_dt >= seconds)
+        since.is_some_and(|at| (self.decisions - at) as f64 * self.dt >= seconds)
     }
 }
 

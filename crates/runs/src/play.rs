@@ -1,0 +1,62 @@
+//! A policy at play: agents side by side that it moves with its best actions.
+
+use crate::error::RunError;
+use marathon_envs::{Step, VecEnv, VecEnvOptions};
+use marathon_learn::{BlockPolicy, Policy};
+use marathon_physics::lanes::Isa;
+
+/// Agents of a policy's task, and what became of their last decision. A decision has two halves: [`Play::decide`] chooses
+/// actions, [`Play::step`] carries them out.
+pub struct Play<'a> {
+    env: VecEnv,
+    pilot: BlockPolicy<'a>,
+    actions: Vec<f32>,
+    step: Step,
+}
+
+impl<'a> Play<'a> {
+    /// Agents at the start of their first episodes.
+    ///
+    /// # Errors
+    /// If the policy's task does not exist, or the options make no sense.
+    pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
+        let meta = policy.meta();
+        let mut env = VecEnv::new(&meta.agent, options)?;
+        let mut step = env.buffers();
+        env.reset(None, &mut step.obs)?;
+        Ok(Play {
+            env,
+            pilot: BlockPolicy::new(policy, Isa::best()),
+            actions: vec![0.0; options.agents * meta.act],
+            step,
+        })
+    }
+
+    /// Chooses the best actions, `[agents][act]`, for what the agents observe now.
+    pub fn decide(&mut self) -> &[f32] {
+        self.pilot.act_rows(&self.step.obs, None, &mut self.actions);
+        &self.actions
+    }
+
+    /// Carries the chosen actions out.
+    ///
+    /// # Errors
+    /// If the environments refuse them.
+    pub fn step(&mut self) -> Result<&Step, RunError> {
+        self.env.step(&self.actions, &mut self.step.as_mut())?;
+        Ok(&self.step)
+    }
+
+    /// Observations, rewards and ends of the last decision; before the first, only observations.
+    pub fn last(&self) -> &Step {
+        &self.step
+    }
+
+    /// Generalized positions of an agent.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn qpos(&self, agent: usize) -> Result<Vec<f64>, RunError> {
+        Ok(self.env.state(agent)?.qpos)
+    }
+}
