@@ -4,6 +4,8 @@ use crate::app::cues::Cue;
 use crate::ground::Ground;
 use crate::look::{CameraMode, Quality};
 use clap::{Parser, ValueEnum};
+use marathon_learn::EvalOptions;
+use marathon_runs::{FilmOptions, LearnOptions};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -41,18 +43,12 @@ pub struct Args {
     /// What they run on.
     #[arg(long, value_enum, default_value_t = GroundArg::Level)]
     pub ground: GroundArg,
-    /// Seed of everything random.
-    #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
-    pub seed: u64,
     /// Recording to show, as R makes them.
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
-    /// Configuration of the trainer in the YAML schema of ML-Agents, for --mode learn.
-    #[arg(long, value_name = "F.yaml")]
-    pub config: Option<PathBuf>,
-    /// Threads of the trainer; 0 means all processors but one.
-    #[arg(long, value_name = "T", default_value_t = 0)]
-    pub threads: usize,
+    /// How --mode learn learns; the seed is that of everything random.
+    #[command(flatten)]
+    pub learn: LearnOptions,
 
     /// Port on which mlagents-learn listens (5004 by default): it trains the agents, and one watches.
     #[arg(long, value_name = "N", conflicts_with_all = ["mode", "policy", "replay", "record", "watch_stream"])]
@@ -88,15 +84,9 @@ pub struct Args {
     /// a sequence of .png.
     #[arg(long, value_name = "OUT")]
     pub record: Option<PathBuf>,
-    /// Length of the film.
-    #[arg(long, value_name = "S", default_value_t = 8.0)]
-    pub seconds: f64,
-    /// Seconds that pass before the film begins.
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
-    pub start: f64,
-    /// Frames per second of the film.
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
-    pub fps: u32,
+    /// Its time.
+    #[command(flatten)]
+    pub film: FilmOptions,
     /// Film without text and bars.
     #[arg(long)]
     pub no_hud: bool,
@@ -104,11 +94,29 @@ pub struct Args {
 
 /// Size of a window or film when nobody has chosen one, pixels.
 const SIZE: (u32, u32) = (1280, 720);
+/// Length of a film and its frames per second, likewise.
+const SECONDS: f64 = 8.0;
+const FPS: f64 = 30.0;
 
 impl Args {
     /// Size of the window or film, pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size.unwrap_or(SIZE)
+    }
+
+    /// Seed of everything random.
+    pub fn seed(&self) -> u64 {
+        self.learn.seed.unwrap_or(EvalOptions::default().seed)
+    }
+
+    /// Length of the film, seconds.
+    pub fn seconds(&self) -> f64 {
+        self.film.seconds.unwrap_or(SECONDS)
+    }
+
+    /// Frames per second of the film.
+    pub fn fps(&self) -> f64 {
+        self.film.fps.unwrap_or(FPS)
     }
 
     /// How much a frame may cost.

@@ -1,5 +1,6 @@
 //! What can keep the game from starting, with the remedy.
 
+use marathon_runs::{Flags, RunError};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -14,9 +15,6 @@ pub enum GameError {
         /// Something beside it with a similar name.
         nearest: Option<String>,
     },
-    /// A folder without a policy.
-    #[error("{}: no policy.safetensors in this folder; `marathon train` writes one when it saves a run", .0.display())]
-    NoPolicy(PathBuf),
     /// A recording of another agent, or none.
     #[error("{}: {problem}", .path.display())]
     Replay {
@@ -28,15 +26,15 @@ pub enum GameError {
     /// An agent that does not exist, or a model that is not valid.
     #[error(transparent)]
     Env(#[from] marathon_envs::EnvError),
-    /// A policy that is not whole, or for another agent.
-    #[error(transparent)]
-    Learn(#[from] marathon_learn::Error),
     /// A model file that is not valid.
     #[error(transparent)]
     Model(#[from] Box<marathon_physics::mjcf::MjcfError>),
-    /// A run that cannot begin.
+    /// A policy that is not there or for another agent, a run that cannot begin, options that make no sense.
+    #[error("{}", .0.spelled(&Flags("marathon")))]
+    Run(#[from] RunError),
+    /// The system refuses something.
     #[error("{0}")]
-    Train(String),
+    System(String),
     /// No trainer of ML-Agents.
     #[error(transparent)]
     Player(#[from] marathon_mlagents::PlayerError),

@@ -40,14 +40,14 @@ enum Sink {
 }
 
 impl Sink {
-    fn new(path: &Path, fps: u32) -> Result<Self, GameError> {
+    fn new(path: &Path, fps: f64) -> Result<Self, GameError> {
         if path.extension().is_none() {
             std::fs::create_dir_all(path).map_err(|source| GameError::Write { path: path.into(), source })?;
             return Ok(Sink::Folder(path.into(), 0));
         }
         Ok(match Format::of(path)? {
             Format::Png => Sink::Png(path.into(), None),
-            Format::Gif | Format::Mp4 => Sink::Film(Recorder::create(path, f64::from(fps), 1)?),
+            Format::Gif | Format::Mp4 => Sink::Film(Recorder::create(path, fps, 1)?),
         })
     }
 
@@ -81,9 +81,11 @@ impl Sink {
 /// # Errors
 /// If there are no graphics, or the film cannot be written.
 pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> {
-    let mut sink = Sink::new(out, args.fps)?;
+    args.film.validate()?;
+    let fps = args.fps();
+    let mut sink = Sink::new(out, fps)?;
     check_graphics()?;
-    let frame = Duration::from_secs_f64(1.0 / f64::from(args.fps));
+    let frame = Duration::from_secs_f64(1.0 / fps);
     let (width, height) = args.size();
     let mut app = App::new();
     let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
@@ -139,7 +141,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
     };
     // what happens before the film is not drawn; one tick at least, in which the characters come on stage
     draw(&mut app, false);
-    let before = (args.start / frame.as_secs_f64()).round() as usize;
+    let before = (args.film.start / frame.as_secs_f64()).round() as usize;
     pace(&mut app, Duration::from_secs_f64(1.0 / TICKS));
     (0..before).for_each(|_| pace(&mut app, frame));
     draw(&mut app, true);
@@ -149,7 +151,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
         reel.0.push_back(read.data.clone());
     });
 
-    let frames = ((args.seconds * f64::from(args.fps)).round() as usize).max(1);
+    let frames = ((args.seconds() * fps).round() as usize).max(1);
     let (mut drawn, mut taken, mut waited) = (0, 0, 0);
     while taken < frames {
         // pictures come back in their order, some frames late

@@ -7,9 +7,9 @@ use crate::app::show::{Script, Show, Source, file_stem, free_name};
 use crate::asset::PolicyAsset;
 use crate::ground::Ground;
 use bevy::prelude::*;
-use marathon_cli::session::{Session, TrainArgs};
 use marathon_learn::{Control, IterationStats, Policy, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
+use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Task};
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -19,10 +19,8 @@ const TELL: f32 = 5.0;
 /// How the trainer is made.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Teaching {
-    /// Configuration in the schema of ML-Agents, in place of the agent's own.
-    pub config: Option<PathBuf>,
-    /// Threads; 0 means all processors but one.
-    pub threads: usize,
+    /// What the command line says of it; without threads, it leaves one processor to the picture.
+    pub learn: LearnOptions,
     /// Seed of the next run.
     pub seed: u64,
 }
@@ -74,25 +72,16 @@ pub struct Lesson {
     age: f64,
 }
 
-/// What the trainer for an agent is told: its own fast configuration, or that of a file.
+/// What the trainer for an agent is told: its own fast configuration, or that of a file, and the options.
 ///
 /// # Errors
-/// If the file is no configuration for the agent.
-pub fn settings(agent: &str, teaching: &Teaching) -> Result<PpoConfig, String> {
+/// If the options make no sense, or the file is no configuration for the agent.
+pub fn settings(agent: &str, teaching: &Teaching) -> Result<PpoConfig, RunError> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let args = TrainArgs {
-        agent: Some(agent.into()),
-        algo: None,
-        config: teaching.config.clone(),
-        agents: None,
-        steps: None,
-        seed: Some(teaching.seed),
-        threads: Some(if teaching.threads > 0 { teaching.threads } else { cores.saturating_sub(1).max(1) }),
-        processes: 0,
-        out: None,
-        resume: None,
-    };
-    let (session, _) = Session::begin(&args, None, true).map_err(|e| e.to_string())?;
+    let threads = teaching.learn.threads.unwrap_or(cores.saturating_sub(1).max(1));
+    let learn = LearnOptions { seed: Some(teaching.seed), threads: Some(threads), ..teaching.learn.clone() };
+    let options = RunOptions { learn, ..Default::default() };
+    let (session, _) = Session::open(Some(Task::named(agent)?), &options, None, true)?;
     Ok(session.run.config)
 }
 
@@ -102,7 +91,7 @@ impl Lesson {
     /// # Errors
     /// If the configuration cannot be used.
     pub fn begin(agent: &str, ground: Ground, teaching: &Teaching) -> Result<Self, String> {
-        let config = settings(agent, teaching)?;
+        let config = settings(agent, teaching).map_err(|e| e.spelled(&Flags("marathon")))?;
         let factory = ground.agent(agent).and_then(|a| a.shards(Isa::best())).map_err(|e| e.to_string())?;
         let shared = Arc::new((Mutex::new(Board::default()), Condvar::new()));
         board(&shared).progress.state = "first steps".into();

@@ -29,7 +29,7 @@ pub fn serve(show: &Show, port: u16, threads: usize) -> Result<Feed, GameError> 
         board(&shared).end = Some(result.map_err(|e| e.to_string()));
     };
     let thread = std::thread::Builder::new().name("marathon-mlagents".into()).spawn(talk);
-    thread.map_err(|e| GameError::Train(format!("a thread cannot be started: {e}")))?;
+    thread.map_err(|e| GameError::System(format!("a thread cannot be started: {e}")))?;
     Ok(feed)
 }
 

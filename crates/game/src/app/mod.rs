@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), GameError> {
         game.quality = Quality::Low;
     }
     game.feed = match args.mlagents_port {
-        Some(port) => Some(mlagents::serve(&game.show, port, args.threads)?),
+        Some(port) => Some(mlagents::serve(&game.show, port, args.learn.threads.unwrap_or(0))?),
         None if args.watch_stream => Some(stream::watch(BufReader::new(std::io::stdin()), std::io::stdout())?),
         None => None,
     };
@@ -172,8 +172,7 @@ impl GamePlugin {
             playback = Some(recording);
         }
         if show.mode == Mode::Learn {
-            let teaching = Teaching { config: args.config.clone(), threads: args.threads, seed: 0 };
-            learn::settings(&show.agent, &teaching).map_err(GameError::Train)?;
+            learn::settings(&show.agent, &Teaching { learn: args.learn.clone(), seed: 0 })?;
         }
         if args.mlagents_port.is_some() || args.watch_stream {
             show.mode = Mode::Outside;
@@ -199,7 +198,7 @@ impl Plugin for GamePlugin {
         .insert_resource(self.show.clone())
         .insert_resource(Hud { on: !args.no_hud, help: false })
         .insert_resource(show::Shown { contacts: args.contacts, joints: args.joints })
-        .insert_resource(Teaching { config: args.config.clone(), threads: args.threads, seed: args.seed })
+        .insert_resource(Teaching { learn: args.learn.clone(), seed: args.seed() })
         .insert_resource(Start(args.camera.into()))
         .insert_resource(Given { quality: args.quality.is_some(), size: args.size.is_some(), rate: args.max_fps > 0 })
         .insert_resource(Cues::new(args.press.clone()))

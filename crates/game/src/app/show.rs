@@ -13,6 +13,8 @@ use marathon_learn::Policy as Net;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 use marathon_render::Scene;
+use marathon_runs::folder::policy_path;
+use marathon_runs::{PolicySource, policy_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -97,7 +99,7 @@ impl Show {
             source: Source::Shipped,
             agents: usize::from(args.agents),
             ground: args.ground.into(),
-            seed: args.seed,
+            seed: args.seed(),
             model: None,
             version: 1,
         };
@@ -120,13 +122,10 @@ impl Show {
             (_, Err(error)) => return Err(error.into()),
         };
         if let Some(given) = given {
-            let file = policy_file(&given)?;
-            let policy = Net::load(&file)?;
-            let agent = if show.agent.is_empty() { policy.meta().agent.clone() } else { show.agent.clone() };
-            let factory = registry::factory(&agent, Isa::best())?;
-            Net::load_for(&file, factory.spec())?;
+            let agent = Some(show.agent.clone()).filter(|agent| !agent.is_empty());
+            let (_, factory) = PolicySource { policy: given.clone(), agent }.load()?;
             show.agent = factory.spec().id.clone();
-            show.source = Source::File(file);
+            show.source = Source::File(policy_path(&given)?);
         }
         if show.mode == Mode::Learn {
             show.source = Source::Trainer;
@@ -140,19 +139,8 @@ impl Show {
     }
 }
 
-/// The policy in a file or a run's folder.
+/// Refuses a file that is not there.
 ///
-/// # Errors
-/// If there is none.
-pub fn policy_file(given: &Path) -> Result<PathBuf, GameError> {
-    exists(given)?;
-    if !given.is_dir() {
-        return Ok(given.into());
-    }
-    let file = given.join("policy.safetensors");
-    if file.exists() { Ok(file) } else { Err(GameError::NoPolicy(given.into())) }
-}
-
 /// # Errors
 /// If there is no such file; the error names one with a similar name.
 pub fn exists(path: &Path) -> Result<(), GameError> {
@@ -293,7 +281,10 @@ fn read_policy(show: &Show) -> Result<Option<PolicyAsset>, String> {
     let spec = || registry::factory(&show.agent, Isa::best()).map_err(|e| e.to_string());
     match &show.source {
         Source::Nothing | Source::Trainer => Ok(None),
-        Source::File(path) => Ok(Some(Net::load_for(path, spec()?.spec()).map_err(|e| e.to_string())?.into())),
+        Source::File(path) => {
+            let policy = policy_file::read(path, Some(spec()?.spec())).map_err(|e| e.to_string())?;
+            Ok(Some(policy.into()))
+        }
         Source::Shipped if show.mode == Mode::Testbed => Ok(None),
         Source::Shipped => match shipped(&show.agent) {
             Some(policy) => Ok(Some(policy.into())),
