@@ -6,6 +6,10 @@
 //!   arguments that an agent may take.
 //! * [`Lockstep`] gives a learner the blocks of a [`Crowd`]: a task from elsewhere, whose agents are stepped all at once.
 //!
+//! The folders from the bottom to the top, each of which imports from those before it: `error`, `episode_rng`; `agent` (what
+//! one implements); `shard` (what a learner sees); `lanes` (how an agent runs); `any_agent` (an agent behind a pointer);
+//! `agents` (those that come with the crate); `registry`; `vec` (plain arrays); `external` (tasks from elsewhere).
+//!
 //! The same seed gives the same bits on every machine, for every number of threads, agents and lanes.
 //!
 //! ```
@@ -22,40 +26,24 @@
 
 pub mod agent;
 pub mod agents;
-mod anatomy;
+mod any_agent;
+mod episode_rng;
 pub mod error;
-mod lane_env;
-mod lane_group;
-pub mod lockstep;
-pub mod memory;
-mod mind;
-pub mod options;
-mod pool;
-mod prepared;
-mod random;
+mod external;
+mod lanes;
 pub mod registry;
-pub mod rows;
-mod saved;
-pub mod senses;
 pub mod shard;
-mod start;
-pub mod tolerance;
-pub mod vec_env;
-mod write;
+mod vec;
 
 pub use agent::{
-    Agent, AnyAgent, Body, Controls, Elsewhere, Facts, ModelSource, Motors, Part, ResetNoise, View, names,
+    Agent, Body, Controls, Facts, ModelSource, Motors, Obs, OptionInfo, Options, Part, ResetNoise, Senses, Sigmoid,
+    Start, Terms, Tolerance, Value, View, memory, names, options, senses, tolerance,
 };
+pub use any_agent::{AnyAgent, Elsewhere};
+pub use episode_rng::EpisodeRng;
 pub use error::{EnvError, nearest};
-pub use lane_env::{AgentShard, AgentShards, AgentState, TERMINATION_TERM};
-pub use lockstep::{Crowd, CrowdError, Lockstep};
-pub use options::{OptionInfo, Options, Value};
-pub use random::EpisodeRng;
+pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
+pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
-pub use rows::{ObsNumber, Step, StepMut};
-pub use senses::Senses;
-pub use shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
-pub use start::Start;
-pub use tolerance::{Sigmoid, Tolerance};
-pub use vec_env::{Autoreset, VecEnv, VecEnvOptions};
-pub use write::{Obs, Terms};
+pub use shard::{AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
+pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

@@ -7,12 +7,11 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use marathon_physics::lanes::Isa;
 
-use crate::agent::AnyAgent;
+use crate::agent::Options;
 use crate::agents;
+use crate::any_agent::AnyAgent;
 use crate::error::{EnvError, nearest};
-use crate::lane_env::AgentShards;
-use crate::options::Options;
-use crate::shard::ShardFactory;
+use crate::shard::{AgentShards, ShardFactory};
 
 /// Agents by name.
 #[derive(Clone)]
@@ -28,7 +27,7 @@ impl Default for Registry {
         for agent in agents::all() {
             registry.agents.push((agent.facts().id, agent));
         }
-        for (alias, id) in agents::ALIASES.into_iter().chain(agents::dm_control::ALIASES) {
+        for (alias, id) in agents::aliases() {
             registry.aliases.push((alias.into(), id.into()));
         }
         registry

@@ -35,7 +35,7 @@ fn an_unknown_name_gets_the_nearest_and_the_list() {
 
 #[test]
 fn every_alias_leads_to_an_agent() {
-    for (alias, name) in agents::ALIASES.into_iter().chain(agents::dm_control::ALIASES) {
+    for (alias, name) in agents::aliases() {
         assert_eq!(id(alias), name);
     }
 }
@@ -43,7 +43,7 @@ fn every_alias_leads_to_an_agent() {
 #[test]
 fn a_name_is_registered_once() {
     let mut registry = Registry::default();
-    let error = registry.register(Arc::new(agents::ant::AntV0)).unwrap_err();
+    let error = registry.register(Arc::new(agents::marathon::ant::AntV0)).unwrap_err();
     assert_eq!(
         error.to_string(),
         "agent 'Ant-v0' is registered already; give the new one another id, such as 'Ant-v2'"

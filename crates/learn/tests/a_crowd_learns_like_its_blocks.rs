@@ -5,7 +5,7 @@ mod common;
 
 use common::{silent, small_config};
 use marathon_envs::{
-    AgentShards, Crowd, CrowdError, Lockstep, Shard, ShardFactory, Spec, StepMut, VecEnv, VecEnvOptions, lockstep,
+    AgentShards, Crowd, CrowdError, CrowdFailed, Lockstep, Shard, ShardFactory, Spec, StepMut, VecEnv, VecEnvOptions,
     registry,
 };
 use marathon_learn::{
@@ -121,7 +121,7 @@ fn a_crowd_that_fails_ends_the_run() {
         let factory = lockstep(Fragile(crowd(), 7));
         let run = || train(&factory, Isa::best(), &config(threads), None, &mut silent).map(|_| ());
         let panic = catch_unwind(AssertUnwindSafe(run)).expect_err("it fails");
-        assert!(panic.is::<lockstep::CrowdFailed>(), "{threads} threads");
+        assert!(panic.is::<CrowdFailed>(), "{threads} threads");
         assert_eq!(factory.take_error().expect("a reason").to_string(), "it has had enough");
     }
 }

@@ -19,11 +19,8 @@ use marathon_physics::lanes::Real;
 use marathon_physics::model::JointType;
 
 use super::{observe_positions, observe_velocities};
-use crate::agent::{AnyAgent, Controls, Facts, ModelSource, names};
-use crate::senses::Senses;
-use crate::start::Start;
-use crate::tolerance::{Sigmoid, Tolerance};
-use crate::write::Terms;
+use crate::agent::{Controls, Facts, ModelSource, Senses, Sigmoid, Start, Terms, Tolerance, names};
+use crate::any_agent::AnyAgent;
 
 /// All of them, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {

@@ -8,12 +8,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::Domain;
-use crate::agent::{Agent, Body, Facts, names};
-use crate::options::{OptionInfo, OptionSet, Options};
-use crate::senses::Senses;
-use crate::start::Start;
-use crate::tolerance::Tolerance;
-use crate::write::{Obs, Terms};
+use crate::agent::{Agent, Body, Facts, Obs, OptionInfo, OptionSet, Options, Senses, Start, Terms, Tolerance, names};
 
 const DOMAIN: Domain = Domain {
     file: "walker.xml",

@@ -8,11 +8,11 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
-use crate::agent::{Agent, Body, Facts, Motors, View, names};
-use crate::options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
-use crate::senses::{Senses, clamp};
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::senses::clamp;
+use crate::agent::{
+    Agent, Body, Facts, Motors, Obs, OptionInfo, OptionSet, OptionValue, Options, Scale, Senses, Start, Terms, Value,
+    View, names,
+};
 
 /// A body by number, as MuJoCo counts, or by name.
 #[derive(Clone, Debug, PartialEq)]

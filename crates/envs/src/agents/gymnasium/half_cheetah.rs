@@ -6,11 +6,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
-use crate::agent::{Agent, Facts, Motors, names};
-use crate::options::{OptionInfo, OptionSet, Options, Scale};
-use crate::senses::Senses;
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
     /// Gymnasium's cheetah with its keyword arguments.

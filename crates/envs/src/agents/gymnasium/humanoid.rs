@@ -9,11 +9,10 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::{Noise, Travel};
-use crate::agent::{Agent, Facts, Motors, View, names};
-use crate::options::{OptionInfo, OptionSet, Options, Scale};
-use crate::senses::{Senses, clamp};
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::senses::clamp;
+use crate::agent::{
+    Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, View, names,
+};
 
 /// Velocities of the root, on which no motor acts.
 const ROOT: usize = 6;

@@ -8,11 +8,8 @@ use marathon_physics::lanes::Real;
 
 use super::Noise;
 use super::humanoid::Sight;
-use crate::agent::{Agent, Facts, Motors, names};
-use crate::options::{OptionInfo, OptionSet, Options, Scale};
-use crate::senses::{Senses, clamp};
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::senses::clamp;
+use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
     /// Gymnasium's humanoid that is to stand up, with its keyword arguments.

@@ -8,11 +8,8 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::Noise;
-use crate::agent::{Agent, Facts, View, names};
-use crate::options::{OptionInfo, OptionSet, Options, Scale};
-use crate::senses::{Senses, clamp};
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::senses::clamp;
+use crate::agent::{Agent, Facts, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, View, names};
 
 /// Site at the end of the second pole: the model's first.
 const TIP: usize = 0;

@@ -6,11 +6,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::Noise;
-use crate::agent::{Agent, Facts, names};
-use crate::options::{OptionInfo, OptionSet, Options, Scale};
-use crate::senses::Senses;
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use crate::agent::{Agent, Facts, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 /// Lean at which the pole has fallen, rad.
 const FALLEN: f64 = 0.2;

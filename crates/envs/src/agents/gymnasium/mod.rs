@@ -24,10 +24,9 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::{observe_positions, observe_velocities};
-use crate::agent::{AnyAgent, Controls, Facts, ModelSource, View};
-use crate::senses::{Senses, clamp};
-use crate::start::Start;
-use crate::write::Obs;
+use crate::agent::senses::clamp;
+use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Start, View};
+use crate::any_agent::AnyAgent;
 
 /// All of them, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {

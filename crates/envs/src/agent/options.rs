@@ -296,19 +296,19 @@ macro_rules! options {
             }
         }
 
-        impl $crate::options::OptionSet for $name {
-            fn infos(&self) -> Vec<$crate::options::OptionInfo> {
-                vec![$($crate::options::OptionInfo {
+        impl $crate::agent::options::OptionSet for $name {
+            fn infos(&self) -> Vec<$crate::agent::options::OptionInfo> {
+                vec![$($crate::agent::options::OptionInfo {
                     name: stringify!($field),
-                    value: <$type as $crate::options::OptionValue>::value(&self.$field),
-                    expected: <$type as $crate::options::OptionValue>::EXPECTED,
+                    value: <$type as $crate::agent::options::OptionValue>::value(&self.$field),
+                    expected: <$type as $crate::agent::options::OptionValue>::EXPECTED,
                     about: concat!($($about),+).trim(),
-                    reads: |value| <$type as $crate::options::OptionValue>::read(value).is_some(),
+                    reads: |value| <$type as $crate::agent::options::OptionValue>::read(value).is_some(),
                 },)*]
             }
-            fn put(&mut self, name: &str, value: &$crate::options::Value) -> bool {
+            fn put(&mut self, name: &str, value: &$crate::agent::options::Value) -> bool {
                 match name {
-                    $(stringify!($field) => match <$type as $crate::options::OptionValue>::read(value) {
+                    $(stringify!($field) => match <$type as $crate::agent::options::OptionValue>::read(value) {
                         Some(x) => {
                             self.$field = x;
                             true

@@ -3,19 +3,16 @@
 //! Arrays are row-major, one row per agent, and belong to the caller. Agents live in blocks of sixteen spread over the
 //! threads of a pool; results do not depend on the number of threads, the number of agents or the instruction set.
 
-mod snapshot;
-
 use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
 
+use super::arrays::{ObsNumber, Step, StepMut, to_rows};
+use super::pool::Pool;
+use crate::agent::Options;
 use crate::error::EnvError;
-use crate::lane_env::{AgentShard, AgentState};
-use crate::options::Options;
-use crate::pool::Pool;
 use crate::registry::{self, Registry};
-use crate::rows::{ObsNumber, Step, StepMut, to_rows};
-use crate::shard::{BLOCK, BlockStep, Spec};
+use crate::shard::{AgentShard, AgentState, BLOCK, BlockStep, Spec};
 
 /// What happens to an agent whose episode ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,12 +62,12 @@ impl Default for VecEnvOptions {
 
 /// Agents of one kind that are stepped together.
 pub struct VecEnv {
-    spec: Spec,
+    pub(super) spec: Spec,
     /// No deviation from the model.
     unvaried: Variation,
-    agents: usize,
+    pub(super) agents: usize,
     autoreset: Autoreset,
-    workers: Vec<Worker>,
+    pub(super) workers: Vec<Worker>,
     /// Agents per worker, a multiple of the block; the last worker may have fewer.
     stride: usize,
     /// None for a single worker.
@@ -78,13 +75,13 @@ pub struct VecEnv {
 }
 
 /// A shard and the block-shaped arrays that it reads and writes.
-struct Worker {
-    shard: Box<dyn AgentShard>,
+pub(super) struct Worker {
+    pub(super) shard: Box<dyn AgentShard>,
     action: Vec<f32>,
     obs: Vec<f32>,
     out: BlockStep,
     /// A mask per block: agents that start a new episode at the next step instead of acting.
-    pending: Vec<u16>,
+    pub(super) pending: Vec<u16>,
 }
 
 impl VecEnv {

@@ -9,8 +9,8 @@ use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 use marathon_physics::Readings;
 use marathon_physics::lanes::Real;
 
-use crate::agent::{Body, Motors, Part};
-use crate::anatomy::Anatomy;
+use super::bindings::Bindings;
+use super::{Body, Motors, Part};
 
 /// Speed in m/s that [`Senses::velocity`] calls 1.
 pub const MAX_SPEED: f64 = 4.0;
@@ -22,7 +22,7 @@ pub const MAX_BONUS: f64 = 0.5;
 /// An agent's view of itself after a decision: one value per lane.
 pub struct Senses<'a, T: Real> {
     pub(crate) readings: Readings<'a, T>,
-    pub(crate) anatomy: &'a Anatomy<T>,
+    pub(crate) bindings: &'a Bindings<T>,
     /// As [`Facts::controls`](crate::Facts::controls) says.
     pub(crate) action: &'a [T],
     pub(crate) memory: &'a [T],
@@ -40,39 +40,39 @@ impl<T: Real> Senses<'_, T> {
     /// Position of a part's center in the world, m.
     #[inline(always)]
     pub fn position(&self, part: Part) -> [T; 3] {
-        self.readings.geom_pos(self.anatomy.parts[part.0].geom)
+        self.readings.geom_pos(self.bindings.parts[part.0].geom)
     }
 
     /// Velocity of a part's center, world axes, m/s.
     #[inline(always)]
     pub fn linear_velocity(&self, part: Part) -> [T; 3] {
-        self.readings.geom_velocity(self.anatomy.parts[part.0].geom)
+        self.readings.geom_velocity(self.bindings.parts[part.0].geom)
     }
 
     /// The axis of a part that pointed forward (+x) in the spawn pose.
     #[inline(always)]
     pub fn forward(&self, part: Part) -> [T; 3] {
-        let part = &self.anatomy.parts[part.0];
+        let part = &self.bindings.parts[part.0];
         turn(&self.readings.body_axes(part.body), &part.forward)
     }
 
     /// The axis of a part that pointed up (+z) in the spawn pose.
     #[inline(always)]
     pub fn up(&self, part: Part) -> [T; 3] {
-        let part = &self.anatomy.parts[part.0];
+        let part = &self.bindings.parts[part.0];
         turn(&self.readings.body_axes(part.body), &part.up)
     }
 
     /// Number of touch sensors.
     #[inline(always)]
     pub fn touch_count(&self) -> usize {
-        self.anatomy.touch.len()
+        self.bindings.touch.len()
     }
 
     /// Whether touch sensor `i` touches the ground at the end of the decision. False at the start of an episode.
     #[inline(always)]
     pub fn touch(&self, i: usize) -> T::Mask {
-        if self.fresh { T::none() } else { self.readings.touching(self.anatomy.touch[i]) }
+        if self.fresh { T::none() } else { self.readings.touching(self.bindings.touch[i]) }
     }
 
     /// What touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites) feels, N: the value of MuJoCo's touch sensor
@@ -85,14 +85,14 @@ impl<T: Real> Senses<'_, T> {
     /// Number of actuated pairs of bodies.
     #[inline(always)]
     pub fn joint_rotation_count(&self) -> usize {
-        self.anatomy.pairs.len()
+        self.bindings.pairs.len()
     }
 
     /// Orientation of the parent as seen from the child, `inverse(R_child) R_parent`, for the `i`-th actuated pair of
     /// bodies in the order of the actuators: `[x, y, z, w]` with `w >= 0`. A joint with several axes is one pair.
     #[inline(always)]
     pub fn joint_rotation(&self, i: usize) -> [T; 4] {
-        let [w, x, y, z] = self.anatomy.pairs[i].rotation(&self.readings);
+        let [w, x, y, z] = self.bindings.pairs[i].rotation(&self.readings);
         let flip = w.lt(T::zero());
         // the inverse of a unit quaternion has the opposite vector part
         [T::select(flip, x, -x), T::select(flip, y, -y), T::select(flip, z, -z), T::select(flip, -w, w)]
@@ -102,7 +102,7 @@ impl<T: Real> Senses<'_, T> {
     /// slide. (The original differentiated an Euler angle that wrapped; this is what it meant.)
     #[inline(always)]
     pub fn joint_velocity(&self, i: usize) -> T {
-        let motor = &self.anatomy.motors[i];
+        let motor = &self.bindings.motors[i];
         self.readings.qvel(motor.dof) * T::splat(motor.velocity_scale)
     }
 
@@ -127,7 +127,7 @@ impl<T: Real> Senses<'_, T> {
     /// Index of a body, for the [readings](Senses::readings).
     #[inline(always)]
     pub fn body(&self, body: Body) -> usize {
-        self.anatomy.bodies[body.0]
+        self.bindings.bodies[body.0]
     }
 
     /// What contacts do to the body of an index, see [`Readings::cfrc_ext`]: torque, N m, and force, N. Zero at the start
@@ -291,7 +291,7 @@ impl<T: Real> Senses<'_, T> {
     pub fn terminate_on_non_foot_contact(&self) -> T::Mask {
         let mut hit = T::none();
         if !self.fresh {
-            for geom in &self.anatomy.not_feet {
+            for geom in &self.bindings.not_feet {
                 hit = T::or(hit, self.readings.touched(*geom));
             }
         }

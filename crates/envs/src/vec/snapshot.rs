@@ -8,10 +8,10 @@
 //! | 8 | length of the task's name |
 //! | as long | the task's name |
 //!
-//! Then, for every sixteen agents, their [block](crate::saved) and two bytes: a bit per agent that begins an episode at the
+//! Then, for every sixteen agents, their block (`lanes/saved.rs`) and two bytes: a bit per agent that begins an episode at the
 //! next step. Integers are little-endian. Snapshots of `MRTHNv02` had no checksum; they are still read.
 
-use super::VecEnv;
+use super::vec_env::VecEnv;
 use crate::error::EnvError;
 
 const MARK: &[u8; 8] = b"MRTHNv03";

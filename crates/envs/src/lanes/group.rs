@@ -3,10 +3,10 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{AgentState as PhysicsState, Group, Readings, Sim, Variation, Work};
 
+use super::agent_kernel::{Occasion, Perceived};
+use super::saved::Body;
+use super::task::Task;
 use crate::agent::Controls;
-use crate::lane_env::Task;
-use crate::mind::{Occasion, Perceived};
-use crate::saved::Body;
 use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
@@ -56,8 +56,8 @@ impl<T: Real> LaneGroup<T> {
             obs: vec![T::zero(); task.spec.obs],
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
-            pressed: vec![T::zero(); task.anatomy.touch_sites.len()],
-            feet: vec![0; task.anatomy.feet.len()],
+            pressed: vec![T::zero(); task.bindings.touch_sites.len()],
+            feet: vec![0; task.bindings.feet.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -146,13 +146,13 @@ impl<T: Real> LaneGroup<T> {
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
     pub fn begin(&mut self, task: &Task<T>, work: &mut Work<T>, lanes: u32) {
         self.look(task, work);
-        task.mind.perceive(task, self, work, Occasion::Start(lanes));
+        task.agent.perceive(task, self, work, Occasion::Start(lanes));
         T::enter(Settle { group: self, termination_reward: None, ended: Ended::default() });
     }
 
     /// Brings all readings up to date at the start of an episode.
     fn look(&mut self, task: &Task<T>, work: &mut Work<T>) {
-        let sites = &task.anatomy.touch_sites;
+        let sites = &task.bindings.touch_sites;
         if task.facts.view.joints || !sites.is_empty() {
             task.sim.forward(work, &self.physics);
             if task.facts.view.joints {
@@ -182,7 +182,7 @@ impl<T: Real> LaneGroup<T> {
 
     /// Makes one decision. `action` is the block's, `[act][16]`.
     pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
-        let (along_x, view) = (&task.anatomy.along_x, task.facts.view);
+        let (along_x, view) = (&task.bindings.along_x, task.facts.view);
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(Act { group: self, along_x, action, first, clip });
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
@@ -195,7 +195,7 @@ impl<T: Real> LaneGroup<T> {
             task.sim.measure_bodies(work, &self.physics);
         }
         if !self.pressed.is_empty() {
-            T::enter(Feel { sim: &task.sim, group: self, work, sites: &task.anatomy.touch_sites });
+            T::enter(Feel { sim: &task.sim, group: self, work, sites: &task.bindings.touch_sites });
         }
         if !view.of_last_step {
             task.sim.refresh(work, &self.physics);
@@ -204,7 +204,7 @@ impl<T: Real> LaneGroup<T> {
             }
         }
         T::enter(Move { group: self, along_x });
-        let perceived = task.mind.perceive(task, self, work, Occasion::Decision);
+        let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
         let ended = Ended { terminated: perceived.failed, diverged: unsound };
         T::enter(Settle { group: self, termination_reward: task.facts.termination_reward, ended })
     }
@@ -219,7 +219,7 @@ impl<T: Real> LaneGroup<T> {
         let mut terms = Vec::new();
         self.look(task, work);
         let Perceived { observed, reported, .. } =
-            task.mind.perceive(task, self, work, Occasion::Rehearsal(&mut terms));
+            task.agent.perceive(task, self, work, Occasion::Rehearsal(&mut terms));
         Rehearsal { observed, reported, terms }
     }
 }

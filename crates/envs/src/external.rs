@@ -6,9 +6,8 @@
 //! on with their own rows of the result.
 
 use crate::error::EnvError;
-use crate::rows::{Step, StepMut};
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
-use crate::vec_env::VecEnv;
+use crate::vec::{Step, StepMut, VecEnv};
 use std::any::Any;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

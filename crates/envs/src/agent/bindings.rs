@@ -4,7 +4,7 @@ use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, Readings, Sim, SimOptions, Work};
 
-use crate::agent::{Facts, ModelSource};
+use super::{Facts, ModelSource};
 use crate::error::{EnvError, nearest};
 
 /// Name of the keyframe that holds the start pose and velocity.
@@ -58,7 +58,7 @@ pub(crate) struct Motor<C> {
 }
 
 /// The indices that [`Senses`](crate::Senses) work with.
-pub(crate) struct Anatomy<T: Real> {
+pub(crate) struct Bindings<T: Real> {
     pub parts: Vec<PartFrame<T::Scalar>>,
     pub bodies: Vec<usize>,
     /// Geoms with touch sensors.
@@ -130,7 +130,7 @@ impl Blueprint {
     }
 }
 
-impl<T: Real> Anatomy<T> {
+impl<T: Real> Bindings<T> {
     pub fn new(facts: &Facts, blueprint: &Blueprint) -> Result<Self, EnvError> {
         let model = &blueprint.model;
         let missing = |role: &str, name: &str, kind: &str, known: Vec<&str>| {
@@ -195,7 +195,7 @@ impl<T: Real> Anatomy<T> {
                 _ => {}
             }
         }
-        Ok(Anatomy { parts, bodies, touch, touch_sites, feet, not_feet, pairs, motors, along_x })
+        Ok(Bindings { parts, bodies, touch, touch_sites, feet, not_feet, pairs, motors, along_x })
     }
 }
 

@@ -2,9 +2,9 @@
 
 use marathon_physics::Model;
 
-use crate::agent::ResetNoise;
-use crate::anatomy::Blueprint;
-use crate::random::EpisodeRng;
+use super::ResetNoise;
+use super::bindings::Blueprint;
+use crate::episode_rng::EpisodeRng;
 
 /// The state in which an episode starts, in the making.
 pub struct Start<'a> {

@@ -16,11 +16,10 @@
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
-use crate::agent::{Agent, Facts, Motors, Part, names};
-use crate::senses::{Senses, unit};
-use crate::write::{Obs, Terms};
+use crate::agent::senses::unit;
+use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../assets/agents/walker2d.xml");
+const MODEL: &str = include_str!("../../../../../assets/agents/walker2d.xml");
 
 /// Physics steps per decision: 400 Hz physics, 100 Hz control.
 const FRAME_SKIP: usize = 4;

@@ -19,12 +19,11 @@
 
 use marathon_physics::lanes::Real;
 
-use crate::agent::{Agent, Facts, Motors, Part, names};
-use crate::memory::{PhaseBonus, Stride};
-use crate::senses::{Senses, unit};
-use crate::write::{Obs, Terms};
+use crate::agent::memory::{PhaseBonus, Stride};
+use crate::agent::senses::unit;
+use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../assets/agents/humanoid.xml");
+const MODEL: &str = include_str!("../../../../../assets/agents/humanoid.xml");
 
 /// Physics steps per decision: 200 Hz physics, 40 Hz control.
 const FRAME_SKIP: usize = 5;

@@ -7,25 +7,26 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
 
-use crate::lane_env::{AgentState, Task};
-use crate::lane_group::LARGEST;
-use crate::random::{EpisodeId, EpisodeRng};
+use super::group::LARGEST;
+use super::task::Task;
+use crate::episode_rng::{EpisodeId, EpisodeRng};
+use crate::shard::AgentState;
 
 /// Most draws of a start that is to be free of contacts; then the last one counts, whatever it touches.
 const DRAWS: usize = 1000;
 
 /// Starts of the next episodes of a shard's agents.
-pub(crate) struct Prepared<T: Real> {
+pub(crate) struct StartCache<T: Real> {
     /// Where they are made.
     scratch: Option<Group<T>>,
     /// By agent.
     starts: Vec<Option<(EpisodeId, AgentState)>>,
 }
 
-impl<T: Real> Prepared<T> {
+impl<T: Real> StartCache<T> {
     /// No starts, for a number of agents.
     pub fn new(agents: usize) -> Self {
-        Prepared { scratch: None, starts: vec![None; agents] }
+        StartCache { scratch: None, starts: vec![None; agents] }
     }
 
     /// The start of an agent's episode, if it has been made.

@@ -4,15 +4,12 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Model, Readings, Work};
 
-use crate::agent::Agent;
-use crate::lane_env::Task;
-use crate::lane_group::LaneGroup;
-use crate::senses::Senses;
-use crate::start::Start;
-use crate::write::{Obs, Terms};
+use super::group::LaneGroup;
+use super::task::Task;
+use crate::agent::{Agent, Obs, Senses, Start, Terms};
 
 /// An [`Agent`] for lanes of one kind.
-pub(crate) trait Mind<T: Real>: Send + Sync {
+pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     /// See [`Agent::fits`].
     fn fits(&self, model: &Model) -> Result<(), String>;
     /// Draws the start of an episode, see [`Agent::reset`].
@@ -42,7 +39,7 @@ pub(crate) struct Perceived {
     pub failed: u32,
 }
 
-impl<T: Real, A: Agent> Mind<T> for A {
+impl<T: Real, A: Agent> AgentKernel<T> for A {
     fn fits(&self, model: &Model) -> Result<(), String> {
         Agent::fits(self, model)
     }
@@ -56,7 +53,7 @@ impl<T: Real, A: Agent> Mind<T> for A {
     }
 }
 
-/// What [`Mind::perceive`] runs.
+/// What [`AgentKernel::perceive`] runs.
 struct Perceive<'a, T: Real, A> {
     agent: &'a A,
     task: &'a Task<T>,
@@ -78,7 +75,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         let LaneGroup { physics, memory, start, obs, terms, info, pressed, feet, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
-            anatomy: &task.anatomy,
+            bindings: &task.bindings,
             action: &physics.ctrl,
             memory: &[],
             pressed,
@@ -104,7 +101,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
         let mut info = Obs::new(info);
         agent.info(&s, &mut info);
-        for (lanes, geom) in feet.iter_mut().zip(&task.anatomy.feet) {
+        for (lanes, geom) in feet.iter_mut().zip(&task.bindings.feet) {
             let touched = T::bits(s.readings.touched(*geom));
             *lanes = fresh.map_or(touched, |begun| *lanes & !begun);
         }

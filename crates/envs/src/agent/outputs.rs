@@ -2,7 +2,7 @@
 
 use marathon_physics::lanes::Real;
 
-use crate::senses::Senses;
+use super::Senses;
 
 /// An observation in the making.
 pub struct Obs<'a, T> {

@@ -1,0 +1,91 @@
+//! The paper's `MarathonAgent`: what somebody writes who adds a creature or a task.
+//!
+//! An agent is a small value (usually a unit struct) that implements [`Agent`]: constant [`Facts`], and three functions
+//! over [`Senses`]: what it sees, what it is rewarded for, when it has failed. They are generic over [`Real`], so one text
+//! serves a single agent in double precision and sixteen agents in one vector register. Mark them `#[inline(always)]`
+//! (everything that runs inside [`Real::enter`] must be) and let no lane look at another: there is no way to.
+
+pub(crate) mod bindings;
+mod facts;
+pub mod memory;
+pub mod options;
+mod outputs;
+pub mod senses;
+mod start;
+pub mod tolerance;
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
+pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
+pub use outputs::{Obs, Terms};
+pub use senses::Senses;
+pub use start::Start;
+pub use tolerance::{Sigmoid, Tolerance};
+
+/// A creature with a task.
+pub trait Agent: Send + Sync + 'static {
+    /// Constant facts; the same at every call.
+    fn facts(&self) -> Facts;
+
+    /// Writes the observation, [`Facts::observation`] numbers.
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>);
+
+    /// Adds the terms of the reward of the decision just made, in the order of [`Facts::reward_terms`].
+    ///
+    /// It is called once per decision, with the state that the decision led to. (The original computed a reward at every
+    /// physics step and kept the last.)
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>);
+
+    /// Lanes whose agent has failed.
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask;
+
+    /// Puts the agent where an episode starts. It finds itself in the spawn pose with the spawn velocity; what it adds of
+    /// chance comes from [`Start::random`]. It is a function of these alone, and may be called before the episode is due.
+    fn reset(&self, start: &mut Start) {
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    /// Reports numbers that are neither observed nor rewarded, as many as [`Facts::info`] names: for a user's logs.
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let _ = (s, out);
+    }
+
+    /// Sets the agent's own variables at the start of an episode, where they are zero.
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let _ = (s, memory);
+    }
+
+    /// Updates the agent's own variables, [`Facts::memory`] of them per lane, once per decision, before `step_reward`
+    /// reads them through [`Senses::memory`]. They start at zero, or at what [`Agent::begin`] sets, and belong to snapshots.
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let _ = (s, memory);
+    }
+
+    /// The named arguments that it takes, with the values that it has, see [`options!`](crate::options!).
+    fn options(&self) -> Vec<OptionInfo> {
+        Vec::new()
+    }
+
+    /// The agent with other values for some of its arguments; `None` if it takes none.
+    fn with_options(&self, options: &Options) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        let _ = options;
+        None
+    }
+
+    /// Whether it can do with a model that is not its own, if one of its arguments is a model.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        let _ = model;
+        Ok(())
+    }
+}

@@ -1,0 +1,34 @@
+//! The Marathon Environments.
+//!
+//! `-v0` is the paper's text and its code at release (31, 41, 88, 53 observations); `-v1` is the paper's Table 1, the
+//! code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
+
+pub mod ant;
+pub mod hopper;
+pub mod humanoid;
+pub mod walker2d;
+
+use std::sync::Arc;
+
+use crate::any_agent::AnyAgent;
+
+/// All of them, in the order of listings.
+pub fn all() -> Vec<Arc<dyn AnyAgent>> {
+    vec![
+        Arc::new(hopper::HopperV0),
+        Arc::new(hopper::HopperV1),
+        Arc::new(walker2d::Walker2dV0),
+        Arc::new(walker2d::Walker2dV1),
+        Arc::new(humanoid::HumanoidV0),
+        Arc::new(humanoid::HumanoidV1),
+        Arc::new(ant::AntV0),
+        Arc::new(ant::AntV1),
+    ]
+}
+
+/// Names besides the registered ones, which are the ids without their version. `(alias, id)`.
+pub const ALIASES: [(&str, &str); 3] =
+    [("walker", "Walker2d-v0"), ("walker-v0", "Walker2d-v0"), ("walker-v1", "Walker2d-v1")];
+
+/// Speed that the `-v1` rewards call 1, m/s: the track's length over the episode's duration in the original.
+const FASTEST: f64 = 8.0;

@@ -1,0 +1,142 @@
+//! Agents behind pointers: what the registry holds.
+//!
+//! [`AnyAgent`] is the object-safe face of an agent; every [`Agent`] has it by a blanket implementation, so that the
+//! [`Registry`](crate::Registry) holds agents of any crate.
+
+use std::sync::Arc;
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Isa;
+
+use crate::agent::bindings::Blueprint;
+use crate::agent::{Agent, Facts, ModelSource, OptionInfo, Options};
+use crate::error::{EnvError, nearest};
+use crate::lanes::AgentFactory;
+use crate::shard::AgentShards;
+
+/// An [`Agent`] behind a pointer: what the registry holds. Implemented for every agent; not to be implemented by hand.
+pub trait AnyAgent: Send + Sync {
+    /// Constant facts.
+    fn facts(&self) -> Facts;
+    /// The compiled model.
+    ///
+    /// # Errors
+    /// If the model is not valid MJCF.
+    fn model(&self) -> Result<Model, EnvError>;
+    /// The named arguments that it takes, with the values that it has.
+    fn options(&self) -> Vec<OptionInfo>;
+    /// The agent with other values for some of its arguments.
+    ///
+    /// # Errors
+    /// If it does not take an argument, or not this value for it.
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError>;
+    /// Checks the agent against its model and prepares it for stepping with an instruction set.
+    ///
+    /// # Errors
+    /// If names or lengths of the facts do not fit the model, the model cannot be simulated, or the processor lacks the
+    /// instruction set.
+    fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        let facts = self.facts();
+        self.shards_as(facts, isa)
+    }
+    /// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
+    ///
+    /// # Errors
+    /// As [`AnyAgent::shards`].
+    fn shards_every(self: Arc<Self>, frame_skip: usize, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        let mut facts = self.facts();
+        if frame_skip != facts.frame_skip {
+            facts.max_episode_steps = (facts.max_episode_steps * facts.frame_skip).div_ceil(frame_skip.max(1));
+            facts.frame_skip = frame_skip;
+        }
+        self.shards_as(facts, isa)
+    }
+    /// The same with other facts than its own, such as another model; see [`Elsewhere`].
+    ///
+    /// # Errors
+    /// As [`AnyAgent::shards`].
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
+}
+
+/// An agent on another model: its own body and task, on another ground.
+pub struct Elsewhere {
+    agent: Arc<dyn AnyAgent>,
+    model: ModelSource,
+}
+
+impl Elsewhere {
+    /// Puts an agent on a model.
+    pub fn new(agent: Arc<dyn AnyAgent>, model: ModelSource) -> Self {
+        Elsewhere { agent, model }
+    }
+}
+
+impl AnyAgent for Elsewhere {
+    fn facts(&self) -> Facts {
+        Facts { model: self.model.clone(), ..self.agent.facts() }
+    }
+
+    fn model(&self) -> Result<Model, EnvError> {
+        Blueprint::model(&self.facts())
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.agent.options()
+    }
+
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        let agent = self.agent.clone().with_options(options)?;
+        Ok(Arc::new(Elsewhere { agent, model: self.model.clone() }))
+    }
+
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        self.agent.clone().shards_as(facts, isa)
+    }
+}
+
+impl<A: Agent> AnyAgent for A {
+    fn facts(&self) -> Facts {
+        Agent::facts(self)
+    }
+
+    fn model(&self) -> Result<Model, EnvError> {
+        let facts = Agent::facts(self);
+        Blueprint::model(&facts)
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        Agent::options(self)
+    }
+
+    fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        if options.is_empty() {
+            return Ok(self);
+        }
+        let known = Agent::options(&*self);
+        for (name, value) in options.iter() {
+            let id = Agent::facts(&*self).id;
+            let Some(info) = known.iter().find(|info| info.name == name) else {
+                let names = || known.iter().map(|info| info.name);
+                let nearest = nearest(name, names()).map(Into::into);
+                let known = if known.is_empty() { "none".into() } else { names().collect::<Vec<_>>().join(", ") };
+                return Err(EnvError::UnknownOption { id, name: name.into(), nearest, known });
+            };
+            if !info.takes(value) {
+                let (option, found) = (name.to_string(), value.to_string());
+                return Err(EnvError::OptionValue { id, option, found, expected: info.expected });
+            }
+        }
+        Ok(match Agent::with_options(&*self, options) {
+            Some(agent) => Arc::new(agent),
+            None => self,
+        })
+    }
+
+    fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
+        if !isa.supported() {
+            return Err(EnvError::Isa { isa: isa.name(), best: Isa::best().name() });
+        }
+        let options = Agent::options(&*self).into_iter().map(|o| (o.name.to_string(), o.value)).collect();
+        marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
+    }
+}

@@ -1,0 +1,11 @@
+//! How an agent runs: on the physics kernels, as many agents side by side as a vector has lanes.
+
+mod agent_kernel;
+mod group;
+mod saved;
+mod shard;
+mod start_cache;
+mod task;
+
+pub(crate) use task::AgentFactory;
+pub use task::TERMINATION_TERM;

@@ -1,0 +1,134 @@
+//! A task checked against its model and prepared for lanes of one kind.
+
+use std::sync::Arc;
+
+use marathon_physics::lanes::Real;
+use marathon_physics::model::Actuator;
+use marathon_physics::{Model, Sim, Work};
+
+use super::agent_kernel::AgentKernel;
+use super::group::{LaneGroup, Rehearsal};
+use crate::agent::bindings::{Bindings, Blueprint, sim_options};
+use crate::agent::{Controls, Facts, Options, Start};
+use crate::episode_rng::{EpisodeId, EpisodeRng};
+use crate::error::EnvError;
+use crate::shard::{AgentState, Spec};
+
+/// Name of the reward term that replaces all others when an agent fails.
+pub const TERMINATION_TERM: &str = "termination";
+
+/// What all shards of an agent share.
+pub(crate) struct Task<T: Real> {
+    pub agent: Arc<dyn AgentKernel<T>>,
+    pub facts: Facts,
+    pub spec: Spec,
+    pub blueprint: Blueprint,
+    pub bindings: Bindings<T>,
+    pub sim: Sim<T>,
+}
+
+/// Makes shards of an agent for one lane width.
+pub(crate) struct AgentFactory<T: Real> {
+    pub(super) task: Arc<Task<T>>,
+}
+
+impl<T: Real> AgentFactory<T> {
+    /// With facts that are the agent's but for its pace or its model.
+    pub fn new(facts: Facts, options: Options, agent: Arc<dyn AgentKernel<T>>) -> Result<Self, EnvError> {
+        let blueprint = Blueprint::new(&facts)?;
+        let bindings = Bindings::new(&facts, &blueprint)?;
+        let id = || facts.id.clone();
+        agent.fits(&blueprint.model).map_err(|problem| EnvError::Agent { id: id(), problem })?;
+        let sim = Sim::new(&blueprint.model, sim_options()).map_err(|source| EnvError::Sim { id: id(), source })?;
+        let mut reward_terms = facts.reward_terms.clone();
+        if facts.termination_reward.is_some() {
+            reward_terms.push(TERMINATION_TERM.into());
+        }
+        let [action_low, action_high] = action_bounds(&facts, &blueprint.model);
+        let spec = Spec {
+            id: id(),
+            obs: facts.observation.unwrap_or(0),
+            act: blueprint.model.nu,
+            action_low,
+            action_high,
+            action_names: action_names(&blueprint.model),
+            dt: blueprint.model.opt.timestep * facts.frame_skip as f64,
+            frame_skip: facts.frame_skip,
+            max_episode_steps: facts.max_episode_steps,
+            reward_terms,
+            info: facts.info.clone(),
+            nq: blueprint.model.nq,
+            nv: blueprint.model.nv,
+            options,
+        };
+        let mut task = Task { agent, facts, spec, blueprint, bindings, sim };
+        task.spec.obs = task.rehearse()?;
+        Ok(AgentFactory { task: Arc::new(task) })
+    }
+}
+
+/// Names of the actuators; of one without a name, its number.
+fn action_names(model: &Model) -> Vec<String> {
+    let name = |(i, a): (usize, &Actuator)| if a.name.is_empty() { i.to_string() } else { a.name.clone() };
+    model.actuators.iter().enumerate().map(name).collect()
+}
+
+/// Bounds of the actions.
+fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
+    let bound = |side: usize| {
+        let of = |a: &Actuator| match facts.controls {
+            Controls::Nominal => [-1.0, 1.0][side],
+            Controls::Raw if a.ctrl_limited => a.ctrl_range[side] as f32,
+            Controls::Raw => [f32::NEG_INFINITY, f32::INFINITY][side],
+        };
+        model.actuators.iter().map(of).collect()
+    };
+    [bound(0), bound(1)]
+}
+
+impl<T: Real> Task<T> {
+    /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
+    /// length of its observation.
+    fn rehearse(&self) -> Result<usize, EnvError> {
+        let facts = &self.facts;
+        let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
+        let mut start = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+        self.draw_start(&mut start, &mut EpisodeRng::new(EpisodeId { seed: 0, agent: 0, episode: 0 }));
+        if let Some(x) = start.qpos.iter().chain(&start.qvel).find(|x| !x.is_finite()) {
+            return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
+        }
+        let Rehearsal { observed, reported, terms } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
+        if let Some(expected) = facts.observation.filter(|n| *n != observed) {
+            return wrong(format!("it observes {observed} numbers, but its facts say {expected}"));
+        }
+        if observed == 0 {
+            return wrong("it observes nothing, expected at least one number".into());
+        }
+        if reported != facts.info.len() {
+            return wrong(format!("it reports {reported} numbers, but its facts name {:?}", facts.info));
+        }
+        if terms != facts.reward_terms {
+            return wrong(format!("it adds the reward terms {terms:?}, but its facts say {:?}", facts.reward_terms));
+        }
+        Ok(observed)
+    }
+
+    /// Lets the agent draw the start of an episode into `state`.
+    pub fn draw_start(&self, state: &mut AgentState, random: &mut EpisodeRng) -> Drawn {
+        let blueprint = &self.blueprint;
+        state.qpos.clone_from(&blueprint.spawn);
+        state.qvel.clone_from(&blueprint.spawn_velocity);
+        let AgentState { qpos, qvel } = state;
+        let mut start = Start { qpos, qvel, random, normalize: true, free_of_contacts: false, settle: 0, blueprint };
+        self.agent.draw(&mut start);
+        let Start { normalize, free_of_contacts, settle, .. } = start;
+        Drawn { normalize, free_of_contacts, settle }
+    }
+}
+
+/// What is to be done with a start that was drawn, see [`Start`].
+pub(crate) struct Drawn {
+    pub normalize: bool,
+    pub free_of_contacts: bool,
+    pub settle: usize,
+}

@@ -1,0 +1,65 @@
+//! Constant facts of a task, as learners and tools see them.
+
+use crate::agent::Options;
+
+/// Constant facts of a task.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spec {
+    /// Registry name, such as `Hopper-v0`.
+    pub id: String,
+    /// Observation length.
+    pub obs: usize,
+    /// Action length.
+    pub act: usize,
+    /// Names of the actuators.
+    pub action_names: Vec<String>,
+    /// Lowest sensible action per actuator, in the actuator's own units; -inf for an actuator without bounds.
+    ///
+    /// Every environment takes actions in these units: [-1, 1] for the suite's own agents, which clip them, the
+    /// actuators' `ctrlrange` for Gymnasium's and dm_control's tasks, which do not: their rewards see what was asked for,
+    /// their physics clamps what acts. A learner that acts in [-1, 1] maps that to the bounds with
+    /// [`Spec::action_of`], and so do the policies that it writes: their actions are the environment's, and earn the same
+    /// here and in the original task.
+    pub action_low: Vec<f32>,
+    /// Highest sensible action per actuator.
+    pub action_high: Vec<f32>,
+    /// Seconds between decisions.
+    pub dt: f64,
+    /// Physics steps per decision.
+    pub frame_skip: usize,
+    /// Decisions after which an episode is truncated.
+    pub max_episode_steps: usize,
+    /// Names of the reward's terms, in the order of [`BlockStep::terms`].
+    pub reward_terms: Vec<String>,
+    /// Names of further numbers for logs, in the order of [`BlockStep::info`].
+    pub info: Vec<String>,
+    /// Arguments that the agent takes, with the values that it has.
+    pub options: Options,
+    /// Length of a configuration, `qpos`.
+    pub nq: usize,
+    /// Length of a velocity, `qvel`.
+    pub nv: usize,
+}
+
+impl Spec {
+    /// Bounds of an actuator's actions for a policy that acts within bounds: [-1, 1] for an actuator that has none.
+    #[inline(always)]
+    pub fn action_range(&self, i: usize) -> [f32; 2] {
+        let (low, high) = (self.action_low[i], self.action_high[i]);
+        if low.is_finite() && high.is_finite() { [low, high] } else { [-1.0, 1.0] }
+    }
+
+    /// The action that a nominal one stands for: clipped to [-1, 1], and mapped to the [range](Spec::action_range) of
+    /// actuator `i`.
+    #[inline(always)]
+    pub fn action_of(&self, i: usize, nominal: f32) -> f32 {
+        scale_action(self.action_range(i), nominal.clamp(-1.0, 1.0))
+    }
+}
+
+/// Maps [-1, 1] to a range.
+#[inline(always)]
+pub fn scale_action([low, high]: [f32; 2], nominal: f32) -> f32 {
+    // the same bits where there is nothing to map
+    if low == -1.0 && high == 1.0 { nominal } else { 0.5 * (low + high) + 0.5 * (high - low) * nominal }
+}

@@ -1,0 +1,9 @@
+//! Any number of agents behind plain arrays.
+
+mod arrays;
+mod pool;
+mod snapshot;
+mod vec_env;
+
+pub use arrays::{ObsNumber, Step, StepMut};
+pub use vec_env::{Autoreset, VecEnv, VecEnvOptions};
