@@ -32,6 +32,15 @@ impl EpisodeRng {
         EpisodeRng(ChaCha8Rng::from_seed(key))
     }
 
+    /// The numbers that belong to observation `step` of an episode: streams apart from each other and from the start's, so
+    /// that what is drawn in mid-episode depends on nothing drawn before.
+    pub(crate) fn at(id: EpisodeId, step: u64) -> Self {
+        let mut random = EpisodeRng::new(id);
+        // the start has stream 0
+        random.0.set_stream(step.wrapping_add(1));
+        random
+    }
+
     /// Uniform in [-half_width, half_width).
     pub fn around_zero(&mut self, half_width: f64) -> f64 {
         (2.0 * self.unit() - 1.0) * half_width
@@ -40,6 +49,12 @@ impl EpisodeRng {
     /// Uniform in [low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         (high - low).mul_add(self.unit(), low)
+    }
+
+    /// Whole number, each from `low` to `high` as likely as the others.
+    pub fn whole(&mut self, low: usize, high: usize) -> usize {
+        // of 2^53 values, at most one more falls on one number than on another
+        low + (self.unit() * (high - low + 1) as f64) as usize
     }
 
     /// Normally distributed with mean 0 and standard deviation 1 (Box and Muller's first number of a pair).
@@ -67,6 +82,28 @@ mod tests {
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a != b), "{all:?}");
         }
+    }
+
+    #[test]
+    fn the_streams_of_an_episode_differ() {
+        let id = EpisodeId { seed: 1, agent: 2, episode: 3 };
+        let at = |step| EpisodeRng::at(id, step).around_zero(1.0);
+        assert_eq!(at(7), at(7));
+        let all: Vec<f64> = (0..50).map(at).chain([EpisodeRng::new(id).around_zero(1.0)]).collect();
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| a != b), "{all:?}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_as_likely_as_each_other() {
+        let mut rng = EpisodeRng::new(EpisodeId { seed: 7, agent: 0, episode: 1 });
+        let mut counts = [0; 5];
+        for _ in 0..20_000 {
+            counts[rng.whole(3, 7) - 3] += 1;
+        }
+        // a standard error is 57
+        assert!(counts.iter().all(|n| (3770..4230).contains(n)), "{counts:?}");
     }
 
     #[test]

@@ -49,6 +49,22 @@ pub enum EnvError {
         /// What is allowed.
         expected: &'static str,
     },
+    /// An agent cannot be told this.
+    #[error("agent '{id}': command {name} is {found}, expected {low} to {high} {unit}")]
+    Command {
+        /// Registry name of the agent.
+        id: String,
+        /// Name of the number.
+        name: String,
+        /// What was given.
+        found: f64,
+        /// Lowest value.
+        low: f64,
+        /// Highest value.
+        high: f64,
+        /// Unit.
+        unit: String,
+    },
     /// An agent and its model do not fit together.
     #[error("agent '{id}': {problem}")]
     Agent {

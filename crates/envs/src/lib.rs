@@ -36,8 +36,8 @@ pub mod shard;
 mod vec;
 
 pub use agent::{
-    Agent, Body, Controls, Facts, ModelSource, Motors, Obs, OptionInfo, Options, Part, ResetNoise, Senses, Sigmoid,
-    Start, Terms, Tolerance, Value, View, memory, names, options, senses, tolerance,
+    Agent, Body, CommandRange, Controls, Ctrl, Facts, ModelSource, Motors, Obs, OptionInfo, Options, Part, ResetNoise,
+    Senses, Sigmoid, Start, Terms, Tolerance, Value, View, memory, names, options, senses, tolerance,
 };
 pub use any_agent::{AnyAgent, Elsewhere};
 pub use episode_rng::EpisodeRng;
@@ -45,5 +45,5 @@ pub use error::{EnvError, nearest};
 pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
-pub use shard::{AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
+pub use shard::{AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
 pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

@@ -139,6 +139,24 @@ fn a_snapshot_of_an_earlier_version_is_read() {
     assert!(env.save() == again, "nothing has changed");
 }
 
+/// `snapshots/hopper-v03.bin` is of three hoppers after 23 decisions, one heavier, one pushed, written before actions and
+/// commands belonged to snapshots. The program that wrote it went on with observations of this checksum.
+#[test]
+fn a_snapshot_of_before_there_were_commands_continues_with_the_same_bits() {
+    let options =
+        VecEnvOptions { agents: 3, autoreset: Autoreset::NextStep, max_episode_steps: Some(25), ..Default::default() };
+    let mut env = VecEnv::new("Hopper-v1", &options).unwrap_or_else(|e| panic!("{e}"));
+    let mut out = env.buffers();
+    env.load(include_bytes!("snapshots/hopper-v03.bin")).unwrap_or_else(|e| panic!("{e}"));
+    let mut sum = crc32fast::Hasher::new();
+    for decision in 23..40 {
+        let action = 0.125 * ((decision % 5) as f32 - 2.0);
+        env.step(&[action; 12], &mut out.as_mut()).expect("the arrays fit");
+        sum.update(&out.obs.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    assert_eq!(sum.finalize(), 116_901_608);
+}
+
 /// A creature whose future hangs on everything that an agent can have: muscles that react late, ground of its own, and
 /// starts that take physics.
 const MODEL: &str = r#"
@@ -305,9 +323,9 @@ fn a_block_moves_with_what_its_agents_have_of_their_own() {
     a.reset(1, 0xffff, &mut obs);
     let mut own = shards.unvaried();
     own.strength.fill(0.3);
-    a.vary(20, &own);
-    a.push(21, 1, [3.0, 0.0, 1.0], [0.0; 3]);
-    a.set_ground(22, 0, &[0.1; 25]).expect("the field's grid");
+    a.context(20).vary(&own).expect("a sound variation");
+    a.context(21).push(1, [3.0, 0.0, 1.0], [0.0; 3]).expect("a body that there is");
+    a.context(22).set_ground(0, &[0.1; 25]).expect("the field's grid");
     let action = vec![0.25; a.spec().act * BLOCK];
     let (mut here, mut there) = (BlockStep::default(), BlockStep::default());
     let mut obs_there = obs.clone();

@@ -137,6 +137,7 @@ impl Idle {
             options: Options::new(),
             nq: 2,
             nv: 2,
+            ..Spec::default()
         })
     }
 }

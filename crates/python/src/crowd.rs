@@ -89,6 +89,7 @@ pub fn spec(env: &Bound<'_, PyAny>) -> PyResult<Spec> {
         options: Options::new(),
         nq: spec.getattr("nq")?.extract()?,
         nv: spec.getattr("nv")?.extract()?,
+        ..Spec::default()
     })
 }
 

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
+use super::CommandRange;
+
 /// Constant facts of an agent. What is left to [`Facts::default`] is as the suite's own agents have it.
 #[derive(Clone, Debug)]
 pub struct Facts {
@@ -36,6 +38,8 @@ pub struct Facts {
     pub touch: Vec<String>,
     /// Sites with a touch sensor, see [`Senses::touch_force`].
     pub touch_sites: Vec<String>,
+    /// What the agent can be told to do: the numbers of its command, see [`Agent::command`].
+    pub command: Vec<CommandRange>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`].
     pub memory: usize,
     /// What it sees of the physics.
@@ -62,6 +66,7 @@ impl Default for Facts {
             feet: Vec::new(),
             touch: Vec::new(),
             touch_sites: Vec::new(),
+            command: Vec::new(),
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),

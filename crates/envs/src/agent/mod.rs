@@ -6,6 +6,7 @@
 //! (everything that runs inside [`Real::enter`] must be) and let no lane look at another: there is no way to.
 
 pub(crate) mod bindings;
+mod command;
 mod facts;
 pub mod memory;
 pub mod options;
@@ -17,6 +18,9 @@ pub mod tolerance;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
+use crate::episode_rng::EpisodeRng;
+
+pub use command::{CommandRange, Ctrl};
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
 pub use outputs::{Obs, Terms};
@@ -47,20 +51,40 @@ pub trait Agent: Send + Sync + 'static {
         start.add_noise(ResetNoise::MARATHON);
     }
 
+    /// The agent's own schedule: draws the command, [`Facts::command`], of observation number `step` of an episode, 0 at the
+    /// start, and returns for how many decisions it holds. `out` is the command so far; at the start, the values nearest to 0.
+    ///
+    /// What it adds of chance comes from `random`, whose numbers belong to this agent's episode and step alone: whoever runs
+    /// beside it, and wherever it was interrupted, it is told the same. A caller's
+    /// [`set_command`](crate::VecEnv::set_command) goes before the schedule.
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        let _ = (random, step, out);
+        usize::MAX
+    }
+
+    /// Turns an action into the controls of the actuators: the place of scaling, delays and targets of servos. Without it, an
+    /// action is the controls.
+    #[inline(always)]
+    fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
+        c.ctrl.copy_from_slice(c.action);
+    }
+
     /// Reports numbers that are neither observed nor rewarded, as many as [`Facts::info`] names: for a user's logs.
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let _ = (s, out);
     }
 
-    /// Sets the agent's own variables at the start of an episode, where they are zero.
+    /// Sets the agent's own variables at the start of an episode, where they are zero, or what [`Agent::reset`] has drawn
+    /// ([`Start::memory`]).
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let _ = (s, memory);
     }
 
     /// Updates the agent's own variables, [`Facts::memory`] of them per lane, once per decision, before `step_reward`
-    /// reads them through [`Senses::memory`]. They start at zero, or at what [`Agent::begin`] sets, and belong to snapshots.
+    /// reads them through [`Senses::memory`]. They start at zero, or at what [`Agent::reset`] and [`Agent::begin`] set, and
+    /// belong to snapshots.
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let _ = (s, memory);

@@ -25,6 +25,8 @@ pub struct Senses<'a, T: Real> {
     pub(crate) bindings: &'a Bindings<T>,
     /// As [`Facts::controls`](crate::Facts::controls) says.
     pub(crate) action: &'a [T],
+    /// The command that the present question is about.
+    pub(crate) command: &'a [T],
     pub(crate) memory: &'a [T],
     /// What touch sites feel.
     pub(crate) pressed: &'a [T],
@@ -116,6 +118,13 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn action(&self, i: usize) -> T {
         self.action[i]
+    }
+
+    /// Number `i` of the command, see [`Facts::command`](crate::Facts::command): to an observation, the one to follow from now
+    /// on; to everything else, the one that the decision was made under.
+    #[inline(always)]
+    pub fn command(&self, i: usize) -> T {
+        self.command[i]
     }
 
     /// Variable `i` of the agent's own memory, see [`Agent::remember`](crate::Agent::remember).

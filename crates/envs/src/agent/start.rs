@@ -21,6 +21,11 @@ pub struct Start<'a> {
     pub free_of_contacts: bool,
     /// Physics steps without controls that lead from here to where the episode begins; none unless told otherwise.
     pub settle: usize,
+    /// The agent's own variables, [`Facts::memory`](crate::Facts::memory) of them, zero to begin with: what they are when
+    /// [`Agent::begin`](crate::Agent::begin) is called. For what is drawn here and has to be known later, such as the phase of
+    /// a motion.
+    pub memory: &'a mut [f64],
+    pub(crate) grounds: &'a mut Vec<(usize, Vec<f32>)>,
     pub(crate) blueprint: &'a Blueprint,
 }
 
@@ -28,6 +33,19 @@ impl Start<'_> {
     /// The model.
     pub fn model(&self) -> &Model {
         &self.blueprint.model
+    }
+
+    /// Gives the agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
+    /// first of which has the smallest y. It lasts until changed, by another start or by a caller.
+    ///
+    /// # Panics
+    /// If there is no such field, or the elevations are not finite numbers for each point of its grid.
+    pub fn set_ground(&mut self, field: usize, elevations: Vec<f32>) {
+        let grid = &self.blueprint.model.hfields[field];
+        assert_eq!(elevations.len(), grid.nrow * grid.ncol, "one elevation per point of the grid");
+        assert!(elevations.iter().all(|z| z.is_finite()), "elevations are finite");
+        self.grounds.retain(|(known, _)| *known != field);
+        self.grounds.push((field, elevations));
     }
 
     /// Adds noise to the actuated joints and the root's velocity.

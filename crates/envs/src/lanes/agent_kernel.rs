@@ -2,11 +2,12 @@
 //! not once per agent besides.
 
 use marathon_physics::lanes::{Kernel, Real};
-use marathon_physics::{Model, Readings, Work};
+use marathon_physics::{Group, Model, Readings, Work};
 
 use super::group::LaneGroup;
 use super::task::Task;
-use crate::agent::{Agent, Obs, Senses, Start, Terms};
+use crate::agent::{Agent, Ctrl, Obs, Senses, Start, Terms};
+use crate::episode_rng::EpisodeRng;
 
 /// An [`Agent`] for lanes of one kind.
 pub(crate) trait AgentKernel<T: Real>: Send + Sync {
@@ -14,6 +15,10 @@ pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     fn fits(&self, model: &Model) -> Result<(), String>;
     /// Draws the start of an episode, see [`Agent::reset`].
     fn draw(&self, start: &mut Start);
+    /// Draws a command, see [`Agent::command`].
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize;
+    /// Turns the group's actions into controls, see [`Agent::ctrl`].
+    fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>);
     /// Begins or remembers, observes, rewards, reports and terminates, all in one kernel: an agent's code is compiled into it
     /// once per instruction set.
     fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived;
@@ -48,8 +53,33 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
         self.reset(start);
     }
 
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        Agent::command(self, random, step, out)
+    }
+
+    fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>) {
+        T::enter(Drive { agent: self, dt: task.spec.dt, group });
+    }
+
     fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived {
         T::enter(Perceive { agent: self, task, group, work, occasion })
+    }
+}
+
+/// What [`AgentKernel::control`] runs.
+struct Drive<'a, T: Real, A> {
+    agent: &'a A,
+    dt: f64,
+    group: &'a mut LaneGroup<T>,
+}
+
+impl<T: Real, A: Agent> Kernel<T> for Drive<'_, T, A> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let LaneGroup { physics, memory, action, commands, .. } = self.group;
+        let Group { qpos, qvel, ctrl, .. } = physics;
+        self.agent.ctrl(&mut Ctrl { action, ctrl, memory, command: &commands.present, qpos, qvel, dt: self.dt });
     }
 }
 
@@ -72,11 +102,12 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             Occasion::Start(lanes) => (Some(lanes), None),
             Occasion::Rehearsal(names) => (Some(!0), Some(names)),
         };
-        let LaneGroup { physics, memory, start, obs, terms, info, pressed, feet, .. } = group;
+        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, pressed, feet, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             bindings: &task.bindings,
-            action: &physics.ctrl,
+            action,
+            command: &commands.present,
             memory: &[],
             pressed,
             fresh: fresh.is_some(),
@@ -87,16 +118,20 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             Some(lanes) => {
                 // the others are in the middle of their episodes
                 let on = T::from_bits(lanes & ((1 << T::LANES) - 1));
-                start.fill(T::zero());
                 agent.begin(&s, start);
                 for (m, begun) in memory.iter_mut().zip(start) {
                     *m = T::select(on, *begun, *m);
+                    *begun = T::zero();
                 }
             }
         }
         s.memory = memory;
         let mut obs = Obs::new(obs);
+        if fresh.is_none() {
+            s.command = &commands.next;
+        }
         agent.observe(&s, &mut obs);
+        s.command = &commands.present;
         let own = task.facts.reward_terms.len();
         agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
         let mut info = Obs::new(info);

@@ -1,12 +1,14 @@
 //! `L` agents side by side: one decision, from action to observation and reward, inside vector code.
 
 use marathon_physics::lanes::{Kernel, Real};
-use marathon_physics::{AgentState as PhysicsState, Group, Readings, Sim, Variation, Work};
+use marathon_physics::{Group, Readings, Sim, Work};
 
 use super::agent_kernel::{Occasion, Perceived};
-use super::saved::Body;
-use super::task::Task;
+use super::context::Commands;
+use super::saved::{Body, Whole};
+use super::task::{EpisodeStart, Task};
 use crate::agent::Controls;
+use crate::episode_rng::EpisodeId;
 use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
@@ -16,8 +18,11 @@ pub(crate) const LARGEST: f64 = 1e6;
 pub(crate) struct LaneGroup<T: Real> {
     pub physics: Group<T>,
     pub memory: Vec<T>,
-    /// What the memory is at the start of an episode.
+    /// What starts have drawn of the memory, until the episodes begin; otherwise zero.
     pub start: Vec<T>,
+    /// Actions of the last decision.
+    pub action: Vec<T>,
+    pub commands: Commands<T>,
     pub obs: Vec<T>,
     /// Terms of the reward; the termination last, if it has a reward of its own.
     pub terms: Vec<T>,
@@ -53,6 +58,8 @@ impl<T: Real> LaneGroup<T> {
             physics: Group::new(&task.sim),
             memory: vec![T::zero(); task.facts.memory],
             start: vec![T::zero(); task.facts.memory],
+            action: vec![T::zero(); task.spec.act],
+            commands: Commands::new(task),
             obs: vec![T::zero(); task.spec.obs],
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
@@ -71,36 +78,32 @@ impl<T: Real> LaneGroup<T> {
     /// Puts an agent into a state and empties its memory.
     pub fn put(&mut self, sim: &Sim<T>, lane: usize, qpos: &[f64], qvel: &[f64]) {
         self.physics.reset_lane(sim, lane, qpos, qvel);
-        for m in &mut self.memory {
-            m.set(lane, T::scalar(0.0));
+        for x in self.memory.iter_mut().chain(&mut self.start).chain(&mut self.action) {
+            x.set(lane, T::scalar(0.0));
         }
     }
 
-    /// Pushes a body of an agent until told otherwise or put elsewhere.
-    pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
-        self.physics.push(sim, lane, body, force, torque);
+    /// Puts an agent where an episode starts.
+    pub fn put_at_start(&mut self, sim: &Sim<T>, lane: usize, start: &EpisodeStart) {
+        let EpisodeStart { state, normalize, memory, grounds, .. } = start;
+        self.put(sim, lane, &state.qpos, &state.qvel);
+        if !normalize {
+            // these numbers, quaternions included
+            for (v, x) in self.physics.qpos.iter_mut().zip(&state.qpos) {
+                v.set(lane, T::scalar(*x));
+            }
+        }
+        for (m, x) in self.start.iter_mut().zip(memory) {
+            m.set(lane, T::scalar(*x));
+        }
+        for (field, elevations) in grounds {
+            self.physics.set_ground(sim, lane, *field, elevations);
+        }
     }
 
     /// Feet of an agent that touched the ground during its last decision, a bit each.
     pub fn feet(&self, lane: usize) -> u32 {
         self.feet.iter().take(32).enumerate().fold(0, |bits, (i, lanes)| bits | (lanes >> lane & 1) << i)
-    }
-
-    /// Changes the configuration of an agent to these numbers, quaternions that are not normalized included.
-    pub fn set_qpos(&mut self, lane: usize, qpos: &[f64]) {
-        for (v, x) in self.physics.qpos.iter_mut().zip(qpos) {
-            v.set(lane, T::scalar(*x));
-        }
-    }
-
-    /// Gives an agent ground of its own, until changed.
-    pub fn set_ground(&mut self, sim: &Sim<T>, lane: usize, field: usize, elevations: &[f32]) {
-        self.physics.set_ground(sim, lane, field, elevations);
-    }
-
-    /// Gives an agent constants of its own, until changed.
-    pub fn vary(&mut self, sim: &Sim<T>, lane: usize, variation: &Variation) {
-        self.physics.vary(sim, lane, variation);
     }
 
     /// Configuration and velocity of an agent.
@@ -119,28 +122,44 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
-    /// Copies an agent's physics and memory out of its lane: with its life, everything that its future depends on.
-    pub fn save(&self, sim: &Sim<T>, lane: usize) -> (PhysicsState, impl Iterator<Item = f64>) {
-        (self.physics.save(sim, lane), self.memory.iter().map(move |m| T::widen(m.get(lane))))
+    /// Copies an agent out of its lane: with its life, everything that its future depends on.
+    pub fn save(&self, sim: &Sim<T>, lane: usize) -> Whole {
+        let numbers = |v: &[T]| v.iter().map(|x| T::widen(x.get(lane))).collect();
+        Whole {
+            physics: self.physics.save(sim, lane),
+            memory: numbers(&self.memory),
+            given: Some((numbers(&self.action), self.commands.save(lane))),
+        }
     }
 
-    /// Puts an agent where it was when it was saved.
-    pub fn load(&mut self, sim: &Sim<T>, lane: usize, body: &Body) {
-        let LaneGroup { physics: p, memory, .. } = self;
-        match body {
-            Body::Whole { physics, memory: saved } => {
-                p.load(sim, lane, physics);
-                for (m, x) in memory.iter_mut().zip(saved) {
-                    m.set(lane, T::scalar(*x));
-                }
+    /// Puts an agent where it was when it was saved, in observation number `step` of an episode.
+    pub fn load(&mut self, task: &Task<T>, lane: usize, id: EpisodeId, step: u64, body: &Body) {
+        let LaneGroup { physics: p, memory, action, commands, .. } = self;
+        let put = |to: &mut [T], from: &[f64]| {
+            for (v, x) in to.iter_mut().zip(from) {
+                v.set(lane, T::scalar(*x));
+            }
+        };
+        let given = match body {
+            Body::Whole(Whole { physics, memory: saved, given }) => {
+                p.load(&task.sim, lane, physics);
+                put(memory, saved);
+                given.as_ref()
             }
             Body::Unmarked(saved) => {
                 let there = p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.warm).chain(memory);
                 for (v, x) in there.zip(saved) {
                     v.set(lane, T::scalar(*x));
                 }
+                None
             }
+        };
+        match given {
+            Some((saved, _)) => put(action, saved),
+            // before actions and controls were two things
+            None => action.iter_mut().zip(&p.ctrl).for_each(|(a, c)| a.set(lane, c.get(lane))),
         }
+        commands.load(task, lane, id, step, given.map(|(_, command)| command));
     }
 
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
@@ -185,6 +204,7 @@ impl<T: Real> LaneGroup<T> {
         let (along_x, view) = (&task.bindings.along_x, task.facts.view);
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(Act { group: self, along_x, action, first, clip });
+        task.agent.control(task, self);
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
         if view.joints {
             task.sim.measure_joints(work);
@@ -205,6 +225,7 @@ impl<T: Real> LaneGroup<T> {
         }
         T::enter(Move { group: self, along_x });
         let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
+        self.commands.advance();
         let ended = Ended { terminated: perceived.failed, diverged: unsound };
         T::enter(Settle { group: self, termination_reward: task.facts.termination_reward, ended })
     }
@@ -287,11 +308,11 @@ impl<T: Real> Kernel<T> for Act<'_, T> {
         let Act { group, along_x, action, first, clip } = self;
         let one = T::lit(1.0);
         let mut ok = T::not(T::none());
-        for (i, ctrl) in group.physics.ctrl.iter_mut().enumerate() {
+        for (i, own) in group.action.iter_mut().enumerate() {
             let a = load::<T>(&action[i * BLOCK + first..]);
             let finite = a.is_finite();
             ok = T::and(ok, finite);
-            *ctrl = T::masked(finite, if clip { a.max(-one).min(one) } else { a });
+            *own = T::masked(finite, if clip { a.max(-one).min(one) } else { a });
         }
         group.forward = T::zero();
         for (i, axis) in along_x {

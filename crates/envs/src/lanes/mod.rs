@@ -1,6 +1,7 @@
 //! How an agent runs: on the physics kernels, as many agents side by side as a vector has lanes.
 
 mod agent_kernel;
+mod context;
 mod group;
 mod saved;
 mod shard;

@@ -8,13 +8,14 @@ use std::sync::Arc;
 use marathon_physics::lanes::Real;
 use marathon_physics::{Variation, Work};
 
+use super::context::LaneContext;
 use super::group::LaneGroup;
 use super::saved;
 use super::start_cache::StartCache;
-use super::task::{AgentFactory, Task};
+use super::task::{AgentFactory, EpisodeStart, Task};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
-use crate::shard::{AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use crate::shard::{AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
 
 impl<T: Real> ShardFactory for AgentFactory<T> {
     fn spec(&self) -> &Spec {
@@ -73,7 +74,7 @@ struct LaneShard<T: Real> {
     /// Starts that took physics.
     starts: StartCache<T>,
     /// Scratch of resets.
-    start: AgentState,
+    start: EpisodeStart,
 }
 
 impl<T: Real> LaneShard<T> {
@@ -88,7 +89,7 @@ impl<T: Real> LaneShard<T> {
             .collect();
         let work = Work::new(&task.sim);
         let max_episode_steps = task.spec.max_episode_steps as u64;
-        let start = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+        let start = EpisodeStart::new();
         LaneShard { task, work, blocks, max_episode_steps, starts, start }
     }
 
@@ -99,20 +100,15 @@ impl<T: Real> LaneShard<T> {
         let (group, lane, number) = (&mut groups[agent / T::LANES], agent % T::LANES, block * BLOCK + agent);
         let id = lives[agent].next();
         if starts.get(number, id).is_none() {
-            let drawn = task.draw_start(start, &mut EpisodeRng::new(id));
-            if drawn.free_of_contacts || drawn.settle > 0 {
+            task.draw_start(start, &mut EpisodeRng::new(id));
+            if start.takes_physics() {
                 let ids: Vec<EpisodeId> = lives[agent - lane..][..T::LANES].iter().map(Life::next).collect();
                 starts.make(task, work, number - lane, &ids);
-            } else {
-                group.put(&task.sim, lane, &start.qpos, &start.qvel);
-                if !drawn.normalize {
-                    group.set_qpos(lane, &start.qpos);
-                }
             }
         }
-        if let Some(start) = starts.get(number, id) {
-            group.put(&task.sim, lane, &start.qpos, &start.qvel);
-        }
+        group.put_at_start(&task.sim, lane, starts.get(number, id).unwrap_or(start));
+        group.commands.tell(task, lane, id, 0);
+        group.commands.begin(lane);
         lives[agent] = Life { id, steps: 0 };
     }
 }
@@ -146,6 +142,9 @@ impl<T: Real> Shard for LaneShard<T> {
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
+            for (lane, life) in lives[first..].iter().take(T::LANES).enumerate() {
+                group.commands.tell(task, lane, life.id, life.steps + 1);
+            }
             let ended = group.decide(task, &mut self.work, action, first);
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
@@ -169,19 +168,18 @@ impl<T: Real> Shard for LaneShard<T> {
         saved::begin(bytes);
         for (i, life) in lives.iter().enumerate() {
             let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
-            let (physics, memory) = groups[i / T::LANES].save(&self.task.sim, i % T::LANES);
-            saved::add(bytes, [seed, agent, episode, steps], &physics, memory);
+            saved::add(bytes, [seed, agent, episode, steps], &groups[i / T::LANES].save(&self.task.sim, i % T::LANES));
         }
     }
 
     fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
-        let (agents, rest) = saved::read(&task.blueprint.model, task.facts.memory, bytes)?;
+        let (agents, rest) = saved::read(&task.blueprint.model, &task.spec, task.facts.memory, bytes)?;
         for (i, (life, agent)) in lives.iter_mut().zip(&agents).enumerate() {
             let [seed, number, episode, steps] = agent.life;
             *life = Life { id: EpisodeId { seed, agent: number, episode }, steps };
-            groups[i / T::LANES].load(&task.sim, i % T::LANES, &agent.body);
+            groups[i / T::LANES].load(task, i % T::LANES, life.id, steps, &agent.body);
         }
         Ok(rest)
     }
@@ -214,16 +212,19 @@ impl<T: Real> AgentShard for LaneShard<T> {
             }
         }
         let block = &mut self.blocks[agent / BLOCK];
-        block.lives[agent % BLOCK].steps = 0;
+        let life = &mut block.lives[agent % BLOCK];
+        life.steps = 0;
         let (group, lane) = (&mut block.groups[agent % BLOCK / T::LANES], agent % T::LANES);
         group.put(&self.task.sim, lane, &state.qpos, &state.qvel);
+        group.commands.tell(&self.task, lane, life.id, 0);
+        group.commands.begin(lane);
         group.begin(&self.task, &mut self.work, 1 << lane);
         Ok(())
     }
 
-    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+    fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_> {
         let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
-        group.push(&self.task.sim, agent % T::LANES, body, force, torque);
+        Box::new(LaneContext { task: &self.task, group, lane: agent % T::LANES })
     }
 
     fn feet(&self, agent: usize) -> u32 {
@@ -261,28 +262,5 @@ impl<T: Real> AgentShard for LaneShard<T> {
 
     fn limit_episodes(&mut self, max_episode_steps: usize) {
         self.max_episode_steps = max_episode_steps as u64;
-    }
-
-    fn vary(&mut self, agent: usize, variation: &Variation) {
-        let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
-        group.vary(&self.task.sim, agent % T::LANES, variation);
-    }
-
-    fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
-        let fields = &self.task.blueprint.model.hfields;
-        let Some(grid) = fields.get(field) else {
-            let expected = "less than the number of the model's height fields";
-            return Err(EnvError::Option { option: "field", found: field.to_string(), expected });
-        };
-        let (found, expected) = (elevations.len(), grid.nrow * grid.ncol);
-        if found != expected {
-            return Err(EnvError::Shape { what: "elevations [nrow][ncol]".into(), found, expected });
-        }
-        if let Some(x) = elevations.iter().find(|x| !x.is_finite()) {
-            return Err(EnvError::Option { option: "elevations", found: x.to_string(), expected: "finite numbers" });
-        }
-        let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
-        group.set_ground(&self.task.sim, agent % T::LANES, field, elevations);
-        Ok(())
     }
 }

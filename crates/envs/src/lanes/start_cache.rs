@@ -8,7 +8,7 @@ use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
 
 use super::group::LARGEST;
-use super::task::Task;
+use super::task::{EpisodeStart, Task};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::shard::AgentState;
 
@@ -20,7 +20,7 @@ pub(crate) struct StartCache<T: Real> {
     /// Where they are made.
     scratch: Option<Group<T>>,
     /// By agent.
-    starts: Vec<Option<(EpisodeId, AgentState)>>,
+    starts: Vec<Option<(EpisodeId, EpisodeStart)>>,
 }
 
 impl<T: Real> StartCache<T> {
@@ -30,8 +30,8 @@ impl<T: Real> StartCache<T> {
     }
 
     /// The start of an agent's episode, if it has been made.
-    pub fn get(&self, agent: usize, id: EpisodeId) -> Option<&AgentState> {
-        self.starts[agent].as_ref().filter(|(known, _)| *known == id).map(|(_, state)| state)
+    pub fn get(&self, agent: usize, id: EpisodeId) -> Option<&EpisodeStart> {
+        self.starts[agent].as_ref().filter(|(known, _)| *known == id).map(|(_, start)| start)
     }
 
     /// Makes the starts of the episodes `ids` of consecutive agents, one per lane, as far as they have not been made.
@@ -43,45 +43,53 @@ impl<T: Real> StartCache<T> {
         for lane in 0..T::LANES {
             group.reset_lane(&task.sim, lane, spawn, &at_rest);
         }
-        let settle = draw(task, work, group, &due, ids);
+        let drawn = draw(task, work, group, &due, ids);
         let mut steps = 0;
         loop {
-            for lane in due.iter().copied().filter(|lane| settle[*lane] == steps) {
+            for lane in due.iter().copied().filter(|lane| drawn[*lane].settle == steps) {
                 let mut state = read(group, lane);
                 if !state.qpos.iter().chain(&state.qvel).all(|x| x.abs() < LARGEST) {
                     state = AgentState { qpos: spawn.clone(), qvel: at_rest.clone() };
                 }
-                self.starts[first + lane] = Some((ids[lane], state));
+                // the physics has normalized it
+                self.starts[first + lane] =
+                    Some((ids[lane], EpisodeStart { state, normalize: true, ..drawn[lane].clone() }));
             }
-            let Some(next) = due.iter().map(|lane| settle[*lane]).filter(|n| *n > steps).min() else { return };
+            let Some(next) = due.iter().map(|lane| drawn[*lane].settle).filter(|n| *n > steps).min() else { break };
             // in calls of single steps: a lane's bits must not depend on when others have settled
             while steps < next {
                 task.sim.advance(work, group, 1);
                 steps += 1;
             }
         }
+        if drawn.iter().any(|start| !start.grounds.is_empty()) {
+            // the next starts are drawn on the model's own ground
+            self.scratch = None;
+        }
     }
 }
 
-/// Draws the starts of some lanes until they count. Returns for every lane how many steps it is to settle.
+/// Draws the starts of some lanes until they count. Returns every lane's; how many steps it is to settle is still to be done.
 fn draw<T: Real>(
     task: &Task<T>,
     work: &mut Work<T>,
     group: &mut Group<T>,
     due: &[usize],
     ids: &[EpisodeId],
-) -> Vec<usize> {
+) -> Vec<EpisodeStart> {
     let mut randoms: Vec<EpisodeRng> = ids.iter().map(|id| EpisodeRng::new(*id)).collect();
-    let mut settle = vec![0; T::LANES];
-    let mut state = AgentState { qpos: Vec::new(), qvel: Vec::new() };
+    let mut drawn = vec![EpisodeStart::new(); T::LANES];
     let mut missing = due.to_vec();
     for _ in 0..DRAWS {
         let mut doubtful = Vec::new();
         for lane in missing {
-            let drawn = task.draw_start(&mut state, &mut randoms[lane]);
-            group.reset_lane(&task.sim, lane, &state.qpos, &state.qvel);
-            settle[lane] = drawn.settle;
-            if drawn.free_of_contacts {
+            let start = &mut drawn[lane];
+            task.draw_start(start, &mut randoms[lane]);
+            group.reset_lane(&task.sim, lane, &start.state.qpos, &start.state.qvel);
+            for (field, elevations) in &start.grounds {
+                group.set_ground(&task.sim, lane, *field, elevations);
+            }
+            if start.free_of_contacts {
                 doubtful.push(lane);
             }
         }
@@ -92,7 +100,7 @@ fn draw<T: Real>(
         let touching = T::enter(Touching { sim: &task.sim, group, work });
         missing = doubtful.into_iter().filter(|lane| touching >> lane & 1 == 1).collect();
     }
-    settle
+    drawn
 }
 
 /// State of a lane.

@@ -9,7 +9,7 @@ use marathon_physics::{Model, Sim, Work};
 use super::agent_kernel::AgentKernel;
 use super::group::{LaneGroup, Rehearsal};
 use crate::agent::bindings::{Bindings, Blueprint, sim_options};
-use crate::agent::{Controls, Facts, Options, Start};
+use crate::agent::{CommandRange, Controls, Facts, Options, Start};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
 use crate::shard::{AgentState, Spec};
@@ -57,6 +57,7 @@ impl<T: Real> AgentFactory<T> {
             max_episode_steps: facts.max_episode_steps,
             reward_terms,
             info: facts.info.clone(),
+            command: facts.command.clone(),
             nq: blueprint.model.nq,
             nv: blueprint.model.nv,
             options,
@@ -86,17 +87,34 @@ fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
     [bound(0), bound(1)]
 }
 
+/// Whether a command has names of its own and ranges that are ranges.
+fn check_command(ranges: &[CommandRange]) -> Result<(), String> {
+    for (i, CommandRange { name, low, high, .. }) in ranges.iter().enumerate() {
+        if name.is_empty() || ranges[..i].iter().any(|other| other.name == *name) {
+            return Err(format!("number {i} of its command is called '{name}', expected a name of its own"));
+        }
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            return Err(format!("its command '{name}' is from {low} to {high}, expected a range of finite numbers"));
+        }
+    }
+    Ok(())
+}
+
 impl<T: Real> Task<T> {
     /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
     /// length of its observation.
     fn rehearse(&self) -> Result<usize, EnvError> {
         let facts = &self.facts;
         let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
-        let mut start = AgentState { qpos: Vec::new(), qvel: Vec::new() };
-        self.draw_start(&mut start, &mut EpisodeRng::new(EpisodeId { seed: 0, agent: 0, episode: 0 }));
-        if let Some(x) = start.qpos.iter().chain(&start.qvel).find(|x| !x.is_finite()) {
+        let (mut start, id) = (EpisodeStart::new(), EpisodeId { seed: 0, agent: 0, episode: 0 });
+        self.draw_start(&mut start, &mut EpisodeRng::new(id));
+        if let Some(x) = start.state.qpos.iter().chain(&start.state.qvel).find(|x| !x.is_finite()) {
             return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
         }
+        if let Some(x) = start.memory.iter().find(|x| !x.is_finite()) {
+            return wrong(format!("its episodes start with a memory of {x}, expected finite numbers"));
+        }
+        check_command(&facts.command).or_else(|problem| wrong(problem).map(|_: usize| ()))?;
         let Rehearsal { observed, reported, terms } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
         if let Some(expected) = facts.observation.filter(|n| *n != observed) {
             return wrong(format!("it observes {observed} numbers, but its facts say {expected}"));
@@ -113,22 +131,59 @@ impl<T: Real> Task<T> {
         Ok(observed)
     }
 
-    /// Lets the agent draw the start of an episode into `state`.
-    pub fn draw_start(&self, state: &mut AgentState, random: &mut EpisodeRng) -> Drawn {
+    /// Lets the agent draw the start of an episode into `out`.
+    pub fn draw_start(&self, out: &mut EpisodeStart, random: &mut EpisodeRng) {
         let blueprint = &self.blueprint;
-        state.qpos.clone_from(&blueprint.spawn);
-        state.qvel.clone_from(&blueprint.spawn_velocity);
-        let AgentState { qpos, qvel } = state;
-        let mut start = Start { qpos, qvel, random, normalize: true, free_of_contacts: false, settle: 0, blueprint };
+        let EpisodeStart { state: AgentState { qpos, qvel }, memory, grounds, .. } = out;
+        qpos.clone_from(&blueprint.spawn);
+        qvel.clone_from(&blueprint.spawn_velocity);
+        memory.clear();
+        memory.resize(self.facts.memory, 0.0);
+        grounds.clear();
+        let mut start = Start {
+            qpos,
+            qvel,
+            random,
+            normalize: true,
+            free_of_contacts: false,
+            settle: 0,
+            memory,
+            grounds,
+            blueprint,
+        };
         self.agent.draw(&mut start);
         let Start { normalize, free_of_contacts, settle, .. } = start;
-        Drawn { normalize, free_of_contacts, settle }
+        (out.normalize, out.free_of_contacts, out.settle) = (normalize, free_of_contacts, settle);
     }
 }
 
-/// What is to be done with a start that was drawn, see [`Start`].
-pub(crate) struct Drawn {
+/// Where an episode starts, and what is to be done with it first, see [`Start`].
+#[derive(Clone, Debug)]
+pub(crate) struct EpisodeStart {
+    pub state: AgentState,
+    pub memory: Vec<f64>,
+    /// Ground of the agent's own, by height field.
+    pub grounds: Vec<(usize, Vec<f32>)>,
     pub normalize: bool,
     pub free_of_contacts: bool,
     pub settle: usize,
+}
+
+impl EpisodeStart {
+    /// To be drawn into.
+    pub fn new() -> Self {
+        EpisodeStart {
+            state: AgentState { qpos: Vec::new(), qvel: Vec::new() },
+            memory: Vec::new(),
+            grounds: Vec::new(),
+            normalize: true,
+            free_of_contacts: false,
+            settle: 0,
+        }
+    }
+
+    /// Whether it takes physics to find.
+    pub fn takes_physics(&self) -> bool {
+        self.free_of_contacts || self.settle > 0
+    }
 }

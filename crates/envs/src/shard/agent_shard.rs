@@ -2,7 +2,7 @@
 
 use marathon_physics::Variation;
 
-use super::{Shard, ShardFactory};
+use super::{AgentContext, Shard, ShardFactory};
 use crate::error::EnvError;
 
 /// A state of one agent.
@@ -26,9 +26,8 @@ pub trait AgentShard: Shard {
     /// # Errors
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
-    /// Pushes a body of an agent, numbered within this shard, until told otherwise or until its next episode: force, N, and
-    /// torque, N m, in world axes at the body's center of mass.
-    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
+    /// What an agent, numbered within this shard, is given from outside: commands, pushes, constants and ground of its own.
+    fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_>;
     /// Feet ([`Facts::feet`]) of an agent that touched the ground during its last decision: a bit each, of the first 32.
     fn feet(&self, agent: usize) -> u32;
     /// Writes what the agents in `mask` report about their present states into `info` (`[info][16]`, see
@@ -43,20 +42,12 @@ pub trait AgentShard: Shard {
     fn observe(&mut self, block: usize, mask: u16, obs: &mut [f32]);
     /// Sets the number of decisions after which an episode is truncated, in place of the task's own.
     fn limit_episodes(&mut self, max_episode_steps: usize);
-    /// Gives an agent, numbered within this shard, masses, friction, strength and gravity of its own, until changed.
-    fn vary(&mut self, agent: usize, variation: &Variation);
-    /// Gives an agent, numbered within this shard, ground of its own, until changed: elevations, m above the zero of the
-    /// model's height field `field`, row by row.
-    ///
-    /// # Errors
-    /// If there is no such field, or the elevations are not finite numbers for each point of its grid.
-    fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError>;
 }
 
 /// A [`ShardFactory`] that can also make [`AgentShard`]s.
 pub trait AgentShards: ShardFactory {
     /// Same as [`ShardFactory::shard`].
     fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard>;
-    /// The model's own constants: what [`AgentShard::vary`] may deviate from.
+    /// The model's own constants: what [`AgentContext::vary`] may deviate from.
     fn unvaried(&self) -> Variation;
 }

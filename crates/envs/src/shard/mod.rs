@@ -7,9 +7,11 @@
 //! on how the blocks are spread over shards and threads.
 
 mod agent_shard;
+mod context;
 mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
+pub use context::AgentContext;
 pub use spec::{Spec, scale_action};
 
 use crate::error::EnvError;

@@ -1,9 +1,9 @@
 //! Constant facts of a task, as learners and tools see them.
 
-use crate::agent::Options;
+use crate::agent::{CommandRange, Options};
 
 /// Constant facts of a task.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spec {
     /// Registry name, such as `Hopper-v0`.
     pub id: String,
@@ -33,6 +33,8 @@ pub struct Spec {
     pub reward_terms: Vec<String>,
     /// Names of further numbers for logs, in the order of [`BlockStep::info`].
     pub info: Vec<String>,
+    /// What the agent can be told to do: names, ranges and units of its command.
+    pub command: Vec<CommandRange>,
     /// Arguments that the agent takes, with the values that it has.
     pub options: Options,
     /// Length of a configuration, `qpos`.

@@ -23,8 +23,8 @@ fn refuse<X>(problem: String) -> Result<X, EnvError> {
 
 impl VecEnv {
     /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
-    /// the same bits, whatever the number of threads. What agents have of their own ([`VecEnv::vary`],
-    /// [`VecEnv::push`], [`VecEnv::set_ground`]) is included; the task's arguments and the limit of episodes are not.
+    /// the same bits, whatever the number of threads. What agents have of their own ([`VecEnv::context`])
+    /// is included; the task's arguments and the limit of episodes are not.
     pub fn save(&self) -> Vec<u8> {
         let mut bytes = [&MARK[..], &[0; 4]].concat();
         bytes.extend((self.agents as u64).to_le_bytes());

@@ -12,7 +12,7 @@ use super::pool::Pool;
 use crate::agent::Options;
 use crate::error::EnvError;
 use crate::registry::{self, Registry};
-use crate::shard::{AgentShard, AgentState, BLOCK, BlockStep, Spec};
+use crate::shard::{AgentContext, AgentShard, AgentState, BLOCK, BlockStep, Spec};
 
 /// What happens to an agent whose episode ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -196,50 +196,38 @@ impl VecEnv {
         &self.unvaried
     }
 
-    /// Gives an agent masses, friction, strength and gravity of its own, for domain randomization. They last until changed,
-    /// over all resets; starts that take physics ([`Start::settle`](crate::Start::settle)) are found without them.
+    /// What an agent is given from outside: its command, and pushes, constants and ground of its own.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn context(&mut self, agent: usize) -> Result<Box<dyn AgentContext + '_>, EnvError> {
+        self.check_agent(agent)?;
+        Ok(self.workers[agent / self.stride].shard.context(agent % self.stride))
+    }
+
+    /// Tells an agent what to do, or gives it back to its own schedule, see [`AgentContext::set_command`].
+    ///
+    /// # Errors
+    /// If there is no such agent, or it cannot be told this.
+    pub fn set_command(&mut self, agent: usize, command: Option<&[f64]>) -> Result<(), EnvError> {
+        self.context(agent)?.set_command(command)
+    }
+
+    /// Gives an agent masses, friction, strength and gravity of its own, for domain randomization, see
+    /// [`AgentContext::vary`].
     ///
     /// # Errors
     /// If there is no such agent, a length is wrong, or a number makes no sense.
     pub fn vary(&mut self, agent: usize, variation: &Variation) -> Result<(), EnvError> {
-        self.check_agent(agent)?;
-        let Variation { mass, friction, strength, gravity } = variation;
-        let lengths = [
-            ("mass [bodies]", mass.len(), self.unvaried.mass.len()),
-            ("strength [actuators]", strength.len(), self.unvaried.strength.len()),
-        ];
-        for (what, found, expected) in lengths {
-            if found != expected {
-                return Err(EnvError::Shape { what: what.into(), found, expected });
-            }
-        }
-        let wrong =
-            |option, found: &f64, expected| Err(EnvError::Option { option, found: found.to_string(), expected });
-        if let Some(x) = mass.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
-            return wrong("mass", x, "a factor above 0");
-        }
-        if !(friction.is_finite() && *friction >= 0.0) {
-            return wrong("friction", friction, "a factor of 0 or more");
-        }
-        if let Some(x) = strength.iter().find(|x| !x.is_finite()) {
-            return wrong("strength", x, "a finite factor");
-        }
-        if let Some(x) = gravity.iter().find(|x| !x.is_finite()) {
-            return wrong("gravity", x, "finite numbers");
-        }
-        self.workers[agent / self.stride].shard.vary(agent % self.stride, variation);
-        Ok(())
+        self.context(agent)?.vary(variation)
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
-    /// first of which has the smallest y. It lasts until changed, over all resets; starts that take physics are found on the
-    /// model's own.
+    /// Gives an agent ground of its own, see [`AgentContext::set_ground`].
     ///
     /// # Errors
     /// If there is no such agent or field, or the elevations are not finite numbers for each point of the field's grid.
     pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
-        self.check_agent(agent)?;
-        self.workers[agent / self.stride].shard.set_ground(agent % self.stride, field, elevations)
+        self.context(agent)?.set_ground(field, elevations)
     }
 
     /// Writes the observations of the agents in `mask` at their present states, which begin an episode there; for use
@@ -345,22 +333,12 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
-    /// the body's center of mass.
+    /// Pushes a body of an agent until told otherwise or until its next episode, see [`AgentContext::push`].
     ///
     /// # Errors
     /// If there is no such agent or body, or the numbers are not finite.
     pub fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) -> Result<(), EnvError> {
-        self.check_agent(agent)?;
-        if body >= self.unvaried.mass.len() {
-            let expected = "less than the number of the model's bodies";
-            return Err(EnvError::Option { option: "body", found: body.to_string(), expected });
-        }
-        if let Some(x) = force.iter().chain(&torque).find(|x| !x.is_finite()) {
-            return Err(EnvError::Option { option: "push", found: x.to_string(), expected: "finite numbers" });
-        }
-        self.workers[agent / self.stride].shard.push(agent % self.stride, body, force, torque);
-        Ok(())
+        self.context(agent)?.push(body, force, torque)
     }
 
     /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision: a bit each,

@@ -60,6 +60,7 @@ fn task(meta: &PolicyMeta) -> Spec {
         options: Options::new(),
         nq: 0,
         nv: 0,
+        ..Spec::default()
     }
 }
 

@@ -44,6 +44,7 @@ impl PuckTask {
             options: Options::new(),
             nq: 2,
             nv: 2,
+            ..Spec::default()
         };
         Self { spec, poison: None }
     }

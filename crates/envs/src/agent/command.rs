@@ -1,0 +1,42 @@
+//! What an agent can be told to do, and how it turns actions into controls.
+
+use std::ops::RangeInclusive;
+
+/// One number of an agent's command, see [`Facts::command`](crate::Facts::command).
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommandRange {
+    /// Name, such as `velocity`.
+    pub name: String,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// Unit, such as `m/s`; empty for a pure number.
+    pub unit: String,
+}
+
+impl CommandRange {
+    /// A number of this name within a range of a unit.
+    pub fn new(name: &str, range: RangeInclusive<f64>, unit: &str) -> Self {
+        CommandRange { name: name.into(), low: *range.start(), high: *range.end(), unit: unit.into() }
+    }
+}
+
+/// Where an agent turns its action into the controls of its actuators, see [`Agent::ctrl`](crate::Agent::ctrl).
+pub struct Ctrl<'a, T> {
+    /// The action, as [`Facts::controls`](crate::Facts::controls) says; a number per actuator.
+    pub action: &'a [T],
+    /// Control of each actuator until the next decision, to be written: a motor's share of its strength, the target of a
+    /// position servo.
+    pub ctrl: &'a mut [T],
+    /// The agent's own variables, see [`Agent::remember`](crate::Agent::remember).
+    pub memory: &'a mut [T],
+    /// The command that the agent observed.
+    pub command: &'a [T],
+    /// Configuration, MuJoCo's layout.
+    pub qpos: &'a [T],
+    /// Velocity, MuJoCo's layout.
+    pub qvel: &'a [T],
+    /// Seconds between decisions.
+    pub dt: f64,
+}
