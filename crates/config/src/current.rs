@@ -3,7 +3,7 @@
 use super::behavior::{Behavior, Format, Notes, select};
 use super::document::Map;
 use super::error::ConfigError;
-use super::features::{Without, off, refuse, reward_signals, threaded, trainer, visual};
+use super::features::{NETWORK, Without, off, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
 use marathon_learn::Algorithm;
 use std::path::Path;
@@ -62,17 +62,6 @@ const SAC: [&str; 10] = [
     "steps_per_update",
     "save_replay_buffer",
     "reward_signal_steps_per_update",
-];
-/// Keys of a network's section.
-pub const NETWORK: [&str; 8] = [
-    "normalize",
-    "hidden_units",
-    "num_layers",
-    "vis_encode_type",
-    "memory",
-    "goal_conditioning_type",
-    "deterministic",
-    "max_num_agents",
 ];
 const ENV: [&str; 10] = [
     "env_path",

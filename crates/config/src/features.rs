@@ -2,10 +2,21 @@
 //! harmless.
 
 use super::behavior::Notes;
-use super::current::NETWORK;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
 use marathon_learn::{Activation, Algorithm, Init, PpoConfig, Ratio, Schedule, Signal, SignalKind};
+
+/// Keys of a network's section.
+pub const NETWORK: [&str; 8] = [
+    "normalize",
+    "hidden_units",
+    "num_layers",
+    "vis_encode_type",
+    "memory",
+    "goal_conditioning_type",
+    "deterministic",
+    "max_num_agents",
+];
 
 /// Features that a file asks for and lets go again, under `marathon: without:`.
 pub struct Without<'a> {
