@@ -20,11 +20,10 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   if [ ! -x .venv/bin/python ]; then
     python3 -m venv .venv
   fi
-  # most of what is installed is never imported
-  pip=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile)
-  "${pip[@]}" --requirement tests/oracle/requirements.txt --requirement python/tests/requirements.txt
+  install=(tests/oracle/install.sh .venv/bin/python)
+  "${install[@]}" --requirement tests/oracle/requirements.txt --requirement python/tests/requirements.txt
   .venv/bin/python tests/oracle/install_torch.py
-  "${pip[@]}" --no-deps --requirement python/tests/requirements-no-deps.txt
+  "${install[@]}" --no-deps --requirement python/tests/requirements-no-deps.txt
   .venv/bin/python tests/oracle/foreign_models.py --install
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi

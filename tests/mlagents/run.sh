@@ -11,10 +11,10 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   "$base" -c 'import sys; sys.version_info[:2] == (3, 11) or sys.exit(f"ML-Agents needs Python 3.11, found {sys.version}")'
   rm -rf .venv-mlagents
   "$base" -m venv .venv-mlagents
-  pip=("$python" -m pip --quiet --disable-pip-version-check)
-  "${pip[@]}" install --no-compile --no-deps --ignore-requires-python --requirement tests/mlagents/requirements-no-deps.txt
-  # pip notes that mlagents asks for another grpcio; that is meant
-  "${pip[@]}" install --no-compile --requirement tests/mlagents/requirements.txt
+  tests/oracle/install.sh "$python" --requirement tests/mlagents/requirements.txt
+  # uv cannot be told to ignore what Python a package asks for
+  pip=("$python" -m pip --quiet --disable-pip-version-check install --no-compile)
+  "${pip[@]}" --no-deps --ignore-requires-python --requirement tests/mlagents/requirements-no-deps.txt
   "$python" tests/oracle/install_torch.py torch==2.1.2
   touch .venv-mlagents/complete
 fi

@@ -50,9 +50,9 @@ def install():
     stamp = INSTALLED / "pins.txt"
     if stamp.exists() and stamp.read_text() == PINS.read_text():
         return
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    flags = ["--no-deps", "--only-binary=:all:", "--upgrade"]
-    subprocess.run([*pip, *flags, "--target", str(INSTALLED), "--requirement", str(PINS)], check=True)
+    command = [str(Path(__file__).with_name("install.sh")), sys.executable]
+    flags = ["--no-deps", "--only-binary", ":all:", "--upgrade"]
+    subprocess.run([*command, *flags, "--target", str(INSTALLED), "--requirement", str(PINS)], check=True)
     stamp.write_text(PINS.read_text())
 
 

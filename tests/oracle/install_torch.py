@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 
+INSTALL = pathlib.Path(__file__).with_name("install.sh")
 TORCH = "torch==2.15.0"
 DEPENDENCIES = ["typing_extensions", "sympy", "mpmath", "networkx", "jinja2", "MarkupSafe", "filelock", "fsspec"]
 
@@ -45,8 +46,8 @@ def works():
     return subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
 
-def pip(*arguments):
-    subprocess.check_call([sys.executable, "-m", "pip", "install", "--quiet", *arguments])
+def install(*arguments):
+    subprocess.check_call([INSTALL, sys.executable, *arguments])
 
 
 def readelf(option, library):
@@ -119,9 +120,9 @@ def main():
         print("PyTorch works")
         return
     if importlib.util.find_spec("torch") is None:
-        pip("--no-deps", sys.argv[1] if len(sys.argv) > 1 else TORCH)
+        install("--no-deps", sys.argv[1] if len(sys.argv) > 1 else TORCH)
         importlib.invalidate_caches()
-    pip(*DEPENDENCIES)
+    install(*DEPENDENCIES)
     folder = pathlib.Path(importlib.util.find_spec("torch").origin).parent / "lib"
     for name, functions in missing_libraries(folder).items():
         build_empty_library(folder / name, functions)

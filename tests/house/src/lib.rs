@@ -1,0 +1,42 @@
+//! The house as it stands: crates, the rooms in each, and every import from one room to another.
+//!
+//! A *room* is a top-level module of a crate: a folder or a file under `src`. [`House::read`] parses the sources, and
+//! [`Order::read`] takes from `docs/architecture.md` the order in which crates and rooms are said to stand. The test compares
+//! them; `cargo run -p house` draws the picture of that page.
+
+mod imports;
+mod order;
+pub mod picture;
+mod plan;
+
+pub use imports::Import;
+pub use order::{Order, Step};
+pub use plan::{Crate, House, Room};
+
+use std::path::PathBuf;
+
+/// What keeps the house from being read.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A source is not Rust.
+    #[error("{}:{line}: {message}", path.display())]
+    Syntax {
+        /// The source.
+        path: PathBuf,
+        /// Where in it.
+        line: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// Cargo does not tell the crates of the workspace.
+    #[error("cargo metadata: {0}")]
+    Cargo(String),
+}

@@ -1,0 +1,149 @@
+//! The house stands as `docs/architecture.md` says:
+//!
+//! 1. The page names every crate and every room, and no other.
+//! 2. A crate depends only on crates below it.
+//! 3. A room imports only from rooms below it. So there is no ring of rooms that import each other.
+//! 4. The picture on the page shows the house of today.
+
+use house::{Crate, House, Order, Step, picture};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn today() -> (House, Order) {
+    let order = Order::read(&root().join("docs/architecture.md")).expect("the page is there");
+    (House::read(&root()).expect("the sources can be read"), order)
+}
+
+/// Names that only one of the two lists has.
+fn differences<'a>(said: &'a [Step], found: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
+    let said: BTreeSet<&str> = said.iter().map(|step| step.name.as_str()).collect();
+    let found: BTreeSet<&str> = found.map(String::as_str).collect();
+    said.symmetric_difference(&found).copied().collect()
+}
+
+/// What is wrong with a crate whose rooms are said to stand in an order.
+fn faults(found: &Crate, steps: &[Step]) -> Vec<String> {
+    let level = |room: &str| steps.iter().position(|step| step.name == room);
+    let wrong = |import: &&house::Import| level(&import.to) >= level(&import.from);
+    let fault = |i: &house::Import| {
+        format!("crates/{}/src/{}:{}: {} imports {}", found.name, i.file.display(), i.line, i.from, i.to)
+    };
+    found.imports.iter().filter(wrong).map(fault).collect()
+}
+
+#[test]
+fn the_page_names_every_crate_and_room() {
+    let (house, order) = today();
+    assert_eq!(differences(&order.crates, house.crates.iter().map(|c| &c.name)), [""; 0], "on the page or in crates/");
+    for found in &house.crates {
+        let steps = order.rooms.iter().find(|(name, _)| *name == found.name).map_or(&[][..], |(_, steps)| steps);
+        let differ = differences(steps, found.rooms.iter().map(|r| &r.name));
+        assert_eq!(differ, [""; 0], "on the page or in crates/{}/src", found.name);
+    }
+}
+
+#[test]
+fn crates_depend_on_crates_below() {
+    let (house, order) = today();
+    let level = |name: &str| order.crates.iter().position(|step| step.name == name);
+    for found in &house.crates {
+        for needed in &found.depends_on {
+            assert!(level(needed) < level(&found.name), "{} depends on {needed}, which stands above it", found.name);
+        }
+    }
+}
+
+#[test]
+fn rooms_import_from_rooms_below() {
+    let (house, order) = today();
+    let mut wrong = Vec::new();
+    for found in &house.crates {
+        if let Some(ring) = found.ring() {
+            wrong.push(format!("crates/{}: a ring of imports: {}", found.name, ring.join(", ")));
+        }
+        let steps = order.rooms.iter().find(|(name, _)| *name == found.name).map_or(&[][..], |(_, steps)| steps);
+        wrong.extend(faults(found, steps));
+    }
+    assert!(wrong.is_empty(), "imports against the order of docs/architecture.md:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_picture_shows_the_house_of_today() {
+    let (house, order) = today();
+    let drawn = std::fs::read_to_string(root().join("docs/images/house.svg")).expect("the picture is there");
+    // a few lines more or less do not matter, rooms and dependencies do
+    let words = |svg: &str| -> Vec<String> {
+        let texts = svg.lines().filter(|l| l.starts_with("<text") && !l.contains(" lines</text>"));
+        texts.filter_map(|l| Some(l.split_once('>')?.1.strip_suffix("</text>")?.to_string())).collect()
+    };
+    assert_eq!(words(&drawn), words(&picture::svg(&house, &order)), "run cargo run -p house to draw it again");
+}
+
+/// Writes a crate of some files into a folder of its own and reads it.
+fn crate_of(files: &[(&str, &str)]) -> Crate {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
+    }
+    Crate::read("test".into(), folder.path(), BTreeSet::new()).expect("a crate")
+}
+
+fn pairs(found: &Crate) -> Vec<(&str, &str, usize)> {
+    found.imports.iter().map(|i| (i.from.as_str(), i.to.as_str(), i.line)).collect()
+}
+
+#[test]
+fn imports_are_found_wherever_they_hide() {
+    let found = crate_of(&[
+        (
+            "lib.rs",
+            "mod a;\nmod b;\nmod c;\nmod d;\npub use b::deep::Thing;\npub use crate::c::Other as Door;\npub struct Own;",
+        ),
+        (
+            "a.rs",
+            "use crate::{\n    Thing,\n    Door,\n};\nfn f() { crate::c::g(); }\nfn h() { println!(\"{}\", [crate::d::x(1)]); }",
+        ),
+        ("b/mod.rs", "mod deep;\nuse super::Own;\nuse self::deep::Thing;"),
+        ("b/deep.rs", "use super::super::c::Other;\nuse super::other;\n#[cfg(test)]\nmod tests { use crate::a::f; }"),
+        ("c.rs", "pub struct Other;\nuse std::fmt;"),
+        ("d/mod.rs", "pub fn x(n: u32) {}\n#[cfg(test)]\nmod tests;"),
+        ("d/tests.rs", "use crate::a::f;"),
+    ]);
+    let expected = [("a", "b", 2), ("a", "c", 3), ("a", "c", 5), ("a", "d", 6), ("b", "c", 1), ("b", "lib", 2)];
+    let mut all = pairs(&found);
+    all.sort();
+    assert_eq!(all, expected);
+    assert_eq!(found.ring(), None);
+}
+
+#[test]
+fn rings_and_wrong_ways_are_found() {
+    let found = crate_of(&[
+        ("lib.rs", "mod a;\nmod b;\nmod c;"),
+        ("a.rs", "use crate::b;"),
+        ("b.rs", "use crate::c;"),
+        ("c.rs", "use super::a;"),
+    ]);
+    assert_eq!(found.ring().map(|ring| ring.len()), Some(3));
+    let step = |name: &str| Step { name: name.into(), about: String::new() };
+    assert_eq!(faults(&found, &[step("c"), step("b"), step("a")]), ["crates/test/src/c.rs:1: c imports a"]);
+}
+
+#[test]
+fn the_page_is_read_by_its_tables() {
+    let page = "# House\n| `no` | x |\n## Crates\n| | |\n|---|---|\n| [`one`](a/b.rs) | first |\n| `two/` | second |\n\
+                ## `one`\n| `lanes/` | numbers |\n## A walk\n| `not` | this |\n";
+    let order = Order::parse(page);
+    let names = |steps: &[Step]| steps.iter().map(|s| format!("{}: {}", s.name, s.about)).collect::<Vec<_>>();
+    assert_eq!(names(&order.crates), ["one: first", "two: second"]);
+    assert_eq!(
+        order.rooms.iter().map(|(n, s)| (n.as_str(), names(s))).collect::<Vec<_>>(),
+        [("one", vec!["lanes: numbers".to_string()])]
+    );
+}
