@@ -70,6 +70,12 @@ pub enum GameError {
     },
 }
 
+impl From<marathon_learn::Error> for GameError {
+    fn from(error: marathon_learn::Error) -> Self {
+        RunError::from(error).into()
+    }
+}
+
 fn hint(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default()
 }
