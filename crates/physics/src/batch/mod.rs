@@ -7,6 +7,7 @@
 mod blowup;
 mod gather;
 mod lanes;
+#[path = "../state/agent.rs"]
 mod state;
 
 pub use blowup::{Blowup, Replay};

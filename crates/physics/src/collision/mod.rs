@@ -5,10 +5,13 @@
 //! found by [`meet`].
 
 mod broad;
+#[path = "../state/clearance.rs"]
 mod clearance;
 mod floor;
 mod meet;
+#[path = "../sim/pairs.rs"]
 mod pairs;
+#[path = "../sim/contact_params.rs"]
 mod params;
 mod slots;
 

@@ -19,14 +19,19 @@
 //! each other's decisions: a lane that is done is frozen. On the curved side of an elliptic cone no point is exact; there
 //! a lane is done when the predicted improvement falls below MuJoCo's tolerance, or below rounding.
 
+#[path = "../rows/block.rs"]
 pub(crate) mod block;
 mod blocks;
+#[path = "../rows/cone.rs"]
 mod cone;
 pub(crate) mod coupled;
 pub(crate) mod crowd;
+#[path = "../rows/floor.rs"]
 pub(crate) mod floor;
+#[path = "../rows/joint.rs"]
 pub(crate) mod joint;
 mod search;
+#[path = "../sim/softness.rs"]
 pub(crate) mod softness;
 
 use crate::articulated::{accelerate, bring_inward, factorize, link_accelerations};

@@ -16,9 +16,13 @@
 //! arithmetic, whatever lanes it shares. The choice, the order and every sum depend on that agent alone. The other stages
 //! of the solver take no notice, and neither do the lanes beside it: see [`coupled`](super::coupled).
 
+#[path = "../../multifrontal/assembly.rs"]
 mod assembly;
+#[path = "../../multifrontal/front.rs"]
 mod front;
+#[path = "../../multifrontal/order.rs"]
 mod order;
+#[path = "../../multifrontal/plan.rs"]
 mod plan;
 
 use crate::lanes::{Real, kernel_fn};
