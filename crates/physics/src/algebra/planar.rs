@@ -5,8 +5,8 @@
 //! turning about y, moving along x and along z. The others are multiplied by exact zeros, so [`Planar`] leaves them
 //! out: same numbers, a third of the work. The arrays keep their shape; unused components are never read.
 
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::spatial::*;
 
 /// Components of spatial vectors that take part.
 pub(crate) trait Space: Copy + Send + Sync + 'static {

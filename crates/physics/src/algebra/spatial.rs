@@ -279,3 +279,27 @@ pub fn sym6_add_outer<T: Real>(k: &mut Sym6<T>, s: &V6<T>, d: T) {
     let v = [s[0] * -d, s[1] * -d, s[2] * -d, s[3] * -d, s[4] * -d, s[5] * -d];
     sym6_sub_outer(k, s, &v);
 }
+
+/// Quaternion of a rotation, `w >= 0`; a fixed sequence of selections, so that every backend agrees.
+pub fn rot_to_quat<T: Real>(r: &Rot<T>) -> [T; 4] {
+    let (one, half) = (T::lit(1.0), T::lit(0.5));
+    let (xx, yy, zz) = (r[0][0], r[1][1], r[2][2]);
+    // four times the squares of the components; the largest one is safe to divide by
+    let squares = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
+    let (wx, wy, wz) = (r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]);
+    let (xy, xz, yz) = (r[1][0] + r[0][1], r[2][0] + r[0][2], r[2][1] + r[1][2]);
+    let candidates =
+        [[squares[0], wx, wy, wz], [wx, squares[1], xy, xz], [wy, xy, squares[2], yz], [wz, xz, yz, squares[3]]];
+    let (mut best, mut q) = (squares[0], candidates[0]);
+    for k in 1..4 {
+        let better = best.lt(squares[k]);
+        best = T::select(better, squares[k], best);
+        for i in 0..4 {
+            q[i] = T::select(better, candidates[k][i], q[i]);
+        }
+    }
+    let scale = half.div(best.max(T::lit(1e-12)).sqrt());
+    let negative = q[0].lt(T::zero());
+    let scale = T::select(negative, -scale, scale);
+    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
+}

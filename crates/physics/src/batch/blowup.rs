@@ -1,9 +1,10 @@
 //! What happened before an agent's state stopped being finite, and the same again step by step.
 
-use super::{AgentState, Batch, BatchOptions};
+use super::{Batch, BatchOptions};
 use crate::lanes::Isa;
 use crate::model::Model;
 use crate::sim::SimError;
+use crate::state::AgentState;
 use serde::{Deserialize, Serialize};
 
 /// The last states of an agent before it broke. It can be written to a file (`serde`) and replayed elsewhere.

@@ -1,12 +1,12 @@
 //! Readings of all agents at once, in arrays with a row per agent: for callers to whom an agent at a time is too slow.
 
 use super::{Batch, lanes::LaneBatch};
+use crate::algebra::spatial::V3;
 use crate::lanes::{Kernel, Real};
 use crate::model::Model;
 use crate::readings::Readings;
 use crate::sim::Sim;
-use crate::spatial::V3;
-use crate::work::{Group, Work};
+use crate::state::{Group, Work};
 
 /// What [`Batch::gather`] can write. World axes and SI units; indices are those of the [`Model`].
 ///
@@ -110,7 +110,7 @@ impl<T: Real> Felt<T> {
     }
 }
 
-/// Rows of consecutive agents, the first of which begins a group.
+/// AgentRows of consecutive agents, the first of which begins a group.
 struct Part<'a> {
     quantity: Quantity,
     width: usize,
@@ -168,7 +168,7 @@ fn read_group<T: Real>(
     let readings = Readings::new(sim, group, work);
     for part in parts {
         let own = part.rows.chunks_mut(T::LANES * part.width).nth(i);
-        let rows = Rows { rows: own.unwrap_or_default(), width: part.width };
+        let rows = AgentRows { rows: own.unwrap_or_default(), width: part.width };
         match part.quantity {
             Quantity::Sensors => read_sensors(&readings, rows),
             quantity => T::enter(Read { readings, felt, quantity, rows }),
@@ -176,7 +176,7 @@ fn read_group<T: Real>(
     }
 }
 
-fn read_sensors<T: Real>(readings: &Readings<'_, T>, mut rows: Rows<'_>) {
+fn read_sensors<T: Real>(readings: &Readings<'_, T>, mut rows: AgentRows<'_>) {
     let mut column = 0;
     for (i, sensor) in readings.sim.model().sensors.iter().enumerate() {
         let values = readings.sensor(i).unwrap_or_else(|| vec![T::lit(f64::NAN); sensor.dim]);
@@ -187,13 +187,13 @@ fn read_sensors<T: Real>(readings: &Readings<'_, T>, mut rows: Rows<'_>) {
     }
 }
 
-/// Rows of the agents of one group, of which the last may be missing.
-struct Rows<'a> {
+/// AgentRows of the agents of one group, of which the last may be missing.
+struct AgentRows<'a> {
     rows: &'a mut [f64],
     width: usize,
 }
 
-impl Rows<'_> {
+impl AgentRows<'_> {
     #[inline(always)]
     fn put<T: Real>(&mut self, column: usize, value: T) {
         let mut lanes = [T::Scalar::default(); 16];
@@ -215,7 +215,7 @@ struct Read<'a, T: Real> {
     readings: Readings<'a, T>,
     felt: &'a Felt<T>,
     quantity: Quantity,
-    rows: Rows<'a>,
+    rows: AgentRows<'a>,
 }
 
 impl<T: Real> Kernel<T> for Read<'_, T> {

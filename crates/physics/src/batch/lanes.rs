@@ -1,12 +1,11 @@
 //! The agents of a batch in lanes of one width.
 
 use super::gather::Felt;
-use super::{AgentState, BodyReading, Quantity};
+use super::{BodyReading, Quantity};
 use crate::lanes::Real;
 use crate::readings::Readings;
 use crate::sim::Sim;
-use crate::variation::Variation;
-use crate::work::{Group, SolverStats, Work};
+use crate::state::{AgentState, Group, SolverStats, Variation, Work};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

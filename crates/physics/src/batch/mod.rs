@@ -7,19 +7,16 @@
 mod blowup;
 mod gather;
 mod lanes;
-#[path = "../state/agent.rs"]
-mod state;
+pub mod workload;
 
 pub use blowup::{Blowup, Replay};
 pub use gather::Quantity;
-pub use state::AgentState;
 
 use crate::lanes::Isa;
 use crate::model::Model;
 use crate::sim::{Sim, SimError, SimOptions};
-use crate::variation::Variation;
+use crate::state::{AgentState, SolverStats, Variation};
 use crate::with_lanes;
-use crate::work::SolverStats;
 use lanes::{LaneBatch, Lanes};
 use std::sync::Arc;
 

@@ -8,8 +8,8 @@
 use crate::lanes::{Isa, Real};
 use crate::model::{JointType, Model};
 use crate::sim::{Sim, SimError, SimOptions};
+use crate::state::{Group, SolverStats, Work};
 use crate::with_lanes;
-use crate::work::{Group, SolverStats, Work};
 
 /// Steps for which a control is held.
 pub const HOLD: usize = 4;

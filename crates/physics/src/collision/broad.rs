@@ -7,97 +7,11 @@
 //! The boxes are those of all lanes together. What is found is more than what touches, and it is taken up in the order of
 //! the list of pairs: contacts are the same as if every pair were tested, and do not depend on the other lanes.
 
-use super::Contacts;
-use super::pairs::Pair;
+use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::model::GeomType;
-use crate::sim::Sim;
-use crate::spatial::*;
-use crate::work::Work;
-
-/// Pairs across trees from which on the broad phase is worth its while.
-const FEWEST: usize = 500;
-
-/// Which pairs belong to which groups.
-#[derive(Clone, Debug)]
-pub(crate) struct Broad<C> {
-    /// Geoms of each group.
-    members: Vec<Vec<usize>>,
-    /// By group: the groups with numbers not below that its geoms have pairs with, ascending, and where those begin and
-    /// end in `pairs`.
-    partners: Vec<Vec<(usize, usize, usize)>>,
-    /// Numbers of the pairs, by groups.
-    pairs: Vec<u32>,
-    /// Added on every side of a box: half of the largest margin.
-    margin: C,
-}
-
-/// Boxes of a group of agents, and the pairs found; the memory is kept from step to step.
-#[derive(Clone, Debug)]
-pub(crate) struct Sweep<S> {
-    /// By geom and by group: least and largest coordinates.
-    geoms: Vec<[V3<S>; 2]>,
-    groups: Vec<[V3<S>; 2]>,
-    /// Groups along the axis.
-    order: Vec<usize>,
-    /// Geoms of two groups that reach into the box of the other.
-    reaching: Vec<bool>,
-    /// Numbers of the pairs whose boxes overlap, ascending.
-    pub found: Vec<u32>,
-}
-
-impl<S: Real> Sweep<S> {
-    pub fn new(geoms: usize) -> Self {
-        Sweep {
-            geoms: vec![nowhere(); geoms],
-            groups: Vec::new(),
-            order: Vec::new(),
-            reaching: vec![false; geoms],
-            found: Vec::new(),
-        }
-    }
-}
-
-/// A box that holds nothing.
-#[inline(always)]
-fn nowhere<S: Real>() -> [V3<S>; 2] {
-    [[S::lit(f64::INFINITY); 3], [S::lit(f64::NEG_INFINITY); 3]]
-}
-
-impl<C: Real> Broad<C> {
-    /// Sorts the pairs of a model into groups; none if they are few. `tree_of` gives the tree of a geom that moves.
-    pub fn of(contacts: &Contacts<C>, trees: usize, tree_of: impl Fn(usize) -> Option<usize>) -> Option<Self> {
-        let mut group_of = vec![usize::MAX; contacts.paired.last().map_or(0, |p| p.geom + 1)];
-        let mut members = vec![Vec::new(); trees];
-        for paired in &contacts.paired {
-            let group = tree_of(paired.geom).unwrap_or_else(|| {
-                members.push(Vec::new());
-                members.len() - 1
-            });
-            group_of[paired.geom] = group;
-            members[group].push(paired.geom);
-        }
-        let mut keys: Vec<([usize; 2], u32)> = Vec::with_capacity(contacts.pairs.len());
-        for (index, pair) in contacts.pairs.iter().enumerate() {
-            let [a, b] = pair.geoms.map(|g| group_of[g as usize]);
-            keys.push(([a.min(b), a.max(b)], index as u32));
-        }
-        if keys.iter().filter(|([a, b], _)| a != b && *b < trees).count() < FEWEST {
-            return None;
-        }
-        keys.sort_unstable();
-        let mut partners: Vec<Vec<(usize, usize, usize)>> = vec![Vec::new(); members.len()];
-        for (at, ([a, b], _)) in keys.iter().enumerate() {
-            match partners[*a].last_mut() {
-                Some((group, _, end)) if group == b => *end = at + 1,
-                _ => partners[*a].push((*b, at, at + 1)),
-            }
-        }
-        let margin = contacts.specs.iter().map(|s| C::widen(s.margin.get(0))).fold(0.0, f64::max);
-        let pairs = keys.into_iter().map(|(_, index)| index).collect();
-        Some(Broad { members, partners, pairs, margin: C::lit(0.5 * margin) })
-    }
-}
+use crate::sim::{Broad, Pair, Sim};
+use crate::state::{Sweep, Work, nowhere};
 
 kernel_fn! {
     /// Finds the pairs that may touch, into [`Sweep::found`], after the geoms were placed.
@@ -235,15 +149,4 @@ fn longest<S: Real>(groups: &[[V3<S>; 2]]) -> usize {
         }
     }
     best.0
-}
-
-impl<C> Broad<C> {
-    /// Numbers of the pairs of geoms of two groups.
-    fn between(&self, a: usize, b: usize) -> &[u32] {
-        let partners = &self.partners[a.min(b)];
-        match partners.binary_search_by_key(&a.max(b), |p| p.0) {
-            Ok(at) => &self.pairs[partners[at].1..partners[at].2],
-            Err(_) => &[],
-        }
-    }
 }

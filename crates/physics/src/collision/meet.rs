@@ -1,18 +1,17 @@
 //! Contacts of pairs of geoms.
 //!
-//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::narrow`]. Of pairs
+//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::geometry`]. Of pairs
 //! by the thousand, the broad phase ([`broad`]) first chooses those that may be near.
 
 use super::broad;
-use super::clearance::clearance;
-use super::pairs::{Cull, PairOf, Test};
 use super::slots::{Place, Slots, write_contact};
+use crate::algebra::spatial::*;
+use crate::geometry::height::{Terrain, field_box};
+use crate::geometry::{self, Capsule, Cuboid, Cylinder, Plane, Sphere, Touch, Touches, pick, pick_axes};
+use crate::geometry::{box_box, capsule_box, field_capsule, plane, round};
 use crate::lanes::{MAX_LANES, Real};
-use crate::narrow::height::Terrain;
-use crate::narrow::{self, Block, Capsule, Cylinder, Plane, Sphere, Touch, Touches, pick, pick_axes};
-use crate::sim::{Mount, Sim};
-use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::sim::{Cull, Mount, PairOf, Sim, Test};
+use crate::state::{Group, Work, clearance};
 
 /// A pair that comes near in some lanes.
 struct Meeting<T: Real> {
@@ -103,14 +102,14 @@ fn near<T: Real>(
     let mut point = centers[0];
     let normal = work.directions[pair.geoms[0]];
     match pair.cull {
-        Cull::Balls => narrow::near(&point, &centers[1], reach),
-        Cull::Plane => narrow::plane::near_plane(&Plane { point, normal }, &centers[1], reach),
+        Cull::Balls => geometry::near(&point, &centers[1], reach),
+        Cull::Plane => plane::near_plane(&Plane { point, normal }, &centers[1], reach),
         Cull::Field => {
             let top = group.ground_top(sim, pair.field);
             for i in 0..3 {
                 point[i] = normal[i].mul_add(top, point[i]);
             }
-            narrow::plane::near_plane(&Plane { point, normal }, &centers[1], reach)
+            plane::near_plane(&Plane { point, normal }, &centers[1], reach)
         }
     }
 }
@@ -143,7 +142,7 @@ fn touch_pair<T: Real>(
     let mut known = None;
     if pair.round() {
         // few of those that come near touch: their distance is known before the place of contact
-        let distance = narrow::round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b));
+        let distance = round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b));
         let clearance = clearance(distance - margin, T::splat(pair.reach));
         if !T::any(clearance.lt(T::zero())) {
             return Some(clearance);
@@ -152,21 +151,19 @@ fn touch_pair<T: Real>(
     }
     let first_sphere = Sphere { center: ca, radius: size_a[0] };
     let sphere = Sphere { center: cb, radius: size_b[0] };
-    let plane = Plane { point: ca, normal: work.directions[a] };
+    let ground = Plane { point: ca, normal: work.directions[a] };
     let found: &[Touch<T>] = match pair.test {
-        Test::PlaneSphere => &[narrow::plane::plane_sphere(&plane, &sphere, margin)],
-        Test::PlaneCapsule => &narrow::plane::plane_capsule(&plane, &capsule(work, b, cb, size_b), margin),
-        Test::PlaneBox => &narrow::plane::plane_box(&plane, &block(work, mb, cb, size_b), margin),
-        Test::PlaneCylinder => &narrow::plane::plane_cylinder(&plane, &cylinder(work, mb, cb, size_b), margin),
-        Test::PlaneEllipsoid => &[narrow::plane::plane_ellipsoid(&plane, &block(work, mb, cb, size_b), margin)],
-        Test::SphereSphere => &[narrow::round::sphere_sphere(&first_sphere, &sphere, margin)],
-        Test::SphereCapsule => &[narrow::round::sphere_capsule(&first_sphere, &capsule(work, b, cb, size_b), margin)],
-        Test::SphereBox => &[narrow::round::sphere_box(&first_sphere, &block(work, mb, cb, size_b), margin)],
-        Test::SphereCylinder => {
-            &[narrow::round::sphere_cylinder(&first_sphere, &cylinder(work, mb, cb, size_b), margin)]
-        }
+        Test::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
+        Test::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),
+        Test::PlaneBox => &plane::plane_box(&ground, &cuboid(work, mb, cb, size_b), margin),
+        Test::PlaneCylinder => &plane::plane_cylinder(&ground, &cylinder(work, mb, cb, size_b), margin),
+        Test::PlaneEllipsoid => &[plane::plane_ellipsoid(&ground, &cuboid(work, mb, cb, size_b), margin)],
+        Test::SphereSphere => &[round::sphere_sphere(&first_sphere, &sphere, margin)],
+        Test::SphereCapsule => &[round::sphere_capsule(&first_sphere, &capsule(work, b, cb, size_b), margin)],
+        Test::SphereBox => &[round::sphere_box(&first_sphere, &cuboid(work, mb, cb, size_b), margin)],
+        Test::SphereCylinder => &[round::sphere_cylinder(&first_sphere, &cylinder(work, mb, cb, size_b), margin)],
         Test::CapsuleCapsule => {
-            &narrow::round::capsule_capsule(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b), margin)
+            &round::capsule_capsule(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b), margin)
         }
         Test::FieldCapsule => {
             touch_field(sim, group, work, slots, meeting);
@@ -192,8 +189,8 @@ fn cylinder<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: 
 }
 
 #[inline(always)]
-fn block<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3<T>) -> Block<T> {
-    Block { center, axes: work.axes(m), half }
+fn cuboid<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3<T>) -> Cuboid<T> {
+    Cuboid { center, axes: work.axes(m), half }
 }
 
 /// Writes the contacts of a pair that some lanes have.
@@ -229,7 +226,7 @@ fn touch_field<T: Real>(
     let mut found = std::mem::take(&mut work.touches);
     found.clear();
     let margin = T::splat(pair.margin);
-    narrow::field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.gaps, &mut found);
+    field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.gaps, &mut found);
     add_all(sim, group, work, slots, meeting.place, &found);
     work.touches = found;
 }
@@ -247,21 +244,21 @@ fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
         let [a, b] = [pick(&meeting.centers[0], lane), pick(&meeting.centers[1], lane)];
         let [turned_a, turned_b] = [pick_axes(&axes[0], lane), pick_axes(&axes[1], lane)];
         let [size_a, size_b] = pair.sizes;
-        let block = Block { center: b, axes: turned_b, half: size_b };
+        let cuboid = Cuboid { center: b, axes: turned_b, half: size_b };
         own.clear();
         match pair.test {
             Test::CapsuleBox => {
                 let capsule = Capsule { center: a, axis: turned_a[2], radius: size_a[0], half: size_a[1] };
-                narrow::capsule_box::capsule_box(&capsule, &block, pair.margin, &mut own);
+                capsule_box::capsule_box(&capsule, &cuboid, pair.margin, &mut own);
             }
             Test::BoxBox => {
-                let first = Block { center: a, axes: turned_a, half: size_a };
-                narrow::box_box::box_box(&first, &block, pair.margin, &mut own);
+                let first = Cuboid { center: a, axes: turned_a, half: size_a };
+                box_box::box_box(&first, &cuboid, pair.margin, &mut own);
             }
             _ => {
                 let field = group.ground(sim, lane, pair.field);
                 let terrain = Terrain { fields: [field; MAX_LANES], center: a, axes: turned_a };
-                narrow::height::field_box(&terrain, &block, pair.margin, &mut own);
+                field_box(&terrain, &cuboid, pair.margin, &mut own);
             }
         }
         gather(&own, lane, &mut found);

@@ -1,14 +1,12 @@
 //! Where contacts of pairs go: a contact takes the next free slot of its own lane, in the order of the pairs, so that
 //! the rows of a lane depend on that lane alone.
 
-use super::pairs::{PairOf, PairSpec};
+use crate::algebra::spatial::*;
+use crate::geometry::Touch;
 use crate::lanes::{Real, kernel_fn};
-use crate::narrow::Touch;
-use crate::sim::Sim;
-use crate::solver::block::{Block, Cost, Jacobian, Source};
-use crate::solver::softness::impedance;
-use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::rows::{Block, Jacobian, Source};
+use crate::sim::{Cost, PairOf, PairSpec, Sim, impedance};
+use crate::state::{Group, Work};
 
 /// The slots of the present class of pairs: where they begin, and how many of them each lane has filled.
 pub(super) struct Slots<T: Real> {
@@ -52,7 +50,7 @@ pub(super) struct Place {
 }
 
 /// The rows of a contact, before they are in a slot.
-struct Rows<T: Real> {
+struct ContactRows<T: Real> {
     /// Relative to the reference of each side's own tree.
     points: [V3<T>; 2],
     /// Normal and tangents.
@@ -114,7 +112,7 @@ kernel_fn! {
     }
 }
 
-/// Rows of a contact in the frame `frame` whose second side, at least, moves.
+/// ContactRows of a contact in the frame `frame` whose second side, at least, moves.
 #[inline(always)]
 fn rows<T: Real>(
     sim: &Sim<T>,
@@ -124,7 +122,7 @@ fn rows<T: Real>(
     touch: &Touch<T>,
     links: &[Option<usize>; 2],
     frame: [V3<T>; 3],
-) -> Rows<T> {
+) -> ContactRows<T> {
     let pair = &sim.contacts.pair(&sim.geoms, place.index);
     let zero = T::zero();
     let mut points = [touch.pos; 2];
@@ -156,7 +154,7 @@ fn rows<T: Real>(
         u0[k] = rate * b;
     }
     u0[0] += imp * violation * T::splat(pair.soft.k);
-    Rows { points, frame, d, u0, friction }
+    ContactRows { points, frame, d, u0, friction }
 }
 
 /// Ratio of an edge's stiffness at `factor` times the friction to that at the model's: `R` is in proportion to
@@ -205,7 +203,7 @@ fn open<T: Real>(block: &mut Block<T>, pair: &PairSpec<T::Scalar>, slot: usize) 
 
 /// Writes a contact into the lanes `here` of a slot.
 #[inline(always)]
-fn fill<T: Real>(block: &mut Block<T>, here: T::Mask, pair: &PairSpec<T::Scalar>, rows: &Rows<T>) {
+fn fill<T: Real>(block: &mut Block<T>, here: T::Mask, pair: &PairSpec<T::Scalar>, rows: &ContactRows<T>) {
     block.on = T::or(block.on, here);
     for k in 0..pair.dim {
         block.d[k] = T::select(here, rows.d * T::splat(pair.ratios[k]), block.d[k]);

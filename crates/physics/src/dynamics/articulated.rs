@@ -8,11 +8,11 @@
 //! Only links marked in `work.stale`, and their ancestors, are done anew by [`factorize`]: towards the end of an
 //! iteration few lanes still change anything, and most of the tree keeps its factors.
 
+use crate::algebra::planar::Space;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::Sim;
-use crate::space::Space;
-use crate::spatial::*;
-use crate::work::Work;
+use crate::state::Work;
 
 /// Factorizes the stale links and brings their forces inward.
 ///

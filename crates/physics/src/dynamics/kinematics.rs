@@ -1,10 +1,10 @@
 //! Positions: link frames, motion axes and spatial inertias from `qpos`.
 
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::JointType;
 use crate::sim::{Link, LinkJoint, Sim};
-use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::state::{Group, Work};
 
 /// Computes every link's frame, its joints' motion axes and its spatial inertia.
 ///

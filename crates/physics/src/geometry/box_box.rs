@@ -59,7 +59,7 @@ struct Relative<S: Real> {
 
 kernel_fn! {
     /// Finds the contacts and appends them.
-    pub(crate) fn box_box<'a, S>(a: &'a Block<S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+    pub(crate) fn box_box<'a, S>(a: &'a Cuboid<S>, b: &'a Cuboid<S>, margin: S, out: &'a mut Touches<S>) {
         let slack = Slack::new();
         let d = sub3(&b.center, &a.center);
         let back = [-d[0], -d[1], -d[2]];
@@ -86,7 +86,7 @@ kernel_fn! {
 
 /// The direction of the largest separation, or none if that is above the margin.
 #[inline(always)]
-fn separate<S: Real>(a: &Block<S>, b: &Block<S>, r: &Relative<S>, margin: S, slack: &Slack<S>) -> Option<Direction> {
+fn separate<S: Real>(a: &Cuboid<S>, b: &Cuboid<S>, r: &Relative<S>, margin: S, slack: &Slack<S>) -> Option<Direction> {
     let (s, t) = (&a.half, &b.half);
     let limit = (s[0] + s[1] + s[2] + t[0] + t[1] + t[2]).mul_add(slack.separation, margin);
     let mut face = S::lit(-1e10);
@@ -180,8 +180,8 @@ fn in_second<S: Real>(r: &Relative<S>, x: &V3<S>) -> V3<S> {
 /// The contact of two edges.
 #[inline(always)]
 fn edge_contact<S: Real>(
-    a: &Block<S>,
-    b: &Block<S>,
+    a: &Cuboid<S>,
+    b: &Cuboid<S>,
     r: &Relative<S>,
     i: usize,
     j: usize,
@@ -261,8 +261,8 @@ fn supports<S: Real>(n: &V3<S>, axis: usize, slack: &Slack<S>) -> [Option<V3<S>>
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn face_contacts<S: Real>(
-    reference: &Block<S>,
-    other: &Block<S>,
+    reference: &Cuboid<S>,
+    other: &Cuboid<S>,
     cos: &[V3<S>; 3],
     center: &V3<S>,
     axis: usize,

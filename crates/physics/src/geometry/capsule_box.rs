@@ -31,7 +31,7 @@ struct Closest<S> {
 
 kernel_fn! {
     /// Finds the contacts and appends them.
-    pub(crate) fn capsule_box<'a, S>(a: &'a Capsule<S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+    pub(crate) fn capsule_box<'a, S>(a: &'a Capsule<S>, b: &'a Cuboid<S>, margin: S, out: &'a mut Touches<S>) {
         let center = into_axes(&b.axes, &sub3(&a.center, &b.center));
         let axis = into_axes(&b.axes, &a.axis);
         let arm = scale3(&axis, a.half);
@@ -45,7 +45,7 @@ kernel_fn! {
 
 /// The contact of the capsule's ball at a place of its segment.
 #[inline(always)]
-fn ball_at<S: Real>(a: &Capsule<S>, b: &Block<S>, along: S, margin: S) -> Touch<S> {
+fn ball_at<S: Real>(a: &Capsule<S>, b: &Cuboid<S>, along: S, margin: S) -> Touch<S> {
     sphere_box(&Sphere { center: axpy3(&a.axis, along * a.half, &a.center), radius: a.radius }, b, margin)
 }
 

@@ -213,7 +213,7 @@ impl<'a, T: Real> Terrain<'a, T> {
 
 kernel_fn! {
     /// Finds the contacts of a height field and a box and appends them.
-    pub(crate) fn field_box<'a, S>(a: &'a Terrain<'a, S>, b: &'a Block<S>, margin: S, out: &'a mut Touches<S>) {
+    pub(crate) fn field_box<'a, S>(a: &'a Terrain<'a, S>, b: &'a Cuboid<S>, margin: S, out: &'a mut Touches<S>) {
         let center = into_axes(&a.axes, &sub3(&b.center, &a.center));
         let mut arms = [[S::zero(); 3]; 3];
         let mut extent = [margin; 3];

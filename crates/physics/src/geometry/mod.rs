@@ -20,9 +20,9 @@ pub(crate) mod round;
 #[cfg(test)]
 mod tests;
 
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::GeomType;
-use crate::spatial::*;
 
 /// Length below which MuJoCo takes a vector for zero.
 const TINY: f64 = 1e-15;
@@ -133,7 +133,7 @@ pub(crate) struct Cylinder<T: Real> {
 
 /// A solid box or ellipsoid.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Block<T: Real> {
+pub(crate) struct Cuboid<T: Real> {
     pub center: V3<T>,
     pub axes: Rot<T>,
     /// Half the extent along each axis.

@@ -61,7 +61,7 @@ fn axis_tangent<T: Real>(n: &V3<T>, axis: &V3<T>, slope: T) -> V3<T> {
 /// Up to four contacts, the corners below the center. Of two opposite corners only the lower can be one of them, so
 /// contact `i` is that of corners `i` and `7 - i` (bit `k` of a corner's number tells its side along axis `k`).
 #[inline(always)]
-pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Block<T>, margin: T) -> [Touch<T>; 4] {
+pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> [Touch<T>; 4] {
     let n = &plane.normal;
     let middle = height(plane, &b.center);
     let tangent = first_tangent(n);
@@ -129,7 +129,7 @@ pub(crate) fn plane_cylinder<T: Real>(plane: &Plane<T>, b: &Cylinder<T>, margin:
 
 /// One contact, at the lowest point.
 #[inline(always)]
-pub(crate) fn plane_ellipsoid<T: Real>(plane: &Plane<T>, b: &Block<T>, margin: T) -> Touch<T> {
+pub(crate) fn plane_ellipsoid<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> Touch<T> {
     let n = into_axes(&b.axes, &plane.normal);
     let s = [n[0] * b.half[0], n[1] * b.half[1], n[2] * b.half[2]];
     let reach = dot(&s, &s).sqrt();

@@ -128,7 +128,7 @@ fn crossing_normal<T: Real>(n: &V3<T>, sin2: T) -> V3<T> {
 
 /// One contact; a center inside the box leaves by the nearest face.
 #[inline(always)]
-pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Block<T>, margin: T) -> Touch<T> {
+pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Cuboid<T>, margin: T) -> Touch<T> {
     let (zero, one) = (T::zero(), T::lit(1.0));
     let c = into_axes(&b.axes, &sub3(&a.center, &b.center));
     let to = [clamp(c[0], b.half[0]) - c[0], clamp(c[1], b.half[1]) - c[1], clamp(c[2], b.half[2]) - c[2]];

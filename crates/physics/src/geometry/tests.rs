@@ -97,8 +97,8 @@ impl<T: Real> Pose<T> {
     fn capsule(&self, radius: f64, half: f64) -> super::Capsule<T> {
         super::Capsule { center: self.center, axis: self.axes[2], radius: T::lit(radius), half: T::lit(half) }
     }
-    fn block(&self, half: [f64; 3]) -> Block<T> {
-        Block { center: self.center, axes: self.axes, half: half.map(T::lit) }
+    fn block(&self, half: [f64; 3]) -> Cuboid<T> {
+        Cuboid { center: self.center, axes: self.axes, half: half.map(T::lit) }
     }
     fn cylinder(&self, radius: f64, half: f64) -> super::Cylinder<T> {
         super::Cylinder { center: self.center, axes: self.axes, radius: T::lit(radius), half: T::lit(half) }

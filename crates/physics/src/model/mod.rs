@@ -23,7 +23,7 @@ pub type Vec3 = [f64; 3];
 /// A unit quaternion `[w, x, y, z]`.
 pub type Quat = [f64; 4];
 
-/// A compiled model. Made by [`Model::from_xml_file`](crate::mjcf) and friends, then never changed.
+/// A compiled model. Made by [`Model::from_xml_file`] and friends, then never changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Name from `<mujoco model="...">`.

@@ -2,14 +2,14 @@
 
 use super::front::Numbers;
 use super::plan::{Front, NONE, Plan};
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
+use crate::rows::{RowValues, at};
 use crate::sim::Link;
-use crate::solver::block::{Rows, at};
-use crate::spatial::*;
 
 /// A contact of two links.
 #[derive(Clone, Debug)]
-pub(super) struct Tie<S> {
+pub(crate) struct Tie<S> {
     pub block: usize,
     /// The link that is eliminated first, the other one, and the place of the other in the front of the first.
     pub links: [usize; 2],
@@ -25,7 +25,7 @@ pub(super) struct Tie<S> {
     pub sign: [S; 2],
     /// Stiffness of the rows, and their force without any acceleration.
     pub w: [S; 21],
-    pub force: Rows<S>,
+    pub force: RowValues<S>,
 }
 
 impl<S> Tie<S> {
@@ -50,7 +50,7 @@ const PACKED: [[usize; 6]; 6] = [
 
 /// Fills a front: the link's own stiffness, contacts and rows that enter here, and what is left of other fronts.
 #[inline(always)]
-pub(super) fn assemble<S: Real>(links: &[Link<S>], plan: &Plan<S>, n: &mut Numbers<S>, l: usize) {
+pub(crate) fn assemble<S: Real>(links: &[Link<S>], plan: &Plan<S>, n: &mut Numbers<S>, l: usize) {
     let front = &plan.fronts[l];
     let stride = front.stride;
     let (before, rest) = n.matrix.split_at_mut(front.matrix);

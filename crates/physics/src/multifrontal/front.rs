@@ -6,13 +6,13 @@
 
 use super::assembly::{Tie, assemble};
 use super::plan::{Front, NONE, Plan};
+use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Link;
-use crate::spatial::*;
 
 /// A row over joints.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct JointRow<S> {
+pub(crate) struct JointRow<S> {
     pub block: usize,
     pub w: S,
     pub u0: S,
@@ -20,7 +20,7 @@ pub(super) struct JointRow<S> {
 
 /// Matrix, factors and vectors of one agent.
 #[derive(Clone, Debug)]
-pub(super) struct Numbers<S> {
+pub(crate) struct Numbers<S> {
     /// By link: stiffness with its inertia and what stands still; whether the front is to be done anew.
     pub stiffness: Vec<Sym6<S>>,
     pub stale: Vec<bool>,
@@ -98,7 +98,7 @@ impl<S: Real> Numbers<S> {
 kernel_fn! {
     /// Factorizes the stale fronts, and those that take what is left of them. Returns the number of entries of the
     /// factors that were computed.
-    pub(super) fn factorize<'a, S>(links: &'a [Link<S>], plan: &'a Plan<S>, n: &'a mut Numbers<S>) -> u64 {
+    pub(crate) fn factorize<'a, S>(links: &'a [Link<S>], plan: &'a Plan<S>, n: &'a mut Numbers<S>) -> u64 {
         let mut entries = 0;
         for l in &plan.order {
             if !std::mem::replace(&mut n.stale[*l], false) {
@@ -118,7 +118,7 @@ kernel_fn! {
 
 kernel_fn! {
     /// Solves for the forces in `rhs`, `force` and `row_force`, into `next` and `acc`.
-    pub(super) fn solve<'a, S>(links: &'a [Link<S>], plan: &'a Plan<S>, n: &'a mut Numbers<S>) {
+    pub(crate) fn solve<'a, S>(links: &'a [Link<S>], plan: &'a Plan<S>, n: &'a mut Numbers<S>) {
         for l in &plan.order {
             inward(&links[*l], plan, n, *l);
         }

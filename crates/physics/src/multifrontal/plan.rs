@@ -10,13 +10,13 @@ use crate::lanes::Real;
 use crate::sim::Link;
 
 /// No link, no row, no place.
-pub(super) const NONE: usize = usize::MAX;
+pub(crate) const NONE: usize = usize::MAX;
 /// Matrices' rows begin at multiples of this.
 const ALIGN: usize = 8;
 
 /// The front of a link.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Front {
+pub(crate) struct Front {
     /// Where its other links begin in [`Plan::others`], and how many there are.
     pub others: usize,
     pub links: usize,
@@ -67,7 +67,7 @@ impl Front {
 
 /// A row over joints: its terms, in [`Plan::terms`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RowTerms {
+pub(crate) struct RowTerms {
     pub start: usize,
     pub end: usize,
     /// The link in whose front it enters, and the next row there.
@@ -77,7 +77,7 @@ pub(super) struct RowTerms {
 
 /// Order and fronts; the memory is kept from step to step.
 #[derive(Clone, Debug)]
-pub(super) struct Plan<S> {
+pub(crate) struct Plan<S> {
     /// Links in the order of elimination, and the place of each in it.
     pub order: Vec<usize>,
     pub position: Vec<usize>,

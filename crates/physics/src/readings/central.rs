@@ -6,13 +6,13 @@
 
 use super::Readings;
 use super::forces::{ContactForce, Wrench};
-use crate::forces::Pull;
-use crate::inverse::{constraint_wrenches, joint_space};
+use super::joint_space::{constraint_wrenches, joint_space};
+use crate::algebra::spatial::*;
 use crate::lanes::{Kernel, Real};
+use crate::rows::Source;
+use crate::sim::Pull;
 use crate::sim::{Mount, Sim};
-use crate::solver::block::Source;
-use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::state::{Group, Work};
 
 impl<T: Real> Sim<T> {
     /// Prepares [`Readings::cinert`] and [`Readings::cvel`] for the frames that `work` has now.

@@ -3,9 +3,9 @@
 use super::Readings;
 use super::forces::ContactForce;
 use super::rays::inside_shape;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{Sensor, SensorObject};
-use crate::spatial::*;
 
 /// Fields of the sensor, as bits: number of contacts, force, torque, distance, place, normal, tangent.
 const FOUND: i32 = 1;

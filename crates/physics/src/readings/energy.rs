@@ -1,9 +1,9 @@
 //! Sums over bodies: centers of mass, momenta, energies.
 
 use super::Readings;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{JointType, TendonKind};
-use crate::spatial::*;
 
 /// Mass properties and motion of a body together with all bodies below it.
 pub(super) struct Subtree<T> {

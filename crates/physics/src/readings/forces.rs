@@ -1,12 +1,12 @@
 //! Forces between bodies at the last physics step: contacts, and what a body's parent exerts on it.
 
 use super::Readings;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::EqualityKind;
+use crate::rows::FloorRow;
+use crate::rows::{Block, Jacobian, Source};
 use crate::sim::Mount;
-use crate::solver::block::{Block, Jacobian, Source};
-use crate::solver::floor::FloorRow;
-use crate::spatial::*;
 
 /// A contact in some lanes.
 pub(super) struct ContactForce<T: Real> {

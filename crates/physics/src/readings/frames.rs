@@ -1,10 +1,10 @@
 //! Frames of bodies, geoms, sites and cameras: where they are relative to each other and how they move.
 
 use super::Readings;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{JointType, SensorObject, TrackMode};
 use crate::sim::Mount;
-use crate::spatial::*;
 
 impl<T: Real> Readings<'_, T> {
     /// Where an object sits on its link. `None` for what has no frame, and for cameras that turn by themselves.

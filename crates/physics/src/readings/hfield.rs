@@ -1,8 +1,8 @@
 //! Rays against a height field: a box below, triangles above it, and walls where the field ends.
 
 use super::rays::{Hit, TINY, along, normalized, ray_face};
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::spatial::*;
 
 /// A height field in its own frame.
 pub(super) struct Grid<'a, S> {

@@ -1,12 +1,12 @@
 //! Joint-space quantities for inspection and tests: bias, passive, actuator and constraint forces, and the mass matrix.
 //!
-//! A step never needs them; they are computed from what the last [`Sim::forward`](crate::Sim::forward) left behind.
+//! A step never needs them; they are computed from what the last [`Sim::forward`](crate::sim::Sim::forward) left behind.
 
+use super::Readings;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::readings::Readings;
 use crate::sim::Sim;
-use crate::spatial::*;
-use crate::work::Work;
+use crate::state::Work;
 
 impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
@@ -126,7 +126,10 @@ pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6
 
 #[cfg(test)]
 mod tests {
-    use crate::{Group, Model, Readings, Sim, SimOptions, Work};
+    use crate::model::Model;
+    use crate::readings::Readings;
+    use crate::sim::{Sim, SimOptions};
+    use crate::state::{Group, Work};
 
     const BALL: &str = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
 

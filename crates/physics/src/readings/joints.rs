@@ -1,10 +1,10 @@
 //! Scalars of joints, tendons and actuators.
 
 use super::Readings;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{JointType, TendonKind, Transmission};
-use crate::solver::block::Source;
-use crate::spatial::*;
+use crate::rows::Source;
 
 /// A limit that is reached: distance less margin, its rate, the limit's force; zero where no limit is.
 #[derive(Clone, Copy)]

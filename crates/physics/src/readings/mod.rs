@@ -8,20 +8,21 @@ mod energy;
 mod forces;
 mod frames;
 mod hfield;
+mod joint_space;
 mod joints;
 mod rays;
 mod sensors;
 mod touch;
 
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::{Mount, Sim};
-use crate::spatial::*;
-use crate::work::{Group, Work};
+use crate::state::{Group, Work};
 
 /// A view of the group that was stepped (or refreshed) last with `work`.
 ///
 /// Positions and velocities belong to the present state. Accelerations, contacts and forces belong to the last physics
-/// step, as the dynamics that produced them does. Indices are those of the [`Model`](crate::Model).
+/// step, as the dynamics that produced them does. Indices are those of the [`Model`](crate::model::Model).
 #[derive(Clone, Copy)]
 pub struct Readings<'a, T: Real> {
     /// Constants.
@@ -230,28 +231,4 @@ impl<'a, T: Real> Readings<'a, T> {
         let at_point = cross_add(&ang(&a), &r, &lin(&a));
         (cross_add(&spin, &v, &at_point), ang(&a))
     }
-}
-
-/// Quaternion of a rotation, `w >= 0`; a fixed sequence of selections, so that every backend agrees.
-pub fn rot_to_quat<T: Real>(r: &Rot<T>) -> [T; 4] {
-    let (one, half) = (T::lit(1.0), T::lit(0.5));
-    let (xx, yy, zz) = (r[0][0], r[1][1], r[2][2]);
-    // four times the squares of the components; the largest one is safe to divide by
-    let squares = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
-    let (wx, wy, wz) = (r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]);
-    let (xy, xz, yz) = (r[1][0] + r[0][1], r[2][0] + r[0][2], r[2][1] + r[1][2]);
-    let candidates =
-        [[squares[0], wx, wy, wz], [wx, squares[1], xy, xz], [wy, xy, squares[2], yz], [wz, xz, yz, squares[3]]];
-    let (mut best, mut q) = (squares[0], candidates[0]);
-    for k in 1..4 {
-        let better = best.lt(squares[k]);
-        best = T::select(better, squares[k], best);
-        for i in 0..4 {
-            q[i] = T::select(better, candidates[k][i], q[i]);
-        }
-    }
-    let scale = half.div(best.max(T::lit(1e-12)).sqrt());
-    let negative = q[0].lt(T::zero());
-    let scale = T::select(negative, -scale, scale);
-    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }

@@ -4,9 +4,9 @@
 
 use super::Readings;
 use super::hfield::{Grid, ray_hfield};
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::GeomType;
-use crate::spatial::*;
 
 /// Below this a direction or a discriminant counts as zero (MuJoCo's `mjMINVAL`).
 pub(super) const TINY: f64 = 1e-15;

@@ -3,10 +3,10 @@
 use super::Readings;
 use super::joints::LimitReading;
 use super::rays::inside_shape;
+use crate::algebra::spatial::*;
 use crate::lanes::{Kernel, Real};
 use crate::model::{Sensor, SensorObject, SensorType};
 use crate::sim::Mount;
-use crate::spatial::*;
 
 impl<T: Real> Readings<'_, T> {
     /// Value of a sensor, `dim` numbers, clamped to its cutoff. `None` for a sensor that is not evaluated:

@@ -3,9 +3,9 @@
 use super::Readings;
 use super::forces::ContactForce;
 use super::rays::ray_shape;
+use crate::algebra::spatial::into_axes;
 use crate::lanes::Real;
-use crate::solver::block::Source;
-use crate::spatial::into_axes;
+use crate::rows::Source;
 
 impl<T: Real> Readings<'_, T> {
     /// Normal forces of all contacts of a geom, with whatever it touches.
@@ -22,8 +22,8 @@ impl<T: Real> Readings<'_, T> {
 
     /// What a touch sensor on a site feels, N: the normal forces of the contacts of the site's body in the site's volume,
     /// at the last physics step. A contact is felt if the ray from its point against the force on the body meets the
-    /// volume, which one from inside always does. To be called after [`Sim::advance`](crate::Sim::advance) or
-    /// [`Sim::forward`](crate::Sim::forward), before [`Sim::refresh`](crate::Sim::refresh) moves the site on.
+    /// volume, which one from inside always does. To be called after [`Sim::advance`](crate::sim::Sim::advance) or
+    /// [`Sim::forward`](crate::sim::Sim::forward), before [`Sim::refresh`](crate::sim::Sim::refresh) moves the site on.
     #[inline(always)]
     pub fn site_touch(&self, site: usize) -> T {
         let mut total = T::zero();

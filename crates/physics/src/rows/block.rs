@@ -5,28 +5,15 @@
 //! block is a slot: every lane fills its slots in the order of its own contacts, so that two agents that touch the
 //! ground with different limbs share a block. Lanes that leave a slot empty have stiffness zero in it.
 
+use super::cone::ConePoint;
+use super::jacobian::{Jacobian, Side};
+use super::row::{NewtonStep, Row, replace};
+use crate::algebra::spatial::V6;
 use crate::lanes::Real;
-use crate::solver::cone::Cone;
-use crate::solver::{Move, Row, replace};
-use crate::spatial::*;
+use crate::sim::Cost;
 
 /// Values of up to six rows.
-pub(crate) type Rows<T> = [T; 6];
-
-/// How a block's cost depends on its row values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cost {
-    /// One row that pushes while its value is negative.
-    Push,
-    /// A friction pyramid: edges `u[0] +- mu[j] u[j + 1]` that push while negative.
-    Pyramid,
-    /// An elliptic friction cone.
-    Elliptic,
-    /// Every row pulls and pushes.
-    Equal,
-    /// One row whose force is bounded: dry friction.
-    Dry,
-}
+pub(crate) type RowValues<T> = [T; 6];
 
 /// What a block stands for: the readings look for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,25 +30,6 @@ pub(crate) enum Source {
     TendonFriction,
 }
 
-/// What the rows measure.
-#[derive(Clone, Debug)]
-pub(crate) enum Jacobian<T: Real> {
-    /// Motion of a point of the second side relative to one of the first: linear along `lin` (rows 0 to 2), angular
-    /// along `ang` (rows 3 to 5).
-    Points { sides: [Side<T>; 2], lin: [V3<T>; 3], ang: [V3<T>; 3] },
-    /// One row: a weighted sum over degrees of freedom.
-    Joints(Vec<(usize, T)>),
-}
-
-/// One side of a [`Jacobian::Points`].
-#[derive(Clone, Debug)]
-pub(crate) struct Side<T: Real> {
-    /// The links that carry the point, each with the lanes where it does; no link where the point stands still.
-    pub links: Vec<(usize, T::Mask)>,
-    /// The point, relative to the reference point of the link's tree.
-    pub r: V3<T>,
-}
-
 /// A constraint of up to six rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Block<T: Real> {
@@ -73,24 +41,24 @@ pub(crate) struct Block<T: Real> {
     pub coupled: bool,
     pub on: T::Mask,
     /// Stiffness of the rows (of all edges of a pyramid: the first), 0 in lanes without this block.
-    pub d: Rows<T>,
+    pub d: RowValues<T>,
     /// Friction coefficients of rows 1 to 5; the bound of [`Cost::Dry`] is the first.
     pub mu: [T; 5],
     /// Regularized slope of an elliptic cone.
     pub slope: T,
     /// Minus the reference acceleration.
-    pub u0: Rows<T>,
+    pub u0: RowValues<T>,
     /// `J a - aref` at the present point and at the Newton point.
-    pub u: Rows<T>,
-    pub next: Rows<T>,
+    pub u: RowValues<T>,
+    pub next: RowValues<T>,
     /// Force of the present point in the sense of the solver's first identity.
-    pub force: Rows<T>,
+    pub force: RowValues<T>,
     /// The force near the present point is `hold - stiffness u` (lower triangle, row by row).
     pub stiffness: [T; 21],
     pub hold: T,
     /// Which edges push; or (bottom, middle) zone of an elliptic cone; or (below the bound, positive).
     pub zones: [T::Mask; 10],
-    /// Lanes whose stiffness has changed since [`crowd`](super::crowd) took note of it.
+    /// Lanes whose stiffness has changed since the sparse factorization took note of it.
     pub moved: T::Mask,
     /// Lanes whose zones are those of the evaluation before.
     pub recalled: T::Mask,
@@ -187,100 +155,9 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// One row: a weighted sum over degrees of freedom.
-    #[inline(always)]
-    pub fn tie_joints(&mut self, terms: impl Iterator<Item = (usize, T)>) {
-        if let Jacobian::Points { .. } = &self.jacobian {
-            self.jacobian = Jacobian::Joints(Vec::new());
-        }
-        if let Jacobian::Joints(list) = &mut self.jacobian {
-            list.clear();
-            list.extend(terms);
-        }
-    }
-
-    /// Rows between two points, given by their links and places; the same links in the lanes `on`.
-    #[inline(always)]
-    pub fn tie_points(&mut self, lin: [V3<T>; 3], ang: [V3<T>; 3], points: [(Option<usize>, V3<T>); 2], on: T::Mask) {
-        if let Jacobian::Joints(_) = &self.jacobian {
-            let side = || Side { links: Vec::with_capacity(T::LANES), r: [T::zero(); 3] };
-            self.jacobian = Jacobian::Points { sides: [side(), side()], lin, ang };
-        }
-        if let Jacobian::Points { sides, lin: l, ang: a } = &mut self.jacobian {
-            *l = lin;
-            *a = ang;
-            for (side, (link, r)) in sides.iter_mut().zip(points) {
-                side.links.clear();
-                side.links.extend(link.map(|l| (l, on)));
-                side.r = r;
-            }
-        }
-    }
-
-    /// Row values of motions of the links and accelerations of the joints.
-    #[inline(always)]
-    pub fn of_motion(&self, link_acc: &[V6<T>], joint_acc: &[T]) -> Rows<T> {
-        let z = T::zero();
-        let mut u = [z; 6];
-        match &self.jacobian {
-            Jacobian::Joints(terms) => {
-                for (dof, coefficient) in terms {
-                    u[0] = coefficient.mul_add(joint_acc[*dof], u[0]);
-                }
-            }
-            Jacobian::Points { sides, lin, ang: turn } => {
-                let a = sides[0].motion(link_acc);
-                let b = sides[1].motion(link_acc);
-                let v = sub3(&sides[1].velocity(&b), &sides[0].velocity(&a));
-                for k in 0..self.dim.min(3) {
-                    u[k] = dot(&lin[k], &v);
-                }
-                if self.dim > 3 {
-                    let w = sub3(&ang(&b), &ang(&a));
-                    for k in 3..self.dim {
-                        u[k] = dot(&turn[k - 3], &w);
-                    }
-                }
-            }
-        }
-        u
-    }
-
-    /// Motion direction of row `k` as a wrench about a reference point, for a side whose point is at `r`.
-    #[inline(always)]
-    pub fn wrench(&self, k: usize, r: &V3<T>) -> V6<T> {
-        let z = T::zero();
-        match &self.jacobian {
-            Jacobian::Points { lin, .. } if k < 3 => {
-                let t = cross(r, &lin[k]);
-                [t[0], t[1], t[2], lin[k][0], lin[k][1], lin[k][2]]
-            }
-            Jacobian::Points { ang, .. } => [ang[k - 3][0], ang[k - 3][1], ang[k - 3][2], z, z, z],
-            Jacobian::Joints(_) => [z; 6],
-        }
-    }
-
-    /// Total wrench of row forces on a side whose point is at `r`.
-    #[inline(always)]
-    pub fn total_wrench(&self, f: &Rows<T>, r: &V3<T>) -> V6<T> {
-        let z = T::zero();
-        let Jacobian::Points { lin, ang, .. } = &self.jacobian else { return [z; 6] };
-        let (mut force, mut torque) = ([z; 3], [z; 3]);
-        for i in 0..3 {
-            for k in 0..self.dim.min(3) {
-                force[i] = lin[k][i].mul_add(f[k], force[i]);
-            }
-            for k in 3..self.dim {
-                torque[i] = ang[k - 3][i].mul_add(f[k], torque[i]);
-            }
-        }
-        let t = cross_add(r, &force, &torque);
-        [t[0], t[1], t[2], force[0], force[1], force[2]]
-    }
-
     /// Edges of the pyramid at `u`: pairs for each tangent.
     #[inline(always)]
-    fn edge(&self, u: &Rows<T>, e: usize) -> T {
+    fn edge(&self, u: &RowValues<T>, e: usize) -> T {
         let j = e / 2;
         if e.is_multiple_of(2) { self.mu[j].mul_add(u[j + 1], u[0]) } else { self.mu[j].neg_mul_add(u[j + 1], u[0]) }
     }
@@ -291,7 +168,7 @@ impl<T: Real> Block<T> {
 
     /// Adds a force along an edge to row forces.
     #[inline(always)]
-    fn add_edge(&self, f: &mut Rows<T>, e: usize, x: T) {
+    fn add_edge(&self, f: &mut RowValues<T>, e: usize, x: T) {
         let j = e / 2;
         f[0] += x;
         f[j + 1] =
@@ -300,7 +177,7 @@ impl<T: Real> Block<T> {
 
     /// The force that the block exerts at `u`.
     #[inline(always)]
-    pub fn true_force(&self, u: &Rows<T>) -> Rows<T> {
+    pub fn true_force(&self, u: &RowValues<T>) -> RowValues<T> {
         let z = T::zero();
         let mut f = [z; 6];
         match self.cost {
@@ -317,7 +194,7 @@ impl<T: Real> Block<T> {
                 }
             }
             Cost::Elliptic => {
-                let cone = Cone::at(self, u);
+                let cone = ConePoint::at(self, u);
                 for k in 0..self.dim {
                     f[k] = T::masked(cone.bottom, -(self.d[k] * u[k]));
                 }
@@ -336,7 +213,7 @@ impl<T: Real> Block<T> {
 
     /// Force of the linear model of the present point, at `u`.
     #[inline(always)]
-    pub fn linear_force(&self, u: &Rows<T>) -> Rows<T> {
+    pub fn linear_force(&self, u: &RowValues<T>) -> RowValues<T> {
         let mut f = [T::zero(); 6];
         for i in 0..self.dim {
             let mut sum = T::zero();
@@ -398,7 +275,7 @@ impl<T: Real> Block<T> {
                 }
             }
             Cost::Elliptic => {
-                let cone = Cone::at(self, &self.u);
+                let cone = ConePoint::at(self, &self.u);
                 let bottom = replace::<T>(live, T::and(cone.bottom, self.on), self.zones[0]);
                 let middle = replace::<T>(live, T::and(cone.middle, self.on), self.zones[1]);
                 // on the curved part every move changes the model
@@ -438,7 +315,7 @@ impl<T: Real> Block<T> {
             }
             Cost::Elliptic => {
                 // on the curved part of the cone the model is never exact
-                let cone = Cone::at(self, &self.next);
+                let cone = ConePoint::at(self, &self.next);
                 let differs = T::or(T::xor(cone.bottom, self.zones[0]), T::or(cone.middle, self.zones[1]));
                 T::and(self.on, differs)
             }
@@ -447,7 +324,7 @@ impl<T: Real> Block<T> {
 
     /// Moves; returns the lanes whose linear model changed.
     #[inline(always)]
-    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
+    pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);
         for i in 0..self.dim {
             self.u[i] = step.of(self.u[i], self.next[i]);
@@ -456,31 +333,8 @@ impl<T: Real> Block<T> {
         self.activate(step.live())
     }
 
-    /// Adds the block's force to the forces on links and joints.
     #[inline(always)]
-    pub fn exert(&self, links: &mut [V6<T>], joints: &mut [T]) {
-        match &self.jacobian {
-            Jacobian::Joints(terms) => {
-                for (dof, coefficient) in terms {
-                    joints[*dof] = coefficient.mul_add(self.force[0], joints[*dof]);
-                }
-            }
-            Jacobian::Points { sides, .. } => {
-                for (s, side) in sides.iter().enumerate() {
-                    let w = self.total_wrench(&self.force, &side.r);
-                    for (link, lanes) in &side.links {
-                        for i in 0..6 {
-                            let x = T::masked(*lanes, w[i]);
-                            links[*link][i] += if s == 0 { -x } else { x };
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn along(&self, f: &Rows<T>) -> T {
+    fn along(&self, f: &RowValues<T>) -> T {
         let mut sum = T::zero();
         for k in 0..self.dim {
             sum = (self.next[k] - self.u[k]).mul_add(f[k], sum);
@@ -534,24 +388,5 @@ impl<T: Real> Row<T> for Block<T> {
             }
             Cost::Elliptic => self.elliptic_slope(&u, &du),
         }
-    }
-}
-
-impl<T: Real> Side<T> {
-    /// Motion of the link that carries the point.
-    #[inline(always)]
-    fn motion(&self, link_acc: &[V6<T>]) -> V6<T> {
-        let mut m = [T::zero(); 6];
-        for (link, lanes) in &self.links {
-            for i in 0..6 {
-                m[i] = T::select(*lanes, link_acc[*link][i], m[i]);
-            }
-        }
-        m
-    }
-
-    #[inline(always)]
-    fn velocity(&self, m: &V6<T>) -> V3<T> {
-        cross_add(&ang(m), &self.r, &lin(m))
     }
 }

@@ -1,10 +1,10 @@
 //! Contacts with elliptic friction cones: the cost has a flat part, a curved one, and one where nothing pushes.
 
+use super::block::{Block, RowValues, at};
 use crate::lanes::Real;
-use crate::solver::block::{Block, Rows, at};
 
 /// Where a point lies with respect to an elliptic cone.
-pub(super) struct Cone<T: Real> {
+pub(super) struct ConePoint<T: Real> {
     /// The contact sticks.
     pub bottom: T::Mask,
     /// It slides.
@@ -17,9 +17,9 @@ pub(super) struct Cone<T: Real> {
     pub weight: T,
 }
 
-impl<T: Real> Cone<T> {
+impl<T: Real> ConePoint<T> {
     #[inline(always)]
-    pub(super) fn at(block: &Block<T>, u: &Rows<T>) -> Self {
+    pub(super) fn at(block: &Block<T>, u: &RowValues<T>) -> Self {
         let (z, one) = (T::zero(), T::lit(1.0));
         let mu = block.slope;
         let mut square = z;
@@ -35,7 +35,7 @@ impl<T: Real> Cone<T> {
         let full = T::not(z.lt(mu.mul_add(normal, sliding)));
         let square_mu = mu * mu;
         let safe = T::select(block.on, square_mu * (one + square_mu), one);
-        Cone {
+        ConePoint {
             bottom: T::and(inside, full),
             middle: T::and(inside, T::not(full)),
             normal,
@@ -49,7 +49,7 @@ impl<T: Real> Cone<T> {
 impl<T: Real> Block<T> {
     /// Second derivative of the elliptic cone's cost.
     #[inline(always)]
-    pub(super) fn elliptic_stiffness(&mut self, cone: &Cone<T>, live: T::Mask) {
+    pub(super) fn elliptic_stiffness(&mut self, cone: &ConePoint<T>, live: T::Mask) {
         let z = T::zero();
         let [bottom, middle] = [self.zones[0], self.zones[1]];
         let (mu, inv) = (self.slope, cone.inv_sliding);
@@ -81,9 +81,9 @@ impl<T: Real> Block<T> {
 
     /// First and second derivative of the elliptic cone's cost along `du` at `u`.
     #[inline(always)]
-    pub(super) fn elliptic_slope(&self, u: &Rows<T>, du: &Rows<T>) -> [T; 2] {
+    pub(super) fn elliptic_slope(&self, u: &RowValues<T>, du: &RowValues<T>) -> [T; 2] {
         let z = T::zero();
-        let cone = Cone::at(self, u);
+        let cone = ConePoint::at(self, u);
         let (mut b1, mut b2) = (z, z);
         let (mut cross, mut square) = (z, z);
         for k in 0..self.dim {

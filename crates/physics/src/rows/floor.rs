@@ -2,10 +2,10 @@
 //!
 //! The other side stands still, so the contact adds a symmetric 6x6 to its own link and nothing else.
 
+use super::row::{NewtonStep, Row, replace};
+use crate::algebra::planar::Space;
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::solver::{Move, Row, replace};
-use crate::space::Space;
-use crate::spatial::*;
 
 /// A contact with the floor: a pyramid of four edges. Vectors are along (normal, tangent 1, tangent 2).
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +119,7 @@ impl<T: Real> FloorRow<T> {
 
     /// Moves; returns the lanes whose active edges changed.
     #[inline(always)]
-    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
+    pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);
         for i in 0..3 {
             self.u[i] = step.of(self.u[i], self.next[i]);

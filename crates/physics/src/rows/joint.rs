@@ -1,10 +1,7 @@
 //! Rows of single degrees of freedom: joint limits and dry friction. They add to the diagonal.
 
+use super::row::{NewtonStep, Row, replace};
 use crate::lanes::Real;
-use crate::sim::Sim;
-use crate::solver::softness::{Softness, impedance};
-use crate::solver::{Move, Row, replace};
-use crate::work::{Group, Work, former};
 
 /// A joint limit.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +69,7 @@ impl<T: Real> LimitRow<T> {
     }
 
     #[inline(always)]
-    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
+    pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear(self.next);
         self.u = step.of(self.u, self.next);
         self.force = step.of(self.force, linear);
@@ -137,7 +134,7 @@ impl<T: Real> DryRow<T> {
     }
 
     #[inline(always)]
-    pub fn advance(&mut self, step: &Move<T>) -> T::Mask {
+    pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear(self.next);
         self.u = step.of(self.u, self.next);
         self.force = step.of(self.force, linear);
@@ -159,75 +156,4 @@ impl<T: Real> Row<T> for DryRow<T> {
         let (sticking, _) = self.zone(u);
         [-(du * self.true_force(u)), T::masked(sticking, self.d * du) * du]
     }
-}
-
-/// Writes the rows of violated joint limits and of dry friction.
-#[inline(always)]
-pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    let one = T::lit(1.0);
-    let mut past = 0;
-    for (i, limit) in sim.limits.iter().enumerate() {
-        let q = group.qpos[limit.qpos];
-        let low = (q - T::splat(limit.low[0])) - T::splat(limit.low[1]);
-        let high = (T::splat(limit.high[0]) - q) + T::splat(limit.high[1]);
-        let [first, second] = [2 * i, 2 * i + 1];
-        if limit.two_sided {
-            push_limit((limit.dof, first), low, one, &limit.soft, group, work, &mut past);
-            push_limit((limit.dof, second), high, -one, &limit.soft, group, work, &mut past);
-        } else {
-            // at most one side is violated: one row serves both
-            let lower = low.lt(high);
-            let (dist, sign) = (T::select(lower, low, high), T::select(lower, one, -one));
-            push_limit((limit.dof, first), dist, sign, &limit.soft, group, work, &mut past);
-        }
-    }
-    for (i, dry) in sim.dry.iter().enumerate() {
-        let (_, d) = impedance(&dry.soft, T::zero());
-        let u0 = T::splat(dry.soft.b) * group.qvel[dry.dof];
-        let (mut sticking, mut positive) = (T::none(), T::none());
-        let recalled = i < work.past.dry.len();
-        if recalled {
-            (sticking, positive) = (work.past.dry[i].sticking, work.past.dry[i].positive);
-        }
-        work.dry.push(DryRow {
-            dof: dry.dof,
-            loss: dry.loss,
-            d,
-            u0,
-            u: u0,
-            next: u0,
-            force: T::zero(),
-            sticking,
-            positive,
-            recalled,
-        });
-    }
-}
-
-/// Writes the row of a joint's limit with a number; `past` walks along the rows of the evaluation before.
-#[inline(always)]
-fn push_limit<T: Real>(
-    (dof, number): (usize, usize),
-    dist: T,
-    sign: T,
-    soft: &Softness<T::Scalar>,
-    group: &Group<T>,
-    work: &mut Work<T>,
-    past: &mut usize,
-) {
-    let on = dist.lt(T::splat(soft.margin));
-    if !T::any(on) {
-        return;
-    }
-    let violation = dist - T::splat(soft.margin);
-    let (imp, d) = impedance(soft, violation);
-    let u0 = (sign * group.qvel[dof]).mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));
-    let d = T::masked(on, d);
-    let (mut active, mut recalled) = (T::none(), T::none());
-    if let Some(row) = former(&work.past.limits, past, number, |row| row.number) {
-        recalled = T::and(on, row.on);
-        active = T::and(recalled, row.active);
-    }
-    let force = T::zero();
-    work.limits.push(LimitRow { dof, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
 }

@@ -1,7 +1,7 @@
 //! Which geoms collide, and with which parameters.
 
+use super::weld::BodyMount;
 use crate::model::{Geom, Model, Pair};
-use crate::rigid::BodyMount;
 use std::collections::BTreeSet;
 
 /// Smallest friction coefficient (MuJoCo's `mjMINMU`).

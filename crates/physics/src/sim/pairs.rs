@@ -1,14 +1,14 @@
 //! Pairs of geoms that may touch: moving bodies with each other, and with terrain.
 
-use super::Contacts;
-use super::params::ContactParams;
+use super::contact_params::ContactParams;
+use super::contacts::Contacts;
+use super::link::Mount;
+use super::softness::{Cost, Softness, softness};
+use super::weights::{inverse_weights, is_hard};
+use super::weld::BodyMount;
+use crate::geometry::bounding_radius;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
-use crate::narrow;
-use crate::rigid::{BodyMount, inverse_weights, is_hard};
-use crate::sim::Mount;
-use crate::solver::block::Cost;
-use crate::solver::softness::{Softness, softness};
 
 /// Function that finds the contacts of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,7 +177,7 @@ pub(super) fn add<T: Real>(
         GeomType::Hfield => Cull::Field,
         _ => Cull::Balls,
     };
-    let radius = |g: &Geom| narrow::bounding_radius(g.kind, &g.size);
+    let radius = |g: &Geom| bounding_radius(g.kind, &g.size);
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
     contacts.hard |= is_hard(model, mounts, [a.body, b.body], diag);
     contacts.specs.push(PairSpec {

@@ -1,7 +1,23 @@
-//! Impedance of a constraint: how stiff it is at a given violation (MuJoCo documentation, "Solver parameters").
+//! How hard a constraint is: the shape of its cost, and its impedance, which says how stiff it is at a given violation
+//! (MuJoCo documentation, "Solver parameters").
 
 use crate::lanes::Real;
 use crate::model::Model;
+
+/// How a block's cost depends on its row values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cost {
+    /// One row that pushes while its value is negative.
+    Push,
+    /// A friction pyramid: edges `u[0] +- mu[j] u[j + 1]` that push while negative.
+    Pyramid,
+    /// An elliptic friction cone.
+    Elliptic,
+    /// Every row pulls and pushes.
+    Equal,
+    /// One row whose force is bounded: dry friction.
+    Dry,
+}
 
 /// Solver parameters of one constraint: impedance and reference acceleration as functions of the violation.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! What the kernels do not simulate is refused here by name, never ignored.
 
+use super::options::SimError;
 use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, TendonKind, Transmission};
-use crate::sim::SimError;
 
 /// Refuses a model that would not be simulated as MuJoCo does. Contacts are checked where their list is made.
 pub(crate) fn check(model: &Model) -> Result<(), SimError> {

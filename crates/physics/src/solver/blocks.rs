@@ -2,12 +2,11 @@
 //!
 //! Many models have none, so these are functions of their own: the solver's inner loop stays small.
 
+use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
+use crate::rows::{Block, Jacobian, NewtonStep, Row, Side, at};
 use crate::sim::Sim;
-use crate::solver::block::{Block, Jacobian, Side, at};
-use crate::solver::{Move, Row};
-use crate::spatial::*;
-use crate::work::Work;
+use crate::state::Work;
 
 /// Whether some block does not fit the tree.
 pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
@@ -128,7 +127,7 @@ kernel_fn! {
 
 kernel_fn! {
     /// Moves the lanes and marks the links whose system changed.
-    pub(crate) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, step: Move<T>) {
+    pub(crate) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, step: NewtonStep<T>) {
         for b in work.blocks.iter_mut() {
             let changed = b.advance(&step);
             if !T::any(changed) {

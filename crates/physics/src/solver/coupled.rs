@@ -2,7 +2,7 @@
 //!
 //! The articulated-body factors are those of `H0 = M + (what fits the tree)`. Blocks between moving bodies add
 //! `B' W B`, with few rows B (three per contact, and an agent has one or two such contacts; beyond
-//! [`MOST_ROWS`](super::crowd::MOST_ROWS) another factorization takes over, lane by lane). With `W = R' R` the
+//! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS) another factorization takes over, lane by lane). With `W = R' R` the
 //! matrix identity of Sherman, Morrison and Woodbury gives the exact Newton point from the factors of `H0`:
 //!
 //! `f = -R' (1 + R B inv(H0) B' R')^-1 R (B inv(H0) b + u0)`,  `a = inv(H0) (b + B' f)`.
@@ -17,46 +17,12 @@
 //! several times as many iterations; a dense factorization of H costs about twice the recursion before the first contact
 //! (`docs/physics.md` has the numbers).
 
-use crate::articulated::reduce_free_root;
+use crate::algebra::planar::{Full, Planar, Space};
+use crate::dynamics::reduce_free_root;
 use crate::lanes::{Real, kernel_fn};
+use crate::rows::{Block, Jacobian, at};
 use crate::sim::Sim;
-use crate::solver::block::{Block, Jacobian, at};
-use crate::space::{Full, Planar, Space};
-use crate::work::Work;
-
-/// Columns of the coupled rows and the factors of the small matrix.
-#[derive(Clone, Debug)]
-pub(crate) struct Coupling<T: Real> {
-    /// Inward passes of the rows: `nv` numbers each.
-    columns: Vec<T>,
-    /// The same times R.
-    scaled: Vec<T>,
-    /// R u0.
-    offset: Vec<T>,
-    /// Cholesky factor of the small matrix, lower triangle; inverses on the diagonal.
-    factor: Vec<T>,
-    y: Vec<T>,
-    /// Number of rows.
-    rows: usize,
-    /// Scratch: joint forces of one row.
-    rhs: Vec<T>,
-    on_path: Vec<bool>,
-}
-
-impl<T: Real> Coupling<T> {
-    pub fn new(links: usize, nv: usize) -> Self {
-        Coupling {
-            columns: Vec::new(),
-            scaled: Vec::new(),
-            offset: Vec::new(),
-            factor: Vec::new(),
-            y: Vec::new(),
-            rows: 0,
-            rhs: vec![T::zero(); nv],
-            on_path: vec![false; links],
-        }
-    }
-}
+use crate::state::{Coupling, Work};
 
 kernel_fn! {
     /// Computes the columns of all coupled blocks (`fresh`: the factors of the tree changed) and factorizes.

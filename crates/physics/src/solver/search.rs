@@ -1,9 +1,10 @@
 //! The line search: where the cost is least along the segment to the Newton point.
 
+use super::blocks;
 use crate::lanes::Real;
+use crate::rows::Row;
 use crate::sim::Sim;
-use crate::solver::{Row, blocks};
-use crate::work::Work;
+use crate::state::Work;
 
 /// Longest way of a line search in units of the Newton step. The minimum is hardly ever beyond a few; where it is, the
 /// next iteration goes on.

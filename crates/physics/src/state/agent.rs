@@ -1,11 +1,11 @@
 //! The complete state of one agent, independent of lanes.
 
+use super::group::Group;
+use super::variation::Variation;
+use crate::geometry::height::HeightField;
 use crate::lanes::Real;
 use crate::model::Model;
-use crate::narrow::height::HeightField;
 use crate::sim::Sim;
-use crate::variation::Variation;
-use crate::work::Group;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Everything an agent's future depends on. It is exact: numbers are written to files by their bits, so that even what
@@ -25,7 +25,7 @@ pub struct AgentState {
 }
 
 impl AgentState {
-    /// Whether it has the sizes of a state of this model. One that has not cannot be put into a [`Batch`](crate::Batch).
+    /// Whether it has the sizes of a state of this model. One that has not cannot be put into a `Batch`.
     pub fn fits(&self, model: &Model) -> bool {
         let Model { nq, nv, nu, na, bodies, .. } = model;
         let varied = |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu;

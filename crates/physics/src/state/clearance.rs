@@ -4,10 +4,10 @@
 //! alone until its two geoms together have moved as far as they were apart. That is on the safe side, so contacts are
 //! the same, to the bit, as if every pair were tested every time.
 //!
-//! What is remembered belongs to one group of agents, see [`Work::continues`](crate::work::Work::continues).
+//! What is remembered belongs to one group of agents, see [`Work::continues`](super::Work::continues).
 
+use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::spatial::*;
 
 /// Distance at which a pair counts as touching already, as a fraction of its reach: far above the rounding of distances
 /// and ways.
@@ -60,6 +60,6 @@ impl<T: Real> Clearances<T> {
 
 /// How far a pair is from touching that is apart by `distance` beyond its margin: less than nothing where it may touch.
 #[inline(always)]
-pub(super) fn clearance<T: Real>(distance: T, reach: T) -> T {
+pub(crate) fn clearance<T: Real>(distance: T, reach: T) -> T {
     reach.neg_mul_add(T::lit(SAFETY), distance)
 }

@@ -1,124 +1,17 @@
-//! State of a lane group and the scratch memory of a step.
+//! Scratch memory of a step.
 
-use crate::collision::{Clearances, Sweep};
+use super::clearance::Clearances;
+use super::coupling::Coupling;
+use super::group::Group;
+use super::stats::SolverStats;
+use super::sweep::Sweep;
+use crate::algebra::spatial::*;
+use crate::geometry::field_capsule::Gaps;
+use crate::geometry::{Touch, Touches};
 use crate::lanes::Real;
-use crate::model::JointType;
-use crate::narrow::field_capsule::Gaps;
-use crate::narrow::height::HeightField;
-use crate::narrow::{Touch, Touches};
+use crate::multifrontal::Crowd;
+use crate::rows::{Blocks, ConstraintRows, DryRow, FloorRow, LimitRow};
 use crate::sim::{Mount, Sim};
-use crate::solver::block::Block;
-use crate::solver::coupled::Coupling;
-use crate::solver::crowd::Crowd;
-use crate::solver::floor::FloorRow;
-use crate::solver::joint::{DryRow, LimitRow};
-use crate::spatial::*;
-use crate::variation::Varied;
-use std::sync::Arc;
-
-/// Largest sound position, velocity or acceleration.
-const LARGEST: f64 = 1e10;
-
-/// State of `T::LANES` agents that share a model: everything their future depends on.
-#[derive(Clone, Debug)]
-pub struct Group<T: Real> {
-    /// Configuration in MuJoCo's layout, one entry per coordinate.
-    pub qpos: Vec<T>,
-    /// Velocity in MuJoCo's layout.
-    pub qvel: Vec<T>,
-    /// Controls, one per actuator; kept until changed.
-    pub ctrl: Vec<T>,
-    /// Activations of the actuators that have one.
-    pub act: Vec<T>,
-    /// Acceleration of the last step: where the constraint solver starts from.
-    pub warm: Vec<T>,
-    /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
-    pub external: Vec<V6<T>>,
-    /// Constants that differ from the model's.
-    pub(crate) varied: Option<Box<Varied<T>>>,
-    /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
-    pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
-}
-
-impl<T: Real> Group<T> {
-    /// All agents in the reference configuration, at rest.
-    pub fn new(sim: &Sim<T>) -> Self {
-        let m = &sim.model;
-        let zero = T::zero();
-        Group {
-            qpos: m.qpos0.iter().map(|x| T::lit(*x)).collect(),
-            qvel: vec![zero; m.nv],
-            ctrl: vec![zero; m.nu],
-            act: vec![zero; m.na],
-            external: Vec::new(),
-            varied: None,
-            grounds: Vec::new(),
-            warm: vec![zero; m.nv],
-        }
-    }
-
-    /// Pushes a body of one agent until told otherwise: force, N, and torque, N m, in world axes at its center of mass.
-    ///
-    /// # Panics
-    /// If the body does not exist.
-    pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
-        if self.external.is_empty() {
-            self.external = vec![[T::zero(); 6]; sim.model.bodies.len()];
-        }
-        for i in 0..3 {
-            self.external[body][i].set(lane, T::scalar(torque[i]));
-            self.external[body][3 + i].set(lane, T::scalar(force[i]));
-        }
-    }
-
-    /// Puts one agent into a state; its controls, activations, pushes and warm start are cleared. Quaternions are normalized.
-    ///
-    /// # Panics
-    /// If a slice's length is not the model's `nq` or `nv`.
-    pub fn reset_lane(&mut self, sim: &Sim<T>, lane: usize, qpos: &[f64], qvel: &[f64]) {
-        assert_eq!(qpos.len(), self.qpos.len(), "qpos has the model's length");
-        assert_eq!(qvel.len(), self.qvel.len(), "qvel has the model's length");
-        for (v, x) in self.qpos.iter_mut().zip(qpos) {
-            v.set(lane, T::scalar(*x));
-        }
-        for joint in &sim.model.joints {
-            let start = match joint.kind {
-                JointType::Free => joint.qpos_adr + 3,
-                JointType::Ball => joint.qpos_adr,
-                _ => continue,
-            };
-            let q = &qpos[start..start + 4];
-            let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-            for i in 0..4 {
-                let x = if n > 1e-10 { q[i] / n } else { f64::from(i == 0) };
-                self.qpos[start + i].set(lane, T::scalar(x));
-            }
-        }
-        for (v, x) in self.qvel.iter_mut().zip(qvel) {
-            v.set(lane, T::scalar(*x));
-        }
-        for v in
-            self.warm.iter_mut().chain(&mut self.ctrl).chain(&mut self.act).chain(self.external.iter_mut().flatten())
-        {
-            v.set(lane, T::scalar(0.0));
-        }
-    }
-
-    /// Lanes whose state is sound: finite, and with positions, velocities and accelerations below 1e10, MuJoCo's bound
-    /// too. Far beyond it products overflow, and then even what a mask makes zero is not.
-    pub fn finite(&self) -> T::Mask {
-        let mut sum = T::zero();
-        for x in &self.act {
-            // 0 x is 0, or NaN where x is not finite
-            sum += *x * T::zero();
-        }
-        let mut sound = sum.is_finite();
-        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
-            sound = T::and(sound, x.abs().lt(T::lit(LARGEST)));
-        }
-        sound
-    }
-}
 
 /// Scratch memory of a step; holds the readings of the group stepped last. One per thread.
 #[derive(Clone, Debug)]
@@ -181,7 +74,7 @@ pub struct Work<T: Real> {
     pub(crate) stale: Vec<bool>,
     /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
     pub(crate) root_factor: Vec<[[T; 6]; 6]>,
-    /// Forces on links for [`crate::articulated::bring_inward`].
+    /// Forces on links for `bring_inward`.
     pub(crate) link_force: Vec<V6<T>>,
     /// The last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a call of
     /// [`Sim::advance`], and there is much that one can keep from it.
@@ -191,7 +84,7 @@ pub struct Work<T: Real> {
     pub(crate) dry: Vec<DryRow<T>>,
     pub(crate) blocks: Blocks<T>,
     /// Rows of the last evaluation, if the present one [continues](Work::continues) it; else none.
-    pub(crate) past: Past<T>,
+    pub(crate) past: ConstraintRows<T>,
     pub(crate) coupling: Coupling<T>,
     /// Per lane, once one has had a crowd: its factorization.
     pub(crate) crowds: Vec<Crowd<T::Scalar>>,
@@ -227,97 +120,6 @@ pub struct Work<T: Real> {
     /// States of the Runge-Kutta stages.
     pub(crate) stages: Vec<Group<T>>,
     pub(crate) stats: SolverStats,
-}
-
-/// Rows of an earlier evaluation of the forces. What pushed then mostly pushes now. (The accelerations of then are a
-/// worse guide: a contact that was slowing something down is, by them, about to let go.)
-#[derive(Clone, Debug)]
-pub(crate) struct Past<T: Real> {
-    pub contacts: Vec<FloorRow<T>>,
-    pub limits: Vec<LimitRow<T>>,
-    pub dry: Vec<DryRow<T>>,
-    pub blocks: Blocks<T>,
-}
-
-/// The former row with a number, if there is one; both come in ascending order, and `at` walks along the former.
-#[inline(always)]
-pub(crate) fn former<'a, R>(
-    rows: &'a [R],
-    at: &mut usize,
-    number: usize,
-    number_of: impl Fn(&R) -> usize,
-) -> Option<&'a R> {
-    while *at < rows.len() && number_of(&rows[*at]) < number {
-        *at += 1;
-    }
-    if *at < rows.len() && number_of(&rows[*at]) == number { Some(&rows[*at]) } else { None }
-}
-
-/// The blocks of a step; their memory is kept from step to step.
-#[derive(Clone, Debug)]
-pub(crate) struct Blocks<T: Real> {
-    items: Vec<Block<T>>,
-    len: usize,
-}
-
-impl<T: Real> Blocks<T> {
-    fn new() -> Self {
-        Blocks { items: Vec::new(), len: 0 }
-    }
-
-    /// Forgets all blocks.
-    pub fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    /// Adds a block, whose contents are those of some earlier one, and returns its index.
-    pub fn add(&mut self) -> usize {
-        if self.len == self.items.len() {
-            self.items.push(Block::new());
-        }
-        self.len += 1;
-        self.len - 1
-    }
-}
-
-impl<T: Real> std::ops::Deref for Blocks<T> {
-    type Target = [Block<T>];
-    #[inline(always)]
-    fn deref(&self) -> &[Block<T>] {
-        &self.items[..self.len]
-    }
-}
-
-impl<T: Real> std::ops::DerefMut for Blocks<T> {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [Block<T>] {
-        &mut self.items[..self.len]
-    }
-}
-
-/// Counts of the constraint solver's work, summed over steps since the work was made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SolverStats {
-    /// Solves of a lane group.
-    pub solves: u64,
-    /// Newton iterations of a lane group (that of its slowest lane).
-    pub newton: u64,
-    /// Line search iterations.
-    pub line_search: u64,
-    /// Largest number of Newton iterations in a solve.
-    pub max_newton: u64,
-    /// Lanes that hit the iteration cap before they converged.
-    pub unconverged: u64,
-    /// Contacts, summed over lanes.
-    pub contacts: u64,
-    /// Contacts in the union of a group's lanes.
-    pub contact_rows: u64,
-    /// Pairs of geoms looked at, of lane groups.
-    pub pairs: u64,
-    /// Factorizations of single agents in which much touches much, instead of by lane groups.
-    pub crowded: u64,
-    /// Entries of the factors that they computed: what they cost.
-    pub entries: u64,
 }
 
 impl<T: Real> Work<T> {
@@ -365,7 +167,7 @@ impl<T: Real> Work<T> {
             dry: Vec::with_capacity(sim.dry.len()),
             continues: false,
             blocks: Blocks::new(),
-            past: Past { contacts: Vec::new(), limits: Vec::new(), dry: Vec::new(), blocks: Blocks::new() },
+            past: ConstraintRows { contacts: Vec::new(), limits: Vec::new(), dry: Vec::new(), blocks: Blocks::new() },
             coupling: Coupling::new(nl, nv),
             crowds: Vec::new(),
             crowded: T::none(),
@@ -439,34 +241,5 @@ impl<T: Real> Work<T> {
     /// Counts of the constraint solver's work.
     pub fn stats(&self) -> SolverStats {
         self.stats
-    }
-}
-
-impl SolverStats {
-    /// Adds another thread's counts.
-    pub fn add(&mut self, other: &SolverStats) {
-        self.solves += other.solves;
-        self.newton += other.newton;
-        self.line_search += other.line_search;
-        self.max_newton = self.max_newton.max(other.max_newton);
-        self.unconverged += other.unconverged;
-        self.contacts += other.contacts;
-        self.contact_rows += other.contact_rows;
-        self.pairs += other.pairs;
-        self.crowded += other.crowded;
-        self.entries += other.entries;
-    }
-
-    /// Takes earlier counts away (the largest iteration count stays).
-    pub(crate) fn subtract(&mut self, earlier: &SolverStats) {
-        self.solves -= earlier.solves;
-        self.newton -= earlier.newton;
-        self.line_search -= earlier.line_search;
-        self.unconverged -= earlier.unconverged;
-        self.contacts -= earlier.contacts;
-        self.contact_rows -= earlier.contact_rows;
-        self.pairs -= earlier.pairs;
-        self.crowded -= earlier.crowded;
-        self.entries -= earlier.entries;
     }
 }

@@ -3,12 +3,12 @@
 //! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
 //! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
 
+use super::group::Group;
+use crate::algebra::spatial::V3;
+use crate::geometry::height::HeightField;
 use crate::lanes::{MAX_LANES, Real};
 use crate::model::{Model, Vec3};
-use crate::narrow::height::HeightField;
 use crate::sim::Sim;
-use crate::spatial::V3;
-use crate::work::Group;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

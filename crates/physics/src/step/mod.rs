@@ -1,20 +1,15 @@
 //! One step, stage by stage.
 
-use crate::articulated::{accelerate, bring_inward, factorize};
+use crate::algebra::planar::{Full, Planar, Space};
+use crate::algebra::spatial::*;
 use crate::collision::{collide_floor, collide_pairs};
-use crate::equality::equality_blocks;
-use crate::fluid::external_forces;
-use crate::forces::{advance_activations, applied_forces};
-use crate::kinematics::{kinematics, velocities};
+use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
+use crate::dynamics::*;
 use crate::lanes::{Kernel, Real, kernel_fn};
 use crate::model::JointType;
 use crate::sim::Sim;
-use crate::solver::joint::joint_rows;
 use crate::solver::{apply_forces, solve};
-use crate::space::{Full, Planar, Space};
-use crate::spatial::*;
-use crate::tendon::tendon_blocks;
-use crate::work::{Group, Work};
+use crate::state::{Group, Work};
 
 kernel_fn! {
     /// Frames, axes, inertias, velocities.
@@ -26,7 +21,10 @@ kernel_fn! {
 kernel_fn! {
     /// Applied forces.
     fn force_stage<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        applied_forces(sim, group, work);
+        measure_tendons(sim, group, work);
+        passive(sim, group, work);
+        tendon_springs(sim, work);
+        actuation(sim, group, work);
     }
 }
 kernel_fn! {

@@ -2,64 +2,26 @@
 //!
 //! The correction of [`coupled`](super::coupled) costs the square of its rows for every degree of freedom. A pile of
 //! bodies has hundreds of rows and few of them say anything new: what counts is which links touch. Beyond
-//! [`MOST_ROWS`] rows an agent is solved by a factorization of the whole matrix `H = M + J' D J`.
-//!
-//! It generalizes the articulated-body recursion. That recursion eliminates the joints of a link and hands to the
-//! parent a 6x6 matrix over the parent's spatial acceleration. Here the matrix of a link, its front, is also over the
-//! accelerations of the links that it touches: they are carried inward as they are, until the elimination reaches them
-//! (Duff and Reid's multifrontal method, with links for variables). Rows over several joints, such as tendons, are carried
-//! along in the same way, as the sum of their terms that are still to come. A link that touches nothing costs what it
-//! costs in the recursion, islands never meet, and a contact costs by the links between it and the root, not by the other
-//! contacts. Trees are eliminated by minimum degree ([`order`]), the links of a tree from the tips to the root.
-//!
-//! Which links touch differs between agents, and so do order and fronts: a crowded agent is factorized in scalar
-//! arithmetic, whatever lanes it shares. The choice, the order and every sum depend on that agent alone. The other stages
-//! of the solver take no notice, and neither do the lanes beside it: see [`coupled`](super::coupled).
+//! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS) rows an agent is solved by a factorization of the whole matrix
+//! `H = M + J' D J` ([`multifrontal`]). The other stages of the solver take no notice, and neither do the lanes beside it:
+//! see [`coupled`](super::coupled).
 
-#[path = "../../multifrontal/assembly.rs"]
-mod assembly;
-#[path = "../../multifrontal/front.rs"]
-mod front;
-#[path = "../../multifrontal/order.rs"]
-mod order;
-#[path = "../../multifrontal/plan.rs"]
-mod plan;
-
-use crate::lanes::{Real, kernel_fn};
+use crate::algebra::spatial::*;
+use crate::lanes::{MAX_LANES, Real, kernel_fn};
+use crate::multifrontal::{self, Crowd, JointRow, NONE, RowTerms, Tie};
+use crate::rows::{Block, Jacobian};
 use crate::sim::Sim;
-use crate::solver::block::{Block, Jacobian};
-use crate::spatial::*;
-use crate::work::Work;
-use assembly::Tie;
-use front::{JointRow, Numbers};
-use plan::{NONE, Plan, RowTerms};
-
-/// Rows between moving links (and over several joints) up to which the correction of low rank is used. Eight contacts
-/// with friction: more than a figure has with itself but in rare heaps.
-pub(crate) const MOST_ROWS: usize = 24;
-
-/// The factorization of one agent.
-#[derive(Clone, Debug)]
-pub(crate) struct Crowd<S> {
-    plan: Plan<S>,
-    numbers: Numbers<S>,
-}
-
-impl<S: Real> Crowd<S> {
-    fn new() -> Self {
-        Crowd { plan: Plan::new(), numbers: Numbers::new() }
-    }
-}
+use crate::state::Work;
 
 kernel_fn! {
-    /// Finds the lanes with more than [`MOST_ROWS`] coupled rows and prepares their factorization.
+    /// Finds the lanes with more than [`Sim::most_rows`] coupled rows and prepares their factorization.
     pub(crate) fn start<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) -> T::Mask {
         let most = sim.most_rows;
         let coupled = || work.blocks.iter().filter(|b| b.coupled);
         if coupled().map(|b| b.dim).sum::<usize>() <= most {
             return T::none();
         }
-        let mut rows = [0; crate::lanes::MAX_LANES];
+        let mut rows = [0; MAX_LANES];
         for b in coupled() {
             let bits = T::bits(b.on);
             for (lane, n) in rows.iter_mut().enumerate().take(T::LANES) {
@@ -146,7 +108,7 @@ fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
 
 kernel_fn! {
     /// Factorizes the system of the lanes `lanes`: what changed of it since their last factorization, by
-    /// [`Work::stale`](crate::work::Work::stale) and [`Block::moved`].
+    /// [`Work::stale`] and [`Block::moved`].
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
@@ -186,7 +148,7 @@ kernel_fn! {
                 }
             }
             stats.crowded += 1;
-            stats.entries += front::factorize(&sim.links, plan, numbers);
+            stats.entries += multifrontal::factorize(&sim.links, plan, numbers);
         }
         for b in work.blocks.iter_mut() {
             b.moved = T::none();
@@ -195,9 +157,9 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Solves for the forces of the present system in the lanes `lanes`, into [`Work::next`](crate::work::Work::next)
-    /// and [`Work::link_acc`](crate::work::Work::link_acc); without the blocks' and the motion's forces for a residual,
-    /// whose forces on links are in [`Work::link_force`](crate::work::Work::link_force).
+    /// Solves for the forces of the present system in the lanes `lanes`, into [`Work::next`]
+    /// and [`Work::link_acc`]; without the blocks' and the motion's forces for a residual,
+    /// whose forces on links are in [`Work::link_force`].
     pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
@@ -224,7 +186,7 @@ kernel_fn! {
             for (force, row) in numbers.row_force.iter_mut().zip(&numbers.rows) {
                 *force = if residual { zero } else { row.w * row.u0 };
             }
-            front::solve(&sim.links, plan, numbers);
+            multifrontal::solve(&sim.links, plan, numbers);
             for (to, from) in next.iter_mut().zip(&numbers.next) {
                 to.set(lane, *from);
             }

@@ -1,0 +1,13 @@
+//! Smooth dynamics: frames, velocities, applied forces, and the recursion that solves for accelerations in linear time.
+
+mod actuation;
+mod articulated;
+mod external;
+mod kinematics;
+mod passive;
+
+pub(crate) use actuation::{actuation, advance_activations};
+pub(crate) use articulated::{accelerate, bring_inward, factorize, link_accelerations, reduce_free_root};
+pub(crate) use external::external_forces;
+pub(crate) use kinematics::{kinematics, velocities};
+pub(crate) use passive::{measure_tendons, passive, tendon_springs};

@@ -1,0 +1,61 @@
+//! The rows of one evaluation of the forces.
+
+use super::block::Block;
+use super::floor::FloorRow;
+use super::joint::{DryRow, LimitRow};
+use crate::lanes::Real;
+
+/// All rows of one evaluation of the forces, by kind.
+#[derive(Clone, Debug)]
+pub(crate) struct ConstraintRows<T: Real> {
+    /// Contacts with level planes.
+    pub contacts: Vec<FloorRow<T>>,
+    /// Limits of hinges and slides.
+    pub limits: Vec<LimitRow<T>>,
+    /// Dry friction of degrees of freedom.
+    pub dry: Vec<DryRow<T>>,
+    /// Everything else.
+    pub blocks: Blocks<T>,
+}
+
+/// The blocks of a step; their memory is kept from step to step.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks<T: Real> {
+    items: Vec<Block<T>>,
+    len: usize,
+}
+
+impl<T: Real> Blocks<T> {
+    pub fn new() -> Self {
+        Blocks { items: Vec::new(), len: 0 }
+    }
+
+    /// Forgets all blocks.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds a block, whose contents are those of some earlier one, and returns its index.
+    pub fn add(&mut self) -> usize {
+        if self.len == self.items.len() {
+            self.items.push(Block::new());
+        }
+        self.len += 1;
+        self.len - 1
+    }
+}
+
+impl<T: Real> std::ops::Deref for Blocks<T> {
+    type Target = [Block<T>];
+    #[inline(always)]
+    fn deref(&self) -> &[Block<T>] {
+        &self.items[..self.len]
+    }
+}
+
+impl<T: Real> std::ops::DerefMut for Blocks<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [Block<T>] {
+        &mut self.items[..self.len]
+    }
+}

@@ -1,0 +1,19 @@
+//! Rows: what a constraint measures, how hard it is, and what it exerts at a given acceleration.
+//!
+//! Three kinds have a layout of their own because walking consists of them: points above a level floor ([`FloorRow`]),
+//! limits of hinges and slides ([`LimitRow`]), dry friction ([`DryRow`]). Everything else is a [`Block`].
+
+mod block;
+mod blocks;
+mod cone;
+mod floor;
+mod jacobian;
+mod joint;
+mod row;
+
+pub(crate) use block::{Block, RowValues, Source, at};
+pub(crate) use blocks::{Blocks, ConstraintRows};
+pub(crate) use floor::FloorRow;
+pub(crate) use jacobian::{Jacobian, Side};
+pub(crate) use joint::{DryRow, LimitRow};
+pub(crate) use row::{NewtonStep, Row, former};

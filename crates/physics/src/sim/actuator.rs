@@ -1,0 +1,95 @@
+//! Actuators.
+
+use crate::lanes::Real;
+use crate::model::{Actuator, Dynamics, Model, Transmission};
+
+/// What an actuator pulls at.
+#[derive(Clone, Debug)]
+pub(crate) enum Pull<C> {
+    /// Degrees of freedom and their gears; `qpos` is the coordinate of a scalar joint, for affine gains and biases.
+    Joint { dofs: std::ops::Range<usize>, qpos: usize, gear: [C; 6] },
+    /// A tendon, and the gear.
+    Tendon { index: usize, gear: C },
+}
+
+/// An actuator.
+#[derive(Clone, Debug)]
+pub(crate) struct ActuatorSpec<C> {
+    pub pull: Pull<C>,
+    pub ctrl: Option<(C, C)>,
+    pub force: Option<(C, C)>,
+    pub gain: [C; 3],
+    pub bias: [C; 3],
+    /// Plain motor: force = gain * input.
+    pub plain: bool,
+    pub activation: Option<Activation<C>>,
+}
+
+/// How an actuator's activation follows its control.
+#[derive(Clone, Debug)]
+pub(crate) struct Activation<C> {
+    /// Index in `act`.
+    pub index: usize,
+    /// Rate of change per unit of distance from the control; `None` integrates the control.
+    pub rate: Option<C>,
+    /// Seconds by which the rate of change is multiplied over a step.
+    pub reach: C,
+    pub range: Option<(C, C)>,
+    /// The force follows the activation at the end of the step.
+    pub early: bool,
+}
+
+/// Prepares the actuators.
+pub(super) fn motors<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> {
+    let c = T::scalar;
+    let flags = &model.opt.flags;
+    let range = |on: bool, r: &[f64; 2]| on.then(|| (c(r[0]), c(r[1])));
+    let motor = |a: &Actuator| {
+        let pull = match a.transmission {
+            Transmission::Joint(j) | Transmission::JointInParent(j) => {
+                let joint = &model.joints[j];
+                let dofs = joint.dof_adr..joint.dof_adr + joint.kind.dofs();
+                Pull::Joint { dofs, qpos: joint.qpos_adr, gear: a.gear.map(c) }
+            }
+            Transmission::Tendon(index) => Pull::Tendon { index, gear: c(a.gear[0]) },
+        };
+        let (dt, tiny) = (model.opt.timestep, 1e-15);
+        let rate = match a.dynamics {
+            Dynamics::None | Dynamics::Integrator => None,
+            Dynamics::Filter { time_constant } | Dynamics::FilterExact { time_constant } => {
+                Some(c(1.0 / f64::max(time_constant, tiny)))
+            }
+        };
+        let reach = match a.dynamics {
+            Dynamics::FilterExact { time_constant } => {
+                let t = f64::max(time_constant, tiny);
+                t * (1.0 - libm::exp(-dt / t))
+            }
+            _ => dt,
+        };
+        ActuatorSpec {
+            pull,
+            ctrl: range(a.ctrl_limited && flags.clampctrl, &a.ctrl_range),
+            force: range(a.force_limited, &a.force_range),
+            gain: a.gain.map(c),
+            bias: a.bias.map(c),
+            plain: a.gain[1..] == [0.0; 2] && a.bias == [0.0; 3],
+            activation: a.act.map(|index| Activation {
+                index,
+                rate,
+                reach: c(reach),
+                range: range(a.act_limited, &a.act_range),
+                early: a.act_early,
+            }),
+        }
+    };
+    if flags.actuation { model.actuators.iter().map(motor).collect() } else { Vec::new() }
+}
+
+/// Bounds of what all actuators together exert on a degree of freedom.
+pub(super) fn joint_force_ranges<T: Real>(model: &Model) -> Vec<(usize, T::Scalar, T::Scalar)> {
+    let bounded = |j: &crate::model::Joint| {
+        j.actuator_force_range.map(|[low, high]| (j.dof_adr, T::scalar(low), T::scalar(high)))
+    };
+    model.joints.iter().filter_map(bounded).collect()
+}

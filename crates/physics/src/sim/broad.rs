@@ -1,0 +1,68 @@
+//! Which pairs belong to which groups, for the broad phase of models with many pairs: every tree, and every geom that
+//! stands still, is a group.
+
+use super::contacts::Contacts;
+use crate::lanes::Real;
+
+/// Pairs across trees from which on the broad phase is worth its while.
+const FEWEST: usize = 500;
+
+/// Which pairs belong to which groups.
+#[derive(Clone, Debug)]
+pub(crate) struct Broad<C> {
+    /// Geoms of each group.
+    pub members: Vec<Vec<usize>>,
+    /// By group: the groups with numbers not below that its geoms have pairs with, ascending, and where those begin and
+    /// end in `pairs`.
+    partners: Vec<Vec<(usize, usize, usize)>>,
+    /// Numbers of the pairs, by groups.
+    pairs: Vec<u32>,
+    /// Added on every side of a box: half of the largest margin.
+    pub margin: C,
+}
+
+impl<C: Real> Broad<C> {
+    /// Sorts the pairs of a model into groups; none if they are few. `tree_of` gives the tree of a geom that moves.
+    pub fn of(contacts: &Contacts<C>, trees: usize, tree_of: impl Fn(usize) -> Option<usize>) -> Option<Self> {
+        let mut group_of = vec![usize::MAX; contacts.paired.last().map_or(0, |p| p.geom + 1)];
+        let mut members = vec![Vec::new(); trees];
+        for paired in &contacts.paired {
+            let group = tree_of(paired.geom).unwrap_or_else(|| {
+                members.push(Vec::new());
+                members.len() - 1
+            });
+            group_of[paired.geom] = group;
+            members[group].push(paired.geom);
+        }
+        let mut keys: Vec<([usize; 2], u32)> = Vec::with_capacity(contacts.pairs.len());
+        for (index, pair) in contacts.pairs.iter().enumerate() {
+            let [a, b] = pair.geoms.map(|g| group_of[g as usize]);
+            keys.push(([a.min(b), a.max(b)], index as u32));
+        }
+        if keys.iter().filter(|([a, b], _)| a != b && *b < trees).count() < FEWEST {
+            return None;
+        }
+        keys.sort_unstable();
+        let mut partners: Vec<Vec<(usize, usize, usize)>> = vec![Vec::new(); members.len()];
+        for (at, ([a, b], _)) in keys.iter().enumerate() {
+            match partners[*a].last_mut() {
+                Some((group, _, end)) if group == b => *end = at + 1,
+                _ => partners[*a].push((*b, at, at + 1)),
+            }
+        }
+        let margin = contacts.specs.iter().map(|s| C::widen(s.margin.get(0))).fold(0.0, f64::max);
+        let pairs = keys.into_iter().map(|(_, index)| index).collect();
+        Some(Broad { members, partners, pairs, margin: C::lit(0.5 * margin) })
+    }
+}
+
+impl<C> Broad<C> {
+    /// Numbers of the pairs of geoms of two groups.
+    pub fn between(&self, a: usize, b: usize) -> &[u32] {
+        let partners = &self.partners[a.min(b)];
+        match partners.binary_search_by_key(&a.max(b), |p| p.0) {
+            Ok(at) => &self.pairs[partners[at].1..partners[at].2],
+            Err(_) => &[],
+        }
+    }
+}

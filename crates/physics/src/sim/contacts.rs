@@ -1,0 +1,171 @@
+//! Which geoms may touch: the list of contacts, made once per model.
+//!
+//! Points of spheres, capsules and boxes above a level plane are the common case and have their own list
+//! ([`floor_points`]); everything else is listed by [`pairs`].
+
+use super::broad::Broad;
+use super::contact_params::{ContactParams, declared, label, may_collide};
+use super::floor_points::{self, Candidate};
+use super::options::{SimError, SimOptions};
+use super::pairs::{self, Pair, PairSpec};
+use super::weld::BodyMount;
+use crate::lanes::Real;
+use crate::model::{Geom, GeomType, Model};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Everything that may touch.
+#[derive(Clone, Debug)]
+pub(crate) struct Contacts<C> {
+    /// Points above level planes.
+    pub floor: Vec<Candidate<C>>,
+    /// Other pairs of geoms, those of a kind next to each other.
+    pub pairs: Vec<Pair>,
+    /// What those pairs are.
+    pub specs: Vec<PairSpec<C>>,
+    /// Geoms of those pairs.
+    pub paired: Vec<Paired<C>>,
+    /// Some are [hard](super::weights::is_hard).
+    pub hard: bool,
+    /// How to find those of the pairs that may touch, if they are many.
+    pub broad: Option<Broad<C>>,
+}
+
+/// A geom that meets others.
+#[derive(Clone, Debug)]
+pub(crate) struct Paired<C> {
+    pub geom: usize,
+    /// Length on either side of the center along the third axis, of a capsule; else 0, and it is a ball that bounds it.
+    pub half: C,
+}
+
+impl<C> Contacts<C> {
+    /// No contacts.
+    pub fn none() -> Self {
+        Contacts {
+            floor: Vec::new(),
+            pairs: Vec::new(),
+            specs: Vec::new(),
+            paired: Vec::new(),
+            hard: false,
+            broad: None,
+        }
+    }
+}
+
+/// Lists the contacts of a model; refuses those that are not simulated. `link_of` numbers the bodies that move, `tree_of`
+/// the trees of those.
+pub(super) fn contacts<T: Real>(
+    model: &Model,
+    mounts: &[BodyMount],
+    link_of: &[Option<usize>],
+    tree_of: &[usize],
+    options: &SimOptions,
+) -> Result<Contacts<T::Scalar>, SimError> {
+    let mut out = Contacts::none();
+    if !(model.opt.flags.contact && model.opt.flags.constraint) {
+        return Ok(out);
+    }
+    let refuse = |what: String, remedy: &str| {
+        Err(SimError::Unsupported { model: model.name.clone(), what, remedy: remedy.into() })
+    };
+    let link = |g: usize| link_of[mounts[model.geoms[g].body].body];
+    let excluded: BTreeSet<[usize; 2]> = model.excludes.iter().copied().collect();
+    let kinds = kinds(model, mounts, link);
+    // what pairs of two kinds have in common; the geoms of a crowd are of few kinds
+    let mut known: BTreeMap<[usize; 2], u32> = BTreeMap::new();
+    for i in 0..model.geoms.len() {
+        for j in i + 1..model.geoms.len() {
+            let declared = declared(model, i, j).is_some();
+            if !declared && !may_collide(model, mounts, &excluded, i, j) {
+                continue;
+            }
+            match (link(i), link(j)) {
+                (None, None) => continue,
+                // what a declared pair of one link exerts on one geom it takes from the other
+                (Some(a), Some(b)) if a == b => continue,
+                (Some(_), Some(_)) if options.ground_contacts_only => continue,
+                _ => {}
+            }
+            // in the order of MuJoCo's shape types
+            let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
+            let geoms = [a as u32, b as u32];
+            if let (false, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
+                out.pairs.push(Pair { geoms, spec: *spec });
+                continue;
+            }
+            let params = ContactParams::of(model, i, j);
+            if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out) {
+                continue;
+            }
+            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out) {
+                let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
+                return refuse(
+                    format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
+                    "use spheres, capsules or boxes, or turn the contact off with contype and conaffinity",
+                );
+            }
+            let spec = out.specs.len() as u32 - 1;
+            out.pairs.push(Pair { geoms, spec });
+            if !declared {
+                known.insert([kinds[a], kinds[b]], spec);
+            }
+        }
+    }
+    // the candidates of a geom are neighbors; the order of planes within a geom stays
+    out.floor.sort_by_key(|c| c.geom);
+    // slots of one class are filled together
+    out.pairs.sort_by_key(|p| out.specs[p.spec as usize].class());
+    let mut meets = vec![false; model.geoms.len()];
+    out.pairs.iter().flat_map(|p| p.geoms).for_each(|g| meets[g as usize] = true);
+    let paired = (0..meets.len()).filter(|g| meets[*g]);
+    let half = |g: &Geom| if g.kind == GeomType::Capsule { g.size[1] } else { 0.0 };
+    out.paired = paired.map(|g| Paired { geom: g, half: T::scalar(half(&model.geoms[g])) }).collect();
+    let group = |g: usize| link(g).map(|l| tree_of[l]);
+    out.broad = Broad::of(&out, tree_of.iter().max().map_or(0, |t| t + 1), group);
+    Ok(out)
+}
+
+/// Geoms from which on a model is a crowd.
+const CROWD: usize = 200;
+
+/// A number to twelve digits.
+fn rounded(x: f64) -> f64 {
+    const LOST: u64 = 1 << 12;
+    f64::from_bits((x.to_bits() + LOST / 2) & !(LOST - 1))
+}
+
+/// Numbers of the geoms' kinds: equal geoms of equal bodies that move are of one kind, whatever their names and whatever
+/// carries their bodies. In a crowd, inverse weights that differ by rounding are equal: copies of a body in other places
+/// would all be of kinds of their own.
+fn kinds(model: &Model, mounts: &[BodyMount], link: impl Fn(usize) -> Option<usize>) -> Vec<usize> {
+    let mut numbers: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
+    let mut kind = |(index, g): (usize, &Geom)| {
+        let body = &model.bodies[g.body];
+        let alone = if link(index).is_some() { 0 } else { index as u64 + 1 };
+        let mut key = vec![alone, g.kind as u64, g.condim as u64, g.priority as u64];
+        let single = [g.margin, g.solmix, body.mass];
+        let shape = [&g.size[..], &g.pos, &g.quat, &g.friction, &g.solref, &g.solimp, &single];
+        let [w, v] = body.invweight0;
+        let weights = [w, v, mounts[g.body].spread];
+        let weights = if model.geoms.len() < CROWD { weights } else { weights.map(rounded) };
+        let carrier = [&weights[..], &body.ipos, &body.iquat, &body.inertia];
+        key.extend(shape.into_iter().chain(carrier).flatten().map(|x| x.to_bits()));
+        let next = numbers.len();
+        *numbers.entry(key).or_insert(next)
+    };
+    model.geoms.iter().enumerate().map(&mut kind).collect()
+}
+
+/// Place in MuJoCo's order of shape types.
+fn rank(kind: GeomType) -> usize {
+    match kind {
+        GeomType::Plane => 0,
+        GeomType::Hfield => 1,
+        GeomType::Sphere => 2,
+        GeomType::Capsule => 3,
+        GeomType::Ellipsoid => 4,
+        GeomType::Cylinder => 5,
+        GeomType::Box => 6,
+        GeomType::Mesh => 7,
+    }
+}

@@ -1,0 +1,115 @@
+//! Points of moving geoms that may touch a level plane.
+//!
+//! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
+//! corners. Each is a [`Candidate`].
+
+use super::contact_params::ContactParams;
+use super::contacts::Contacts;
+use super::softness::{Softness, softness};
+use super::weights::{inverse_weights, is_hard};
+use super::weld::BodyMount;
+use crate::algebra::rigid::{self, quat_to_rot};
+use crate::lanes::Real;
+use crate::model::{Cone, GeomType, Model};
+
+/// A point of a moving geom that may touch a level plane.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate<C> {
+    pub link: usize,
+    /// Geom index in the model.
+    pub geom: usize,
+    /// Geom of the plane.
+    pub plane: usize,
+    /// Center of the sphere that touches (radius 0 for a box corner), in the link's frame.
+    pub point: [C; 3],
+    pub radius: C,
+    /// Capsule axis in the link's frame: the first tangent is its projection.
+    pub axis: Option<[C; 3]>,
+    /// Center of the box that this is a corner of, and the number of the corner among its eight.
+    pub corner: Option<([C; 3], usize)>,
+    /// Height of the plane.
+    pub height: C,
+    /// Friction along the two tangents; zero for a frictionless contact.
+    pub mu: [C; 2],
+    pub soft: Softness<C>,
+}
+
+/// Adds the points of a moving geom that may touch a level plane. Returns whether the list takes it: pyramidal cones
+/// of condim 1 or 3, spheres, capsules and boxes.
+pub(super) fn add<T: Real>(
+    model: &Model,
+    mounts: &[BodyMount],
+    (fixed, geom): (usize, usize),
+    link: Option<usize>,
+    params: &ContactParams,
+    contacts: &mut Contacts<T::Scalar>,
+) -> bool {
+    let (plane_geom, fixed, moving) = (fixed, &model.geoms[fixed], &model.geoms[geom]);
+    let Some(link) = link else { return false };
+    let pyramid = params.condim == 1 || (params.condim == 3 && model.opt.cone == Cone::Pyramidal);
+    let shape = matches!(moving.kind, GeomType::Sphere | GeomType::Capsule | GeomType::Box);
+    if fixed.kind != GeomType::Plane || mounts[fixed.body].body != 0 || !pyramid || !shape {
+        return false;
+    }
+    let mount = &mounts[fixed.body];
+    let plane = rigid::compose(&(mount.pos, mount.rot), &(fixed.pos, quat_to_rot(&fixed.quat)));
+    if plane.1[2][2] < 1.0 - 1e-12 {
+        return false;
+    }
+
+    let mu = if params.condim == 1 { [0.0; 2] } else { [params.friction[0], params.friction[1]] };
+    let [invweight, _] = inverse_weights(model, mounts, [moving.body, fixed.body]);
+    // pyramid edges share R = 2 mu^2 (1 + mu^2) / invweight-scaled impedance (MuJoCo's mj_makeImpedance)
+    let diag = if params.condim == 1 {
+        // four coinciding edges of a flat pyramid carry a quarter each
+        4.0 * invweight
+    } else {
+        2.0 * mu[0] * mu[0] / model.opt.impratio * invweight * (1.0 + mu[0] * mu[0])
+    };
+    contacts.hard |= is_hard(model, mounts, [moving.body, fixed.body], diag);
+    let out = &mut contacts.floor;
+    let soft = softness::<T>(model, &params.solref, &params.solimp, params.margin, diag);
+
+    let on_link = &mounts[moving.body];
+    let frame = rigid::compose(&(on_link.pos, on_link.rot), &(moving.pos, quat_to_rot(&moving.quat)));
+    let c3 = |v: [f64; 3]| [T::scalar(v[0]), T::scalar(v[1]), T::scalar(v[2])];
+    let base = Candidate {
+        link,
+        geom,
+        plane: plane_geom,
+        point: c3(frame.0),
+        radius: T::scalar(moving.size[0]),
+        axis: None,
+        corner: None,
+        height: T::scalar(plane.0[2]),
+        mu: mu.map(T::scalar),
+        soft,
+    };
+    match moving.kind {
+        GeomType::Sphere => out.push(base),
+        GeomType::Capsule => {
+            let axis = frame.1[2];
+            for side in [1.0, -1.0] {
+                let h = side * moving.size[1];
+                let point = [frame.0[0] + h * axis[0], frame.0[1] + h * axis[1], frame.0[2] + h * axis[2]];
+                out.push(Candidate { point: c3(point), axis: Some(c3(axis)), ..base.clone() });
+            }
+        }
+        GeomType::Box => {
+            for i in 0..8 {
+                let sign = |bit: usize, x: f64| if i & bit != 0 { x } else { -x };
+                let local = [sign(1, moving.size[0]), sign(2, moving.size[1]), sign(4, moving.size[2])];
+                let at = rigid::rotate(&frame.1, &local);
+                let point = [frame.0[0] + at[0], frame.0[1] + at[1], frame.0[2] + at[2]];
+                out.push(Candidate {
+                    point: c3(point),
+                    radius: T::scalar(0.0),
+                    corner: Some((c3(frame.0), i)),
+                    ..base.clone()
+                });
+            }
+        }
+        _ => unreachable!("other shapes were sent away above"),
+    }
+    true
+}

@@ -1,0 +1,35 @@
+//! What a user chooses when building a [`Sim`](super::Sim), and why that may fail.
+
+use thiserror::Error;
+
+/// Rows between moving links (and over several joints) up to which an agent is solved by a correction of low rank. Eight
+/// contacts with friction: more than a figure has with itself but in rare heaps.
+pub(crate) const MOST_COUPLED_ROWS: usize = 24;
+
+/// Why a model cannot be simulated.
+#[derive(Debug, Error, PartialEq)]
+pub enum SimError {
+    /// The model uses something that this engine does not simulate.
+    #[error("model '{model}': {what} is not supported by the simulator; {remedy}")]
+    Unsupported {
+        /// Model name.
+        model: String,
+        /// The offending element by name.
+        what: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+/// Choices a user makes when building a [`Sim`].
+#[derive(Clone, Debug, Default)]
+pub struct SimOptions {
+    /// Simulate contacts with the static world alone even if the model's moving geoms could collide with each other (by
+    /// their contype and conaffinity).
+    pub ground_contacts_only: bool,
+    /// Overrides the model's cap on Newton iterations.
+    pub max_newton: Option<usize>,
+    /// Overrides the number of rows between moving bodies beyond which an agent is solved as a crowd (24). It changes
+    /// the time of a step, and its results to rounding.
+    pub most_coupled_rows: Option<usize>,
+}

@@ -1,0 +1,325 @@
+//! Newton's iteration over all rows.
+
+use super::{blocks, coupled, crowd, search};
+use crate::algebra::planar::Space;
+use crate::algebra::spatial::*;
+use crate::dynamics::{accelerate, bring_inward, factorize, link_accelerations};
+use crate::lanes::Real;
+use crate::rows::NewtonStep;
+use crate::sim::Sim;
+use crate::state::{Group, Work};
+
+/// Solves for the constrained acceleration, into `acc`; rows end with their true forces.
+#[inline(always)]
+pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    start::<T, S>(sim, group, work);
+    let free = work.contacts.is_empty() && work.limits.is_empty() && work.dry.is_empty() && work.blocks.is_empty();
+    let any_coupled = blocks::any_coupled(work);
+    work.crowded = if any_coupled { crowd::start(sim, work) } else { T::none() };
+    // lanes whose tree is corrected for its coupled blocks, and those beside them
+    let (crowd, trees) = (T::any(work.crowded), !T::all(work.crowded));
+    let coupled = any_coupled && trees;
+    let mut done = T::none();
+    // lanes that stopped at a Newton point of their own active set
+    let mut arrived = T::none();
+    let mut iteration = 0;
+    loop {
+        assemble::<T, S>(sim, work);
+        if crowd {
+            crowd::factorize(sim, work, T::and(work.crowded, T::not(done)));
+        }
+        if coupled {
+            // links that are not stale keep their inward pass, without the correction of the last iteration
+            let fresh = work.stale.contains(&true);
+            work.drive.copy_from_slice(&work.tree_drive);
+            factorize::<T, S>(sim, work, true);
+            work.tree_drive.copy_from_slice(&work.drive);
+            coupled::factorize(sim, work, fresh);
+            coupled::correct(sim, work, true);
+        } else if trees {
+            factorize::<T, S>(sim, work, true);
+        }
+        work.stale.fill(false);
+        if trees {
+            accelerate::<T, S>(sim, work);
+        }
+        if crowd {
+            crowd::solve(sim, work, T::and(work.crowded, T::not(done)), false);
+        }
+        iteration += 1;
+        if free {
+            work.acc.copy_from_slice(&work.next);
+            arrived = T::not(arrived);
+            break;
+        }
+        let changed = newton_point(work);
+        let exact = T::not(changed);
+        arrived = T::or(arrived, T::and(exact, T::not(done)));
+        if T::all(T::or(done, exact)) {
+            // every live lane arrived
+            advance(sim, work, &NewtonStep { done, exact, alpha: T::lit(1.0), last: exact });
+            done = T::or(done, exact);
+        } else if iteration == 1 {
+            // the warm start only chose the active set: its accelerations obey no identity, take the whole step
+            advance(sim, work, &NewtonStep { done, exact: T::not(T::none()), alpha: T::lit(1.0), last: exact });
+            done = exact;
+        } else {
+            let (alpha, small) = search::line_search(sim, work, T::or(done, exact), iteration);
+            if sim.elliptic {
+                arrived = T::or(arrived, T::and(small, T::not(done)));
+            }
+            let last = T::or(exact, small);
+            advance(sim, work, &NewtonStep { done, exact, alpha, last });
+            done = T::or(done, last);
+        }
+        if T::all(done) || iteration >= sim.max_newton {
+            break;
+        }
+    }
+    true_forces(work);
+    refine::<T, S>(sim, work, arrived, coupled);
+    report_forces(sim, work);
+    work.stats.solves += 1;
+    work.stats.newton += iteration as u64;
+    work.stats.max_newton = work.stats.max_newton.max(iteration as u64);
+    if !free {
+        work.stats.unconverged += T::bits(T::not(done)).count_ones() as u64;
+    }
+}
+
+/// Active sets to start from: those of the evaluation before where there was one, else those at the warm start.
+#[inline(always)]
+fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    work.stale.fill(true);
+    work.in_contact.fill(false);
+    let mut known = true;
+    for c in &work.contacts {
+        work.in_contact[c.link] = true;
+        known &= !T::any(T::and(c.on, T::not(c.recalled)));
+    }
+    for l in &work.limits {
+        known &= !T::any(T::and(l.on, T::not(l.recalled)));
+    }
+    for f in &work.dry {
+        known &= f.recalled;
+    }
+    if !work.blocks.is_empty() {
+        known &= blocks::recall(work);
+    }
+    if !known {
+        warm_start::<T, S>(sim, group, work);
+    }
+    if !work.blocks.is_empty() {
+        blocks::start(work, known);
+    }
+}
+
+/// Row values at the warm start, and the active sets of rows that are new.
+#[inline(always)]
+fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    for d in 0..sim.model.nv {
+        work.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
+    }
+    link_accelerations::<T, S>(sim, work);
+    for c in work.contacts.iter_mut() {
+        let ja = c.of_motion(&work.link_acc[c.link]);
+        c.u = add3(&ja, &c.u0);
+        c.activate(T::not(c.recalled));
+    }
+    for l in work.limits.iter_mut() {
+        l.u = l.sign.mul_add(work.acc[l.dof], l.u0);
+        l.activate(T::not(l.recalled));
+    }
+    for f in work.dry.iter_mut() {
+        f.u = work.acc[f.dof] + f.u0;
+        if !f.recalled {
+            f.activate(T::not(T::none()));
+        }
+    }
+}
+
+/// Stiffness and right-hand side of the present active set, for the links where it changed.
+#[inline(always)]
+fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
+    let z = T::zero();
+    for (l, link) in sim.links.iter().enumerate() {
+        if !work.stale[l] {
+            continue;
+        }
+        for d in link.dofs.clone() {
+            work.diag[d] = T::splat(sim.armature[d]);
+            work.rhs[d] = work.tau[d];
+        }
+        if work.in_contact[l] {
+            work.stiffness[l] = [z; 21];
+            work.wrench[l] = [z; 6];
+        }
+    }
+    for c in &work.contacts {
+        let l = c.link;
+        if !work.stale[l] {
+            continue;
+        }
+        c.add_stiffness::<S>(&mut work.stiffness[l]);
+        let w = c.wrench(&c.linear_force(&c.u0));
+        S::add(&mut work.wrench[l], &w);
+    }
+    for l in &work.limits {
+        if !work.stale[sim.dof_link[l.dof]] {
+            continue;
+        }
+        let s = T::masked(l.active, l.d);
+        work.diag[l.dof] += s;
+        work.rhs[l.dof] += -(l.sign * (s * l.u0));
+    }
+    for f in &work.dry {
+        if !work.stale[sim.dof_link[f.dof]] {
+            continue;
+        }
+        work.diag[f.dof] += T::masked(f.sticking, f.d);
+        work.rhs[f.dof] += f.linear(f.u0);
+    }
+    if !work.blocks.is_empty() {
+        blocks::assemble(sim, work);
+    }
+}
+
+/// Row values at the Newton point; lanes whose active set differs there from the one that was solved with.
+#[inline(always)]
+fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
+    let mut changed = T::none();
+    for c in work.contacts.iter_mut() {
+        changed = T::or(changed, c.newton_point(&work.link_acc[c.link]));
+    }
+    for l in work.limits.iter_mut() {
+        changed = T::or(changed, l.newton_point(work.next[l.dof]));
+    }
+    for f in work.dry.iter_mut() {
+        changed = T::or(changed, f.newton_point(work.next[f.dof]));
+    }
+    if !work.blocks.is_empty() {
+        changed = T::or(changed, blocks::newton_point(work));
+    }
+    changed
+}
+
+/// Moves the lanes and marks the links whose system changed.
+#[inline(always)]
+fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
+    for (a, n) in work.acc.iter_mut().zip(&work.next) {
+        *a = step.of(*a, *n);
+    }
+    for c in work.contacts.iter_mut() {
+        work.stale[c.link] |= T::any(c.advance(step));
+    }
+    for l in work.limits.iter_mut() {
+        work.stale[sim.dof_link[l.dof]] |= T::any(l.advance(step));
+    }
+    for f in work.dry.iter_mut() {
+        work.stale[sim.dof_link[f.dof]] |= T::any(f.advance(step));
+    }
+    if !work.blocks.is_empty() {
+        blocks::advance(sim, work, *step);
+    }
+}
+
+/// Every row's true force at the present point.
+#[inline(always)]
+fn true_forces<T: Real>(work: &mut Work<T>) {
+    for c in work.contacts.iter_mut() {
+        c.force = c.true_force(&c.u);
+    }
+    for l in work.limits.iter_mut() {
+        l.force = l.true_force(l.u);
+    }
+    for f in work.dry.iter_mut() {
+        f.force = f.true_force(f.u);
+    }
+    if !work.blocks.is_empty() {
+        blocks::true_forces(work);
+    }
+}
+
+/// One step of iterative refinement: the equation of motion's residual, evaluated link by link, solved for with the
+/// matrix of the last iteration. It takes the rounding of stiff contacts out of single precision for little cost.
+/// Only for lanes in `arrived`: the matrix is that of their active set.
+#[inline(always)]
+fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask, coupled: bool) {
+    for d in 0..sim.model.nv {
+        work.rhs[d] = T::splat(sim.armature[d]).neg_mul_add(work.acc[d], work.tau[d]);
+    }
+    apply_forces::<T, S>(work);
+    link_accelerations::<T, S>(sim, work);
+    for l in 0..sim.links.len() {
+        let mut f = S::momentum(&work.inertia[l], &work.link_acc[l]);
+        S::add(&mut f, &work.bias_force[l]);
+        if work.in_contact[l] {
+            S::sub(&mut f, &work.wrench[l]);
+        }
+        work.link_force[l] = f;
+    }
+    if !T::all(work.crowded) {
+        bring_inward::<T, S>(sim, work);
+        if coupled {
+            coupled::correct(sim, work, false);
+        }
+        accelerate::<T, S>(sim, work);
+    }
+    if T::any(work.crowded) {
+        crowd::solve(sim, work, work.crowded, true);
+    }
+    for (a, x) in work.acc.iter_mut().zip(&work.next) {
+        *a += T::masked(arrived, *x);
+    }
+    for c in work.contacts.iter_mut() {
+        let du = c.of_motion(&work.link_acc[c.link]);
+        for i in 0..3 {
+            c.u[i] += T::masked(arrived, du[i]);
+        }
+    }
+    for l in work.limits.iter_mut() {
+        l.u += T::masked(arrived, l.sign * work.next[l.dof]);
+    }
+    for f in work.dry.iter_mut() {
+        f.u += T::masked(arrived, work.next[f.dof]);
+    }
+    if !work.blocks.is_empty() {
+        blocks::add_refinement(work, arrived);
+    }
+    true_forces(work);
+}
+
+/// Puts the constraint forces on the right-hand side: contact wrenches on links, limit and friction forces on joints.
+#[inline(always)]
+pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
+    for l in 0..work.wrench.len() {
+        if work.in_contact[l] {
+            work.wrench[l] = [T::zero(); 6];
+        }
+    }
+    for c in &work.contacts {
+        let w = c.wrench(&c.force);
+        S::add(&mut work.wrench[c.link], &w);
+    }
+    for l in &work.limits {
+        work.rhs[l.dof] += l.sign * l.force;
+    }
+    for f in &work.dry {
+        work.rhs[f.dof] += f.force;
+    }
+    if !work.blocks.is_empty() {
+        blocks::apply_forces(work);
+    }
+}
+
+/// Normal forces for the readings.
+#[inline(always)]
+fn report_forces<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+    work.normal_force.fill(T::zero());
+    for c in &work.contacts {
+        work.normal_force[c.geom] += c.force[0];
+    }
+    if !work.blocks.is_empty() {
+        blocks::report_forces(sim, work);
+    }
+}

@@ -1,0 +1,37 @@
+//! Memory of the correction for blocks that tie branches of a tree together.
+
+use crate::lanes::Real;
+
+/// Columns of the coupled rows and the factors of the small matrix.
+#[derive(Clone, Debug)]
+pub(crate) struct Coupling<T: Real> {
+    /// Inward passes of the rows: `nv` numbers each.
+    pub columns: Vec<T>,
+    /// The same times R.
+    pub scaled: Vec<T>,
+    /// R u0.
+    pub offset: Vec<T>,
+    /// Cholesky factor of the small matrix, lower triangle; inverses on the diagonal.
+    pub factor: Vec<T>,
+    pub y: Vec<T>,
+    /// Number of rows.
+    pub rows: usize,
+    /// Scratch: joint forces of one row.
+    pub rhs: Vec<T>,
+    pub on_path: Vec<bool>,
+}
+
+impl<T: Real> Coupling<T> {
+    pub fn new(links: usize, nv: usize) -> Self {
+        Coupling {
+            columns: Vec::new(),
+            scaled: Vec::new(),
+            offset: Vec::new(),
+            factor: Vec::new(),
+            y: Vec::new(),
+            rows: 0,
+            rhs: vec![T::zero(); nv],
+            on_path: vec![false; links],
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! State of a lane group.
+
+use super::variation::Varied;
+use crate::algebra::spatial::V6;
+use crate::geometry::height::HeightField;
+use crate::lanes::Real;
+use crate::model::JointType;
+use crate::sim::Sim;
+use std::sync::Arc;
+
+/// Largest sound position, velocity or acceleration.
+const LARGEST: f64 = 1e10;
+
+/// State of `T::LANES` agents that share a model: everything their future depends on.
+#[derive(Clone, Debug)]
+pub struct Group<T: Real> {
+    /// Configuration in MuJoCo's layout, one entry per coordinate.
+    pub qpos: Vec<T>,
+    /// Velocity in MuJoCo's layout.
+    pub qvel: Vec<T>,
+    /// Controls, one per actuator; kept until changed.
+    pub ctrl: Vec<T>,
+    /// Activations of the actuators that have one.
+    pub act: Vec<T>,
+    /// Acceleration of the last step: where the constraint solver starts from.
+    pub warm: Vec<T>,
+    /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
+    pub external: Vec<V6<T>>,
+    /// Constants that differ from the model's.
+    pub(crate) varied: Option<Box<Varied<T>>>,
+    /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
+    pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
+}
+
+impl<T: Real> Group<T> {
+    /// All agents in the reference configuration, at rest.
+    pub fn new(sim: &Sim<T>) -> Self {
+        let m = &sim.model;
+        let zero = T::zero();
+        Group {
+            qpos: m.qpos0.iter().map(|x| T::lit(*x)).collect(),
+            qvel: vec![zero; m.nv],
+            ctrl: vec![zero; m.nu],
+            act: vec![zero; m.na],
+            external: Vec::new(),
+            varied: None,
+            grounds: Vec::new(),
+            warm: vec![zero; m.nv],
+        }
+    }
+
+    /// Pushes a body of one agent until told otherwise: force, N, and torque, N m, in world axes at its center of mass.
+    ///
+    /// # Panics
+    /// If the body does not exist.
+    pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
+        if self.external.is_empty() {
+            self.external = vec![[T::zero(); 6]; sim.model.bodies.len()];
+        }
+        for i in 0..3 {
+            self.external[body][i].set(lane, T::scalar(torque[i]));
+            self.external[body][3 + i].set(lane, T::scalar(force[i]));
+        }
+    }
+
+    /// Puts one agent into a state; its controls, activations, pushes and warm start are cleared. Quaternions are normalized.
+    ///
+    /// # Panics
+    /// If a slice's length is not the model's `nq` or `nv`.
+    pub fn reset_lane(&mut self, sim: &Sim<T>, lane: usize, qpos: &[f64], qvel: &[f64]) {
+        assert_eq!(qpos.len(), self.qpos.len(), "qpos has the model's length");
+        assert_eq!(qvel.len(), self.qvel.len(), "qvel has the model's length");
+        for (v, x) in self.qpos.iter_mut().zip(qpos) {
+            v.set(lane, T::scalar(*x));
+        }
+        for joint in &sim.model.joints {
+            let start = match joint.kind {
+                JointType::Free => joint.qpos_adr + 3,
+                JointType::Ball => joint.qpos_adr,
+                _ => continue,
+            };
+            let q = &qpos[start..start + 4];
+            let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            for i in 0..4 {
+                let x = if n > 1e-10 { q[i] / n } else { f64::from(i == 0) };
+                self.qpos[start + i].set(lane, T::scalar(x));
+            }
+        }
+        for (v, x) in self.qvel.iter_mut().zip(qvel) {
+            v.set(lane, T::scalar(*x));
+        }
+        for v in
+            self.warm.iter_mut().chain(&mut self.ctrl).chain(&mut self.act).chain(self.external.iter_mut().flatten())
+        {
+            v.set(lane, T::scalar(0.0));
+        }
+    }
+
+    /// Lanes whose state is sound: finite, and with positions, velocities and accelerations below 1e10, MuJoCo's bound
+    /// too. Far beyond it products overflow, and then even what a mask makes zero is not.
+    pub fn finite(&self) -> T::Mask {
+        let mut sum = T::zero();
+        for x in &self.act {
+            // 0 x is 0, or NaN where x is not finite
+            sum += *x * T::zero();
+        }
+        let mut sound = sum.is_finite();
+        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
+            sound = T::and(sound, x.abs().lt(T::lit(LARGEST)));
+        }
+        sound
+    }
+}

@@ -1,0 +1,19 @@
+//! State of agents, and the scratch memory of a step.
+
+mod agent;
+mod clearance;
+mod coupling;
+mod group;
+mod scratch;
+mod stats;
+mod sweep;
+mod variation;
+
+pub use agent::AgentState;
+pub(crate) use clearance::clearance;
+pub(crate) use coupling::Coupling;
+pub use group::Group;
+pub use scratch::Work;
+pub use stats::SolverStats;
+pub(crate) use sweep::{Sweep, nowhere};
+pub use variation::Variation;
