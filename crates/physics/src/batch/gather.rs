@@ -93,9 +93,9 @@ impl<T: Real> Felt<T> {
 
     /// Those of the group that was stepped last with `work`.
     pub(super) fn keep(&mut self, work: &Work<T>) {
-        self.touching.copy_from_slice(&work.touching);
-        self.touched.copy_from_slice(&work.touched);
-        self.normal_force.copy_from_slice(&work.normal_force);
+        self.touching.copy_from_slice(&work.contacts.touching);
+        self.touched.copy_from_slice(&work.contacts.touched);
+        self.normal_force.copy_from_slice(&work.contacts.normal_force);
     }
 
     /// An agent has left where it was.

@@ -17,9 +17,9 @@ kernel_fn! {
     /// Finds the pairs that may touch, into [`Sweep::found`], after the geoms were placed.
     pub(super) fn find<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, broad: &'a Broad<T::Scalar>) {
         for paired in &sim.contacts.paired {
-            work.sweep.geoms[paired.geom] = surround(sim, work, broad, paired.geom);
+            work.contacts.sweep.geoms[paired.geom] = surround(sim, work, broad, paired.geom);
         }
-        sweep(broad, &sim.contacts.pairs, &mut work.sweep);
+        sweep(broad, &sim.contacts.pairs, &mut work.contacts.sweep);
     }
 }
 
@@ -28,7 +28,7 @@ kernel_fn! {
 fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geom: usize) -> [V3<T::Scalar>; 2] {
     let (model, mount) = (&sim.model.geoms[geom], &sim.geoms[geom]);
     let size = [T::lit(model.size[0]), T::lit(model.size[1]), T::lit(model.size[2])];
-    let axis = &work.directions[geom];
+    let axis = &work.contacts.directions[geom];
     let mut half = [T::zero(); 3];
     match model.kind {
         GeomType::Sphere => half = [size[0]; 3],
@@ -38,7 +38,7 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
             }
         }
         GeomType::Box => {
-            let axes = work.axes(mount);
+            let axes = work.motion.axes(mount);
             for (column, s) in axes.iter().zip(&size) {
                 for i in 0..3 {
                     half[i] = column[i].abs().mul_add(*s, half[i]);
@@ -48,9 +48,9 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
         GeomType::Ellipsoid => half = [size[0].max(size[1]).max(size[2]); 3],
         GeomType::Plane | GeomType::Hfield | GeomType::Mesh => half = [T::lit(f64::INFINITY); 3],
     }
-    let mut center = work.centers[geom];
+    let mut center = work.contacts.centers[geom];
     if let Some(l) = mount.link {
-        center = add3(&center, &work.reference[sim.links[l].tree]);
+        center = add3(&center, &work.motion.reference[sim.links[l].tree]);
     }
     let mut out = nowhere();
     for i in 0..3 {

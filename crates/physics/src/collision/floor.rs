@@ -12,14 +12,14 @@ use crate::state::{Group, Work};
 #[inline(always)]
 pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let zero = T::zero();
-    work.touching.fill(T::none());
-    work.ground_contacts.fill(zero);
+    work.contacts.touching.fill(T::none());
+    work.contacts.ground_contacts.fill(zero);
     // corners of the present box that are already in contact, per lane
     let mut corners = zero;
     let mut past = 0;
     for (candidate, c) in sim.contacts.floor.iter().enumerate() {
         let tree = sim.links[c.link].tree;
-        let (rot, pos, reference) = (&work.rot[c.link], &work.pos[c.link], &work.reference[tree]);
+        let (rot, pos, reference) = (&work.motion.rot[c.link], &work.motion.pos[c.link], &work.motion.reference[tree]);
         let p: V3<T> = splat3(&c.point);
         let base = pos[2] + (reference[2] - T::splat(c.height));
         let height = rot[0][2].mul_add(p[0], rot[1][2].mul_add(p[1], rot[2][2].mul_add(p[2], base)));
@@ -56,7 +56,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             }
             mu = [mu[0] * factor, mu[1] * factor];
         }
-        let vel = &work.vel[c.link];
+        let vel = &work.motion.vel[c.link];
         let v = cross_add(&ang(vel), &r, &lin(vel));
         let (v1, v2) = (v[0].mul_add(tx, v[1] * ty), v[1].mul_add(tx, -(v[0] * ty)));
         let b = T::splat(c.soft.b);
@@ -69,7 +69,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
                 active[k] = T::and(recalled, row.active[k]);
             }
         }
-        work.contacts.push(FloorRow {
+        work.rows.contacts.push(FloorRow {
             link: c.link,
             candidate,
             geom: c.geom,
@@ -87,7 +87,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             on,
             recalled,
         });
-        work.touch_ground(c.geom, on);
+        work.contacts.touch_ground(c.geom, on);
     }
 }
 

@@ -24,25 +24,25 @@ struct Meeting<T: Real> {
 /// Finds the contacts of all pairs and writes their blocks.
 #[inline(always)]
 pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    work.touching_bodies.fill(T::none());
+    work.contacts.touching_bodies.fill(T::none());
     place_geoms(sim, work);
     let mut slots = Slots::new();
     let count = match &sim.contacts.broad {
         None => sim.contacts.pairs.len(),
         Some(broad) => {
             broad::find(sim, work, broad);
-            work.sweep.found.len()
+            work.contacts.sweep.found.len()
         }
     };
     work.stats.pairs += count as u64;
     let few = sim.contacts.broad.is_none();
     for k in 0..count {
-        let index = if few { k } else { work.sweep.found[k] as usize };
+        let index = if few { k } else { work.contacts.sweep.found[k] as usize };
         let pair = &sim.contacts.pair(&sim.geoms, index);
-        if few && work.clearances.apart(index, pair.geoms) {
+        if few && work.contacts.clearances.apart(index, pair.geoms) {
             continue;
         }
-        slots.turn_to(pair.class(), work.blocks.len());
+        slots.turn_to(pair.class(), work.rows.blocks.len());
         // everything relative to the reference point of one of the moving geoms' trees
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
@@ -57,7 +57,7 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             None
         };
         if let (Some(clearance), true) = (clearance, within) {
-            work.clearances.remember(index, pair.geoms, clearance);
+            work.contacts.clearances.remember(index, pair.geoms, clearance);
         }
     }
 }
@@ -72,20 +72,20 @@ fn within_tree<T: Real>(sim: &Sim<T>, pair: &PairOf<T::Scalar>) -> bool {
 #[inline(always)]
 fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     if !work.continues && sim.contacts.broad.is_none() {
-        work.clearances.forget();
+        work.contacts.clearances.forget();
     }
     for paired in &sim.contacts.paired {
         let (g, mount) = (paired.geom, &sim.geoms[paired.geom]);
         let (center, axis) = match mount.link {
             None => (splat3(&mount.pos), splat3(&mount.rot[2])),
-            Some(l) => (work.arm(mount, l), rotate(&work.rot[l], &splat3(&mount.rot[2]))),
+            Some(l) => (work.motion.arm(mount, l), rotate(&work.motion.rot[l], &splat3(&mount.rot[2]))),
         };
         if work.continues && sim.contacts.broad.is_none() {
-            let (shift, turn) = (sub3(&center, &work.centers[g]), sub3(&axis, &work.directions[g]));
-            work.clearances.follow(g, &shift, &turn, T::splat(paired.half));
+            let (shift, turn) = (sub3(&center, &work.contacts.centers[g]), sub3(&axis, &work.contacts.directions[g]));
+            work.contacts.clearances.follow(g, &shift, &turn, T::splat(paired.half));
         }
-        work.centers[g] = center;
-        work.directions[g] = axis;
+        work.contacts.centers[g] = center;
+        work.contacts.directions[g] = axis;
     }
 }
 
@@ -100,7 +100,7 @@ fn near<T: Real>(
 ) -> T::Mask {
     let reach = T::splat(pair.reach);
     let mut point = centers[0];
-    let normal = work.directions[pair.geoms[0]];
+    let normal = work.contacts.directions[pair.geoms[0]];
     match pair.cull {
         Cull::Balls => geometry::near(&point, &centers[1], reach),
         Cull::Plane => plane::near_plane(&Plane { point, normal }, &centers[1], reach),
@@ -117,11 +117,11 @@ fn near<T: Real>(
 /// Center of a geom relative to the reference point of tree `base`.
 #[inline(always)]
 fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3<T> {
-    let own = &work.centers[geom];
+    let own = &work.contacts.centers[geom];
     match sim.geoms[geom].link.map(|l| sim.links[l].tree) {
-        None => sub3(own, &work.reference[base]),
+        None => sub3(own, &work.motion.reference[base]),
         Some(t) if t == base => *own,
-        Some(t) => add3(own, &sub3(&work.reference[t], &work.reference[base])),
+        Some(t) => add3(own, &sub3(&work.motion.reference[t], &work.motion.reference[base])),
     }
 }
 
@@ -151,7 +151,7 @@ fn touch_pair<T: Real>(
     }
     let first_sphere = Sphere { center: ca, radius: size_a[0] };
     let sphere = Sphere { center: cb, radius: size_b[0] };
-    let ground = Plane { point: ca, normal: work.directions[a] };
+    let ground = Plane { point: ca, normal: work.contacts.directions[a] };
     let found: &[Touch<T>] = match pair.test {
         Test::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
         Test::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),
@@ -180,17 +180,17 @@ fn touch_pair<T: Real>(
 
 #[inline(always)]
 fn capsule<T: Real>(work: &Work<T>, geom: usize, center: V3<T>, size: V3<T>) -> Capsule<T> {
-    Capsule { center, axis: work.directions[geom], radius: size[0], half: size[1] }
+    Capsule { center, axis: work.contacts.directions[geom], radius: size[0], half: size[1] }
 }
 
 #[inline(always)]
 fn cylinder<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: V3<T>) -> Cylinder<T> {
-    Cylinder { center, axes: work.axes(m), radius: size[0], half: size[1] }
+    Cylinder { center, axes: work.motion.axes(m), radius: size[0], half: size[1] }
 }
 
 #[inline(always)]
 fn cuboid<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3<T>) -> Cuboid<T> {
-    Cuboid { center, axes: work.axes(m), half }
+    Cuboid { center, axes: work.motion.axes(m), half }
 }
 
 /// Writes the contacts of a pair that some lanes have.
@@ -221,23 +221,23 @@ fn touch_field<T: Real>(
 ) {
     let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
     let fields = group.all_grounds(sim, pair.field);
-    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.axes(&sim.geoms[pair.geoms[0]]) };
+    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.motion.axes(&sim.geoms[pair.geoms[0]]) };
     let capsule = capsule(work, pair.geoms[1], meeting.centers[1], splat3(&pair.sizes[1]));
-    let mut found = std::mem::take(&mut work.touches);
+    let mut found = std::mem::take(&mut work.contacts.touches);
     found.clear();
     let margin = T::splat(pair.margin);
-    field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.gaps, &mut found);
+    field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.contacts.gaps, &mut found);
     add_all(sim, group, work, slots, meeting.place, &found);
-    work.touches = found;
+    work.contacts.touches = found;
 }
 
 /// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
 #[inline(always)]
 fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
     let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
-    let axes = pair.geoms.map(|g| work.axes(&sim.geoms[g]));
-    let mut found = std::mem::take(&mut work.touches);
-    let mut own = std::mem::take(&mut work.lane_touches);
+    let axes = pair.geoms.map(|g| work.motion.axes(&sim.geoms[g]));
+    let mut found = std::mem::take(&mut work.contacts.touches);
+    let mut own = std::mem::take(&mut work.contacts.lane_touches);
     found.clear();
     let bits = T::bits(meeting.near);
     for lane in (0..T::LANES).filter(|l| bits >> l & 1 == 1) {
@@ -264,8 +264,8 @@ fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
         gather(&own, lane, &mut found);
     }
     add_all(sim, group, work, slots, meeting.place, &found);
-    work.touches = found;
-    work.lane_touches = own;
+    work.contacts.touches = found;
+    work.contacts.lane_touches = own;
 }
 
 /// Puts one lane's contacts into that lane of `found`.

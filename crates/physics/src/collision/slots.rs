@@ -87,15 +87,15 @@ kernel_fn! {
 
         // every lane's next free slot
         let mut left = touch.on;
-        let (mut slot, mut number) = slots.least(touch.on, work.blocks.len());
+        let (mut slot, mut number) = slots.least(touch.on, work.rows.blocks.len());
         while T::any(left) {
             let here = T::and(left, slots.filled.lt(number + T::lit(0.5)));
             if T::any(here) {
-                if slot == work.blocks.len() {
-                    let new = work.blocks.add();
-                    open(&mut work.blocks[new], pair, slot - slots.first);
+                if slot == work.rows.blocks.len() {
+                    let new = work.rows.blocks.add();
+                    open(&mut work.rows.blocks[new], pair, slot - slots.first);
                 }
-                let block = &mut work.blocks[slot];
+                let block = &mut work.rows.blocks[slot];
                 fill(block, here, pair, &rows);
                 for (s, link) in links.iter().enumerate() {
                     if let (Some(l), Jacobian::Points { sides, .. }) = (link, &mut block.jacobian) {
@@ -132,9 +132,9 @@ fn rows<T: Real>(
         let Some(l) = links[s] else { continue };
         let tree = sim.links[l].tree;
         if tree != place.base {
-            points[s] = add3(&points[s], &sub3(&work.reference[place.base], &work.reference[tree]));
+            points[s] = add3(&points[s], &sub3(&work.motion.reference[place.base], &work.motion.reference[tree]));
         }
-        let v = &work.vel[l];
+        let v = &work.motion.vel[l];
         velocity[s] = cross_add(&ang(v), &points[s], &lin(v));
         spin[s] = ang(v);
     }
@@ -172,10 +172,10 @@ pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
 fn report<T: Real>(pair: &PairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
     if pair.coupled {
         for g in pair.geoms {
-            work.touching_bodies[g] = T::or(work.touching_bodies[g], on);
+            work.contacts.touching_bodies[g] = T::or(work.contacts.touching_bodies[g], on);
         }
     } else {
-        work.touch_ground(pair.moving(), on);
+        work.contacts.touch_ground(pair.moving(), on);
     }
 }
 

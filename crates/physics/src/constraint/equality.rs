@@ -47,11 +47,11 @@ fn bodies_block<T: Real>(
         match links[i] {
             None => place[i] = splat3(&points[i].pos),
             Some(l) => {
-                r[i] = work.arm(&points[i], l);
+                r[i] = work.motion.arm(&points[i], l);
                 // within a tree the common reference would only cost digits
-                place[i] = if same_tree { r[i] } else { add3(&r[i], &work.reference[sim.links[l].tree]) };
-                v[i] = cross_add(&ang(&work.vel[l]), &r[i], &lin(&work.vel[l]));
-                w[i] = ang(&work.vel[l]);
+                place[i] = if same_tree { r[i] } else { add3(&r[i], &work.motion.reference[sim.links[l].tree]) };
+                v[i] = cross_add(&ang(&work.motion.vel[l]), &r[i], &lin(&work.motion.vel[l]));
+                w[i] = ang(&work.motion.vel[l]);
             }
         }
     }
@@ -60,7 +60,7 @@ fn bodies_block<T: Real>(
     let (mut here, mut spin) = ([[z; 3]; 2], [[z; 3]; 2]);
     for i in 0..2 {
         if let Some(l) = links[i] {
-            let a = &work.bias_acc[l];
+            let a = &work.motion.bias_acc[l];
             let at = cross_add(&w[i], &v[i], &cross_add(&ang(a), &r[i], &lin(a)));
             // the bias acceleration has gravity in it
             here[i] = add3(&at, &group.gravity(sim));
@@ -78,7 +78,7 @@ fn bodies_block<T: Real>(
     if let Some(Frames { quats, scale }) = frames {
         let frame = |i: usize| {
             let q = quats[i].map(T::splat);
-            links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.rot[l]), &q))
+            links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
         };
         let (q0, q1) = (frame(0), frame(1));
         let back = quat_conjugate(&q1);
@@ -112,8 +112,8 @@ fn bodies_block<T: Real>(
     let imp = impedance_at(&spec.soft, square.sqrt());
     let ratio = imp.div(one - imp);
     let (k, b) = (imp * T::splat(spec.soft.k), T::splat(spec.soft.b));
-    let index = work.blocks.add();
-    let block = &mut work.blocks[index];
+    let index = work.rows.blocks.add();
+    let block = &mut work.rows.blocks[index];
     block.reset(Source::Equality(spec.index), Cost::Equal, dim);
     block.on = T::not(T::none());
     block.coupled = links[0].is_some() && links[1].is_some();
@@ -161,8 +161,8 @@ fn lengths_block<T: Real>(
     }
     let error = q1 - goal;
     let imp = impedance_at(&spec.soft, error);
-    let index = work.blocks.add();
-    let block = &mut work.blocks[index];
+    let index = work.rows.blocks.add();
+    let block = &mut work.rows.blocks[index];
     block.reset(Source::Equality(spec.index), Cost::Equal, 1);
     block.on = T::not(T::none());
     block.d[0] = imp.div((T::lit(1.0) - imp) * T::splat(spec.diag[0]));

@@ -33,7 +33,7 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         if recalled {
             (sticking, positive) = (work.past.dry[i].sticking, work.past.dry[i].positive);
         }
-        work.dry.push(DryRow {
+        work.rows.dry.push(DryRow {
             dof: dry.dof,
             loss: dry.loss,
             d,
@@ -73,5 +73,5 @@ fn push_limit<T: Real>(
         active = T::and(recalled, row.active);
     }
     let force = T::zero();
-    work.limits.push(LimitRow { dof, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
+    work.rows.limits.push(LimitRow { dof, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
 }

@@ -11,11 +11,11 @@ kernel_fn! {
     pub(crate) fn tendon_blocks<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         let one = T::lit(1.0);
         for (i, t) in sim.tendons.iter().enumerate() {
-            let (length, velocity) = (work.tendon_length[i], work.tendon_velocity[i]);
+            let (length, velocity) = (work.forces.tendon_length[i], work.forces.tendon_velocity[i]);
             if let Some((loss, soft)) = &t.friction {
                 let (_, d) = impedance(soft, T::zero());
-                let index = work.blocks.add();
-                let block = &mut work.blocks[index];
+                let index = work.rows.blocks.add();
+                let block = &mut work.rows.blocks[index];
                 block.reset(Source::TendonFriction, Cost::Dry, 1);
                 block.on = T::not(T::none());
                 block.d[0] = d;
@@ -71,8 +71,8 @@ fn push<T: Real>(
     }
     let violation = dist - T::splat(soft.margin);
     let (imp, d) = impedance(soft, violation);
-    let index = work.blocks.add();
-    let block = &mut work.blocks[index];
+    let index = work.rows.blocks.add();
+    let block = &mut work.rows.blocks[index];
     block.reset(source, Cost::Push, 1);
     block.on = on;
     block.d[0] = T::masked(on, d);

@@ -34,8 +34,8 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
     let bounded = !sim.joint_force_ranges.is_empty();
     if bounded {
         // what the actuators add is bounded on its own
-        work.rhs.copy_from_slice(&work.tau);
-        work.tau.fill(T::zero());
+        work.solver.rhs.copy_from_slice(&work.forces.tau);
+        work.forces.tau.fill(T::zero());
     }
     for (i, motor) in sim.motors.iter().enumerate() {
         let u = clamp(group.ctrl[i], motor.ctrl);
@@ -44,7 +44,7 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
             Some(a) => {
                 let act = group.act[a.index];
                 let rate = a.rate.map_or(u, |r| (u - act) * T::splat(r));
-                work.act_dot[a.index] = rate;
+                work.forces.act_dot[a.index] = rate;
                 if a.early { a.next(act, rate) } else { act }
             }
         };
@@ -58,7 +58,7 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                 }
                 Pull::Tendon { index, gear } => {
                     let gear = T::splat(*gear);
-                    (gear * work.tendon_length[*index], gear * work.tendon_velocity[*index])
+                    (gear * work.forces.tendon_length[*index], gear * work.forces.tendon_velocity[*index])
                 }
             };
             let (g, b) = (&motor.gain, &motor.bias);
@@ -77,34 +77,34 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
             force *= varied.strength[i];
             slope *= varied.strength[i];
         }
-        work.actuator_force[i] = force;
+        work.forces.actuator_force[i] = force;
         match &motor.pull {
             Pull::Joint { dofs, gear, .. } => {
                 for (k, d) in dofs.clone().enumerate() {
                     let gear = T::splat(gear[k]);
-                    work.tau[d] = force.mul_add(gear, work.tau[d]);
+                    work.forces.tau[d] = force.mul_add(gear, work.forces.tau[d]);
                     if sim.implicit_fast && k == 0 {
-                        work.rate[d] = (gear * gear).neg_mul_add(slope, work.rate[d]);
+                        work.forces.rate[d] = (gear * gear).neg_mul_add(slope, work.forces.rate[d]);
                     }
                 }
             }
             Pull::Tendon { index, gear } => {
                 let pull = force * T::splat(*gear);
                 for term in &sim.tendons[*index].terms {
-                    work.tau[term.dof] = pull.mul_add(T::splat(term.coef), work.tau[term.dof]);
+                    work.forces.tau[term.dof] = pull.mul_add(T::splat(term.coef), work.forces.tau[term.dof]);
                 }
             }
         }
     }
     if bounded {
         for (dof, low, high) in &sim.joint_force_ranges {
-            let (low, high, force) = (T::splat(*low), T::splat(*high), work.tau[*dof]);
+            let (low, high, force) = (T::splat(*low), T::splat(*high), work.forces.tau[*dof]);
             // a force at its bound does not change with the velocity
             let inside = T::and(low.lt(force), force.lt(high));
-            work.rate[*dof] = T::select(inside, work.rate[*dof], T::splat(sim.damping[*dof]));
-            work.tau[*dof] = force.max(low).min(high);
+            work.forces.rate[*dof] = T::select(inside, work.forces.rate[*dof], T::splat(sim.damping[*dof]));
+            work.forces.tau[*dof] = force.max(low).min(high);
         }
-        for (t, passive) in work.tau.iter_mut().zip(&work.rhs) {
+        for (t, passive) in work.forces.tau.iter_mut().zip(&work.solver.rhs) {
             *t += *passive;
         }
     }

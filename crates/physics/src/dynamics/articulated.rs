@@ -5,7 +5,7 @@
 //! its own share of the forces would cause (`drive`). Going outward, [`accelerate`] completes the solution. Featherstone's
 //! recursion with rank-one updates per degree of freedom is exact for joints of several degrees of freedom.
 //!
-//! Only links marked in `work.stale`, and their ancestors, are done anew by [`factorize`]: towards the end of an
+//! Only links marked in `work.solver.stale`, and their ancestors, are done anew by [`factorize`]: towards the end of an
 //! iteration few lanes still change anything, and most of the tree keeps its factors.
 
 use crate::algebra::planar::Space;
@@ -16,32 +16,32 @@ use crate::state::Work;
 
 /// Factorizes the stale links and brings their forces inward.
 ///
-/// `M` without armature comes from the links' inertias; `work.diag` is added to its diagonal (armature, limit stiffness,
+/// `M` without armature comes from the links' inertias; `work.solver.diag` is added to its diagonal (armature, limit stiffness,
 /// implicit damping). `with_stiffness` adds the contact stiffness of the links that are in contact; their wrench is
 /// applied in either case.
 #[inline(always)]
 pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
     for l in (0..sim.links.len()).rev() {
-        if !work.stale[l] {
+        if !work.solver.stale[l] {
             continue;
         }
         let link = &sim.links[l];
-        let mut k: Sym6<T> = sym6_of_inertia(&work.inertia[l]);
-        let mut f: V6<T> = work.bias_force[l];
-        if work.in_contact[l] {
+        let mut k: Sym6<T> = sym6_of_inertia(&work.motion.inertia[l]);
+        let mut f: V6<T> = work.motion.bias_force[l];
+        if work.solver.in_contact[l] {
             if with_stiffness {
-                S::add_sym(&mut k, &work.stiffness[l]);
+                S::add_sym(&mut k, &work.solver.stiffness[l]);
             }
-            S::sub(&mut f, &work.wrench[l]);
+            S::sub(&mut f, &work.solver.wrench[l]);
         }
         let mut child = link.last_child;
         while let Some(c) = child {
-            S::add_sym(&mut k, &work.art[c]);
-            S::add(&mut f, &work.art_force[c]);
+            S::add_sym(&mut k, &work.solver.art[c]);
+            S::add(&mut f, &work.solver.art_force[c]);
             child = sim.links[c].sibling;
         }
         if let Some(p) = link.parent {
-            work.stale[p] = true;
+            work.solver.stale[p] = true;
         }
         if link.free_block {
             factor_free_root(link.dofs.start, link.tree, &k, work);
@@ -49,19 +49,19 @@ pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, wit
             continue;
         }
         for d in link.dofs.clone().rev() {
-            let s = work.axis[d];
+            let s = work.motion.axis[d];
             let u = S::mul(&k, &s);
-            let pivot = (S::dot(&s, &u) + work.diag[d]).recip();
-            let force = work.rhs[d] - S::dot(&s, &f);
+            let pivot = (S::dot(&s, &u) + work.solver.diag[d]).recip();
+            let force = work.solver.rhs[d] - S::dot(&s, &f);
             let v = S::scale(&u, pivot);
             S::sub_outer(&mut k, &u, &v);
             f = S::axpy(&v, force, &f);
-            work.gain[d] = v;
-            work.pivot[d] = pivot;
-            work.drive[d] = force * pivot;
+            work.solver.gain[d] = v;
+            work.solver.pivot[d] = pivot;
+            work.solver.drive[d] = force * pivot;
         }
-        work.art[l] = k;
-        work.art_force[l] = f;
+        work.solver.art[l] = k;
+        work.solver.art_force[l] = f;
     }
 }
 
@@ -71,10 +71,10 @@ pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, wit
 pub(crate) fn bring_inward<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     for l in (0..sim.links.len()).rev() {
         let link = &sim.links[l];
-        let mut f = work.link_force[l];
+        let mut f = work.solver.link_force[l];
         let mut child = link.last_child;
         while let Some(c) = child {
-            S::add(&mut f, &work.art_force[c]);
+            S::add(&mut f, &work.solver.art_force[c]);
             child = sim.links[c].sibling;
         }
         if link.free_block {
@@ -82,11 +82,11 @@ pub(crate) fn bring_inward<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) 
             continue;
         }
         for d in link.dofs.clone().rev() {
-            let force = work.rhs[d] - S::dot(&work.axis[d], &f);
-            f = S::axpy(&work.gain[d], force, &f);
-            work.drive[d] = force * work.pivot[d];
+            let force = work.solver.rhs[d] - S::dot(&work.motion.axis[d], &f);
+            f = S::axpy(&work.solver.gain[d], force, &f);
+            work.solver.drive[d] = force * work.solver.pivot[d];
         }
-        work.art_force[l] = f;
+        work.solver.art_force[l] = f;
     }
 }
 
@@ -101,15 +101,15 @@ pub(crate) fn accelerate<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
             continue;
         }
         let mut a = match link.parent {
-            Some(p) => work.link_acc[p],
+            Some(p) => work.solver.link_acc[p],
             None => [z; 6],
         };
         for d in link.dofs.clone() {
-            let x = work.drive[d] - S::dot(&work.gain[d], &a);
-            work.next[d] = x;
-            a = S::axpy(&work.axis[d], x, &a);
+            let x = work.solver.drive[d] - S::dot(&work.solver.gain[d], &a);
+            work.solver.next[d] = x;
+            a = S::axpy(&work.motion.axis[d], x, &a);
         }
-        work.link_acc[l] = a;
+        work.solver.link_acc[l] = a;
     }
 }
 
@@ -117,11 +117,11 @@ pub(crate) fn accelerate<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 #[inline(always)]
 pub(crate) fn link_accelerations<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     for (l, link) in sim.links.iter().enumerate() {
-        let mut a = link.parent.map_or([T::zero(); 6], |p| work.link_acc[p]);
+        let mut a = link.parent.map_or([T::zero(); 6], |p| work.solver.link_acc[p]);
         for d in link.dofs.clone() {
-            a = S::axpy(&work.axis[d], work.acc[d], &a);
+            a = S::axpy(&work.motion.axis[d], work.solver.acc[d], &a);
         }
-        work.link_acc[l] = a;
+        work.solver.link_acc[l] = a;
     }
 }
 
@@ -130,8 +130,8 @@ pub(crate) fn link_accelerations<T: Real, S: Space>(sim: &Sim<T>, work: &mut Wor
 fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work<T>) {
     let mut k = *k;
     for i in 0..3 {
-        k[i] += work.diag[d + 3 + i];
-        k[15 + i] += work.diag[d + i];
+        k[i] += work.solver.diag[d + 3 + i];
+        k[15 + i] += work.solver.diag[d + i];
     }
     let mut a = [
         [k[0], k[3], k[4], k[6], k[7], k[8]],
@@ -153,16 +153,16 @@ fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work
         }
         a[p][p] = pivot;
     }
-    work.root_factor[tree] = a;
+    work.solver.root_factor[tree] = a;
 }
 
 /// Inward half of the six degrees of freedom of a free root: the pivots are on the factor's diagonal.
 #[inline(always)]
 fn drive_free_root<T: Real>(d: usize, tree: usize, f: &V6<T>, work: &mut Work<T>) {
-    let y = reduce_free_root(d, &work.root_factor[tree], &work.axis, &work.rhs, f);
+    let y = reduce_free_root(d, &work.solver.root_factor[tree], &work.motion.axis, &work.solver.rhs, f);
     for p in 0..6 {
-        work.pivot[d + p] = work.root_factor[tree][p][p];
-        work.drive[d + p] = y[p] * work.pivot[d + p];
+        work.solver.pivot[d + p] = work.solver.root_factor[tree][p][p];
+        work.solver.drive[d + p] = y[p] * work.solver.pivot[d + p];
     }
 }
 
@@ -188,10 +188,10 @@ pub(crate) fn reduce_free_root<T: Real>(d: usize, a: &[[T; 6]; 6], axis: &[V6<T>
 /// Outward half of a free root.
 #[inline(always)]
 fn accelerate_free_root<T: Real>(d: usize, tree: usize, l: usize, work: &mut Work<T>) {
-    let a = &work.root_factor[tree];
+    let a = &work.solver.root_factor[tree];
     let mut y = [T::zero(); 6];
     for p in 0..6 {
-        let mut v = work.drive[d + p];
+        let mut v = work.solver.drive[d + p];
         for i in 0..p {
             v = a[p][i].neg_mul_add(y[i], v);
         }
@@ -199,9 +199,9 @@ fn accelerate_free_root<T: Real>(d: usize, tree: usize, l: usize, work: &mut Wor
     }
     let spin = [y[0], y[1], y[2]];
     for i in 0..3 {
-        work.next[d + i] = y[3 + i];
-        let s = &work.axis[d + 3 + i];
-        work.next[d + 3 + i] = dot(&[s[0], s[1], s[2]], &spin);
+        work.solver.next[d + i] = y[3 + i];
+        let s = &work.motion.axis[d + 3 + i];
+        work.solver.next[d + 3 + i] = dot(&[s[0], s[1], s[2]], &spin);
     }
-    work.link_acc[l] = y;
+    work.solver.link_acc[l] = y;
 }

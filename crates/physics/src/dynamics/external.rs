@@ -10,9 +10,9 @@ kernel_fn! {
     pub(crate) fn external_forces<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         let z = T::zero();
         let gravity = group.gravity(sim);
-        work.external.resize(sim.links.len(), [z; 6]);
+        work.forces.external.resize(sim.links.len(), [z; 6]);
         for lift in &sim.lifts {
-            let r = rotate_add(&work.rot[lift.link], &splat3(&lift.at), &work.pos[lift.link]);
+            let r = rotate_add(&work.motion.rot[lift.link], &splat3(&lift.at), &work.motion.pos[lift.link]);
             let mut weight = T::splat(lift.mass);
             if let Some(varied) = &group.varied {
                 weight *= varied.mass[lift.link];
@@ -27,9 +27,9 @@ kernel_fn! {
         }
         for drag in &sim.drags {
             let m = &sim.coms[drag.body];
-            let axes = work.axes(m);
-            let r = work.arm(m, drag.link);
-            let v = &work.vel[drag.link];
+            let axes = work.motion.axes(m);
+            let r = work.motion.arm(m, drag.link);
+            let v = &work.motion.vel[drag.link];
             let through = sub3(&cross_add(&ang(v), &r, &lin(v)), &splat3(&sim.wind));
             let (mut force, mut torque) = ([z; 3], [z; 3]);
             for k in 0..3 {
@@ -46,12 +46,12 @@ kernel_fn! {
         for (body, x) in group.external.iter().enumerate() {
             let m = &sim.coms[body];
             let Some(link) = m.link else { continue };
-            let r = work.arm(m, link);
+            let r = work.motion.arm(m, link);
             push(work, link, &r, &lin(x), &ang(x));
         }
         for l in 0..sim.links.len() {
             for i in 0..6 {
-                work.bias_force[l][i] -= work.external[l][i];
+                work.motion.bias_force[l][i] -= work.forces.external[l][i];
             }
         }
     }
@@ -62,7 +62,7 @@ kernel_fn! {
 fn push<T: Real>(work: &mut Work<T>, link: usize, r: &V3<T>, force: &V3<T>, torque: &V3<T>) {
     let t = cross_add(r, force, torque);
     for i in 0..3 {
-        work.external[link][i] += t[i];
-        work.external[link][3 + i] += force[i];
+        work.forces.external[link][i] += t[i];
+        work.forces.external[link][3 + i] += force[i];
     }
 }

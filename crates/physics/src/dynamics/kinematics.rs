@@ -21,21 +21,21 @@ pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         }
         if root {
             // the tree's reference point is known only now: move anchors and axes to it
-            work.reference[link.tree] = pos;
+            work.motion.reference[link.tree] = pos;
             for j in link.joints.clone() {
-                work.anchor[j] = sub3(&work.anchor[j], &pos);
+                work.motion.anchor[j] = sub3(&work.motion.anchor[j], &pos);
             }
             pos = [T::zero(); 3];
         }
         for j in link.joints.clone() {
             finish_axes(&sim.joints[j], j, &rot, work);
         }
-        work.rot[l] = rot;
-        work.pos[l] = pos;
-        work.inertia[l] = spatial_inertia(link, &rot, &pos);
+        work.motion.rot[l] = rot;
+        work.motion.pos[l] = pos;
+        work.motion.inertia[l] = spatial_inertia(link, &rot, &pos);
     }
     if let Some(varied) = &group.varied {
-        for (inertia, factor) in work.inertia.iter_mut().zip(&varied.mass) {
+        for (inertia, factor) in work.motion.inertia.iter_mut().zip(&varied.mass) {
             for x in inertia {
                 *x *= *factor;
             }
@@ -49,8 +49,8 @@ fn frame_at_parent<T: Real>(link: &Link<T::Scalar>, work: &Work<T>) -> (Rot<T>, 
     match link.parent {
         None => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
         Some(p) => {
-            let parent = &work.rot[p];
-            let pos = rotate_add(parent, &splat3(&link.pos), &work.pos[p]);
+            let parent = &work.motion.rot[p];
+            let pos = rotate_add(parent, &splat3(&link.pos), &work.motion.pos[p]);
             let rot = if link.rot_is_identity { *parent } else { compose(parent, &link.rot) };
             (rot, pos)
         }
@@ -73,14 +73,14 @@ fn apply_joint<T: Real>(
         JointType::Free => {
             *pos = [q[a], q[a + 1], q[a + 2]];
             *rot = quat_to_rot(&[q[a + 3], q[a + 4], q[a + 5], q[a + 6]]);
-            work.anchor[j] = *pos;
+            work.motion.anchor[j] = *pos;
         }
         JointType::Slide => {
             let dir = rotate(rot, &splat3(&joint.axis));
             let d = q[a] - T::splat(joint.q0);
             *pos = [d.mul_add(dir[0], pos[0]), d.mul_add(dir[1], pos[1]), d.mul_add(dir[2], pos[2])];
-            work.axis[joint.dof] = [z, z, z, dir[0], dir[1], dir[2]];
-            work.anchor[j] = *pos;
+            work.motion.axis[joint.dof] = [z, z, z, dir[0], dir[1], dir[2]];
+            work.motion.anchor[j] = *pos;
         }
         JointType::Hinge => {
             let anchor = anchor_of(joint, rot, pos);
@@ -109,15 +109,15 @@ fn apply_joint<T: Real>(
                 *rot = [rotate(rot, &c0), rotate(rot, &c1), rotate(rot, &c2)];
             }
             restore_anchor(joint, rot, pos, &anchor);
-            work.anchor[j] = anchor;
-            work.axis[joint.dof] = [dir[0], dir[1], dir[2], z, z, z];
+            work.motion.anchor[j] = anchor;
+            work.motion.axis[joint.dof] = [dir[0], dir[1], dir[2], z, z, z];
         }
         JointType::Ball => {
             let anchor = anchor_of(joint, rot, pos);
             let turn = quat_to_rot(&[q[a], q[a + 1], q[a + 2], q[a + 3]]);
             *rot = [rotate(rot, &turn[0]), rotate(rot, &turn[1]), rotate(rot, &turn[2])];
             restore_anchor(joint, rot, pos, &anchor);
-            work.anchor[j] = anchor;
+            work.motion.anchor[j] = anchor;
         }
     }
 }
@@ -143,16 +143,16 @@ fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, wo
     match joint.kind {
         JointType::Slide => {}
         JointType::Hinge => {
-            let s = &mut work.axis[d];
-            let l = cross(&work.anchor[j], &[s[0], s[1], s[2]]);
+            let s = &mut work.motion.axis[d];
+            let l = cross(&work.motion.anchor[j], &[s[0], s[1], s[2]]);
             s[3] = l[0];
             s[4] = l[1];
             s[5] = l[2];
         }
         JointType::Ball => {
             for k in 0..3 {
-                let l = cross(&work.anchor[j], &rot[k]);
-                work.axis[d + k] = [rot[k][0], rot[k][1], rot[k][2], l[0], l[1], l[2]];
+                let l = cross(&work.motion.anchor[j], &rot[k]);
+                work.motion.axis[d + k] = [rot[k][0], rot[k][1], rot[k][2], l[0], l[1], l[2]];
             }
         }
         JointType::Free => {
@@ -160,8 +160,8 @@ fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, wo
             for k in 0..3 {
                 let mut e = [z; 6];
                 e[3 + k] = one;
-                work.axis[d + k] = e;
-                work.axis[d + 3 + k] = [rot[k][0], rot[k][1], rot[k][2], z, z, z];
+                work.motion.axis[d + k] = e;
+                work.motion.axis[d + 3 + k] = [rot[k][0], rot[k][1], rot[k][2], z, z, z];
             }
         }
     }
@@ -216,7 +216,7 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     for l in 0..sim.links.len() {
         let link = &sim.links[l];
         let (mut vel, mut acc) = match link.parent {
-            Some(p) => (work.vel[p], work.bias_acc[p]),
+            Some(p) => (work.motion.vel[p], work.motion.bias_acc[p]),
             None => ([z; 6], [z, z, z, -gravity[0], -gravity[1], -gravity[2]]),
         };
         for j in link.joints.clone() {
@@ -228,15 +228,15 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
                     for k in 0..3 {
                         vel[3 + k] += v[d + k];
                     }
-                    let s = ball_motion(&work.axis, v, d + 3);
+                    let s = ball_motion(&work.motion.axis, v, d + 3);
                     add_motion(&s, &mut vel, &mut acc);
                 }
                 JointType::Ball => {
-                    let s = ball_motion(&work.axis, v, d);
+                    let s = ball_motion(&work.motion.axis, v, d);
                     add_motion(&s, &mut vel, &mut acc);
                 }
                 JointType::Slide => {
-                    let s = &work.axis[d];
+                    let s = &work.motion.axis[d];
                     let turn = cross(&ang(&vel), &lin(s));
                     for k in 0..3 {
                         acc[3 + k] = turn[k].mul_add(v[d], acc[3 + k]);
@@ -244,22 +244,22 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
                     }
                 }
                 JointType::Hinge => {
-                    let s = &work.axis[d];
+                    let s = &work.motion.axis[d];
                     let rate = cross_motion(&vel, s);
                     acc = axpy6(&rate, v[d], &acc);
                     vel = axpy6(s, v[d], &vel);
                 }
             }
         }
-        work.vel[l] = vel;
-        work.bias_acc[l] = acc;
-        let inertia = &work.inertia[l];
+        work.motion.vel[l] = vel;
+        work.motion.bias_acc[l] = acc;
+        let inertia = &work.motion.inertia[l];
         let f = inertia_mul(inertia, &acc);
         let h = inertia_mul(inertia, &vel);
         // v x* h: the momentum carried along
         let t = cross_add(&ang(&vel), &ang(&h), &cross_add(&lin(&vel), &lin(&h), &ang(&f)));
         let f = cross_add(&ang(&vel), &lin(&h), &lin(&f));
-        work.bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];
+        work.motion.bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];
     }
 }
 

@@ -11,8 +11,8 @@ use crate::state::{Group, Work};
 pub(crate) fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
         let damping = T::splat(sim.damping[d]);
-        work.tau[d] = -(damping * group.qvel[d]);
-        work.rate[d] = damping;
+        work.forces.tau[d] = -(damping * group.qvel[d]);
+        work.forces.rate[d] = damping;
     }
     for joint in &sim.joints {
         if !joint.has_spring {
@@ -22,13 +22,13 @@ pub(crate) fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T
         match joint.kind {
             JointType::Hinge | JointType::Slide => {
                 let stretch = group.qpos[joint.qpos] - T::splat(joint.spring[0]);
-                work.tau[d] = stretch.neg_mul_add(k, work.tau[d]);
+                work.forces.tau[d] = stretch.neg_mul_add(k, work.forces.tau[d]);
             }
             JointType::Ball => add_ball_spring(joint, group, work, joint.qpos, d, k),
             JointType::Free => {
                 for i in 0..3 {
                     let stretch = group.qpos[joint.qpos + i] - T::lit(sim.model.qpos_spring[joint.qpos + i]);
-                    work.tau[d + i] = stretch.neg_mul_add(k, work.tau[d + i]);
+                    work.forces.tau[d + i] = stretch.neg_mul_add(k, work.forces.tau[d + i]);
                 }
                 add_ball_spring(joint, group, work, joint.qpos + 3, d + 3, k);
             }
@@ -51,7 +51,7 @@ fn add_ball_spring<T: Real>(
     let now = [group.qpos[q], group.qpos[q + 1], group.qpos[q + 2], group.qpos[q + 3]];
     let r = quat_to_rotvec(&quat_mul(&quat_conjugate(&rest), &now));
     for i in 0..3 {
-        work.tau[d + i] = r[i].neg_mul_add(k, work.tau[d + i]);
+        work.forces.tau[d + i] = r[i].neg_mul_add(k, work.forces.tau[d + i]);
     }
 }
 
@@ -64,8 +64,8 @@ pub(crate) fn measure_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mu
             length = T::splat(term.coef).mul_add(group.qpos[term.qpos], length);
             velocity = T::splat(term.coef).mul_add(group.qvel[term.dof], velocity);
         }
-        work.tendon_length[i] = length;
-        work.tendon_velocity[i] = velocity;
+        work.forces.tendon_length[i] = length;
+        work.forces.tendon_velocity[i] = velocity;
     }
 }
 
@@ -74,13 +74,13 @@ pub(crate) fn measure_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mu
 pub(crate) fn tendon_springs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
     for (i, t) in sim.tendons.iter().enumerate() {
-        let length = work.tendon_length[i];
+        let length = work.forces.tendon_length[i];
         // zero between the slack lengths
         let below = (T::splat(t.slack[0]) - length).max(z);
         let above = (T::splat(t.slack[1]) - length).min(z);
-        let force = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * work.tendon_velocity[i];
+        let force = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * work.forces.tendon_velocity[i];
         for term in &t.terms {
-            work.tau[term.dof] = T::splat(term.coef).mul_add(force, work.tau[term.dof]);
+            work.forces.tau[term.dof] = T::splat(term.coef).mul_add(force, work.forces.tau[term.dof]);
         }
     }
 }

@@ -47,7 +47,7 @@ impl<T: Real> Readings<'_, T> {
     pub fn cinert(&self, body: usize) -> [T; 10] {
         let com = &self.sim.coms[body];
         let (mass, i) = (self.own_mass(body), self.own_inertia(body));
-        let [x, y, z] = self.work.axes(com);
+        let [x, y, z] = self.work.motion.axes(com);
         // sum of moment times axis times axis' over the principal axes
         let entry = |a: usize, b: usize| (i[0] * x[a]).mul_add(x[b], (i[1] * y[a]).mul_add(y[b], i[2] * z[a] * z[b]));
         let d = self.offset(body, com);
@@ -81,19 +81,19 @@ impl<T: Real> Readings<'_, T> {
     /// mass of its tree (N m), and force (N). Zero for the world. After [`Sim::measure_bodies`].
     #[inline(always)]
     pub fn cfrc_ext(&self, body: usize) -> V6<T> {
-        self.work.body_force[body]
+        self.work.readings.body_force[body]
     }
 
     /// Force of all actuators on a degree of freedom, N or N m. After [`Sim::measure_joints`].
     #[inline(always)]
     pub fn qfrc_actuator(&self, dof: usize) -> T {
-        self.work.actuation[dof]
+        self.work.readings.actuation[dof]
     }
 
     /// Force of all constraints on a degree of freedom, N or N m. After [`Sim::measure_joints`].
     #[inline(always)]
     pub fn qfrc_constraint(&self, dof: usize) -> T {
-        self.work.constraint[dof]
+        self.work.readings.constraint[dof]
     }
 
     /// Center of mass of all bodies, m. After [`Sim::measure_centers`].
@@ -103,7 +103,7 @@ impl<T: Real> Readings<'_, T> {
         let mut sum = [T::zero(); 3];
         for (root, body) in bodies.iter().enumerate().skip(1) {
             if body.root_id == root {
-                let center = add3(&self.mount_pos(&self.sim.coms[root]), &self.work.tree_com[root]);
+                let center = add3(&self.mount_pos(&self.sim.coms[root]), &self.work.readings.tree_com[root]);
                 // one tree has all of the mass, and then no digit is lost
                 let share = T::lit(body.subtree_mass / bodies[0].subtree_mass);
                 for k in 0..3 {
@@ -118,7 +118,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     fn offset(&self, body: usize, to: &Mount<T::Scalar>) -> V3<T> {
         let root = self.sim.model.bodies[body].root_id;
-        sub3(&self.separation(&self.sim.coms[root], to), &self.work.tree_com[root])
+        sub3(&self.separation(&self.sim.coms[root], to), &self.work.readings.tree_com[root])
     }
 
     /// Adds a contact to the bodies that it acts on.
@@ -147,7 +147,7 @@ impl<T: Real> Readings<'_, T> {
         out: &mut [V6<T>],
     ) {
         let root = self.sim.model.bodies[body].root_id;
-        let arm = sub3(arm, &self.work.tree_com[root]);
+        let arm = sub3(arm, &self.work.readings.tree_com[root]);
         let mut sum = Wrench { force: lin(&out[body]), torque: ang(&out[body]) };
         if plus {
             sum.add(&arm, force, torque, on);
@@ -166,7 +166,7 @@ impl<T: Real> Kernel<T> for Centers<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Centers(sim, group, work) = self;
-        let mut center = std::mem::take(&mut work.tree_com);
+        let mut center = std::mem::take(&mut work.readings.tree_com);
         let bodies = &sim.model.bodies;
         let readings = Readings::new(sim, group, work);
         for root in 1..bodies.len() {
@@ -189,7 +189,7 @@ impl<T: Real> Kernel<T> for Centers<'_, T> {
             let inverse = mass.max(T::lit(1e-15)).recip();
             center[root] = [sum[0] * inverse, sum[1] * inverse, sum[2] * inverse];
         }
-        work.tree_com = center;
+        work.readings.tree_com = center;
     }
 }
 
@@ -200,13 +200,13 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Wrenches(sim, group, work) = self;
-        let mut out = std::mem::take(&mut work.body_force);
+        let mut out = std::mem::take(&mut work.readings.body_force);
         out.fill([T::zero(); 6]);
         let readings = Readings::new(sim, group, work);
-        for row in &work.contacts {
+        for row in &work.rows.contacts {
             readings.add_contact(&readings.floor_contact(row), &mut out);
         }
-        for block in work.blocks.iter() {
+        for block in work.rows.blocks.iter() {
             if block.source != Source::Contacts {
                 continue;
             }
@@ -233,7 +233,7 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
             let arm = readings.separation(root, &sim.coms[body]);
             readings.add_wrench(body, &arm, (&lin(push), &ang(push)), (true, all), &mut out);
         }
-        work.body_force = out;
+        work.readings.body_force = out;
     }
 }
 
@@ -244,24 +244,25 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Actuation(sim, work) = self;
-        work.actuation.fill(T::zero());
-        for (motor, force) in sim.motors.iter().zip(&work.actuator_force) {
+        work.readings.actuation.fill(T::zero());
+        for (motor, force) in sim.motors.iter().zip(&work.forces.actuator_force) {
             match &motor.pull {
                 Pull::Joint { dofs, gear, .. } => {
                     for (k, d) in dofs.clone().enumerate() {
-                        work.actuation[d] = force.mul_add(T::splat(gear[k]), work.actuation[d]);
+                        work.readings.actuation[d] = force.mul_add(T::splat(gear[k]), work.readings.actuation[d]);
                     }
                 }
                 Pull::Tendon { index, gear } => {
                     let pull = *force * T::splat(*gear);
                     for term in &sim.tendons[*index].terms {
-                        work.actuation[term.dof] = pull.mul_add(T::splat(term.coef), work.actuation[term.dof]);
+                        work.readings.actuation[term.dof] =
+                            pull.mul_add(T::splat(term.coef), work.readings.actuation[term.dof]);
                     }
                 }
             }
         }
         for (dof, low, high) in &sim.joint_force_ranges {
-            work.actuation[*dof] = work.actuation[*dof].max(T::splat(*low)).min(T::splat(*high));
+            work.readings.actuation[*dof] = work.readings.actuation[*dof].max(T::splat(*low)).min(T::splat(*high));
         }
     }
 }
@@ -273,10 +274,10 @@ impl<T: Real> Kernel<T> for JointForces<'_, T> {
     #[inline(always)]
     fn run(self) {
         let JointForces(sim, work) = self;
-        let mut links = std::mem::take(&mut work.link_force);
-        let mut joints = std::mem::take(&mut work.constraint);
+        let mut links = std::mem::take(&mut work.solver.link_force);
+        let mut joints = std::mem::take(&mut work.readings.constraint);
         constraint_wrenches(work, &mut links, &mut joints);
         joint_space(sim, work, &mut links, &mut joints);
-        (work.link_force, work.constraint) = (links, joints);
+        (work.solver.link_force, work.readings.constraint) = (links, joints);
     }
 }

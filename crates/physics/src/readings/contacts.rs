@@ -44,7 +44,7 @@ impl<T: Real> Readings<'_, T> {
         let (mut weight, mut place) = (z, [z; 3]);
         for (c, on, _) in &matches {
             let w = T::masked(*on, dot(&c.force, &c.force).sqrt());
-            let at = add3(&c.point, &self.work.reference[c.tree]);
+            let at = add3(&c.point, &self.work.motion.reference[c.tree]);
             weight += w;
             for k in 0..3 {
                 place[k] = at[k].mul_add(w, place[k]);
@@ -54,7 +54,7 @@ impl<T: Real> Readings<'_, T> {
         let place = [place[0] * inverse, place[1] * inverse, place[2] * inverse];
         let (mut force, mut torque) = ([z; 3], [z; 3]);
         for (c, on, flip) in &matches {
-            let arm = sub3(&add3(&c.point, &self.work.reference[c.tree]), &place);
+            let arm = sub3(&add3(&c.point, &self.work.motion.reference[c.tree]), &place);
             let t = cross_add(&arm, &c.force, &c.torque);
             for k in 0..3 {
                 let (f, t) = (T::masked(*on, c.force[k]), T::masked(*on, t[k]));
@@ -95,7 +95,7 @@ impl<T: Real> Readings<'_, T> {
         let mut on = c.on;
         if let SensorObject::Site(site) = a {
             let (zone, mount) = (&self.sim.model.sites[site], &self.sim.sites[site]);
-            let p = into_axes(&self.work.axes(mount), &self.arm_from(mount, Some(c.tree), &c.point));
+            let p = into_axes(&self.work.motion.axes(mount), &self.arm_from(mount, Some(c.tree), &c.point));
             on = T::and(on, inside_shape(zone.kind, &zone.size, &p));
         }
         (on, reversed == c.natural)

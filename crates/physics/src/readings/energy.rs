@@ -121,7 +121,7 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn kinetic_energy(&self) -> T {
         let m = &self.sim.model;
         let mut twice = T::zero();
-        for (inertia, v) in self.work.inertia.iter().zip(&self.work.vel) {
+        for (inertia, v) in self.work.motion.inertia.iter().zip(&self.work.motion.vel) {
             twice += dot6(v, &inertia_mul(inertia, v));
         }
         for (armature, v) in self.sim.armature.iter().zip(&self.group.qvel) {

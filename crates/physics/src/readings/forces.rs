@@ -66,10 +66,10 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn contact_forces(&self) -> Vec<ContactForce<T>> {
         let mut out = Vec::new();
-        for row in &self.work.contacts {
+        for row in &self.work.rows.contacts {
             out.push(self.floor_contact(row));
         }
-        for block in self.work.blocks.iter().filter(|b| b.source == Source::Contacts) {
+        for block in self.work.rows.blocks.iter().filter(|b| b.source == Source::Contacts) {
             for (index, on) in &block.members {
                 out.extend(self.pair_contact(block, *index, *on));
             }
@@ -121,7 +121,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn tie_forces(&self) -> Vec<TieForce<T>> {
         let mut out = Vec::new();
-        for block in self.work.blocks.iter() {
+        for block in self.work.rows.blocks.iter() {
             let Source::Equality(index) = block.source else { continue };
             let (EqualityKind::Connect { bodies, anchors, .. } | EqualityKind::Weld { bodies, anchors, .. }) =
                 &self.sim.model.equalities[index].kind
@@ -185,7 +185,7 @@ impl<T: Real> Readings<'_, T> {
                 sum.subtract(&self.separation(mount, &t.points[1]), &t.force, &t.torque, all);
             }
         }
-        let axes = self.work.axes(mount);
+        let axes = self.work.motion.axes(mount);
         Some((into_axes(&axes, &sum.force), into_axes(&axes, &sum.torque)))
     }
 
@@ -196,7 +196,7 @@ impl<T: Real> Readings<'_, T> {
         let (a, turn) = self.mount_acceleration(com);
         let mass = self.own_mass(body);
         // Euler's equations in the principal axes
-        let axes = self.work.axes(com);
+        let axes = self.work.motion.axes(com);
         let (w, dw) = (into_axes(&axes, &self.mount_spin(com)), into_axes(&axes, &turn));
         let i = self.own_inertia(body);
         let torque = [
@@ -222,7 +222,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn spin_momentum(&self, body: usize) -> V3<T> {
         let com: &Mount<T::Scalar> = &self.sim.coms[body];
-        let axes = self.work.axes(com);
+        let axes = self.work.motion.axes(com);
         let w = into_axes(&axes, &self.mount_spin(com));
         let i = self.own_inertia(body);
         rotate(&axes, &[i[0] * w[0], i[1] * w[1], i[2] * w[2]])

@@ -38,7 +38,7 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn separation(&self, from: &Mount<T::Scalar>, to: &Mount<T::Scalar>) -> V3<T> {
         match to.link {
             None => self.arm_from(from, None, &splat3(&to.pos)),
-            Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.work.arm(to, l)),
+            Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.work.motion.arm(to, l)),
         }
     }
 
@@ -47,22 +47,22 @@ impl<T: Real> Readings<'_, T> {
     pub(super) fn arm_from(&self, from: &Mount<T::Scalar>, tree: Option<usize>, point: &V3<T>) -> V3<T> {
         let (start, start_tree) = match from.link {
             None => (splat3(&from.pos), None),
-            Some(l) => (self.work.arm(from, l), Some(self.sim.links[l].tree)),
+            Some(l) => (self.work.motion.arm(from, l), Some(self.sim.links[l].tree)),
         };
         let arm = sub3(point, &start);
         if tree == start_tree {
             return arm;
         }
         let origin = [T::zero(); 3];
-        let to = tree.map_or(origin, |t| self.work.reference[t]);
-        let back = start_tree.map_or(origin, |t| self.work.reference[t]);
+        let to = tree.map_or(origin, |t| self.work.motion.reference[t]);
+        let back = start_tree.map_or(origin, |t| self.work.motion.reference[t]);
         add3(&arm, &sub3(&to, &back))
     }
 
     /// A vector in a frame's own axes.
     #[inline(always)]
     pub(super) fn in_axes(&self, m: &Mount<T::Scalar>, v: &V3<T>) -> V3<T> {
-        into_axes(&self.work.axes(m), v)
+        into_axes(&self.work.motion.axes(m), v)
     }
 
     /// Orientation of an object as the product of the quaternions from the root outward, as MuJoCo has it: its sign is
@@ -128,7 +128,7 @@ impl<T: Real> Readings<'_, T> {
         // what the turning of the reference frame makes of a point at rest
         let v = cross_add(&self.separation(from, m), &turning, &v);
         let w = sub3(&self.mount_spin(m), &turning);
-        let axes = self.work.axes(from);
+        let axes = self.work.motion.axes(from);
         (into_axes(&axes, &v), into_axes(&axes, &w))
     }
 }

@@ -11,9 +11,9 @@ use crate::state::Work;
 impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
     pub fn bias_forces(&self) -> Vec<T> {
-        let mut forces = self.work.bias_force.clone();
-        if self.work.bias_is_net {
-            for (f, x) in forces.iter_mut().zip(&self.work.external) {
+        let mut forces = self.work.motion.bias_force.clone();
+        if self.work.forces.bias_is_net {
+            for (f, x) in forces.iter_mut().zip(&self.work.forces.external) {
                 for i in 0..6 {
                     f[i] += x[i];
                 }
@@ -24,10 +24,10 @@ impl<T: Real> Readings<'_, T> {
 
     /// Springs, dampers, actuators, the medium and pushes together (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
     pub fn applied_forces(&self) -> Vec<T> {
-        let mut external = self.work.external.clone();
+        let mut external = self.work.forces.external.clone();
         external.resize(self.sim.links.len(), [T::zero(); 6]);
         let mut sum = self.joint_space(external);
-        for (s, t) in sum.iter_mut().zip(&self.work.tau) {
+        for (s, t) in sum.iter_mut().zip(&self.work.forces.tau) {
             *s += *t;
         }
         sum
@@ -53,10 +53,10 @@ impl<T: Real> Readings<'_, T> {
             for (l, link) in self.sim.links.iter().enumerate() {
                 let mut a = link.parent.map_or([T::zero(); 6], |p| motion[p]);
                 if link.dofs.contains(&i) {
-                    a = axpy6(&self.work.axis[i], T::lit(1.0), &a);
+                    a = axpy6(&self.work.motion.axis[i], T::lit(1.0), &a);
                 }
                 motion[l] = a;
-                forces[l] = inertia_mul(&self.work.inertia[l], &a);
+                forces[l] = inertia_mul(&self.work.motion.inertia[l], &a);
             }
             let mut row = self.joint_space(forces);
             row[i] += T::splat(self.sim.armature[i]);
@@ -75,10 +75,10 @@ impl<T: Real> Readings<'_, T> {
     /// Number of contacts per lane.
     pub fn contact_count(&self) -> T {
         let mut n = T::zero();
-        for c in &self.work.contacts {
+        for c in &self.work.rows.contacts {
             n += T::masked(c.on, T::lit(1.0));
         }
-        for b in self.work.blocks.iter().filter(|b| !b.members.is_empty()) {
+        for b in self.work.rows.blocks.iter().filter(|b| !b.members.is_empty()) {
             n += T::masked(b.on, T::lit(1.0));
         }
         n
@@ -90,19 +90,19 @@ impl<T: Real> Readings<'_, T> {
 pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], joints: &mut [T]) {
     links.fill([T::zero(); 6]);
     joints.fill(T::zero());
-    for c in &work.contacts {
+    for c in &work.rows.contacts {
         let w = c.wrench(&c.force);
         for i in 0..6 {
             links[c.link][i] += w[i];
         }
     }
-    for b in work.blocks.iter() {
+    for b in work.rows.blocks.iter() {
         b.exert(links, joints);
     }
-    for l in &work.limits {
+    for l in &work.rows.limits {
         joints[l.dof] += l.sign * l.force;
     }
-    for f in &work.dry {
+    for f in &work.rows.dry {
         joints[f.dof] += f.force;
     }
 }
@@ -114,7 +114,7 @@ pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6
     for (l, link) in sim.links.iter().enumerate().rev() {
         let f = links[l];
         for d in link.dofs.clone() {
-            joints[d] += dot6(&work.axis[d], &f);
+            joints[d] += dot6(&work.motion.axis[d], &f);
         }
         if let Some(p) = link.parent {
             for i in 0..6 {

@@ -93,7 +93,7 @@ impl<T: Real> Readings<'_, T> {
                 },
             };
             if lever != 0.0 {
-                sum = T::lit(lever * a.gear[0]).mul_add(self.work.actuator_force[i], sum);
+                sum = T::lit(lever * a.gear[0]).mul_add(self.work.forces.actuator_force[i], sum);
             }
         }
         if let Some([low, high]) = one.actuator_force_range {
@@ -106,7 +106,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn tendon_actuator_force(&self, tendon: usize) -> T {
         let mut sum = T::zero();
-        for (a, force) in self.sim.model.actuators.iter().zip(&self.work.actuator_force) {
+        for (a, force) in self.sim.model.actuators.iter().zip(&self.work.forces.actuator_force) {
             if a.transmission == Transmission::Tendon(tendon) {
                 sum += *force;
             }
@@ -128,7 +128,7 @@ impl<T: Real> Readings<'_, T> {
         let high = (T::splat(limit.high[0]) - q) + T::splat(limit.high[1]);
         (out.pos, out.vel) = reached(low, high, T::splat(limit.soft.margin), self.group.qvel[one.dof]);
         let mut left = T::not(T::none());
-        for row in self.work.limits.iter().filter(|row| row.dof == one.dof) {
+        for row in self.work.rows.limits.iter().filter(|row| row.dof == one.dof) {
             out.force = T::select(T::and(left, row.on), row.force, out.force);
             left = T::and(left, T::not(row.on));
         }
@@ -177,7 +177,7 @@ impl<T: Real> Readings<'_, T> {
     fn limit_force(&self, source: Source) -> T {
         let mut force = T::zero();
         let mut left = T::not(T::none());
-        for block in self.work.blocks.iter().filter(|b| b.source == source) {
+        for block in self.work.rows.blocks.iter().filter(|b| b.source == source) {
             force = T::select(T::and(left, block.on), block.force[0], force);
             left = T::and(left, T::not(block.on));
         }

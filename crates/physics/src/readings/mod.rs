@@ -55,13 +55,13 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Acceleration `i` of the last physics step.
     #[inline(always)]
     pub fn qacc(&self, i: usize) -> T {
-        self.work.acc[i]
+        self.work.solver.acc[i]
     }
 
     /// Force of an actuator in the last physics step (before its gear), N or N m.
     #[inline(always)]
     pub fn actuator_force(&self, i: usize) -> T {
-        self.work.actuator_force[i]
+        self.work.forces.actuator_force[i]
     }
 
     /// Origin of a body's frame, m.
@@ -73,7 +73,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a body's frame (columns x, y, z).
     #[inline(always)]
     pub fn body_axes(&self, body: usize) -> Rot<T> {
-        self.work.axes(&self.sim.bodies[body])
+        self.work.motion.axes(&self.sim.bodies[body])
     }
 
     /// Center of mass of a body, m.
@@ -109,7 +109,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a geom's frame (columns).
     #[inline(always)]
     pub fn geom_axes(&self, geom: usize) -> Rot<T> {
-        self.work.axes(&self.sim.geoms[geom])
+        self.work.motion.axes(&self.sim.geoms[geom])
     }
 
     /// Velocity of a geom's center, m/s.
@@ -127,31 +127,31 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Axes of a site's frame (columns).
     #[inline(always)]
     pub fn site_axes(&self, site: usize) -> Rot<T> {
-        self.work.axes(&self.sim.sites[site])
+        self.work.motion.axes(&self.sim.sites[site])
     }
 
     /// Lanes in which a geom touches the static world, at the last physics step.
     #[inline(always)]
     pub fn touching(&self, geom: usize) -> T::Mask {
-        self.work.touching[geom]
+        self.work.contacts.touching[geom]
     }
 
     /// Lanes in which a geom touched the static world at any physics step of the last call of [`Sim::step`].
     #[inline(always)]
     pub fn touched(&self, geom: usize) -> T::Mask {
-        self.work.touched[geom]
+        self.work.contacts.touched[geom]
     }
 
     /// Lanes in which a geom touches another moving geom, at the last physics step.
     #[inline(always)]
     pub fn touching_bodies(&self, geom: usize) -> T::Mask {
-        self.work.touching_bodies[geom]
+        self.work.contacts.touching_bodies[geom]
     }
 
     /// Number of contacts of a body with the static world at the last physics step.
     pub fn body_contacts(&self, body: usize) -> T {
         let mut n = T::zero();
-        for (geom, count) in self.sim.model.geoms.iter().zip(&self.work.ground_contacts) {
+        for (geom, count) in self.sim.model.geoms.iter().zip(&self.work.contacts.ground_contacts) {
             if geom.body == body {
                 n += *count;
             }
@@ -161,14 +161,14 @@ impl<'a, T: Real> Readings<'a, T> {
 
     /// Normal force of a geom's contacts with the static world at the last physics step, N.
     pub fn normal_force(&self, geom: usize) -> T {
-        self.work.normal_force[geom]
+        self.work.contacts.normal_force[geom]
     }
 
     #[inline(always)]
     fn mount_pos(&self, m: &Mount<T::Scalar>) -> V3<T> {
         match m.link {
             None => splat3(&m.pos),
-            Some(l) => add3(&self.work.arm(m, l), &self.work.reference[self.sim.links[l].tree]),
+            Some(l) => add3(&self.work.motion.arm(m, l), &self.work.motion.reference[self.sim.links[l].tree]),
         }
     }
 
@@ -177,15 +177,15 @@ impl<'a, T: Real> Readings<'a, T> {
         match m.link {
             None => [T::zero(); 3],
             Some(l) => {
-                let v = &self.work.vel[l];
-                cross_add(&ang(v), &self.work.arm(m, l), &lin(v))
+                let v = &self.work.motion.vel[l];
+                cross_add(&ang(v), &self.work.motion.arm(m, l), &lin(v))
             }
         }
     }
 
     #[inline(always)]
     fn mount_spin(&self, m: &Mount<T::Scalar>) -> V3<T> {
-        m.link.map_or([T::zero(); 3], |l| ang(&self.work.vel[l]))
+        m.link.map_or([T::zero(); 3], |l| ang(&self.work.motion.vel[l]))
     }
 
     /// Factor of a body's mass and inertia.
@@ -217,17 +217,17 @@ impl<'a, T: Real> Readings<'a, T> {
             let g = self.group.gravity(self.sim);
             return ([-g[0], -g[1], -g[2]], [T::zero(); 3]);
         };
-        let mut a = self.work.bias_acc[link];
+        let mut a = self.work.motion.bias_acc[link];
         let mut l = Some(link);
         while let Some(i) = l {
             for d in self.sim.links[i].dofs.clone() {
-                a = axpy6(&self.work.axis[d], self.work.acc[d], &a);
+                a = axpy6(&self.work.motion.axis[d], self.work.solver.acc[d], &a);
             }
             l = self.sim.links[i].parent;
         }
-        let r = self.work.arm(m, link);
+        let r = self.work.motion.arm(m, link);
         let v = self.mount_velocity(m);
-        let spin = ang(&self.work.vel[link]);
+        let spin = ang(&self.work.motion.vel[link]);
         let at_point = cross_add(&ang(&a), &r, &lin(&a));
         (cross_add(&spin, &v, &at_point), ang(&a))
     }

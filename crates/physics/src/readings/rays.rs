@@ -203,7 +203,7 @@ impl<T: Real> Readings<'_, T> {
         let m = &self.sim.model;
         let body = m.sites[site].body;
         let mount = &self.sim.sites[site];
-        let direction = self.work.axes(mount)[2];
+        let direction = self.work.motion.axes(mount)[2];
         let mut nearest = Hit::none();
         for (g, geom) in m.geoms.iter().enumerate() {
             // what cannot be seen is not hit
@@ -211,7 +211,7 @@ impl<T: Real> Readings<'_, T> {
                 continue;
             }
             let frame = &self.sim.geoms[g];
-            let axes = self.work.axes(frame);
+            let axes = self.work.motion.axes(frame);
             let p = into_axes(&axes, &self.separation(frame, mount));
             let d = into_axes(&axes, &direction);
             let size = [T::lit(geom.size[0]), T::lit(geom.size[1]), T::lit(geom.size[2])];

@@ -54,7 +54,7 @@ impl<T: Real> Readings<'_, T> {
             (S::ActuatorPos | S::ActuatorVel, O::Actuator(a)) => {
                 vec![self.transmission(a)[usize::from(s.kind == S::ActuatorVel)]]
             }
-            (S::ActuatorFrc, O::Actuator(a)) => vec![self.work.actuator_force[a]],
+            (S::ActuatorFrc, O::Actuator(a)) => vec![self.work.forces.actuator_force[a]],
             (S::SubtreeCom | S::SubtreeLinVel | S::SubtreeAngMom, O::Body(b) | O::XBody(b)) => {
                 let sums = self.subtree(b);
                 match s.kind {
@@ -101,9 +101,9 @@ impl<T: Real> Readings<'_, T> {
                 None => self.mount_pos(m),
                 Some(f) => self.in_axes(f, &self.separation(f, m)),
             },
-            S::FrameXAxis => seen(self.work.axes(m)[0]),
-            S::FrameYAxis => seen(self.work.axes(m)[1]),
-            S::FrameZAxis => seen(self.work.axes(m)[2]),
+            S::FrameXAxis => seen(self.work.motion.axes(m)[0]),
+            S::FrameYAxis => seen(self.work.motion.axes(m)[1]),
+            S::FrameZAxis => seen(self.work.motion.axes(m)[2]),
             S::FrameLinVel => match &from {
                 None => self.mount_velocity(m),
                 Some(f) => self.relative_velocity(m, f).0,
@@ -119,7 +119,7 @@ impl<T: Real> Readings<'_, T> {
             S::Accelerometer => self.in_axes(m, &self.mount_acceleration(m).0),
             S::Magnetometer => {
                 let flux = self.sim.model.opt.magnetic;
-                into_axes(&self.work.axes(m), &[T::lit(flux[0]), T::lit(flux[1]), T::lit(flux[2])])
+                into_axes(&self.work.motion.axes(m), &[T::lit(flux[0]), T::lit(flux[1]), T::lit(flux[2])])
             }
             _ => return None,
         })

@@ -27,10 +27,10 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub fn site_touch(&self, site: usize) -> T {
         let mut total = T::zero();
-        for row in &self.work.contacts {
+        for row in &self.work.rows.contacts {
             total += self.felt(site, &self.floor_contact(row));
         }
-        for block in self.work.blocks.iter() {
+        for block in self.work.rows.blocks.iter() {
             if block.source != Source::Contacts {
                 continue;
             }
@@ -53,7 +53,7 @@ impl<T: Real> Readings<'_, T> {
             return T::zero();
         }
         let mount = &self.sim.sites[site];
-        let axes = self.work.axes(mount);
+        let axes = self.work.motion.axes(mount);
         let size = [T::lit(s.size[0]), T::lit(s.size[1]), T::lit(s.size[2])];
         let start = into_axes(&axes, &self.arm_from(mount, Some(c.tree), &c.point));
         let normal = into_axes(&axes, &c.normal);

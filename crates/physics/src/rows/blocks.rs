@@ -18,6 +18,32 @@ pub(crate) struct ConstraintRows<T: Real> {
     pub blocks: Blocks<T>,
 }
 
+impl<T: Real> ConstraintRows<T> {
+    /// No rows.
+    pub fn new() -> Self {
+        Self::with_capacity(0, 0, 0)
+    }
+
+    /// No rows, and room for so many of the first three kinds.
+    pub fn with_capacity(contacts: usize, limits: usize, dry: usize) -> Self {
+        ConstraintRows {
+            contacts: Vec::with_capacity(contacts),
+            limits: Vec::with_capacity(limits),
+            dry: Vec::with_capacity(dry),
+            blocks: Blocks::new(),
+        }
+    }
+
+    /// Forgets all rows.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.contacts.clear();
+        self.limits.clear();
+        self.dry.clear();
+        self.blocks.clear();
+    }
+}
+
 /// The blocks of a step; their memory is kept from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks<T: Real> {

@@ -12,7 +12,7 @@ mod joint;
 mod row;
 
 pub(crate) use block::{Block, RowValues, Source, at};
-pub(crate) use blocks::{Blocks, ConstraintRows};
+pub(crate) use blocks::ConstraintRows;
 pub(crate) use floor::FloorRow;
 pub(crate) use jacobian::{Jacobian, Side};
 pub(crate) use joint::{DryRow, LimitRow};

@@ -10,19 +10,19 @@ use crate::state::Work;
 
 /// Whether some block does not fit the tree.
 pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
-    work.blocks.iter().any(|b| b.coupled)
+    work.rows.blocks.iter().any(|b| b.coupled)
 }
 
 kernel_fn! {
     /// Marks the links that are touched and recalls zones. Returns whether all zones are known thereby.
     pub(crate) fn recall<'a, T>(work: &'a mut Work<T>) -> bool {
-        let Work { blocks, past, in_contact, .. } = work;
+        let Work { rows, past, solver, .. } = work;
         let mut known = true;
         let mut at = 0;
-        for b in blocks.iter_mut() {
+        for b in rows.blocks.iter_mut() {
             if let Jacobian::Points { sides, .. } = &b.jacobian {
                 for (link, _) in sides.iter().flat_map(|s| &s.links) {
-                    in_contact[*link] = true;
+                    solver.in_contact[*link] = true;
                 }
             }
             b.recall(&past.blocks, &mut at);
@@ -35,9 +35,9 @@ kernel_fn! {
 kernel_fn! {
     /// Values and zones at the warm start, where they are not recalled.
     pub(crate) fn start<'a, T>(work: &'a mut Work<T>, known: bool) {
-        for b in work.blocks.iter_mut() {
+        for b in work.rows.blocks.iter_mut() {
             if !known {
-                let ja = b.of_motion(&work.link_acc, &work.acc);
+                let ja = b.of_motion(&work.solver.link_acc, &work.solver.acc);
                 for k in 0..b.dim {
                     b.u[k] = ja[k] + b.u0[k];
                 }
@@ -51,19 +51,19 @@ kernel_fn! {
 kernel_fn! {
     /// The blocks' share of the system: everything if they fit the tree, only constant forces if they are coupled.
     pub(crate) fn assemble<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
-        for b in work.blocks.iter() {
+        for b in work.rows.blocks.iter() {
             match &b.jacobian {
                 Jacobian::Joints(terms) => {
                     for (dof, coefficient) in terms {
-                        if work.stale[sim.dof_link[*dof]] {
-                            work.rhs[*dof] = coefficient.mul_add(b.hold, work.rhs[*dof]);
+                        if work.solver.stale[sim.dof_link[*dof]] {
+                            work.solver.rhs[*dof] = coefficient.mul_add(b.hold, work.solver.rhs[*dof]);
                         }
                     }
                 }
                 Jacobian::Points { sides, .. } if !b.coupled => {
-                    if sides[1].links.iter().any(|(l, _)| work.stale[*l]) {
-                        let (side, stale) = (&sides[1], &work.stale);
-                        let sums = (&mut work.stiffness[..], &mut work.wrench[..]);
+                    if sides[1].links.iter().any(|(l, _)| work.solver.stale[*l]) {
+                        let (side, stale) = (&sides[1], &work.solver.stale);
+                        let sums = (&mut work.solver.stiffness[..], &mut work.solver.wrench[..]);
                         match b.dim {
                             1 => add_to_links::<T, 1>(b, side, stale, sums),
                             3 => add_to_links::<T, 3>(b, side, stale, sums),
@@ -118,8 +118,8 @@ kernel_fn! {
     /// Moves to the Newton point; lanes where some block's linear model does not hold there.
     pub(crate) fn newton_point<'a, T>(work: &'a mut Work<T>) -> T::Mask {
         let mut changed = T::none();
-        for b in work.blocks.iter_mut() {
-            changed = T::or(changed, b.newton_point(&work.link_acc, &work.next));
+        for b in work.rows.blocks.iter_mut() {
+            changed = T::or(changed, b.newton_point(&work.solver.link_acc, &work.solver.next));
         }
         changed
     }
@@ -128,7 +128,7 @@ kernel_fn! {
 kernel_fn! {
     /// Moves the lanes and marks the links whose system changed.
     pub(crate) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, step: NewtonStep<T>) {
-        for b in work.blocks.iter_mut() {
+        for b in work.rows.blocks.iter_mut() {
             let changed = b.advance(&step);
             if !T::any(changed) {
                 continue;
@@ -137,12 +137,12 @@ kernel_fn! {
             match &b.jacobian {
                 Jacobian::Points { sides, .. } if !b.coupled => {
                     for (link, lanes) in &sides[1].links {
-                        work.stale[*link] |= T::any(T::and(*lanes, changed));
+                        work.solver.stale[*link] |= T::any(T::and(*lanes, changed));
                     }
                 }
                 Jacobian::Joints(terms) => {
                     for (dof, _) in terms {
-                        work.stale[sim.dof_link[*dof]] = true;
+                        work.solver.stale[sim.dof_link[*dof]] = true;
                     }
                 }
                 Jacobian::Points { .. } => {}
@@ -155,7 +155,7 @@ kernel_fn! {
     /// Sums of [`Row::ends`].
     pub(crate) fn ends<'a, T>(work: &'a Work<T>) -> [T; 3] {
         let mut sums = [T::zero(); 3];
-        for b in work.blocks.iter() {
+        for b in work.rows.blocks.iter() {
             let e = b.ends();
             for i in 0..3 {
                 sums[i] += e[i];
@@ -169,7 +169,7 @@ kernel_fn! {
     /// Sums of [`Row::slope`].
     pub(crate) fn slope<'a, T>(work: &'a Work<T>, alpha: T) -> [T; 2] {
         let mut sums = [T::zero(); 2];
-        for b in work.blocks.iter() {
+        for b in work.rows.blocks.iter() {
             let s = b.slope(alpha);
             sums[0] += s[0];
             sums[1] += s[1];
@@ -181,7 +181,7 @@ kernel_fn! {
 kernel_fn! {
     /// True forces at the present point.
     pub(crate) fn true_forces<'a, T>(work: &'a mut Work<T>) {
-        for b in work.blocks.iter_mut() {
+        for b in work.rows.blocks.iter_mut() {
             b.force = b.true_force(&b.u);
         }
     }
@@ -190,8 +190,8 @@ kernel_fn! {
 kernel_fn! {
     /// Adds the refinement's accelerations to the row values of the lanes in `arrived`.
     pub(crate) fn add_refinement<'a, T>(work: &'a mut Work<T>, arrived: T::Mask) {
-        for b in work.blocks.iter_mut() {
-            let du = b.of_motion(&work.link_acc, &work.next);
+        for b in work.rows.blocks.iter_mut() {
+            let du = b.of_motion(&work.solver.link_acc, &work.solver.next);
             for k in 0..b.dim {
                 b.u[k] += T::masked(arrived, du[k]);
             }
@@ -202,8 +202,8 @@ kernel_fn! {
 kernel_fn! {
     /// Puts the blocks' forces on links and joints.
     pub(crate) fn apply_forces<'a, T>(work: &'a mut Work<T>) {
-        for b in work.blocks.iter() {
-            b.exert(&mut work.wrench, &mut work.rhs);
+        for b in work.rows.blocks.iter() {
+            b.exert(&mut work.solver.wrench, &mut work.solver.rhs);
         }
     }
 }
@@ -211,10 +211,10 @@ kernel_fn! {
 kernel_fn! {
     /// Adds the normal forces of contacts with the static world to their geoms.
     pub(crate) fn report_forces<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
-        for b in work.blocks.iter().filter(|b| !b.coupled) {
+        for b in work.rows.blocks.iter().filter(|b| !b.coupled) {
             for (pair, lanes) in &b.members {
                 let geom = sim.contacts.pair(&sim.geoms, *pair).moving();
-                work.normal_force[geom] += T::masked(*lanes, b.force[0]);
+                work.contacts.normal_force[geom] += T::masked(*lanes, b.force[0]);
             }
         }
     }

@@ -22,7 +22,7 @@ use crate::dynamics::reduce_free_root;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, at};
 use crate::sim::Sim;
-use crate::state::{Coupling, Work};
+use crate::state::{Coupling, Solver, Work};
 
 kernel_fn! {
     /// Computes the columns of all coupled blocks (`fresh`: the factors of the tree changed) and factorizes.
@@ -38,11 +38,11 @@ kernel_fn! {
 #[inline(always)]
 fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool) {
     let nv = sim.model.nv;
-    let mut c = std::mem::replace(&mut work.coupling, Coupling::new(0, 0));
+    let mut c = std::mem::replace(&mut work.solver.coupling, Coupling::new(0, 0));
     // blocks of crowded lanes alone are left out: in the other lanes they are zero
-    let trees = T::not(work.crowded);
+    let trees = T::not(work.solver.crowded);
     let corrects = |b: &Block<T>| b.coupled && (T::all(trees) || T::any(T::and(b.on, trees)));
-    c.rows = work.blocks.iter().filter(|b| corrects(b)).map(|b| b.dim).sum();
+    c.rows = work.rows.blocks.iter().filter(|b| corrects(b)).map(|b| b.dim).sum();
     let (n, z) = (c.rows, T::zero());
     c.columns.resize(n * nv, z);
     c.scaled.resize(n * nv, z);
@@ -50,19 +50,19 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
     c.y.resize(n, z);
     c.factor.resize(n * (n + 1) / 2, z);
     let mut first = 0;
-    for b in 0..work.blocks.len() {
-        if !corrects(&work.blocks[b]) {
+    for b in 0..work.rows.blocks.len() {
+        if !corrects(&work.rows.blocks[b]) {
             continue;
         }
-        let dim = work.blocks[b].dim;
+        let dim = work.rows.blocks[b].dim;
         if fresh {
-            mark_path(sim, &work.blocks[b], &mut c.on_path);
+            mark_path(sim, &work.rows.blocks[b], &mut c.on_path);
             for k in 0..dim {
                 let from = (first + k) * nv;
                 inward::<T, S>(sim, work, b, k, &mut c.rhs, &c.on_path, &mut c.columns[from..from + nv]);
             }
         }
-        scale_rows(&work.blocks[b], &mut c, first, nv);
+        scale_rows(&work.rows.blocks[b], &mut c, first, nv);
         first += dim;
     }
     // 1 + sum over the degrees of freedom
@@ -71,7 +71,7 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
             let (a, b) = (&c.scaled[i * nv..(i + 1) * nv], &c.scaled[j * nv..(j + 1) * nv]);
             let mut sum = if i == j { T::lit(1.0) } else { z };
             for d in 0..nv {
-                sum = (a[d] * work.pivot[d]).mul_add(b[d], sum);
+                sum = (a[d] * work.solver.pivot[d]).mul_add(b[d], sum);
             }
             c.factor[at(i, j)] = sum;
         }
@@ -91,14 +91,14 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
             c.factor[at(i, j)] = x * inverse;
         }
     }
-    work.coupling = c;
+    work.solver.coupling = c;
 }
 
 kernel_fn! {
     /// Corrects `drive` for the coupled blocks; `with_offset` at a Newton point, without for a residual.
     pub(crate) fn correct<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, with_offset: bool) {
         let nv = sim.model.nv;
-        let Work { coupling: c, drive, pivot, .. } = work;
+        let Solver { coupling: c, drive, pivot, .. } = &mut work.solver;
         let n = c.rows;
         for i in 0..n {
             let column = &c.scaled[i * nv..(i + 1) * nv];
@@ -165,10 +165,10 @@ fn inward<T: Real, S: Space>(
     out.fill(z);
     for l in 0..sim.links.len() {
         if on_path[l] {
-            work.link_force[l] = [z; 6];
+            work.solver.link_force[l] = [z; 6];
         }
     }
-    let block = &work.blocks[b];
+    let block = &work.rows.blocks[b];
     match &block.jacobian {
         Jacobian::Points { sides, .. } => {
             for (s, side) in sides.iter().enumerate() {
@@ -177,7 +177,7 @@ fn inward<T: Real, S: Space>(
                     for i in 0..6 {
                         // link forces are what the motion needs: minus what is applied
                         let x = T::masked(*lanes, w[i]);
-                        work.link_force[*link][i] += if s == 0 { x } else { -x };
+                        work.solver.link_force[*link][i] += if s == 0 { x } else { -x };
                     }
                 }
             }
@@ -193,20 +193,20 @@ fn inward<T: Real, S: Space>(
             continue;
         }
         let link = &sim.links[l];
-        let mut f = work.link_force[l];
+        let mut f = work.solver.link_force[l];
         let dofs = link.dofs.clone();
         if link.free_block {
-            let reduced = reduce_free_root(dofs.start, &work.root_factor[link.tree], &work.axis, rhs, &f);
+            let reduced = reduce_free_root(dofs.start, &work.solver.root_factor[link.tree], &work.motion.axis, rhs, &f);
             out[dofs].copy_from_slice(&reduced);
             continue;
         }
         for d in dofs.rev() {
-            let force = rhs[d] - S::dot(&work.axis[d], &f);
-            f = S::axpy(&work.gain[d], force, &f);
+            let force = rhs[d] - S::dot(&work.motion.axis[d], &f);
+            f = S::axpy(&work.solver.gain[d], force, &f);
             out[d] = force;
         }
         if let Some(p) = link.parent {
-            S::add(&mut work.link_force[p], &f);
+            S::add(&mut work.solver.link_force[p], &f);
         }
     }
 }

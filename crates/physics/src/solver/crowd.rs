@@ -11,13 +11,13 @@ use crate::lanes::{MAX_LANES, Real, kernel_fn};
 use crate::multifrontal::{self, Crowd, JointRow, NONE, RowTerms, Tie};
 use crate::rows::{Block, Jacobian};
 use crate::sim::Sim;
-use crate::state::Work;
+use crate::state::{Solver, Work};
 
 kernel_fn! {
     /// Finds the lanes with more than [`Sim::most_rows`] coupled rows and prepares their factorization.
     pub(crate) fn start<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) -> T::Mask {
         let most = sim.most_rows;
-        let coupled = || work.blocks.iter().filter(|b| b.coupled);
+        let coupled = || work.rows.blocks.iter().filter(|b| b.coupled);
         if coupled().map(|b| b.dim).sum::<usize>() <= most {
             return T::none();
         }
@@ -34,8 +34,8 @@ kernel_fn! {
                 crowded |= 1 << lane;
             }
         }
-        if crowded != 0 && work.crowds.is_empty() {
-            work.crowds = vec![Crowd::new(); T::LANES];
+        if crowded != 0 && work.solver.crowds.is_empty() {
+            work.solver.crowds = vec![Crowd::new(); T::LANES];
         }
         for lane in (0..T::LANES).filter(|lane| crowded >> lane & 1 == 1) {
             prepare(sim, work, lane);
@@ -47,10 +47,10 @@ kernel_fn! {
 /// Lists what ties the links of a lane together, and plans the factorization.
 #[inline(always)]
 fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
-    let Work { crowds, blocks, axis, .. } = work;
-    let Crowd { plan, numbers } = &mut crowds[lane];
+    let Work { motion, solver, rows, .. } = work;
+    let Crowd { plan, numbers } = &mut solver.crowds[lane];
     numbers.resize(sim.links.len(), sim.model.nv);
-    for (to, from) in numbers.axis.iter_mut().zip(axis.iter()) {
+    for (to, from) in numbers.axis.iter_mut().zip(&motion.axis) {
         *to = from.map(|x| x.get(lane));
     }
     numbers.ties.clear();
@@ -58,7 +58,7 @@ fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
     plan.row_terms.clear();
     plan.terms.clear();
     let on_lane = |mask: T::Mask| T::bits(mask) >> lane & 1 == 1;
-    for (index, b) in blocks.iter_mut().enumerate() {
+    for (index, b) in rows.blocks.iter_mut().enumerate() {
         b.moved = T::not(T::none());
         if !b.coupled || !on_lane(b.on) {
             continue;
@@ -112,7 +112,9 @@ kernel_fn! {
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let Work { crowds, blocks, stale, in_contact, inertia, stiffness, diag, stats, .. } = work;
+            let Work { motion, solver, rows, stats, .. } = work;
+            let Solver { crowds, stale, in_contact, stiffness, diag, .. } = solver;
+            let (inertia, blocks) = (&motion.inertia, &rows.blocks);
             let Crowd { plan, numbers } = &mut crowds[lane];
             for (l, link) in sim.links.iter().enumerate().filter(|(l, _)| stale[*l]) {
                 let rigid = sym6_of_inertia(&inertia[l].map(|x| x.get(lane)));
@@ -150,7 +152,7 @@ kernel_fn! {
             stats.crowded += 1;
             stats.entries += multifrontal::factorize(&sim.links, plan, numbers);
         }
-        for b in work.blocks.iter_mut() {
+        for b in work.rows.blocks.iter_mut() {
             b.moved = T::none();
         }
     }
@@ -163,7 +165,8 @@ kernel_fn! {
     pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let Work { crowds, in_contact, bias_force, wrench, link_force, rhs, next, link_acc, .. } = work;
+            let bias_force = &work.motion.bias_force;
+            let Solver { crowds, in_contact, wrench, link_force, rhs, next, link_acc, .. } = &mut work.solver;
             let Crowd { plan, numbers } = &mut crowds[lane];
             for (to, from) in numbers.rhs.iter_mut().zip(rhs.iter()) {
                 *to = from.get(lane);

@@ -13,11 +13,14 @@ use crate::state::{Group, Work};
 #[inline(always)]
 pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     start::<T, S>(sim, group, work);
-    let free = work.contacts.is_empty() && work.limits.is_empty() && work.dry.is_empty() && work.blocks.is_empty();
+    let free = work.rows.contacts.is_empty()
+        && work.rows.limits.is_empty()
+        && work.rows.dry.is_empty()
+        && work.rows.blocks.is_empty();
     let any_coupled = blocks::any_coupled(work);
-    work.crowded = if any_coupled { crowd::start(sim, work) } else { T::none() };
+    work.solver.crowded = if any_coupled { crowd::start(sim, work) } else { T::none() };
     // lanes whose tree is corrected for its coupled blocks, and those beside them
-    let (crowd, trees) = (T::any(work.crowded), !T::all(work.crowded));
+    let (crowd, trees) = (T::any(work.solver.crowded), !T::all(work.solver.crowded));
     let coupled = any_coupled && trees;
     let mut done = T::none();
     // lanes that stopped at a Newton point of their own active set
@@ -26,29 +29,29 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
     loop {
         assemble::<T, S>(sim, work);
         if crowd {
-            crowd::factorize(sim, work, T::and(work.crowded, T::not(done)));
+            crowd::factorize(sim, work, T::and(work.solver.crowded, T::not(done)));
         }
         if coupled {
             // links that are not stale keep their inward pass, without the correction of the last iteration
-            let fresh = work.stale.contains(&true);
-            work.drive.copy_from_slice(&work.tree_drive);
+            let fresh = work.solver.stale.contains(&true);
+            work.solver.drive.copy_from_slice(&work.solver.tree_drive);
             factorize::<T, S>(sim, work, true);
-            work.tree_drive.copy_from_slice(&work.drive);
+            work.solver.tree_drive.copy_from_slice(&work.solver.drive);
             coupled::factorize(sim, work, fresh);
             coupled::correct(sim, work, true);
         } else if trees {
             factorize::<T, S>(sim, work, true);
         }
-        work.stale.fill(false);
+        work.solver.stale.fill(false);
         if trees {
             accelerate::<T, S>(sim, work);
         }
         if crowd {
-            crowd::solve(sim, work, T::and(work.crowded, T::not(done)), false);
+            crowd::solve(sim, work, T::and(work.solver.crowded, T::not(done)), false);
         }
         iteration += 1;
         if free {
-            work.acc.copy_from_slice(&work.next);
+            work.solver.acc.copy_from_slice(&work.solver.next);
             arrived = T::not(arrived);
             break;
         }
@@ -90,26 +93,26 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
 /// Active sets to start from: those of the evaluation before where there was one, else those at the warm start.
 #[inline(always)]
 fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    work.stale.fill(true);
-    work.in_contact.fill(false);
+    work.solver.stale.fill(true);
+    work.solver.in_contact.fill(false);
     let mut known = true;
-    for c in &work.contacts {
-        work.in_contact[c.link] = true;
+    for c in &work.rows.contacts {
+        work.solver.in_contact[c.link] = true;
         known &= !T::any(T::and(c.on, T::not(c.recalled)));
     }
-    for l in &work.limits {
+    for l in &work.rows.limits {
         known &= !T::any(T::and(l.on, T::not(l.recalled)));
     }
-    for f in &work.dry {
+    for f in &work.rows.dry {
         known &= f.recalled;
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         known &= blocks::recall(work);
     }
     if !known {
         warm_start::<T, S>(sim, group, work);
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::start(work, known);
     }
 }
@@ -118,20 +121,20 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) 
 #[inline(always)]
 fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
-        work.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
+        work.solver.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
     }
     link_accelerations::<T, S>(sim, work);
-    for c in work.contacts.iter_mut() {
-        let ja = c.of_motion(&work.link_acc[c.link]);
+    for c in work.rows.contacts.iter_mut() {
+        let ja = c.of_motion(&work.solver.link_acc[c.link]);
         c.u = add3(&ja, &c.u0);
         c.activate(T::not(c.recalled));
     }
-    for l in work.limits.iter_mut() {
-        l.u = l.sign.mul_add(work.acc[l.dof], l.u0);
+    for l in work.rows.limits.iter_mut() {
+        l.u = l.sign.mul_add(work.solver.acc[l.dof], l.u0);
         l.activate(T::not(l.recalled));
     }
-    for f in work.dry.iter_mut() {
-        f.u = work.acc[f.dof] + f.u0;
+    for f in work.rows.dry.iter_mut() {
+        f.u = work.solver.acc[f.dof] + f.u0;
         if !f.recalled {
             f.activate(T::not(T::none()));
         }
@@ -143,43 +146,43 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
 fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
     for (l, link) in sim.links.iter().enumerate() {
-        if !work.stale[l] {
+        if !work.solver.stale[l] {
             continue;
         }
         for d in link.dofs.clone() {
-            work.diag[d] = T::splat(sim.armature[d]);
-            work.rhs[d] = work.tau[d];
+            work.solver.diag[d] = T::splat(sim.armature[d]);
+            work.solver.rhs[d] = work.forces.tau[d];
         }
-        if work.in_contact[l] {
-            work.stiffness[l] = [z; 21];
-            work.wrench[l] = [z; 6];
+        if work.solver.in_contact[l] {
+            work.solver.stiffness[l] = [z; 21];
+            work.solver.wrench[l] = [z; 6];
         }
     }
-    for c in &work.contacts {
+    for c in &work.rows.contacts {
         let l = c.link;
-        if !work.stale[l] {
+        if !work.solver.stale[l] {
             continue;
         }
-        c.add_stiffness::<S>(&mut work.stiffness[l]);
+        c.add_stiffness::<S>(&mut work.solver.stiffness[l]);
         let w = c.wrench(&c.linear_force(&c.u0));
-        S::add(&mut work.wrench[l], &w);
+        S::add(&mut work.solver.wrench[l], &w);
     }
-    for l in &work.limits {
-        if !work.stale[sim.dof_link[l.dof]] {
+    for l in &work.rows.limits {
+        if !work.solver.stale[sim.dof_link[l.dof]] {
             continue;
         }
         let s = T::masked(l.active, l.d);
-        work.diag[l.dof] += s;
-        work.rhs[l.dof] += -(l.sign * (s * l.u0));
+        work.solver.diag[l.dof] += s;
+        work.solver.rhs[l.dof] += -(l.sign * (s * l.u0));
     }
-    for f in &work.dry {
-        if !work.stale[sim.dof_link[f.dof]] {
+    for f in &work.rows.dry {
+        if !work.solver.stale[sim.dof_link[f.dof]] {
             continue;
         }
-        work.diag[f.dof] += T::masked(f.sticking, f.d);
-        work.rhs[f.dof] += f.linear(f.u0);
+        work.solver.diag[f.dof] += T::masked(f.sticking, f.d);
+        work.solver.rhs[f.dof] += f.linear(f.u0);
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::assemble(sim, work);
     }
 }
@@ -188,16 +191,16 @@ fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 #[inline(always)]
 fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     let mut changed = T::none();
-    for c in work.contacts.iter_mut() {
-        changed = T::or(changed, c.newton_point(&work.link_acc[c.link]));
+    for c in work.rows.contacts.iter_mut() {
+        changed = T::or(changed, c.newton_point(&work.solver.link_acc[c.link]));
     }
-    for l in work.limits.iter_mut() {
-        changed = T::or(changed, l.newton_point(work.next[l.dof]));
+    for l in work.rows.limits.iter_mut() {
+        changed = T::or(changed, l.newton_point(work.solver.next[l.dof]));
     }
-    for f in work.dry.iter_mut() {
-        changed = T::or(changed, f.newton_point(work.next[f.dof]));
+    for f in work.rows.dry.iter_mut() {
+        changed = T::or(changed, f.newton_point(work.solver.next[f.dof]));
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         changed = T::or(changed, blocks::newton_point(work));
     }
     changed
@@ -206,19 +209,19 @@ fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
 /// Moves the lanes and marks the links whose system changed.
 #[inline(always)]
 fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
-    for (a, n) in work.acc.iter_mut().zip(&work.next) {
+    for (a, n) in work.solver.acc.iter_mut().zip(&work.solver.next) {
         *a = step.of(*a, *n);
     }
-    for c in work.contacts.iter_mut() {
-        work.stale[c.link] |= T::any(c.advance(step));
+    for c in work.rows.contacts.iter_mut() {
+        work.solver.stale[c.link] |= T::any(c.advance(step));
     }
-    for l in work.limits.iter_mut() {
-        work.stale[sim.dof_link[l.dof]] |= T::any(l.advance(step));
+    for l in work.rows.limits.iter_mut() {
+        work.solver.stale[sim.dof_link[l.dof]] |= T::any(l.advance(step));
     }
-    for f in work.dry.iter_mut() {
-        work.stale[sim.dof_link[f.dof]] |= T::any(f.advance(step));
+    for f in work.rows.dry.iter_mut() {
+        work.solver.stale[sim.dof_link[f.dof]] |= T::any(f.advance(step));
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::advance(sim, work, *step);
     }
 }
@@ -226,16 +229,16 @@ fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
 /// Every row's true force at the present point.
 #[inline(always)]
 fn true_forces<T: Real>(work: &mut Work<T>) {
-    for c in work.contacts.iter_mut() {
+    for c in work.rows.contacts.iter_mut() {
         c.force = c.true_force(&c.u);
     }
-    for l in work.limits.iter_mut() {
+    for l in work.rows.limits.iter_mut() {
         l.force = l.true_force(l.u);
     }
-    for f in work.dry.iter_mut() {
+    for f in work.rows.dry.iter_mut() {
         f.force = f.true_force(f.u);
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::true_forces(work);
     }
 }
@@ -246,44 +249,44 @@ fn true_forces<T: Real>(work: &mut Work<T>) {
 #[inline(always)]
 fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask, coupled: bool) {
     for d in 0..sim.model.nv {
-        work.rhs[d] = T::splat(sim.armature[d]).neg_mul_add(work.acc[d], work.tau[d]);
+        work.solver.rhs[d] = T::splat(sim.armature[d]).neg_mul_add(work.solver.acc[d], work.forces.tau[d]);
     }
     apply_forces::<T, S>(work);
     link_accelerations::<T, S>(sim, work);
     for l in 0..sim.links.len() {
-        let mut f = S::momentum(&work.inertia[l], &work.link_acc[l]);
-        S::add(&mut f, &work.bias_force[l]);
-        if work.in_contact[l] {
-            S::sub(&mut f, &work.wrench[l]);
+        let mut f = S::momentum(&work.motion.inertia[l], &work.solver.link_acc[l]);
+        S::add(&mut f, &work.motion.bias_force[l]);
+        if work.solver.in_contact[l] {
+            S::sub(&mut f, &work.solver.wrench[l]);
         }
-        work.link_force[l] = f;
+        work.solver.link_force[l] = f;
     }
-    if !T::all(work.crowded) {
+    if !T::all(work.solver.crowded) {
         bring_inward::<T, S>(sim, work);
         if coupled {
             coupled::correct(sim, work, false);
         }
         accelerate::<T, S>(sim, work);
     }
-    if T::any(work.crowded) {
-        crowd::solve(sim, work, work.crowded, true);
+    if T::any(work.solver.crowded) {
+        crowd::solve(sim, work, work.solver.crowded, true);
     }
-    for (a, x) in work.acc.iter_mut().zip(&work.next) {
+    for (a, x) in work.solver.acc.iter_mut().zip(&work.solver.next) {
         *a += T::masked(arrived, *x);
     }
-    for c in work.contacts.iter_mut() {
-        let du = c.of_motion(&work.link_acc[c.link]);
+    for c in work.rows.contacts.iter_mut() {
+        let du = c.of_motion(&work.solver.link_acc[c.link]);
         for i in 0..3 {
             c.u[i] += T::masked(arrived, du[i]);
         }
     }
-    for l in work.limits.iter_mut() {
-        l.u += T::masked(arrived, l.sign * work.next[l.dof]);
+    for l in work.rows.limits.iter_mut() {
+        l.u += T::masked(arrived, l.sign * work.solver.next[l.dof]);
     }
-    for f in work.dry.iter_mut() {
-        f.u += T::masked(arrived, work.next[f.dof]);
+    for f in work.rows.dry.iter_mut() {
+        f.u += T::masked(arrived, work.solver.next[f.dof]);
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::add_refinement(work, arrived);
     }
     true_forces(work);
@@ -292,22 +295,22 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
 /// Puts the constraint forces on the right-hand side: contact wrenches on links, limit and friction forces on joints.
 #[inline(always)]
 pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
-    for l in 0..work.wrench.len() {
-        if work.in_contact[l] {
-            work.wrench[l] = [T::zero(); 6];
+    for l in 0..work.solver.wrench.len() {
+        if work.solver.in_contact[l] {
+            work.solver.wrench[l] = [T::zero(); 6];
         }
     }
-    for c in &work.contacts {
+    for c in &work.rows.contacts {
         let w = c.wrench(&c.force);
-        S::add(&mut work.wrench[c.link], &w);
+        S::add(&mut work.solver.wrench[c.link], &w);
     }
-    for l in &work.limits {
-        work.rhs[l.dof] += l.sign * l.force;
+    for l in &work.rows.limits {
+        work.solver.rhs[l.dof] += l.sign * l.force;
     }
-    for f in &work.dry {
-        work.rhs[f.dof] += f.force;
+    for f in &work.rows.dry {
+        work.solver.rhs[f.dof] += f.force;
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::apply_forces(work);
     }
 }
@@ -315,11 +318,11 @@ pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
 /// Normal forces for the readings.
 #[inline(always)]
 fn report_forces<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
-    work.normal_force.fill(T::zero());
-    for c in &work.contacts {
-        work.normal_force[c.geom] += c.force[0];
+    work.contacts.normal_force.fill(T::zero());
+    for c in &work.rows.contacts {
+        work.contacts.normal_force[c.geom] += c.force[0];
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         blocks::report_forces(sim, work);
     }
 }

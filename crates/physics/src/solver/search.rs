@@ -24,16 +24,16 @@ pub(super) fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Ma
     let (z, one) = (T::zero(), T::lit(1.0));
     // interpolated forces against the direction at both ends, and the true forces at the start
     let mut sums = [z; 3];
-    for row in &work.contacts {
+    for row in &work.rows.contacts {
         add(&mut sums, &row.ends());
     }
-    for row in &work.limits {
+    for row in &work.rows.limits {
         add(&mut sums, &row.ends());
     }
-    for row in &work.dry {
+    for row in &work.rows.dry {
         add(&mut sums, &row.ends());
     }
-    if !work.blocks.is_empty() {
+    if !work.rows.blocks.is_empty() {
         add(&mut sums, &blocks::ends(work));
     }
     let [g0, g1, f0] = sums;
@@ -52,16 +52,16 @@ pub(super) fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Ma
         work.stats.line_search += 1;
         // slope of the cost and its derivative at alpha
         let mut sums = [alpha.mul_add(curvature, g0), curvature];
-        for row in &work.contacts {
+        for row in &work.rows.contacts {
             add(&mut sums, &row.slope(alpha));
         }
-        for row in &work.limits {
+        for row in &work.rows.limits {
             add(&mut sums, &row.slope(alpha));
         }
-        for row in &work.dry {
+        for row in &work.rows.dry {
             add(&mut sums, &row.slope(alpha));
         }
-        if !work.blocks.is_empty() {
+        if !work.rows.blocks.is_empty() {
             add(&mut sums, &blocks::slope(work, alpha));
         }
         let [slope, second] = sums;

@@ -13,6 +13,7 @@ pub use agent::AgentState;
 pub(crate) use clearance::clearance;
 pub(crate) use coupling::Coupling;
 pub use group::Group;
+pub(crate) use scratch::Solver;
 pub use scratch::Work;
 pub use stats::SolverStats;
 pub(crate) use sweep::{Sweep, nowhere};

@@ -69,12 +69,12 @@ kernel_fn! {
     /// Velocities, activations and positions at the end of the step.
     fn integrate<'a, T>(sim: &'a Sim<T>, group: &'a mut Group<T>, work: &'a mut Work<T>) {
         let dt = T::splat(sim.dt);
-        let acc = if sim.implicit_damping { &work.next } else { &work.acc };
-        group.warm.copy_from_slice(&work.acc);
+        let acc = if sim.implicit_damping { &work.solver.next } else { &work.solver.acc };
+        group.warm.copy_from_slice(&work.solver.acc);
         for (v, a) in group.qvel.iter_mut().zip(acc) {
             *v = a.mul_add(dt, *v);
         }
-        advance_activations(sim, &mut group.act, &work.act_dot);
+        advance_activations(sim, &mut group.act, &work.forces.act_dot);
         integrate_positions(sim, &mut group.qpos, &group.qvel, dt);
     }
 }
@@ -118,9 +118,10 @@ impl<T: Real> Sim<T> {
             Stage::Smooth => {
                 motion_stage(self, group, work);
                 force_stage(self, group, work);
-                work.external.clear();
-                work.bias_is_net = !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty();
-                if work.bias_is_net {
+                work.forces.external.clear();
+                work.forces.bias_is_net =
+                    !self.lifts.is_empty() || !self.drags.is_empty() || !group.external.is_empty();
+                if work.forces.bias_is_net {
                     external_forces(self, group, work);
                 }
             }
@@ -167,7 +168,7 @@ impl<T: Real> Sim<T> {
     /// What a step learns helps the next ones of the same call, which makes it faster than as many calls of one step each.
     /// The results are the same to rounding; equal bits take equal calls.
     pub fn advance(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
-        for touched in work.touched.iter_mut() {
+        for touched in work.contacts.touched.iter_mut() {
             *touched = T::none();
         }
         work.continues = false;
@@ -184,14 +185,14 @@ impl<T: Real> Sim<T> {
     /// Recomputes positions and velocities of bodies at the present state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
         motion_stage(self, group, work);
-        work.bias_is_net = false;
+        work.forces.bias_is_net = false;
     }
 
     /// The same, and the forces of the actuators there, which [`Sim::measure_actuators`] then makes readable.
     pub fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         motion_stage(self, group, work);
         force_stage(self, group, work);
-        work.bias_is_net = false;
+        work.forces.bias_is_net = false;
     }
 
     /// Classical Runge-Kutta over the whole dynamics.
@@ -241,32 +242,32 @@ impl<T: Real> Kernel<T> for RkStage<'_, T> {
             correct_rotations(sim, &start.warm, &mut rate, dt * T::lit(reach_before));
         }
         for d in 0..sim.model.nv {
-            let (v, a) = (rate[d] * w, work.acc[d] * w);
+            let (v, a) = (rate[d] * w, work.solver.acc[d] * w);
             sum.qvel[d] = if first { v } else { sum.qvel[d] + v };
             sum.warm[d] = if first { a } else { sum.warm[d] + a };
         }
-        for (s, rate) in sum.act.iter_mut().zip(&work.act_dot) {
+        for (s, rate) in sum.act.iter_mut().zip(&work.forces.act_dot) {
             *s = if first { *rate * w } else { rate.mul_add(w, *s) };
         }
-        group.warm.copy_from_slice(&work.acc);
+        group.warm.copy_from_slice(&work.solver.acc);
         group.qpos.copy_from_slice(&start.qpos);
         if reach > 0.0 {
             let h = dt * T::lit(reach);
             for i in 0..group.act.len() {
-                group.act[i] = work.act_dot[i].mul_add(h, start.act[i]);
+                group.act[i] = work.forces.act_dot[i].mul_add(h, start.act[i]);
             }
             integrate_positions(sim, &mut group.qpos, &rate, h);
             for d in 0..sim.model.nv {
-                group.qvel[d] = work.acc[d].mul_add(h, start.qvel[d]);
+                group.qvel[d] = work.solver.acc[d].mul_add(h, start.qvel[d]);
             }
             start.warm.copy_from_slice(&rate);
         } else {
             let h = dt * T::lit(1.0 / 6.0);
-            for (mean, s) in work.act_dot.iter_mut().zip(&sum.act) {
+            for (mean, s) in work.forces.act_dot.iter_mut().zip(&sum.act) {
                 *mean = *s * T::lit(1.0 / 6.0);
             }
             group.act.copy_from_slice(&start.act);
-            advance_activations(sim, &mut group.act, &work.act_dot);
+            advance_activations(sim, &mut group.act, &work.forces.act_dot);
             integrate_positions(sim, &mut group.qpos, &sum.qvel, h);
             for d in 0..sim.model.nv {
                 group.qvel[d] = sum.warm[d].mul_add(h, start.qvel[d]);
@@ -307,11 +308,11 @@ fn correct_rotations<T: Real>(sim: &Sim<T>, before: &[T], rate: &mut [T], h: T) 
 fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let dt = T::splat(sim.dt);
     for d in 0..sim.model.nv {
-        work.diag[d] = work.rate[d].mul_add(dt, T::splat(sim.armature[d]));
-        work.rhs[d] = work.tau[d];
+        work.solver.diag[d] = work.forces.rate[d].mul_add(dt, T::splat(sim.armature[d]));
+        work.solver.rhs[d] = work.forces.tau[d];
     }
     apply_forces::<T, S>(work);
-    work.stale.fill(true);
+    work.solver.stale.fill(true);
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
     if sim.hard {
@@ -332,16 +333,16 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let dt = T::splat(sim.dt);
     for (l, link) in sim.links.iter().enumerate() {
-        work.link_force[l] = [T::zero(); 6];
+        work.solver.link_force[l] = [T::zero(); 6];
         if !(sim.implicit_fast && link.alone) {
             for d in link.dofs.clone() {
-                work.rhs[d] = -(work.rate[d] * dt * work.acc[d]);
+                work.solver.rhs[d] = -(work.forces.rate[d] * dt * work.solver.acc[d]);
             }
         }
     }
     bring_inward::<T, S>(sim, work);
     accelerate::<T, S>(sim, work);
-    for (x, a) in work.next.iter_mut().zip(&work.acc) {
+    for (x, a) in work.solver.next.iter_mut().zip(&work.solver.acc) {
         *x += *a;
     }
 }
@@ -353,22 +354,23 @@ fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 #[inline(always)]
 fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     let (d, dt) = (sim.links[l].dofs.start, T::splat(sim.dt));
-    let [m, x, y, z, jxx, jyy, jzz, jxy, jxz, jyz] = work.inertia[l];
-    let (moment, w) = ([x, y, z], ang(&work.vel[l]));
+    let [m, x, y, z, jxx, jyy, jzz, jxy, jxz, jyz] = work.motion.inertia[l];
+    let (moment, w) = ([x, y, z], ang(&work.motion.vel[l]));
     // symmetric, so rows are columns
     let inertia = [[jxx, jxy, jxz], [jxy, jyy, jyz], [jxz, jyz, jzz]];
     let spin = rotate(&inertia, &w);
-    let mut wrench = work.bias_force[l];
-    if work.in_contact[l] {
+    let mut wrench = work.motion.bias_force[l];
+    if work.solver.in_contact[l] {
         for i in 0..6 {
-            wrench[i] -= work.wrench[l][i];
+            wrench[i] -= work.solver.wrench[l][i];
         }
     }
     // torques are given along the body's axes
-    let axes = [ang(&work.axis[d + 3]), ang(&work.axis[d + 4]), ang(&work.axis[d + 5])];
-    let torque = sub3(&rotate(&axes, &[work.rhs[d + 3], work.rhs[d + 4], work.rhs[d + 5]]), &ang(&wrench));
-    let force = sub3(&[work.rhs[d], work.rhs[d + 1], work.rhs[d + 2]], &lin(&wrench));
-    let (mass, along) = ((m + work.diag[d]).recip(), dot(&w, &moment));
+    let axes = [ang(&work.motion.axis[d + 3]), ang(&work.motion.axis[d + 4]), ang(&work.motion.axis[d + 5])];
+    let torque =
+        sub3(&rotate(&axes, &[work.solver.rhs[d + 3], work.solver.rhs[d + 4], work.solver.rhs[d + 5]]), &ang(&wrench));
+    let force = sub3(&[work.solver.rhs[d], work.solver.rhs[d + 1], work.solver.rhs[d + 2]], &lin(&wrench));
+    let (mass, along) = ((m + work.solver.diag[d]).recip(), dot(&w, &moment));
     // what turning by `w` changes, column by column: the force, and the torque about the origin
     let mut columns = [[T::zero(); 3]; 3];
     let mut pulls = [[T::zero(); 3]; 3];
@@ -385,7 +387,7 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
             column[i] = bend[i].mul_add(dt, column[i]);
         }
         pull[k] = along.mul_add(dt, pull[k]);
-        column[k] += work.diag[d + 3 + k];
+        column[k] += work.solver.diag[d + 3 + k];
         // the origin gives way
         let arm = cross(&moment, &pull);
         for i in 0..3 {
@@ -404,8 +406,8 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     let turn = [dot(&across[0], &rest) * inverse, dot(&across[1], &rest) * inverse, dot(&across[2], &rest) * inverse];
     let held = rotate(&pulls, &turn);
     for i in 0..3 {
-        work.next[d + i] = (force[i] - held[i]) * mass;
-        work.next[d + 3 + i] = dot(&axes[i], &turn);
+        work.solver.next[d + i] = (force[i] - held[i]) * mass;
+        work.solver.next[d + 3 + i] = dot(&axes[i], &turn);
     }
 }
 

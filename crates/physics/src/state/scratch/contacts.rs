@@ -1,0 +1,65 @@
+//! Where geoms are and what they touch.
+
+use crate::algebra::spatial::V3;
+use crate::geometry::field_capsule::Gaps;
+use crate::geometry::{Touch, Touches};
+use crate::lanes::Real;
+use crate::sim::Sim;
+use crate::state::clearance::Clearances;
+use crate::state::sweep::Sweep;
+
+/// Where geoms are and what they touch.
+#[derive(Clone, Debug)]
+pub(crate) struct GeomContacts<T: Real> {
+    /// Per geom: lanes that touch the static world at the last physics step, and at any step of the last `step` call.
+    pub touching: Vec<T::Mask>,
+    pub touched: Vec<T::Mask>,
+    /// Per geom: number of contacts with the static world, and their normal force, N, at the last physics step.
+    pub ground_contacts: Vec<T>,
+    pub normal_force: Vec<T>,
+    /// Per geom: lanes that touch another moving geom at the last physics step.
+    pub touching_bodies: Vec<T::Mask>,
+    /// Centers of the geoms that meet others, relative to their trees' reference points; of static ones, in the world.
+    pub centers: Vec<V3<T>>,
+    /// Their third axes: of a plane its normal, of a capsule its direction.
+    pub directions: Vec<V3<T>>,
+    pub clearances: Clearances<T>,
+    /// Pairs that may touch, if there are so many that a broad phase chooses them.
+    pub sweep: Sweep<T::Scalar>,
+    /// Contacts of one pair of geoms, and of one lane of them.
+    pub touches: Vec<Touch<T>>,
+    pub lane_touches: Touches<T::Scalar>,
+    /// Gaps between one pair of a height field and another geom.
+    pub gaps: Gaps<T>,
+}
+
+impl<T: Real> GeomContacts<T> {
+    pub fn new(sim: &Sim<T>) -> Self {
+        let z = T::zero();
+        GeomContacts {
+            touching: vec![T::none(); sim.geoms.len()],
+            touched: vec![T::none(); sim.geoms.len()],
+            ground_contacts: vec![z; sim.geoms.len()],
+            normal_force: vec![z; sim.geoms.len()],
+            touching_bodies: vec![T::none(); sim.geoms.len()],
+            centers: vec![[z; 3]; sim.geoms.len()],
+            directions: vec![[z; 3]; sim.geoms.len()],
+            clearances: match sim.contacts.broad {
+                None => Clearances::new(sim.geoms.len(), sim.contacts.pairs.len()),
+                Some(_) => Clearances::new(0, 0),
+            },
+            sweep: Sweep::new(if sim.contacts.broad.is_some() { sim.geoms.len() } else { 0 }),
+            touches: Vec::new(),
+            lane_touches: Touches::new(),
+            gaps: Gaps::new(),
+        }
+    }
+
+    /// A geom touches the static world in the lanes `on`.
+    #[inline(always)]
+    pub fn touch_ground(&mut self, geom: usize, on: T::Mask) {
+        self.touching[geom] = T::or(self.touching[geom], on);
+        self.touched[geom] = T::or(self.touched[geom], on);
+        self.ground_contacts[geom] += T::masked(on, T::lit(1.0));
+    }
+}

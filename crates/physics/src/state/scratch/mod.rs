@@ -1,0 +1,74 @@
+//! Scratch memory of a step.
+
+mod contacts;
+mod forces;
+mod motion;
+mod readings;
+mod solver;
+
+pub(crate) use contacts::GeomContacts;
+pub(crate) use forces::Forces;
+pub(crate) use motion::Motion;
+pub(crate) use readings::Measured;
+pub(crate) use solver::Solver;
+
+use super::group::Group;
+use super::stats::SolverStats;
+use crate::lanes::Real;
+use crate::rows::ConstraintRows;
+use crate::sim::Sim;
+
+/// Scratch memory of a step; holds the readings of the group stepped last. One per thread.
+#[derive(Clone, Debug)]
+pub struct Work<T: Real> {
+    pub(crate) motion: Motion<T>,
+    pub(crate) forces: Forces<T>,
+    pub(crate) solver: Solver<T>,
+    pub(crate) contacts: GeomContacts<T>,
+    pub(crate) readings: Measured<T>,
+    /// Rows of the last evaluation of the forces.
+    pub(crate) rows: ConstraintRows<T>,
+    /// Rows of the evaluation before, if the present one [continues](Work::continues) it; else none. What pushed then
+    /// mostly pushes now. (The accelerations of then are a worse guide: a contact that was slowing something down is, by
+    /// them, about to let go.)
+    pub(crate) past: ConstraintRows<T>,
+    /// The last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a call of
+    /// `Sim::advance`, and there is much that one can keep from it.
+    pub(crate) continues: bool,
+    /// States of the Runge-Kutta stages.
+    pub(crate) stages: Vec<Group<T>>,
+    pub(crate) stats: SolverStats,
+}
+
+impl<T: Real> Work<T> {
+    /// Scratch memory for a model.
+    pub fn new(sim: &Sim<T>) -> Self {
+        Work {
+            motion: Motion::new(sim),
+            forces: Forces::new(sim),
+            solver: Solver::new(sim),
+            contacts: GeomContacts::new(sim),
+            readings: Measured::new(sim),
+            rows: ConstraintRows::with_capacity(sim.contacts.floor.len(), 2 * sim.limits.len(), sim.dry.len()),
+            past: ConstraintRows::new(),
+            continues: false,
+            stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
+            stats: SolverStats::default(),
+        }
+    }
+
+    /// Makes room for new rows; those of before become the [past](Work::past).
+    #[inline(always)]
+    pub(crate) fn put_rows_aside(&mut self) {
+        std::mem::swap(&mut self.rows, &mut self.past);
+        self.rows.clear();
+        if !self.continues {
+            self.past.clear();
+        }
+    }
+
+    /// Counts of the constraint solver's work.
+    pub fn stats(&self) -> SolverStats {
+        self.stats
+    }
+}

@@ -1,0 +1,30 @@
+//! What a step does not need, and is measured on request.
+
+use crate::algebra::spatial::{V3, V6};
+use crate::lanes::Real;
+use crate::sim::Sim;
+
+/// What a step does not need, and is measured on request.
+#[derive(Clone, Debug)]
+pub(crate) struct Measured<T: Real> {
+    /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
+    pub tree_com: Vec<V3<T>>,
+    /// Per body: torque and force from outside, about the center of mass of its tree.
+    pub body_force: Vec<V6<T>>,
+    /// Per degree of freedom: forces of actuators and constraints.
+    pub actuation: Vec<T>,
+    pub constraint: Vec<T>,
+}
+
+impl<T: Real> Measured<T> {
+    pub fn new(sim: &Sim<T>) -> Self {
+        let z = T::zero();
+        let nv = sim.model.nv;
+        Measured {
+            tree_com: vec![[z; 3]; sim.model.bodies.len()],
+            body_force: vec![[z; 6]; sim.model.bodies.len()],
+            actuation: vec![z; nv],
+            constraint: vec![z; nv],
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Memory of the constraint solver and of the recursion that it runs.
+
+use crate::algebra::spatial::*;
+use crate::lanes::Real;
+use crate::multifrontal::Crowd;
+use crate::sim::Sim;
+use crate::state::coupling::Coupling;
+
+/// Memory of the constraint solver and of the recursion that it runs.
+#[derive(Clone, Debug)]
+pub(crate) struct Solver<T: Real> {
+    /// Joint accelerations, after a solve.
+    pub acc: Vec<T>,
+    /// Candidate accelerations of the present Newton iteration.
+    pub next: Vec<T>,
+    /// Spatial acceleration (without bias) of each link for `next`.
+    pub link_acc: Vec<V6<T>>,
+    /// Contact stiffness and wrench of each link.
+    pub stiffness: Vec<Sym6<T>>,
+    pub wrench: Vec<V6<T>>,
+    pub in_contact: Vec<bool>,
+    /// Diagonal added to the mass matrix: armature, limit stiffness, implicit damping.
+    pub diag: Vec<T>,
+    /// Joint forces of the present right-hand side.
+    pub rhs: Vec<T>,
+    /// Articulated inertias and forces.
+    pub art: Vec<Sym6<T>>,
+    pub art_force: Vec<V6<T>>,
+    /// Per degree of freedom: articulated momentum times the inverse pivot, and the inverse pivot.
+    pub gain: Vec<V6<T>>,
+    pub pivot: Vec<T>,
+    /// Acceleration of every degree of freedom if its link's parent did not accelerate.
+    pub drive: Vec<T>,
+    /// The same before the coupled blocks' correction.
+    pub tree_drive: Vec<T>,
+    /// Links whose matrix or forces changed since they were factorized.
+    pub stale: Vec<bool>,
+    /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
+    pub root_factor: Vec<[[T; 6]; 6]>,
+    /// Forces on links for `bring_inward`.
+    pub link_force: Vec<V6<T>>,
+    pub coupling: Coupling<T>,
+    /// Per lane, once one has had a crowd: its factorization.
+    pub crowds: Vec<Crowd<T::Scalar>>,
+    /// Lanes that are solved by it in the present step.
+    pub crowded: T::Mask,
+}
+
+impl<T: Real> Solver<T> {
+    pub fn new(sim: &Sim<T>) -> Self {
+        let z = T::zero();
+        let (nl, nv) = (sim.links.len(), sim.model.nv);
+        Solver {
+            acc: vec![z; nv],
+            next: vec![z; nv],
+            link_acc: vec![[z; 6]; nl],
+            stiffness: vec![[z; 21]; nl],
+            wrench: vec![[z; 6]; nl],
+            in_contact: vec![false; nl],
+            diag: vec![z; nv],
+            rhs: vec![z; nv],
+            art: vec![[z; 21]; nl],
+            art_force: vec![[z; 6]; nl],
+            gain: vec![[z; 6]; nv],
+            pivot: vec![z; nv],
+            drive: vec![z; nv],
+            tree_drive: vec![z; nv],
+            stale: vec![true; nl],
+            root_factor: vec![[[z; 6]; 6]; sim.trees],
+            link_force: vec![[z; 6]; nl],
+            coupling: Coupling::new(nl, nv),
+            crowds: Vec::new(),
+            crowded: T::none(),
+        }
+    }
+}
