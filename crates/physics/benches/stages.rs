@@ -139,13 +139,13 @@ fn a_smooth(bencher: Bencher<'_, '_>, scene: Scene) {
 /// Collision detection and the rows of all constraints.
 #[divan::bench(args = SCENES)]
 fn b_constraints(bencher: Bencher<'_, '_>, scene: Scene) {
-    with_lanes!(Isa::best(), T => Moments::<T>::new(scene).time(bencher, Stage::Constraints));
+    with_lanes!(Isa::best(), T => Moments::<T>::new(scene).time(bencher, Stage::MakeConstraint));
 }
 
 /// Constrained acceleration.
 #[divan::bench(args = SCENES)]
 fn c_solver(bencher: Bencher<'_, '_>, scene: Scene) {
-    with_lanes!(Isa::best(), T => Moments::<T>::new(scene).time(bencher, Stage::Solver));
+    with_lanes!(Isa::best(), T => Moments::<T>::new(scene).time(bencher, Stage::FwdConstraint));
 }
 
 /// Damping at the end of the step, and integration.

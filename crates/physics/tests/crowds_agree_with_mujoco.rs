@@ -167,7 +167,7 @@ fn look<T: Real>(sim: &Sim<T>, work: &mut Work<T>, group: &Group<T>) -> Moment {
     Moment {
         qpos: lane(&group.qpos, 0),
         qvel: lane(&group.qvel, 0),
-        warm: lane(&group.warm, 0),
+        warm: lane(&group.qacc_warmstart, 0),
         qacc: lane(&qacc, 0),
         contacts: T::widen(readings.contact_count().get(0)) as u64,
         crowded: work.stats().crowded > before,
@@ -193,7 +193,7 @@ fn agrees(scene: &Scene, name: &str, steps: usize) {
         let error = distance(&m.qacc, &qacc);
         assert!(error < 1e-8, "{name}: acceleration off by {error:.1e} at moment {k}, {} contacts", m.contacts);
         group.reset_lane(&single, 0, &m.qpos, &m.qvel);
-        for (w, x) in group.warm.iter_mut().zip(&m.warm) {
+        for (w, x) in group.qacc_warmstart.iter_mut().zip(&m.warm) {
             *w = *x as f32;
         }
         errors.push(distance(&look(&single, &mut work, &group).qacc, &qacc));

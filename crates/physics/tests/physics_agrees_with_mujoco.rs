@@ -116,7 +116,7 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
         sim.measure_joints(&mut work);
         let r = Readings::new(&sim, &group, &work);
         let (bias, applied, constraint, mass) =
-            (r.bias_forces(), r.applied_forces(), r.constraint_forces(), r.mass_matrix());
+            (r.qfrc_bias(), r.applied_forces(), r.constraint_forces(), r.mass_matrix());
         let acc: Vec<T> = (0..model.nv).map(|d| r.qacc(d)).collect();
         let dofs = 0..model.nv;
         let measured = dofs.clone().map(|d| r.qfrc_constraint(d)).zip(&constraint);

@@ -122,7 +122,7 @@ fn ours<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> Quantities 
     let mut put = |name: &str, values: Vec<T>| out.insert(name.to_owned(), widen(&values));
     put("acceleration", (0..model.nv).map(|d| r.qacc(d)).collect());
     put("constraint force", r.constraint_forces());
-    put("bias force", r.bias_forces());
+    put("bias force", r.qfrc_bias());
     put("applied force", r.applied_forces());
     put("actuator force", (0..model.nv).map(|d| r.qfrc_actuator(d)).collect());
     put("mass matrix", r.mass_matrix().into_iter().flatten().collect());

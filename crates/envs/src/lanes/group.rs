@@ -147,7 +147,7 @@ impl<T: Real> LaneGroup<T> {
                 given.as_ref()
             }
             Body::Unmarked(saved) => {
-                let there = p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.warm).chain(memory);
+                let there = p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.qacc_warmstart).chain(memory);
                 for (v, x) in there.zip(saved) {
                     v.set(lane, T::scalar(*x));
                 }

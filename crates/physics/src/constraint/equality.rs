@@ -20,6 +20,110 @@ kernel_fn! {
     }
 }
 
+/// Two points that are tied, and the links that carry them.
+struct Ends<T: Real> {
+    links: [Option<usize>; 2],
+    /// The points, relative to the references of their links' trees.
+    r: [V3<T>; 2],
+    /// Velocities of the points, and angular velocities of the links.
+    v: [V3<T>; 2],
+    w: [V3<T>; 2],
+    /// Accelerations that the points and links have without any joint acceleration.
+    acc: [V3<T>; 2],
+    spin: [V3<T>; 2],
+    /// From the second point to the first.
+    gap: V3<T>,
+}
+
+impl<T: Real> Ends<T> {
+    #[inline(always)]
+    fn new(sim: &Sim<T>, group: &Group<T>, work: &Work<T>, points: &[Mount<T::Scalar>; 2]) -> Self {
+        let z = [T::zero(); 3];
+        let links = [points[0].link, points[1].link];
+        let tree = |link: Option<usize>| link.map(|l| sim.links[l].tree);
+        let same_tree = tree(links[0]) == tree(links[1]);
+        let (mut r, mut v, mut w) = ([z; 2], [z; 2], [z; 2]);
+        let (mut acc, mut spin, mut place) = ([z; 2], [z; 2], [z; 2]);
+        for i in 0..2 {
+            let Some(l) = links[i] else {
+                place[i] = splat3(&points[i].pos);
+                continue;
+            };
+            r[i] = work.motion.arm(&points[i], l);
+            // within a tree the common reference would only cost digits
+            place[i] = if same_tree { r[i] } else { add3(&r[i], &work.motion.reference[sim.links[l].tree]) };
+            v[i] = cross_add(&ang(&work.motion.vel[l]), &r[i], &lin(&work.motion.vel[l]));
+            w[i] = ang(&work.motion.vel[l]);
+            let a = &work.motion.bias_acc[l];
+            let at = cross_add(&w[i], &v[i], &cross_add(&ang(a), &r[i], &lin(a)));
+            // the bias acceleration has gravity in it
+            acc[i] = add3(&at, &group.gravity(sim));
+            spin[i] = ang(a);
+        }
+        Ends { links, r, v, w, acc, spin, gap: sub3(&place[0], &place[1]) }
+    }
+}
+
+/// What the rows of two tied bodies measure: three rows of places, then three of orientations.
+struct Violation<T: Real> {
+    error: [T; 6],
+    rate: [T; 6],
+    /// Acceleration of the rows without any joint acceleration: the reference makes up for it.
+    drift: [T; 6],
+    /// Derivative of the last three by the relative angular velocity.
+    turns: [V3<T>; 3],
+}
+
+impl<T: Real> Violation<T> {
+    /// Rows of places.
+    #[inline(always)]
+    fn of_places(ends: &Ends<T>) -> Self {
+        let z = T::zero();
+        let six = |v: V3<T>| [v[0], v[1], v[2], z, z, z];
+        Violation {
+            error: six(ends.gap),
+            rate: six(sub3(&ends.v[0], &ends.v[1])),
+            drift: six(sub3(&ends.acc[0], &ends.acc[1])),
+            turns: [[z; 3]; 3],
+        }
+    }
+
+    /// Adds the rows of orientations.
+    #[inline(always)]
+    fn orient(&mut self, work: &Work<T>, ends: &Ends<T>, frames: &Frames<T::Scalar>) {
+        let (z, one) = (T::zero(), T::lit(1.0));
+        let frame = |i: usize| {
+            let q = frames.quats[i].map(T::splat);
+            ends.links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
+        };
+        let (q0, q1) = (frame(0), frame(1));
+        let back = quat_conjugate(&q1);
+        let scale = T::splat(frames.scale);
+        let relative = quat_mul(&back, &q0);
+        for i in 0..3 {
+            self.error[3 + i] = relative[1 + i] * scale;
+        }
+        // derivative with respect to the relative angular velocity: vec(conj(q1) w q0) / 2
+        for j in 0..3 {
+            let mut axis = [z; 4];
+            axis[1 + j] = one;
+            let d = quat_mul(&quat_mul(&back, &axis), &q0);
+            for i in 0..3 {
+                self.turns[i][j] = d[1 + i] * scale * T::lit(0.5);
+            }
+        }
+        // second derivative: vec(conj(q1) (-|w|^2 / 2, w' + w0 x w1) q0) / 2 for w = w0 - w1
+        let turn = sub3(&ends.w[0], &ends.w[1]);
+        let bend = cross_add(&ends.w[0], &ends.w[1], &sub3(&ends.spin[0], &ends.spin[1]));
+        let e = [dot(&turn, &turn) * T::lit(-0.5), bend[0], bend[1], bend[2]];
+        let second = quat_mul(&quat_mul(&back, &e), &q0);
+        for i in 0..3 {
+            self.rate[3 + i] = dot(&self.turns[i], &turn);
+            self.drift[3 + i] = second[1 + i] * scale * T::lit(0.5);
+        }
+    }
+}
+
 /// Rows that keep two bodies together.
 #[inline(always)]
 fn bodies_block<T: Real>(
@@ -31,80 +135,16 @@ fn bodies_block<T: Real>(
     frames: Option<&Frames<T::Scalar>>,
 ) {
     let (z, one) = (T::zero(), T::lit(1.0));
-    let links = [points[0].link, points[1].link];
-    // points of one link keep their distance, but not the direction of the gap between them
-    if links == [None; 2] {
+    if points[0].link.is_none() && points[1].link.is_none() {
         return;
     }
-    let tree = |link: Option<usize>| link.map(|l| sim.links[l].tree);
-    let same_tree = tree(links[0]) == tree(links[1]);
-    // points relative to their trees' references, and the difference of the places
-    let mut r = [[z; 3]; 2];
-    let mut v = [[z; 3]; 2];
-    let mut w = [[z; 3]; 2];
-    let mut place = [[z; 3]; 2];
-    for i in 0..2 {
-        match links[i] {
-            None => place[i] = splat3(&points[i].pos),
-            Some(l) => {
-                r[i] = work.motion.arm(&points[i], l);
-                // within a tree the common reference would only cost digits
-                place[i] = if same_tree { r[i] } else { add3(&r[i], &work.motion.reference[sim.links[l].tree]) };
-                v[i] = cross_add(&ang(&work.motion.vel[l]), &r[i], &lin(&work.motion.vel[l]));
-                w[i] = ang(&work.motion.vel[l]);
-            }
-        }
+    let ends = Ends::new(sim, group, work, points);
+    let mut violation = Violation::of_places(&ends);
+    if let Some(frames) = frames {
+        violation.orient(work, &ends, frames);
     }
-    // what the rows would accelerate by without any joint acceleration: the reference makes up for it
-    let mut drift = [z; 6];
-    let (mut here, mut spin) = ([[z; 3]; 2], [[z; 3]; 2]);
-    for i in 0..2 {
-        if let Some(l) = links[i] {
-            let a = &work.motion.bias_acc[l];
-            let at = cross_add(&w[i], &v[i], &cross_add(&ang(a), &r[i], &lin(a)));
-            // the bias acceleration has gravity in it
-            here[i] = add3(&at, &group.gravity(sim));
-            spin[i] = ang(a);
-        }
-    }
-    drift[..3].copy_from_slice(&sub3(&here[0], &here[1]));
-    let mut error = [z; 6];
-    let mut rate = [z; 6];
-    let (gap, speed, turn) = (sub3(&place[0], &place[1]), sub3(&v[0], &v[1]), sub3(&w[0], &w[1]));
-    error[..3].copy_from_slice(&gap);
-    rate[..3].copy_from_slice(&speed);
-    let mut turns = [[z; 3]; 3];
+    let Violation { error, rate, drift, mut turns } = violation;
     let dim = if frames.is_some() { 6 } else { 3 };
-    if let Some(Frames { quats, scale }) = frames {
-        let frame = |i: usize| {
-            let q = quats[i].map(T::splat);
-            links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
-        };
-        let (q0, q1) = (frame(0), frame(1));
-        let back = quat_conjugate(&q1);
-        let scale = T::splat(*scale);
-        let relative = quat_mul(&back, &q0);
-        for i in 0..3 {
-            error[3 + i] = relative[1 + i] * scale;
-        }
-        // derivative with respect to the relative angular velocity: vec(conj(q1) w q0) / 2
-        for j in 0..3 {
-            let mut axis = [z; 4];
-            axis[1 + j] = one;
-            let d = quat_mul(&quat_mul(&back, &axis), &q0);
-            for i in 0..3 {
-                turns[i][j] = d[1 + i] * scale * T::lit(0.5);
-            }
-        }
-        // second derivative: vec(conj(q1) (-|w|^2 / 2, w' + w0 x w1) q0) / 2 for w = w0 - w1
-        let bend = cross_add(&w[0], &w[1], &sub3(&spin[0], &spin[1]));
-        let e = [dot(&turn, &turn) * T::lit(-0.5), bend[0], bend[1], bend[2]];
-        let second = quat_mul(&quat_mul(&back, &e), &q0);
-        for i in 0..3 {
-            rate[3 + i] = dot(&turns[i], &turn);
-            drift[3 + i] = second[1 + i] * scale * T::lit(0.5);
-        }
-    }
     let mut square = z;
     for k in 0..dim {
         square = error[k].mul_add(error[k], square);
@@ -116,6 +156,7 @@ fn bodies_block<T: Real>(
     let block = &mut work.rows.blocks[index];
     block.reset(Source::Equality(spec.index), Cost::Equal, dim);
     block.on = T::not(T::none());
+    let Ends { links, r, .. } = ends;
     block.coupled = links[0].is_some() && links[1].is_some();
     for i in 0..dim {
         block.d[i] = ratio.div(T::splat(spec.diag[i / 3]));
@@ -125,7 +166,6 @@ fn bodies_block<T: Real>(
     let flip = links[0].is_none();
     let sign = if flip { -one } else { one };
     let (second, first) = if flip { (1, 0) } else { (0, 1) };
-    let all = T::not(T::none());
     let mut lin = [[z; 3]; 3];
     for i in 0..3 {
         lin[i][i] = sign;
@@ -133,7 +173,7 @@ fn bodies_block<T: Real>(
             *x *= sign;
         }
     }
-    block.tie_points(lin, turns, [(links[first], r[first]), (links[second], r[second])], all);
+    block.tie_points(lin, turns, [(links[first], r[first]), (links[second], r[second])], T::not(T::none()));
 }
 
 /// One row that keeps a length at a polynomial of another.

@@ -1,8 +1,8 @@
 //! Forces of the actuators.
 
 use crate::lanes::Real;
-use crate::sim::{Activation, Pull, Sim};
-use crate::state::{Group, Work};
+use crate::sim::{Activation, ActuatorSpec, Sim, TransmissionSpec};
+use crate::state::{Forces, Group, Work};
 
 #[inline(always)]
 fn clamp<T: Real>(x: T, range: Option<(T::Scalar, T::Scalar)>) -> T {
@@ -23,89 +23,105 @@ impl<C: Real<Scalar = C>> Activation<C> {
 /// Activations after a step at the rates of the last actuation.
 #[inline(always)]
 pub(crate) fn advance_activations<T: Real>(sim: &Sim<T>, act: &mut [T], rates: &[T]) {
-    for a in sim.motors.iter().filter_map(|m| m.activation.as_ref()) {
+    for a in sim.actuators.iter().filter_map(|a| a.activation.as_ref()) {
         act[a.index] = a.next(act[a.index], rates[a.index]);
     }
 }
 
-/// Actuator forces through their gears.
+/// Force of an actuator, before its gear, and the force's derivative by the velocity of what it pulls at. Notes the rate
+/// of change of its activation.
+#[inline(always)]
+fn force_and_slope<T: Real>(
+    group: &Group<T>,
+    forces: &mut Forces<T>,
+    i: usize,
+    actuator: &ActuatorSpec<T::Scalar>,
+) -> (T, T) {
+    let u = clamp(group.ctrl[i], actuator.ctrl);
+    let input = match &actuator.activation {
+        None => u,
+        Some(a) => {
+            let act = group.act[a.index];
+            let rate = a.rate.map_or(u, |r| (u - act) * T::splat(r));
+            forces.act_dot[a.index] = rate;
+            if a.early { a.next(act, rate) } else { act }
+        }
+    };
+    let mut force = input * T::splat(actuator.gain[0]);
+    let mut slope = T::zero();
+    if !actuator.plain {
+        let (length, velocity) = match &actuator.transmission {
+            TransmissionSpec::Joint { dofs, qpos, gear } => {
+                let gear = T::splat(gear[0]);
+                (gear * group.qpos[*qpos], gear * group.qvel[dofs.start])
+            }
+            TransmissionSpec::Tendon { index, gear } => {
+                let gear = T::splat(*gear);
+                (gear * forces.tendon_length[*index], gear * forces.tendon_velocity[*index])
+            }
+        };
+        let (g, b) = (&actuator.gain, &actuator.bias);
+        let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
+        let bias = T::splat(b[2]).mul_add(velocity, T::splat(b[1]).mul_add(length, T::splat(b[0])));
+        force = input.mul_add(gain, bias);
+        slope = T::splat(g[2]).mul_add(input, T::splat(b[2]));
+    }
+    if let Some((low, high)) = actuator.force {
+        let (low, high) = (T::splat(low), T::splat(high));
+        // a force at its bound does not change with the velocity
+        slope = T::masked(T::and(low.lt(force), force.lt(high)), slope);
+        force = force.max(low).min(high);
+    }
+    if let Some(varied) = &group.varied {
+        force *= varied.strength[i];
+        slope *= varied.strength[i];
+    }
+    (force, slope)
+}
+
+/// Forces of the actuators, and through their gears of the joints.
 #[inline(always)]
 pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    let forces = &mut work.forces;
     let bounded = !sim.joint_force_ranges.is_empty();
     if bounded {
         // what the actuators add is bounded on its own
-        work.solver.rhs.copy_from_slice(&work.forces.tau);
-        work.forces.tau.fill(T::zero());
+        forces.qfrc_passive_actuator.fill(T::zero());
+    } else {
+        forces.qfrc_passive_actuator.copy_from_slice(&forces.qfrc_passive);
     }
-    for (i, motor) in sim.motors.iter().enumerate() {
-        let u = clamp(group.ctrl[i], motor.ctrl);
-        let input = match &motor.activation {
-            None => u,
-            Some(a) => {
-                let act = group.act[a.index];
-                let rate = a.rate.map_or(u, |r| (u - act) * T::splat(r));
-                work.forces.act_dot[a.index] = rate;
-                if a.early { a.next(act, rate) } else { act }
-            }
-        };
-        let mut force = input * T::splat(motor.gain[0]);
-        let mut slope = T::zero();
-        if !motor.plain {
-            let (length, velocity) = match &motor.pull {
-                Pull::Joint { dofs, qpos, gear } => {
-                    let gear = T::splat(gear[0]);
-                    (gear * group.qpos[*qpos], gear * group.qvel[dofs.start])
-                }
-                Pull::Tendon { index, gear } => {
-                    let gear = T::splat(*gear);
-                    (gear * work.forces.tendon_length[*index], gear * work.forces.tendon_velocity[*index])
-                }
-            };
-            let (g, b) = (&motor.gain, &motor.bias);
-            let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
-            let bias = T::splat(b[2]).mul_add(velocity, T::splat(b[1]).mul_add(length, T::splat(b[0])));
-            force = input.mul_add(gain, bias);
-            slope = T::splat(g[2]).mul_add(input, T::splat(b[2]));
-        }
-        if let Some((low, high)) = motor.force {
-            let (low, high) = (T::splat(low), T::splat(high));
-            // a force at its bound does not change with the velocity
-            slope = T::masked(T::and(low.lt(force), force.lt(high)), slope);
-            force = force.max(low).min(high);
-        }
-        if let Some(varied) = &group.varied {
-            force *= varied.strength[i];
-            slope *= varied.strength[i];
-        }
-        work.forces.actuator_force[i] = force;
-        match &motor.pull {
-            Pull::Joint { dofs, gear, .. } => {
+    for (i, actuator) in sim.actuators.iter().enumerate() {
+        let (force, slope) = force_and_slope(group, forces, i, actuator);
+        forces.actuator_force[i] = force;
+        let qfrc = &mut forces.qfrc_passive_actuator;
+        match &actuator.transmission {
+            TransmissionSpec::Joint { dofs, gear, .. } => {
                 for (k, d) in dofs.clone().enumerate() {
                     let gear = T::splat(gear[k]);
-                    work.forces.tau[d] = force.mul_add(gear, work.forces.tau[d]);
+                    qfrc[d] = force.mul_add(gear, qfrc[d]);
                     if sim.implicit_fast && k == 0 {
-                        work.forces.rate[d] = (gear * gear).neg_mul_add(slope, work.forces.rate[d]);
+                        forces.minus_qderiv[d] = (gear * gear).neg_mul_add(slope, forces.minus_qderiv[d]);
                     }
                 }
             }
-            Pull::Tendon { index, gear } => {
+            TransmissionSpec::Tendon { index, gear } => {
                 let pull = force * T::splat(*gear);
                 for term in &sim.tendons[*index].terms {
-                    work.forces.tau[term.dof] = pull.mul_add(T::splat(term.coef), work.forces.tau[term.dof]);
+                    qfrc[term.dof] = pull.mul_add(T::splat(term.coef), qfrc[term.dof]);
                 }
             }
         }
     }
     if bounded {
         for (dof, low, high) in &sim.joint_force_ranges {
-            let (low, high, force) = (T::splat(*low), T::splat(*high), work.forces.tau[*dof]);
+            let (low, high, force) = (T::splat(*low), T::splat(*high), forces.qfrc_passive_actuator[*dof]);
             // a force at its bound does not change with the velocity
             let inside = T::and(low.lt(force), force.lt(high));
-            work.forces.rate[*dof] = T::select(inside, work.forces.rate[*dof], T::splat(sim.damping[*dof]));
-            work.forces.tau[*dof] = force.max(low).min(high);
+            forces.minus_qderiv[*dof] = T::select(inside, forces.minus_qderiv[*dof], T::splat(sim.damping[*dof]));
+            forces.qfrc_passive_actuator[*dof] = force.max(low).min(high);
         }
-        for (t, passive) in work.forces.tau.iter_mut().zip(&work.solver.rhs) {
-            *t += *passive;
+        for (sum, passive) in forces.qfrc_passive_actuator.iter_mut().zip(&forces.qfrc_passive) {
+            *sum += *passive;
         }
     }
 }

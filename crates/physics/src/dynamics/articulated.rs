@@ -27,7 +27,7 @@ pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, wit
         }
         let link = &sim.links[l];
         let mut k: Sym6<T> = sym6_of_inertia(&work.motion.inertia[l]);
-        let mut f: V6<T> = work.motion.bias_force[l];
+        let mut f: V6<T> = work.net_bias_force(l);
         if work.solver.in_contact[l] {
             if with_stiffness {
                 S::add_sym(&mut k, &work.solver.stiffness[l]);
@@ -106,7 +106,7 @@ pub(crate) fn accelerate<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
         };
         for d in link.dofs.clone() {
             let x = work.solver.drive[d] - S::dot(&work.solver.gain[d], &a);
-            work.solver.next[d] = x;
+            work.solver.solution[d] = x;
             a = S::axpy(&work.motion.axis[d], x, &a);
         }
         work.solver.link_acc[l] = a;
@@ -119,7 +119,7 @@ pub(crate) fn link_accelerations<T: Real, S: Space>(sim: &Sim<T>, work: &mut Wor
     for (l, link) in sim.links.iter().enumerate() {
         let mut a = link.parent.map_or([T::zero(); 6], |p| work.solver.link_acc[p]);
         for d in link.dofs.clone() {
-            a = S::axpy(&work.motion.axis[d], work.solver.acc[d], &a);
+            a = S::axpy(&work.motion.axis[d], work.solver.qacc[d], &a);
         }
         work.solver.link_acc[l] = a;
     }
@@ -199,9 +199,9 @@ fn accelerate_free_root<T: Real>(d: usize, tree: usize, l: usize, work: &mut Wor
     }
     let spin = [y[0], y[1], y[2]];
     for i in 0..3 {
-        work.solver.next[d + i] = y[3 + i];
+        work.solver.solution[d + i] = y[3 + i];
         let s = &work.motion.axis[d + 3 + i];
-        work.solver.next[d + 3 + i] = dot(&[s[0], s[1], s[2]], &spin);
+        work.solver.solution[d + 3 + i] = dot(&[s[0], s[1], s[2]], &spin);
     }
     work.solver.link_acc[l] = y;
 }

@@ -8,6 +8,6 @@ mod passive;
 
 pub(crate) use actuation::{actuation, advance_activations};
 pub(crate) use articulated::{accelerate, bring_inward, factorize, link_accelerations, reduce_free_root};
-pub(crate) use external::external_forces;
+pub(crate) use external::link_forces;
 pub(crate) use kinematics::{kinematics, velocities};
-pub(crate) use passive::{measure_tendons, passive, tendon_springs};
+pub(crate) use passive::{joint_passive, measure_tendons, tendon_passive};

@@ -6,13 +6,13 @@ use crate::model::JointType;
 use crate::sim::{LinkJoint, Sim};
 use crate::state::{Group, Work};
 
-/// Springs and dampers.
+/// Springs and dampers of the joints.
 #[inline(always)]
-pub(crate) fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+pub(crate) fn joint_passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
         let damping = T::splat(sim.damping[d]);
-        work.forces.tau[d] = -(damping * group.qvel[d]);
-        work.forces.rate[d] = damping;
+        work.forces.qfrc_passive[d] = -(damping * group.qvel[d]);
+        work.forces.minus_qderiv[d] = damping;
     }
     for joint in &sim.joints {
         if !joint.has_spring {
@@ -22,13 +22,13 @@ pub(crate) fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T
         match joint.kind {
             JointType::Hinge | JointType::Slide => {
                 let stretch = group.qpos[joint.qpos] - T::splat(joint.spring[0]);
-                work.forces.tau[d] = stretch.neg_mul_add(k, work.forces.tau[d]);
+                work.forces.qfrc_passive[d] = stretch.neg_mul_add(k, work.forces.qfrc_passive[d]);
             }
             JointType::Ball => add_ball_spring(joint, group, work, joint.qpos, d, k),
             JointType::Free => {
                 for i in 0..3 {
                     let stretch = group.qpos[joint.qpos + i] - T::lit(sim.model.qpos_spring[joint.qpos + i]);
-                    work.forces.tau[d + i] = stretch.neg_mul_add(k, work.forces.tau[d + i]);
+                    work.forces.qfrc_passive[d + i] = stretch.neg_mul_add(k, work.forces.qfrc_passive[d + i]);
                 }
                 add_ball_spring(joint, group, work, joint.qpos + 3, d + 3, k);
             }
@@ -51,7 +51,7 @@ fn add_ball_spring<T: Real>(
     let now = [group.qpos[q], group.qpos[q + 1], group.qpos[q + 2], group.qpos[q + 3]];
     let r = quat_to_rotvec(&quat_mul(&quat_conjugate(&rest), &now));
     for i in 0..3 {
-        work.forces.tau[d + i] = r[i].neg_mul_add(k, work.forces.tau[d + i]);
+        work.forces.qfrc_passive[d + i] = r[i].neg_mul_add(k, work.forces.qfrc_passive[d + i]);
     }
 }
 
@@ -69,9 +69,9 @@ pub(crate) fn measure_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mu
     }
 }
 
-/// Forces of the tendons' springs and dampers, onto `tau`.
+/// Forces of the tendons' springs and dampers, added to those of the joints.
 #[inline(always)]
-pub(crate) fn tendon_springs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(crate) fn tendon_passive<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
     for (i, t) in sim.tendons.iter().enumerate() {
         let length = work.forces.tendon_length[i];
@@ -80,7 +80,7 @@ pub(crate) fn tendon_springs<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
         let above = (T::splat(t.slack[1]) - length).min(z);
         let force = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * work.forces.tendon_velocity[i];
         for term in &t.terms {
-            work.forces.tau[term.dof] = T::splat(term.coef).mul_add(force, work.forces.tau[term.dof]);
+            work.forces.qfrc_passive[term.dof] = T::splat(term.coef).mul_add(force, work.forces.qfrc_passive[term.dof]);
         }
     }
 }

@@ -99,21 +99,36 @@ impl<S: Real> Prism<'_, S> {
         if less((half[0] + half[1] + half[2]) * S::lit(64.0 * S::EPSILON), separation) {
             return self.apart(arms, half, &corners, limit);
         }
-        let middle = match feature {
+        let middle = self.place(feature, (separation, &normal), arms, half, &corners, &faces);
+        Some(BoxGap { dist: separation, normal, pos: middle })
+    }
+
+    /// Where a prism and a box touch that are `separation` apart along `normal` by this feature.
+    #[inline(always)]
+    fn place(
+        &self,
+        feature: Feature,
+        (separation, normal): (S, &V3<S>),
+        arms: &Rot<S>,
+        half: &V3<S>,
+        corners: &[V3<S>; 6],
+        faces: &[Face<S>; 5],
+    ) -> V3<S> {
+        match feature {
             Feature::PrismFace(i) => {
-                let face = box_corners(arms, half, &normal);
-                let touching = face.clip_to_prism(&faces, i);
-                axpy3(&normal, separation * S::lit(-0.5), &touching)
+                let face = box_corners(arms, half, normal);
+                let touching = face.clip_to_prism(faces, i);
+                axpy3(normal, separation * S::lit(-0.5), &touching)
             }
             Feature::BoxFace(k) => {
-                let touching = prism_corners(&corners, &normal, half[k]).clip_to_box(arms, half, k);
-                axpy3(&normal, separation * S::lit(0.5), &touching)
+                let touching = prism_corners(corners, normal, half[k]).clip_to_box(arms, half, k);
+                axpy3(normal, separation * S::lit(0.5), &touching)
             }
             Feature::Edges(e, k) => {
                 let mut from = [S::zero(); 3];
                 for j in 0..3 {
                     if j != k {
-                        let down = less(S::zero(), dot(&normal, &arms[j]));
+                        let down = less(S::zero(), dot(normal, &arms[j]));
                         from = if down { sub3(&from, &arms[j]) } else { add3(&from, &arms[j]) };
                     }
                 }
@@ -121,8 +136,7 @@ impl<S: Real> Prism<'_, S> {
                 let (t, w) = closest_places(&arms[k], &sub3(&corner, &from), &edge);
                 scale3(&add3(&axpy3(&arms[k], t, &from), &axpy3(&edge, w, &corner)), S::lit(0.5))
             }
-        };
-        Some(BoxGap { dist: separation, normal, pos: middle })
+        }
     }
 
     /// The closest points of a box that does not touch the prism: of one of its edges, or of a corner of the prism.

@@ -10,7 +10,7 @@ use super::joint_space::{constraint_wrenches, joint_space};
 use crate::algebra::spatial::*;
 use crate::lanes::{Kernel, Real};
 use crate::rows::Source;
-use crate::sim::Pull;
+use crate::sim::TransmissionSpec;
 use crate::sim::{Mount, Sim};
 use crate::state::{Group, Work};
 
@@ -81,19 +81,19 @@ impl<T: Real> Readings<'_, T> {
     /// mass of its tree (N m), and force (N). Zero for the world. After [`Sim::measure_bodies`].
     #[inline(always)]
     pub fn cfrc_ext(&self, body: usize) -> V6<T> {
-        self.work.readings.body_force[body]
+        self.work.readings.cfrc_ext[body]
     }
 
     /// Force of all actuators on a degree of freedom, N or N m. After [`Sim::measure_joints`].
     #[inline(always)]
     pub fn qfrc_actuator(&self, dof: usize) -> T {
-        self.work.readings.actuation[dof]
+        self.work.readings.qfrc_actuator[dof]
     }
 
     /// Force of all constraints on a degree of freedom, N or N m. After [`Sim::measure_joints`].
     #[inline(always)]
     pub fn qfrc_constraint(&self, dof: usize) -> T {
-        self.work.readings.constraint[dof]
+        self.work.readings.qfrc_constraint[dof]
     }
 
     /// Center of mass of all bodies, m. After [`Sim::measure_centers`].
@@ -200,7 +200,7 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Wrenches(sim, group, work) = self;
-        let mut out = std::mem::take(&mut work.readings.body_force);
+        let mut out = std::mem::take(&mut work.readings.cfrc_ext);
         out.fill([T::zero(); 6]);
         let readings = Readings::new(sim, group, work);
         for row in &work.rows.contacts {
@@ -228,12 +228,12 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
                 }
             }
         }
-        for (body, push) in group.external.iter().enumerate().skip(1) {
+        for (body, push) in group.xfrc_applied.iter().enumerate().skip(1) {
             let root = &sim.coms[sim.model.bodies[body].root_id];
             let arm = readings.separation(root, &sim.coms[body]);
             readings.add_wrench(body, &arm, (&lin(push), &ang(push)), (true, all), &mut out);
         }
-        work.readings.body_force = out;
+        work.readings.cfrc_ext = out;
     }
 }
 
@@ -244,25 +244,27 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Actuation(sim, work) = self;
-        work.readings.actuation.fill(T::zero());
-        for (motor, force) in sim.motors.iter().zip(&work.forces.actuator_force) {
-            match &motor.pull {
-                Pull::Joint { dofs, gear, .. } => {
+        work.readings.qfrc_actuator.fill(T::zero());
+        for (actuator, force) in sim.actuators.iter().zip(&work.forces.actuator_force) {
+            match &actuator.transmission {
+                TransmissionSpec::Joint { dofs, gear, .. } => {
                     for (k, d) in dofs.clone().enumerate() {
-                        work.readings.actuation[d] = force.mul_add(T::splat(gear[k]), work.readings.actuation[d]);
+                        work.readings.qfrc_actuator[d] =
+                            force.mul_add(T::splat(gear[k]), work.readings.qfrc_actuator[d]);
                     }
                 }
-                Pull::Tendon { index, gear } => {
+                TransmissionSpec::Tendon { index, gear } => {
                     let pull = *force * T::splat(*gear);
                     for term in &sim.tendons[*index].terms {
-                        work.readings.actuation[term.dof] =
-                            pull.mul_add(T::splat(term.coef), work.readings.actuation[term.dof]);
+                        work.readings.qfrc_actuator[term.dof] =
+                            pull.mul_add(T::splat(term.coef), work.readings.qfrc_actuator[term.dof]);
                     }
                 }
             }
         }
         for (dof, low, high) in &sim.joint_force_ranges {
-            work.readings.actuation[*dof] = work.readings.actuation[*dof].max(T::splat(*low)).min(T::splat(*high));
+            work.readings.qfrc_actuator[*dof] =
+                work.readings.qfrc_actuator[*dof].max(T::splat(*low)).min(T::splat(*high));
         }
     }
 }
@@ -275,9 +277,9 @@ impl<T: Real> Kernel<T> for JointForces<'_, T> {
     fn run(self) {
         let JointForces(sim, work) = self;
         let mut links = std::mem::take(&mut work.solver.link_force);
-        let mut joints = std::mem::take(&mut work.readings.constraint);
+        let mut joints = std::mem::take(&mut work.readings.qfrc_constraint);
         constraint_wrenches(work, &mut links, &mut joints);
         joint_space(sim, work, &mut links, &mut joints);
-        (work.solver.link_force, work.readings.constraint) = (links, joints);
+        (work.solver.link_force, work.readings.qfrc_constraint) = (links, joints);
     }
 }

@@ -164,7 +164,7 @@ impl<T: Real> Readings<'_, T> {
             let (force, torque) = self.inertial_force(b);
             let arm = self.separation(mount, &self.sim.coms[b]);
             sum.add(&arm, &force, &torque, all);
-            if let Some(push) = self.group.external.get(b) {
+            if let Some(push) = self.group.xfrc_applied.get(b) {
                 sum.subtract(&arm, &lin(push), &ang(push), all);
             }
         }

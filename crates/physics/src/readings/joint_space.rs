@@ -9,25 +9,17 @@ use crate::sim::Sim;
 use crate::state::Work;
 
 impl<T: Real> Readings<'_, T> {
-    /// Coriolis, centrifugal and gravitational forces, N or N m (MuJoCo's `qfrc_bias`).
-    pub fn bias_forces(&self) -> Vec<T> {
-        let mut forces = self.work.motion.bias_force.clone();
-        if self.work.forces.bias_is_net {
-            for (f, x) in forces.iter_mut().zip(&self.work.forces.external) {
-                for i in 0..6 {
-                    f[i] += x[i];
-                }
-            }
-        }
-        self.joint_space(forces)
+    /// Coriolis, centrifugal and gravitational forces, N or N m.
+    pub fn qfrc_bias(&self) -> Vec<T> {
+        self.joint_space(self.work.motion.bias_force.clone())
     }
 
     /// Springs, dampers, actuators, the medium and pushes together (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
     pub fn applied_forces(&self) -> Vec<T> {
-        let mut external = self.work.forces.external.clone();
+        let mut external = self.work.forces.link_applied.clone();
         external.resize(self.sim.links.len(), [T::zero(); 6]);
         let mut sum = self.joint_space(external);
-        for (s, t) in sum.iter_mut().zip(&self.work.forces.tau) {
+        for (s, t) in sum.iter_mut().zip(&self.work.forces.qfrc_passive_actuator) {
             *s += *t;
         }
         sum
@@ -143,12 +135,12 @@ mod tests {
         for (group, force) in [(&pushed, 3.0), (&calm, 0.0)] {
             sim.forward(&mut work, group);
             let readings = Readings::new(&sim, group, &work);
-            let bias = readings.bias_forces();
+            let bias = readings.qfrc_bias();
             assert_eq!(readings.applied_forces()[0], force);
             assert_eq!(bias[0], 0.0);
             // positions and velocities alone know nothing of pushes, and the bias is what it was
             sim.refresh(&mut work, group);
-            assert_eq!(Readings::new(&sim, group, &work).bias_forces(), bias);
+            assert_eq!(Readings::new(&sim, group, &work).qfrc_bias(), bias);
         }
     }
 }

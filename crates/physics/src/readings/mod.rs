@@ -55,7 +55,7 @@ impl<'a, T: Real> Readings<'a, T> {
     /// Acceleration `i` of the last physics step.
     #[inline(always)]
     pub fn qacc(&self, i: usize) -> T {
-        self.work.solver.acc[i]
+        self.work.solver.qacc[i]
     }
 
     /// Force of an actuator in the last physics step (before its gear), N or N m.
@@ -221,7 +221,7 @@ impl<'a, T: Real> Readings<'a, T> {
         let mut l = Some(link);
         while let Some(i) = l {
             for d in self.sim.links[i].dofs.clone() {
-                a = axpy6(&self.work.motion.axis[d], self.work.solver.acc[d], &a);
+                a = axpy6(&self.work.motion.axis[d], self.work.solver.qacc[d], &a);
             }
             l = self.sim.links[i].parent;
         }

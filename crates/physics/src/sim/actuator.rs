@@ -5,7 +5,7 @@ use crate::model::{Actuator, Dynamics, Model, Transmission};
 
 /// What an actuator pulls at.
 #[derive(Clone, Debug)]
-pub(crate) enum Pull<C> {
+pub(crate) enum TransmissionSpec<C> {
     /// Degrees of freedom and their gears; `qpos` is the coordinate of a scalar joint, for affine gains and biases.
     Joint { dofs: std::ops::Range<usize>, qpos: usize, gear: [C; 6] },
     /// A tendon, and the gear.
@@ -15,7 +15,7 @@ pub(crate) enum Pull<C> {
 /// An actuator.
 #[derive(Clone, Debug)]
 pub(crate) struct ActuatorSpec<C> {
-    pub pull: Pull<C>,
+    pub transmission: TransmissionSpec<C>,
     pub ctrl: Option<(C, C)>,
     pub force: Option<(C, C)>,
     pub gain: [C; 3],
@@ -40,18 +40,18 @@ pub(crate) struct Activation<C> {
 }
 
 /// Prepares the actuators.
-pub(super) fn motors<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> {
+pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> {
     let c = T::scalar;
     let flags = &model.opt.flags;
     let range = |on: bool, r: &[f64; 2]| on.then(|| (c(r[0]), c(r[1])));
-    let motor = |a: &Actuator| {
-        let pull = match a.transmission {
+    let spec = |a: &Actuator| {
+        let transmission = match a.transmission {
             Transmission::Joint(j) | Transmission::JointInParent(j) => {
                 let joint = &model.joints[j];
                 let dofs = joint.dof_adr..joint.dof_adr + joint.kind.dofs();
-                Pull::Joint { dofs, qpos: joint.qpos_adr, gear: a.gear.map(c) }
+                TransmissionSpec::Joint { dofs, qpos: joint.qpos_adr, gear: a.gear.map(c) }
             }
-            Transmission::Tendon(index) => Pull::Tendon { index, gear: c(a.gear[0]) },
+            Transmission::Tendon(index) => TransmissionSpec::Tendon { index, gear: c(a.gear[0]) },
         };
         let (dt, tiny) = (model.opt.timestep, 1e-15);
         let rate = match a.dynamics {
@@ -68,7 +68,7 @@ pub(super) fn motors<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> {
             _ => dt,
         };
         ActuatorSpec {
-            pull,
+            transmission,
             ctrl: range(a.ctrl_limited && flags.clampctrl, &a.ctrl_range),
             force: range(a.force_limited, &a.force_range),
             gain: a.gain.map(c),
@@ -83,7 +83,7 @@ pub(super) fn motors<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> {
             }),
         }
     };
-    if flags.actuation { model.actuators.iter().map(motor).collect() } else { Vec::new() }
+    if flags.actuation { model.actuators.iter().map(spec).collect() } else { Vec::new() }
 }
 
 /// Bounds of what all actuators together exert on a degree of freedom.

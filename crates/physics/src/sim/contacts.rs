@@ -5,7 +5,7 @@
 
 use super::broad::Broad;
 use super::contact_params::{ContactParams, declared, label, may_collide};
-use super::floor_points::{self, Candidate};
+use super::floor_points::{self, FloorPoint};
 use super::options::{SimError, SimOptions};
 use super::pairs::{self, Pair, PairSpec};
 use super::weld::BodyMount;
@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts<C> {
     /// Points above level planes.
-    pub floor: Vec<Candidate<C>>,
+    pub floor: Vec<FloorPoint<C>>,
     /// Other pairs of geoms, those of a kind next to each other.
     pub pairs: Vec<Pair>,
     /// What those pairs are.

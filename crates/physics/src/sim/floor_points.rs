@@ -1,7 +1,7 @@
 //! Points of moving geoms that may touch a level plane.
 //!
 //! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
-//! corners. Each is a [`Candidate`].
+//! corners. Each is a [`FloorPoint`].
 
 use super::contact_params::ContactParams;
 use super::contacts::Contacts;
@@ -14,7 +14,7 @@ use crate::model::{Cone, GeomType, Model};
 
 /// A point of a moving geom that may touch a level plane.
 #[derive(Clone, Debug)]
-pub(crate) struct Candidate<C> {
+pub(crate) struct FloorPoint<C> {
     pub link: usize,
     /// Geom index in the model.
     pub geom: usize,
@@ -73,7 +73,7 @@ pub(super) fn add<T: Real>(
     let on_link = &mounts[moving.body];
     let frame = rigid::compose(&(on_link.pos, on_link.rot), &(moving.pos, quat_to_rot(&moving.quat)));
     let c3 = |v: [f64; 3]| [T::scalar(v[0]), T::scalar(v[1]), T::scalar(v[2])];
-    let base = Candidate {
+    let base = FloorPoint {
         link,
         geom,
         plane: plane_geom,
@@ -92,7 +92,7 @@ pub(super) fn add<T: Real>(
             for side in [1.0, -1.0] {
                 let h = side * moving.size[1];
                 let point = [frame.0[0] + h * axis[0], frame.0[1] + h * axis[1], frame.0[2] + h * axis[2]];
-                out.push(Candidate { point: c3(point), axis: Some(c3(axis)), ..base.clone() });
+                out.push(FloorPoint { point: c3(point), axis: Some(c3(axis)), ..base.clone() });
             }
         }
         GeomType::Box => {
@@ -101,7 +101,7 @@ pub(super) fn add<T: Real>(
                 let local = [sign(1, moving.size[0]), sign(2, moving.size[1]), sign(4, moving.size[2])];
                 let at = rigid::rotate(&frame.1, &local);
                 let point = [frame.0[0] + at[0], frame.0[1] + at[1], frame.0[2] + at[2]];
-                out.push(Candidate {
+                out.push(FloorPoint {
                     point: c3(point),
                     radius: T::scalar(0.0),
                     corner: Some((c3(frame.0), i)),

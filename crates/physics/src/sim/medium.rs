@@ -7,7 +7,7 @@ use crate::model::Model;
 
 /// Upward force that carries part of a link's weight.
 #[derive(Clone, Debug)]
-pub(crate) struct Lift<C> {
+pub(crate) struct GravComp<C> {
     pub link: usize,
     /// Where it acts, in the link's frame.
     pub at: [C; 3],
@@ -34,7 +34,11 @@ fn passive(model: &Model) -> bool {
 
 /// Prepares the compensation of gravity: one force per link, and another for bodies that are made heavier. As in MuJoCo,
 /// those count only in a model that makes some body lighter.
-pub(super) fn lifts<T: Real>(model: &Model, mounts: &[BodyMount], link_of: &[Option<usize>]) -> Vec<Lift<T::Scalar>> {
+pub(super) fn gravity_compensation<T: Real>(
+    model: &Model,
+    mounts: &[BodyMount],
+    link_of: &[Option<usize>],
+) -> Vec<GravComp<T::Scalar>> {
     let mut out = Vec::new();
     if !passive(model) || !model.opt.flags.gravity || !model.bodies.iter().any(|b| b.gravcomp > 0.0) {
         return out;
@@ -54,7 +58,7 @@ pub(super) fn lifts<T: Real>(model: &Model, mounts: &[BodyMount], link_of: &[Opt
             }
         }
         if weight != 0.0 {
-            out.push(Lift { link, at: moment.map(|x| T::scalar(x / weight)), mass: T::scalar(weight) });
+            out.push(GravComp { link, at: moment.map(|x| T::scalar(x / weight)), mass: T::scalar(weight) });
         }
     }
     out

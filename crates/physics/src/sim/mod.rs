@@ -22,13 +22,13 @@ mod unsupported;
 mod weights;
 mod weld;
 
-pub(crate) use actuator::{Activation, ActuatorSpec, Pull};
+pub(crate) use actuator::{Activation, ActuatorSpec, TransmissionSpec};
 pub(crate) use broad::Broad;
 pub(crate) use contacts::Contacts;
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};
 pub(crate) use link::{Link, LinkJoint, Mount};
-pub(crate) use medium::{Drag, Lift};
+pub(crate) use medium::{Drag, GravComp};
 pub(crate) use options::MOST_COUPLED_ROWS;
 pub use options::{SimError, SimOptions};
 pub(crate) use pairs::{Cull, Pair, PairOf, PairSpec, Test};
@@ -59,13 +59,13 @@ pub struct Sim<T: Real> {
     pub(crate) hard: bool,
     pub(crate) limits: Vec<LimitSpec<T::Scalar>>,
     pub(crate) dry: Vec<DryFriction<T::Scalar>>,
-    pub(crate) motors: Vec<ActuatorSpec<T::Scalar>>,
+    pub(crate) actuators: Vec<ActuatorSpec<T::Scalar>>,
     /// Bounds of what all actuators together exert on a degree of freedom.
     pub(crate) joint_force_ranges: Vec<(usize, T::Scalar, T::Scalar)>,
     pub(crate) equalities: Vec<EqualitySpec<T::Scalar>>,
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
     pub(crate) ball_limits: Vec<BallLimit<T::Scalar>>,
-    pub(crate) lifts: Vec<Lift<T::Scalar>>,
+    pub(crate) gravcomp: Vec<GravComp<T::Scalar>>,
     pub(crate) drags: Vec<Drag<T::Scalar>>,
     pub(crate) wind: [T::Scalar; 3],
     pub(crate) contacts: Contacts<T::Scalar>,
@@ -125,11 +125,11 @@ impl<T: Real> Sim<T> {
             limits: limit::limits::<T>(model),
             dry: limit::dry_friction::<T>(model),
             ball_limits: limit::ball_limits::<T>(model),
-            motors: actuator::motors::<T>(model),
+            actuators: actuator::actuators::<T>(model),
             joint_force_ranges: actuator::joint_force_ranges::<T>(model),
             equalities,
             tendons,
-            lifts: medium::lifts::<T>(model, &mounts, &link_of),
+            gravcomp: medium::gravity_compensation::<T>(model, &mounts, &link_of),
             drags: medium::drags::<T>(model, &mounts, &link_of),
             wind: model.opt.wind.map(c),
             contacts,

@@ -37,7 +37,7 @@ kernel_fn! {
     pub(crate) fn start<'a, T>(work: &'a mut Work<T>, known: bool) {
         for b in work.rows.blocks.iter_mut() {
             if !known {
-                let ja = b.of_motion(&work.solver.link_acc, &work.solver.acc);
+                let ja = b.of_motion(&work.solver.link_acc, &work.solver.qacc);
                 for k in 0..b.dim {
                     b.u[k] = ja[k] + b.u0[k];
                 }
@@ -119,7 +119,7 @@ kernel_fn! {
     pub(crate) fn newton_point<'a, T>(work: &'a mut Work<T>) -> T::Mask {
         let mut changed = T::none();
         for b in work.rows.blocks.iter_mut() {
-            changed = T::or(changed, b.newton_point(&work.solver.link_acc, &work.solver.next));
+            changed = T::or(changed, b.newton_point(&work.solver.link_acc, &work.solver.solution));
         }
         changed
     }
@@ -191,7 +191,7 @@ kernel_fn! {
     /// Adds the refinement's accelerations to the row values of the lanes in `arrived`.
     pub(crate) fn add_refinement<'a, T>(work: &'a mut Work<T>, arrived: T::Mask) {
         for b in work.rows.blocks.iter_mut() {
-            let du = b.of_motion(&work.solver.link_acc, &work.solver.next);
+            let du = b.of_motion(&work.solver.link_acc, &work.solver.solution);
             for k in 0..b.dim {
                 b.u[k] += T::masked(arrived, du[k]);
             }

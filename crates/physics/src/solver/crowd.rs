@@ -11,7 +11,7 @@ use crate::lanes::{MAX_LANES, Real, kernel_fn};
 use crate::multifrontal::{self, Crowd, JointRow, NONE, RowTerms, Tie};
 use crate::rows::{Block, Jacobian};
 use crate::sim::Sim;
-use crate::state::{Solver, Work};
+use crate::state::{Solver, Work, net_bias_force};
 
 kernel_fn! {
     /// Finds the lanes with more than [`Sim::most_rows`] coupled rows and prepares their factorization.
@@ -108,7 +108,7 @@ fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
 
 kernel_fn! {
     /// Factorizes the system of the lanes `lanes`: what changed of it since their last factorization, by
-    /// [`Work::stale`] and [`Block::moved`].
+    /// `stale` and [`Block::moved`].
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
@@ -159,20 +159,20 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Solves for the forces of the present system in the lanes `lanes`, into [`Work::next`]
-    /// and [`Work::link_acc`]; without the blocks' and the motion's forces for a residual,
-    /// whose forces on links are in [`Work::link_force`].
+    /// Solves for the forces of the present system in the lanes `lanes`, into `solution`
+    /// and `link_acc`; without the blocks' and the motion's forces for a residual,
+    /// whose forces on links are in `link_force`.
     pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let bias_force = &work.motion.bias_force;
-            let Solver { crowds, in_contact, wrench, link_force, rhs, next, link_acc, .. } = &mut work.solver;
+            let Work { motion, forces, solver, .. } = work;
+            let Solver { crowds, in_contact, wrench, link_force, rhs, solution, link_acc, .. } = solver;
             let Crowd { plan, numbers } = &mut crowds[lane];
             for (to, from) in numbers.rhs.iter_mut().zip(rhs.iter()) {
                 *to = from.get(lane);
             }
             for l in 0..sim.links.len() {
-                let from = if residual { &link_force[l] } else { &bias_force[l] };
+                let from = if residual { link_force[l] } else { net_bias_force(motion, forces, l) };
                 numbers.force[l] = from.map(|x| x.get(lane));
                 if !residual && in_contact[l] {
                     for (f, w) in numbers.force[l].iter_mut().zip(&wrench[l]) {
@@ -190,7 +190,7 @@ kernel_fn! {
                 *force = if residual { zero } else { row.w * row.u0 };
             }
             multifrontal::solve(&sim.links, plan, numbers);
-            for (to, from) in next.iter_mut().zip(&numbers.next) {
+            for (to, from) in solution.iter_mut().zip(&numbers.next) {
                 to.set(lane, *from);
             }
             for (to, from) in link_acc.iter_mut().zip(&numbers.acc) {

@@ -51,7 +51,7 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
         }
         iteration += 1;
         if free {
-            work.solver.acc.copy_from_slice(&work.solver.next);
+            work.solver.qacc.copy_from_slice(&work.solver.solution);
             arrived = T::not(arrived);
             break;
         }
@@ -121,7 +121,7 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) 
 #[inline(always)]
 fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
-        work.solver.acc[d] = if sim.warmstart { group.warm[d] } else { T::zero() };
+        work.solver.qacc[d] = if sim.warmstart { group.qacc_warmstart[d] } else { T::zero() };
     }
     link_accelerations::<T, S>(sim, work);
     for c in work.rows.contacts.iter_mut() {
@@ -130,11 +130,11 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
         c.activate(T::not(c.recalled));
     }
     for l in work.rows.limits.iter_mut() {
-        l.u = l.sign.mul_add(work.solver.acc[l.dof], l.u0);
+        l.u = l.sign.mul_add(work.solver.qacc[l.dof], l.u0);
         l.activate(T::not(l.recalled));
     }
     for f in work.rows.dry.iter_mut() {
-        f.u = work.solver.acc[f.dof] + f.u0;
+        f.u = work.solver.qacc[f.dof] + f.u0;
         if !f.recalled {
             f.activate(T::not(T::none()));
         }
@@ -151,7 +151,7 @@ fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
         }
         for d in link.dofs.clone() {
             work.solver.diag[d] = T::splat(sim.armature[d]);
-            work.solver.rhs[d] = work.forces.tau[d];
+            work.solver.rhs[d] = work.forces.qfrc_passive_actuator[d];
         }
         if work.solver.in_contact[l] {
             work.solver.stiffness[l] = [z; 21];
@@ -195,10 +195,10 @@ fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
         changed = T::or(changed, c.newton_point(&work.solver.link_acc[c.link]));
     }
     for l in work.rows.limits.iter_mut() {
-        changed = T::or(changed, l.newton_point(work.solver.next[l.dof]));
+        changed = T::or(changed, l.newton_point(work.solver.solution[l.dof]));
     }
     for f in work.rows.dry.iter_mut() {
-        changed = T::or(changed, f.newton_point(work.solver.next[f.dof]));
+        changed = T::or(changed, f.newton_point(work.solver.solution[f.dof]));
     }
     if !work.rows.blocks.is_empty() {
         changed = T::or(changed, blocks::newton_point(work));
@@ -209,7 +209,7 @@ fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
 /// Moves the lanes and marks the links whose system changed.
 #[inline(always)]
 fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
-    for (a, n) in work.solver.acc.iter_mut().zip(&work.solver.next) {
+    for (a, n) in work.solver.qacc.iter_mut().zip(&work.solver.solution) {
         *a = step.of(*a, *n);
     }
     for c in work.rows.contacts.iter_mut() {
@@ -249,13 +249,14 @@ fn true_forces<T: Real>(work: &mut Work<T>) {
 #[inline(always)]
 fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask, coupled: bool) {
     for d in 0..sim.model.nv {
-        work.solver.rhs[d] = T::splat(sim.armature[d]).neg_mul_add(work.solver.acc[d], work.forces.tau[d]);
+        work.solver.rhs[d] =
+            T::splat(sim.armature[d]).neg_mul_add(work.solver.qacc[d], work.forces.qfrc_passive_actuator[d]);
     }
     apply_forces::<T, S>(work);
     link_accelerations::<T, S>(sim, work);
     for l in 0..sim.links.len() {
         let mut f = S::momentum(&work.motion.inertia[l], &work.solver.link_acc[l]);
-        S::add(&mut f, &work.motion.bias_force[l]);
+        S::add(&mut f, &work.net_bias_force(l));
         if work.solver.in_contact[l] {
             S::sub(&mut f, &work.solver.wrench[l]);
         }
@@ -271,7 +272,7 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
     if T::any(work.solver.crowded) {
         crowd::solve(sim, work, work.solver.crowded, true);
     }
-    for (a, x) in work.solver.acc.iter_mut().zip(&work.solver.next) {
+    for (a, x) in work.solver.qacc.iter_mut().zip(&work.solver.solution) {
         *a += T::masked(arrived, *x);
     }
     for c in work.rows.contacts.iter_mut() {
@@ -281,10 +282,10 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
         }
     }
     for l in work.rows.limits.iter_mut() {
-        l.u += T::masked(arrived, l.sign * work.solver.next[l.dof]);
+        l.u += T::masked(arrived, l.sign * work.solver.solution[l.dof]);
     }
     for f in work.rows.dry.iter_mut() {
-        f.u += T::masked(arrived, work.solver.next[f.dof]);
+        f.u += T::masked(arrived, work.solver.solution[f.dof]);
     }
     if !work.rows.blocks.is_empty() {
         blocks::add_refinement(work, arrived);

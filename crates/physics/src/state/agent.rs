@@ -125,8 +125,8 @@ impl<T: Real> Group<T> {
     /// Copies an agent's state out of its lane. It does not tell what the agents of other lanes have of their own.
     pub fn save(&self, sim: &Sim<T>, lane: usize) -> AgentState {
         let get = |x: &T| T::widen(x.get(lane));
-        let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.warm];
-        let mut pushes: Vec<f64> = self.external.iter().flatten().map(get).collect();
+        let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.qacc_warmstart];
+        let mut pushes: Vec<f64> = self.xfrc_applied.iter().flatten().map(get).collect();
         if pushes.iter().all(|x| x.to_bits() == 0) {
             pushes.clear();
         }
@@ -160,19 +160,19 @@ impl<T: Real> Group<T> {
     /// If the state belongs to another model.
     pub fn load(&mut self, sim: &Sim<T>, lane: usize, state: &AgentState) {
         let bodies = sim.model.bodies.len();
-        let size = self.qpos.len() + self.qvel.len() + self.ctrl.len() + self.act.len() + self.warm.len();
+        let size = self.qpos.len() + self.qvel.len() + self.ctrl.len() + self.act.len() + self.qacc_warmstart.len();
         assert_eq!(state.numbers.len(), size, "a state of the same model");
         assert!(state.pushes.is_empty() || state.pushes.len() == 6 * bodies, "a state of the same model");
-        let parts = [&mut self.qpos, &mut self.qvel, &mut self.ctrl, &mut self.act, &mut self.warm];
+        let parts = [&mut self.qpos, &mut self.qvel, &mut self.ctrl, &mut self.act, &mut self.qacc_warmstart];
         for (x, s) in parts.into_iter().flatten().zip(&state.numbers) {
             x.set(lane, T::scalar(*s));
         }
-        if self.external.is_empty() && !state.pushes.is_empty() {
-            self.external = vec![[T::zero(); 6]; bodies];
+        if self.xfrc_applied.is_empty() && !state.pushes.is_empty() {
+            self.xfrc_applied = vec![[T::zero(); 6]; bodies];
         }
         // an agent that was not pushed when it was saved is not pushed now
         let pushes = state.pushes.iter().copied().chain(std::iter::repeat(0.0));
-        for (x, s) in self.external.iter_mut().flatten().zip(pushes) {
+        for (x, s) in self.xfrc_applied.iter_mut().flatten().zip(pushes) {
             x.set(lane, T::scalar(s));
         }
         match &state.variation {

@@ -23,9 +23,9 @@ pub struct Group<T: Real> {
     /// Activations of the actuators that have one.
     pub act: Vec<T>,
     /// Acceleration of the last step: where the constraint solver starts from.
-    pub warm: Vec<T>,
+    pub qacc_warmstart: Vec<T>,
     /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
-    pub external: Vec<V6<T>>,
+    pub xfrc_applied: Vec<V6<T>>,
     /// Constants that differ from the model's.
     pub(crate) varied: Option<Box<Varied<T>>>,
     /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
@@ -42,10 +42,10 @@ impl<T: Real> Group<T> {
             qvel: vec![zero; m.nv],
             ctrl: vec![zero; m.nu],
             act: vec![zero; m.na],
-            external: Vec::new(),
+            xfrc_applied: Vec::new(),
             varied: None,
             grounds: Vec::new(),
-            warm: vec![zero; m.nv],
+            qacc_warmstart: vec![zero; m.nv],
         }
     }
 
@@ -54,12 +54,12 @@ impl<T: Real> Group<T> {
     /// # Panics
     /// If the body does not exist.
     pub fn push(&mut self, sim: &Sim<T>, lane: usize, body: usize, force: [f64; 3], torque: [f64; 3]) {
-        if self.external.is_empty() {
-            self.external = vec![[T::zero(); 6]; sim.model.bodies.len()];
+        if self.xfrc_applied.is_empty() {
+            self.xfrc_applied = vec![[T::zero(); 6]; sim.model.bodies.len()];
         }
         for i in 0..3 {
-            self.external[body][i].set(lane, T::scalar(torque[i]));
-            self.external[body][3 + i].set(lane, T::scalar(force[i]));
+            self.xfrc_applied[body][i].set(lane, T::scalar(torque[i]));
+            self.xfrc_applied[body][3 + i].set(lane, T::scalar(force[i]));
         }
     }
 
@@ -89,8 +89,12 @@ impl<T: Real> Group<T> {
         for (v, x) in self.qvel.iter_mut().zip(qvel) {
             v.set(lane, T::scalar(*x));
         }
-        for v in
-            self.warm.iter_mut().chain(&mut self.ctrl).chain(&mut self.act).chain(self.external.iter_mut().flatten())
+        for v in self
+            .qacc_warmstart
+            .iter_mut()
+            .chain(&mut self.ctrl)
+            .chain(&mut self.act)
+            .chain(self.xfrc_applied.iter_mut().flatten())
         {
             v.set(lane, T::scalar(0.0));
         }
@@ -105,7 +109,7 @@ impl<T: Real> Group<T> {
             sum += *x * T::zero();
         }
         let mut sound = sum.is_finite();
-        for x in self.qpos.iter().chain(&self.qvel).chain(&self.warm) {
+        for x in self.qpos.iter().chain(&self.qvel).chain(&self.qacc_warmstart) {
             sound = T::and(sound, x.abs().lt(T::lit(LARGEST)));
         }
         sound

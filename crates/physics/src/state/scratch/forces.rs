@@ -7,18 +7,20 @@ use crate::sim::Sim;
 /// Forces on joints and links that do not come from constraints.
 #[derive(Clone, Debug)]
 pub(crate) struct Forces<T: Real> {
-    /// Applied joint forces: springs, dampers, actuators.
-    pub tau: Vec<T>,
-    /// Derivative of the damping forces, negative: what `implicitfast` takes at the end of the step.
-    pub rate: Vec<T>,
+    /// Springs and dampers of joints and tendons.
+    pub qfrc_passive: Vec<T>,
+    /// `qfrc_passive + qfrc_actuator` in one sum: each actuator adds to what is there, in the model's order.
+    pub qfrc_passive_actuator: Vec<T>,
+    /// Minus the derivative of these forces by the velocities, on its diagonal (MuJoCo's `qDeriv`): what
+    /// `implicitfast` takes at the end of the step.
+    pub minus_qderiv: Vec<T>,
     /// Rate of change of the activations.
     pub act_dot: Vec<T>,
     pub tendon_length: Vec<T>,
     pub tendon_velocity: Vec<T>,
-    /// Forces on links from outside; empty: none.
-    pub external: Vec<V6<T>>,
-    /// They have been taken off `bias_force`.
-    pub bias_is_net: bool,
+    /// Torque and force on every link from outside: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty:
+    /// none.
+    pub link_applied: Vec<V6<T>>,
     /// Force of each actuator.
     pub actuator_force: Vec<T>,
 }
@@ -28,13 +30,13 @@ impl<T: Real> Forces<T> {
         let z = T::zero();
         let (nl, nv) = (sim.links.len(), sim.model.nv);
         Forces {
-            tau: vec![z; nv],
-            rate: vec![z; nv],
+            qfrc_passive: vec![z; nv],
+            qfrc_passive_actuator: vec![z; nv],
+            minus_qderiv: vec![z; nv],
             act_dot: vec![z; sim.model.na],
             tendon_length: vec![z; sim.tendons.len()],
             tendon_velocity: vec![z; sim.tendons.len()],
-            external: Vec::with_capacity(nl),
-            bias_is_net: false,
+            link_applied: Vec::with_capacity(nl),
             actuator_force: vec![z; sim.model.nu],
         }
     }

@@ -4,16 +4,18 @@ mod contacts;
 mod forces;
 mod motion;
 mod readings;
+mod rk4;
 mod solver;
 
 pub(crate) use contacts::GeomContacts;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
+pub(crate) use rk4::Rk4;
 pub(crate) use solver::Solver;
 
-use super::group::Group;
 use super::stats::SolverStats;
+use crate::algebra::spatial::V6;
 use crate::lanes::Real;
 use crate::rows::ConstraintRows;
 use crate::sim::Sim;
@@ -35,8 +37,7 @@ pub struct Work<T: Real> {
     /// The last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a call of
     /// `Sim::advance`, and there is much that one can keep from it.
     pub(crate) continues: bool,
-    /// States of the Runge-Kutta stages.
-    pub(crate) stages: Vec<Group<T>>,
+    pub(crate) rk4: Rk4<T>,
     pub(crate) stats: SolverStats,
 }
 
@@ -52,9 +53,16 @@ impl<T: Real> Work<T> {
             rows: ConstraintRows::with_capacity(sim.contacts.floor.len(), 2 * sim.limits.len(), sim.dry.len()),
             past: ConstraintRows::new(),
             continues: false,
-            stages: if sim.rk4 { vec![Group::new(sim); 2] } else { Vec::new() },
+            rk4: Rk4::new(sim),
             stats: SolverStats::default(),
         }
+    }
+
+    /// What the bias force of a link leaves to joints and constraints, after the forces that act on the link from
+    /// outside: gravity compensation, fluid and pushes.
+    #[inline(always)]
+    pub(crate) fn net_bias_force(&self, link: usize) -> V6<T> {
+        net_bias_force(&self.motion, &self.forces, link)
     }
 
     /// Makes room for new rows; those of before become the [past](Work::past).
@@ -71,4 +79,16 @@ impl<T: Real> Work<T> {
     pub fn stats(&self) -> SolverStats {
         self.stats
     }
+}
+
+/// See [`Work::net_bias_force`].
+#[inline(always)]
+pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, link: usize) -> V6<T> {
+    let mut f = motion.bias_force[link];
+    if let Some(applied) = forces.link_applied.get(link) {
+        for i in 0..6 {
+            f[i] -= applied[i];
+        }
+    }
+    f
 }

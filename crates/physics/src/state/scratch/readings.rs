@@ -10,10 +10,10 @@ pub(crate) struct Measured<T: Real> {
     /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
     pub tree_com: Vec<V3<T>>,
     /// Per body: torque and force from outside, about the center of mass of its tree.
-    pub body_force: Vec<V6<T>>,
+    pub cfrc_ext: Vec<V6<T>>,
     /// Per degree of freedom: forces of actuators and constraints.
-    pub actuation: Vec<T>,
-    pub constraint: Vec<T>,
+    pub qfrc_actuator: Vec<T>,
+    pub qfrc_constraint: Vec<T>,
 }
 
 impl<T: Real> Measured<T> {
@@ -22,9 +22,9 @@ impl<T: Real> Measured<T> {
         let nv = sim.model.nv;
         Measured {
             tree_com: vec![[z; 3]; sim.model.bodies.len()],
-            body_force: vec![[z; 6]; sim.model.bodies.len()],
-            actuation: vec![z; nv],
-            constraint: vec![z; nv],
+            cfrc_ext: vec![[z; 6]; sim.model.bodies.len()],
+            qfrc_actuator: vec![z; nv],
+            qfrc_constraint: vec![z; nv],
         }
     }
 }

@@ -9,11 +9,11 @@ use crate::state::coupling::Coupling;
 /// Memory of the constraint solver and of the recursion that it runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Solver<T: Real> {
-    /// Joint accelerations, after a solve.
-    pub acc: Vec<T>,
-    /// Candidate accelerations of the present Newton iteration.
-    pub next: Vec<T>,
-    /// Spatial acceleration (without bias) of each link for `next`.
+    /// Joint accelerations.
+    pub qacc: Vec<T>,
+    /// Solution of the last linear solve: accelerations at a Newton point or at the end of the step, or a correction.
+    pub solution: Vec<T>,
+    /// Spatial acceleration (without bias) of each link for the last accelerations or solution.
     pub link_acc: Vec<V6<T>>,
     /// Contact stiffness and wrench of each link.
     pub stiffness: Vec<Sym6<T>>,
@@ -51,8 +51,8 @@ impl<T: Real> Solver<T> {
         let z = T::zero();
         let (nl, nv) = (sim.links.len(), sim.model.nv);
         Solver {
-            acc: vec![z; nv],
-            next: vec![z; nv],
+            qacc: vec![z; nv],
+            solution: vec![z; nv],
             link_acc: vec![[z; 6]; nl],
             stiffness: vec![[z; 21]; nl],
             wrench: vec![[z; 6]; nl],

@@ -1,0 +1,147 @@
+//! The acceleration of a state, stage by stage.
+
+use crate::algebra::planar::{Full, Planar};
+use crate::collision::{collide_floor, collide_pairs};
+use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
+use crate::dynamics::*;
+use crate::lanes::{Real, kernel_fn};
+use crate::sim::Sim;
+use crate::solver::solve;
+use crate::state::{Group, Work};
+
+kernel_fn! {
+    /// Frames, axes, inertias.
+    fn fwd_position<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        kinematics(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Velocities, and the bias forces that they and gravity need.
+    fn fwd_velocity<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        velocities(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Springs and dampers of joints and tendons, which MuJoCo counts to `fwd_velocity`.
+    fn passive<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        measure_tendons(sim, group, work);
+        joint_passive(sim, group, work);
+        tendon_passive(sim, work);
+    }
+}
+kernel_fn! {
+    /// Forces of the actuators.
+    fn fwd_actuation<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        actuation(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Rows of points above a level floor, of limits and of dry friction.
+    fn common_rows<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        work.put_rows_aside();
+        collide_floor(sim, group, work);
+        joint_rows(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Contacts that are not points above a level floor.
+    fn pair_rows<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        collide_pairs(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// Constrained acceleration.
+    fn fwd_constraint<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve::<T, Full>(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// The same for a planar model.
+    fn planar_fwd_constraint<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve::<T, Planar>(sim, group, work);
+    }
+}
+
+/// A part of [`Sim::forward`]; public for the benchmark of the stages alone.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub enum Stage {
+    /// Frames, velocities, passive and actuator forces, forces on links.
+    Smooth,
+    /// Collision detection and the rows of all constraints: `make_constraint`.
+    MakeConstraint,
+    /// Constrained acceleration: `fwd_constraint`.
+    FwdConstraint,
+}
+
+impl<T: Real> Sim<T> {
+    /// Accelerations and constraint forces at the present state; the state does not change.
+    pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
+        work.continues = false;
+        self.forward_again(work, group);
+    }
+
+    /// The same, of a group that was advanced a little since the last evaluation if [`Work::continues`] says so.
+    pub(super) fn forward_again(&self, work: &mut Work<T>, group: &Group<T>) {
+        self.smooth(work, group);
+        self.make_constraint(work, group);
+        self.fwd_constraint(work, group);
+        work.continues = true;
+    }
+
+    /// One part of [`Sim::forward`], after those before it.
+    #[doc(hidden)]
+    pub fn run_stage(&self, stage: Stage, work: &mut Work<T>, group: &Group<T>) {
+        work.continues = false;
+        match stage {
+            Stage::Smooth => self.smooth(work, group),
+            Stage::MakeConstraint => self.make_constraint(work, group),
+            Stage::FwdConstraint => self.fwd_constraint(work, group),
+        }
+    }
+
+    fn smooth(&self, work: &mut Work<T>, group: &Group<T>) {
+        fwd_position(self, group, work);
+        fwd_velocity(self, group, work);
+        passive(self, group, work);
+        fwd_actuation(self, group, work);
+        work.forces.link_applied.clear();
+        if !self.gravcomp.is_empty() || !self.drags.is_empty() || !group.xfrc_applied.is_empty() {
+            link_forces(self, group, work);
+        }
+    }
+
+    fn make_constraint(&self, work: &mut Work<T>, group: &Group<T>) {
+        common_rows(self, group, work);
+        if !self.equalities.is_empty() {
+            equality_blocks(self, group, work);
+        }
+        if !self.tendons.is_empty() || !self.ball_limits.is_empty() {
+            tendon_blocks(self, group, work);
+        }
+        if !self.contacts.pairs.is_empty() {
+            pair_rows(self, group, work);
+        }
+    }
+
+    fn fwd_constraint(&self, work: &mut Work<T>, group: &Group<T>) {
+        if self.planar {
+            planar_fwd_constraint(self, group, work);
+        } else {
+            fwd_constraint(self, group, work);
+        }
+    }
+
+    /// Recomputes positions and velocities of bodies at the present state.
+    pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
+        fwd_position(self, group, work);
+        fwd_velocity(self, group, work);
+    }
+
+    /// The same, and the forces of the actuators there, which [`Sim::measure_actuators`] then makes readable.
+    pub fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
+        self.refresh(work, group);
+        passive(self, group, work);
+        fwd_actuation(self, group, work);
+    }
+}
