@@ -5,7 +5,26 @@
 //!   [`Work`] the scratch memory of a step. [`Sim::step`] advances a group.
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
-//! The folders stand on each other in the order in which they are listed: each knows only those above it in the list.
+//! Each folder imports only from folders above it in this list:
+//!
+//! | folder | what it holds |
+//! |---|---|
+//! | `lanes` | numbers: one agent, or several side by side in a vector register |
+//! | `algebra` | vectors, rotations, spatial vectors and inertias |
+//! | `model` | the compiled model, MuJoCo's `mjModel` |
+//! | `geometry` | where two shapes touch |
+//! | `mjcf` | from an MJCF file to a model |
+//! | `sim` | the constants of a model as the kernels see them, in lane precision |
+//! | `rows` | rows of constraints: what they measure, cost and exert |
+//! | `multifrontal` | a sparse factorization for one agent with many contacts between its links |
+//! | `state` | the state of agents, and the scratch memory of a step |
+//! | `dynamics` | kinematics, passive and applied forces, the articulated-body recursion |
+//! | `collision` | contacts, and their rows |
+//! | `constraint` | rows of limits, friction, equality constraints and tendons |
+//! | `solver` | Newton's method over all rows |
+//! | `step` | the stages of a step, and the integrators |
+//! | `readings` | what can be read off a group after a step |
+//! | `batch` | any number of agents on any number of threads |
 
 pub mod lanes;
 
@@ -42,7 +61,7 @@ pub use batch::workload;
 pub use batch::{Batch, BatchOptions, Blowup, BodyReading, Quantity, Replay, Snapshot};
 pub use lanes::{Isa, Real};
 pub use model::Model;
-pub use readings::Readings;
+pub use readings::{MeasurePlan, Readings};
 pub use sim::{Sim, SimError, SimOptions};
 pub use state::{AgentState, Group, SolverStats, Variation, Work};
 #[doc(hidden)]

@@ -1,15 +1,17 @@
-//! A sparse factorization of one agent in which much touches much.
+//! A sparse factorization for one agent whose links touch each other in many places.
 //!
-//! It generalizes the articulated-body recursion. That recursion eliminates the joints of a link and hands to the
-//! parent a 6x6 matrix over the parent's spatial acceleration. Here the matrix of a link, its front, is also over the
-//! accelerations of the links that it touches: they are carried inward as they are, until the elimination reaches them
-//! (Duff and Reid's multifrontal method, with links for variables). Rows over several joints, such as tendons, are carried
-//! along in the same way, as the sum of their terms that are still to come. A link that touches nothing costs what it
-//! costs in the recursion, islands never meet, and a contact costs by the links between it and the root, not by the other
-//! contacts. Trees are eliminated by minimum degree ([`order`]), the links of a tree from the tips to the root.
+//! It generalizes the articulated-body recursion. The recursion eliminates the joints of a link and hands a 6x6 matrix
+//! over the parent's spatial acceleration to the parent. Here the matrix of a link, its *front*, also covers the
+//! accelerations of the links that touch it. Those accelerations are carried inward unchanged until the elimination
+//! reaches their links (Duff and Reid's multifrontal method, with links as variables). Rows over several joints, such as
+//! tendons, are carried in the same way, each as the sum of its terms that are still to come.
 //!
-//! Which links touch differs between agents, and so do order and fronts: an agent is factorized in scalar arithmetic,
-//! whatever lanes it shares. The order and every sum depend on that agent alone.
+//! A link that touches nothing costs as much as in the recursion, and separate islands never meet. The cost of a contact
+//! depends on the links between it and the root, not on the other contacts. Trees are eliminated by minimum degree
+//! ([`order`]), the links of a tree from the tips to the root.
+//!
+//! Agents differ in which of their links touch, and therefore in order and fronts. So an agent is factorized in scalar
+//! arithmetic, whatever lanes it shares. The order and every sum depend on this agent alone.
 
 mod assembly;
 mod front;

@@ -10,9 +10,12 @@ mod frames;
 mod hfield;
 mod joint_space;
 mod joints;
+mod measure;
 mod rays;
 mod sensors;
 mod touch;
+
+pub use measure::MeasurePlan;
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;

@@ -1,10 +1,9 @@
-//! Agents in which much touches much: a sparse factorization instead of a correction of low rank.
+//! Agents with many contacts between links ("crowds"): a sparse factorization instead of a correction of low rank.
 //!
-//! The correction of [`coupled`](super::coupled) costs the square of its rows for every degree of freedom. A pile of
-//! bodies has hundreds of rows and few of them say anything new: what counts is which links touch. Beyond
+//! For every degree of freedom, the correction of [`coupled`](super::coupled) costs the square of its rows. A pile of
+//! bodies has hundreds of rows, but they tie few pairs of links. Beyond
 //! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS) rows an agent is solved by a factorization of the whole matrix
-//! `H = M + J' D J` ([`multifrontal`]). The other stages of the solver take no notice, and neither do the lanes beside it:
-//! see [`coupled`](super::coupled).
+//! `H = M + J' D J` ([`multifrontal`]). Neither the other stages of the solver nor the other lanes notice it.
 
 use crate::algebra::spatial::*;
 use crate::lanes::{MAX_LANES, Real, kernel_fn};

@@ -2,11 +2,11 @@
 //!
 //! The acceleration minimizes `1/2 (a - a_s)' M (a - a_s) + sum_i s_i(J_i a - aref_i)`, where `s_i` is quadratic while the
 //! row pushes and zero while it does not (MuJoCo documentation, "Computation", primal form). Given the set of pushing
-//! rows, the minimizer solves `(M + J' D J) a = tau - bias + J' D aref`. A contact with something that stands still adds
-//! to its own link alone, so that system has the structure of the mass matrix and is solved by the articulated-body
-//! recursion ([`articulated`](crate::dynamics)) in linear time. Contacts of moving bodies with each other, equality constraints
-//! and tendons are a correction of low rank on top of it ([`coupled`]). Agents with many of those are solved by a sparse
-//! factorization instead ([`crowd`]).
+//! rows, the minimizer solves `(M + J' D J) a = tau - bias + J' D aref`, where `tau` has all forces that are neither bias
+//! nor constraint. A contact with something that stands still adds to its own link alone, so this system has the structure
+//! of the mass matrix. The articulated-body recursion ([`dynamics`](crate::dynamics)) solves it in linear time. Contacts
+//! of moving bodies with each other, equality constraints and tendons are a correction of low rank on top of it
+//! ([`coupled`]). Agents with many of those are solved by a sparse factorization instead ([`crowd`]).
 //!
 //! Two identities keep the iteration in the space of rows, without ever multiplying by M:
 //! * after a solve with active set A the accelerations obey `M a - (tau - bias) = J' f`, with the linear forces

@@ -14,6 +14,8 @@ pub(crate) struct Measured<T: Real> {
     /// Per degree of freedom: forces of actuators and constraints.
     pub qfrc_actuator: Vec<T>,
     pub qfrc_constraint: Vec<T>,
+    /// What touch sensors feel on the sites that were asked for, N.
+    pub touch_forces: Vec<T>,
 }
 
 impl<T: Real> Measured<T> {
@@ -25,6 +27,7 @@ impl<T: Real> Measured<T> {
             cfrc_ext: vec![[z; 6]; sim.model.bodies.len()],
             qfrc_actuator: vec![z; nv],
             qfrc_constraint: vec![z; nv],
+            touch_forces: Vec::new(),
         }
     }
 }
