@@ -10,7 +10,7 @@
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::model::GeomType;
-use crate::sim::{Broad, Pair, Sim};
+use crate::sim::{Broad, GeomPair, Sim};
 use crate::state::{Sweep, Work, nowhere};
 
 kernel_fn! {
@@ -89,7 +89,7 @@ fn less<S: Real>(a: S, b: S) -> bool {
 
 kernel_fn! {
     /// Finds the pairs whose boxes overlap.
-    fn sweep<'a, S>(broad: &'a Broad<S>, pairs: &'a [Pair], sweep: &'a mut Sweep<S>) {
+    fn sweep<'a, S>(broad: &'a Broad<S>, pairs: &'a [GeomPair], sweep: &'a mut Sweep<S>) {
         let Sweep { geoms, groups, order, reaching, found } = sweep;
         groups.clear();
         for members in &broad.members {

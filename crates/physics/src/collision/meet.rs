@@ -10,7 +10,7 @@ use crate::geometry::height::{Terrain, field_box};
 use crate::geometry::{self, Capsule, Cuboid, Cylinder, Plane, Sphere, Touch, Touches, pick, pick_axes};
 use crate::geometry::{box_box, capsule_box, field_capsule, plane, round};
 use crate::lanes::{MAX_LANES, Real};
-use crate::sim::{Cull, Mount, PairOf, Sim, Test};
+use crate::sim::{Cull, GeomPairOf, Mount, ShapePair, Sim};
 use crate::state::{Group, Work, clearance};
 
 /// A pair that comes near in some lanes.
@@ -64,7 +64,7 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
 
 /// Whether both geoms move and belong to one tree.
 #[inline(always)]
-fn within_tree<T: Real>(sim: &Sim<T>, pair: &PairOf<T::Scalar>) -> bool {
+fn within_tree<T: Real>(sim: &Sim<T>, pair: &GeomPairOf<T::Scalar>) -> bool {
     matches!(pair.links, [Some(a), Some(b)] if sim.links[a].tree == sim.links[b].tree)
 }
 
@@ -95,7 +95,7 @@ fn near<T: Real>(
     sim: &Sim<T>,
     group: &Group<T>,
     work: &Work<T>,
-    pair: &PairOf<T::Scalar>,
+    pair: &GeomPairOf<T::Scalar>,
     centers: &[V3<T>; 2],
 ) -> T::Mask {
     let reach = T::splat(pair.reach);
@@ -152,24 +152,24 @@ fn touch_pair<T: Real>(
     let first_sphere = Sphere { center: ca, radius: size_a[0] };
     let sphere = Sphere { center: cb, radius: size_b[0] };
     let ground = Plane { point: ca, normal: work.contacts.directions[a] };
-    let found: &[Touch<T>] = match pair.test {
-        Test::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
-        Test::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),
-        Test::PlaneBox => &plane::plane_box(&ground, &cuboid(work, mb, cb, size_b), margin),
-        Test::PlaneCylinder => &plane::plane_cylinder(&ground, &cylinder(work, mb, cb, size_b), margin),
-        Test::PlaneEllipsoid => &[plane::plane_ellipsoid(&ground, &cuboid(work, mb, cb, size_b), margin)],
-        Test::SphereSphere => &[round::sphere_sphere(&first_sphere, &sphere, margin)],
-        Test::SphereCapsule => &[round::sphere_capsule(&first_sphere, &capsule(work, b, cb, size_b), margin)],
-        Test::SphereBox => &[round::sphere_box(&first_sphere, &cuboid(work, mb, cb, size_b), margin)],
-        Test::SphereCylinder => &[round::sphere_cylinder(&first_sphere, &cylinder(work, mb, cb, size_b), margin)],
-        Test::CapsuleCapsule => {
+    let found: &[Touch<T>] = match pair.shapes {
+        ShapePair::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
+        ShapePair::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),
+        ShapePair::PlaneBox => &plane::plane_box(&ground, &cuboid(work, mb, cb, size_b), margin),
+        ShapePair::PlaneCylinder => &plane::plane_cylinder(&ground, &cylinder(work, mb, cb, size_b), margin),
+        ShapePair::PlaneEllipsoid => &[plane::plane_ellipsoid(&ground, &cuboid(work, mb, cb, size_b), margin)],
+        ShapePair::SphereSphere => &[round::sphere_sphere(&first_sphere, &sphere, margin)],
+        ShapePair::SphereCapsule => &[round::sphere_capsule(&first_sphere, &capsule(work, b, cb, size_b), margin)],
+        ShapePair::SphereBox => &[round::sphere_box(&first_sphere, &cuboid(work, mb, cb, size_b), margin)],
+        ShapePair::SphereCylinder => &[round::sphere_cylinder(&first_sphere, &cylinder(work, mb, cb, size_b), margin)],
+        ShapePair::CapsuleCapsule => {
             &round::capsule_capsule(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b), margin)
         }
-        Test::FieldCapsule => {
+        ShapePair::FieldCapsule => {
             touch_field(sim, group, work, slots, meeting);
             return None;
         }
-        Test::CapsuleBox | Test::BoxBox | Test::FieldBox => {
+        ShapePair::CapsuleBox | ShapePair::BoxBox | ShapePair::FieldBox => {
             one_by_one(sim, group, work, slots, meeting);
             return None;
         }
@@ -246,12 +246,12 @@ fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
         let [size_a, size_b] = pair.sizes;
         let cuboid = Cuboid { center: b, axes: turned_b, half: size_b };
         own.clear();
-        match pair.test {
-            Test::CapsuleBox => {
+        match pair.shapes {
+            ShapePair::CapsuleBox => {
                 let capsule = Capsule { center: a, axis: turned_a[2], radius: size_a[0], half: size_a[1] };
                 capsule_box::capsule_box(&capsule, &cuboid, pair.margin, &mut own);
             }
-            Test::BoxBox => {
+            ShapePair::BoxBox => {
                 let first = Cuboid { center: a, axes: turned_a, half: size_a };
                 box_box::box_box(&first, &cuboid, pair.margin, &mut own);
             }

@@ -5,7 +5,7 @@ use crate::algebra::spatial::*;
 use crate::geometry::Touch;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, Source};
-use crate::sim::{Cost, PairOf, PairSpec, Sim, impedance};
+use crate::sim::{Cost, GeomPairOf, PairSpec, Sim, impedance};
 use crate::state::{Group, Work};
 
 /// The slots of the present class of pairs: where they begin, and how many of them each lane has filled.
@@ -169,7 +169,7 @@ pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
 
 /// Marks who touches what.
 #[inline(always)]
-fn report<T: Real>(pair: &PairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
+fn report<T: Real>(pair: &GeomPairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
     if pair.coupled {
         for g in pair.geoms {
             work.contacts.touching_bodies[g] = T::or(work.contacts.touching_bodies[g], on);

@@ -187,11 +187,11 @@ fn lengths_block<T: Real>(
     poly: &[T::Scalar; 5],
 ) {
     let z = T::zero();
-    let (q1, v1) = measure(group, follower);
+    let (q1, v1) = length_and_velocity(group, follower);
     let (mut goal, mut slope) = (T::splat(poly[0]), z);
     let mut v = v1;
     if let Some(leader) = leader {
-        let (q2, v2) = measure(group, leader);
+        let (q2, v2) = length_and_velocity(group, leader);
         goal = T::splat(poly[4]);
         for i in (0..4).rev() {
             slope = slope.mul_add(q2, goal);
@@ -214,7 +214,7 @@ fn lengths_block<T: Real>(
 
 /// A length from its zero, and its velocity.
 #[inline(always)]
-fn measure<T: Real>(group: &Group<T>, length: &Length<T::Scalar>) -> (T, T) {
+fn length_and_velocity<T: Real>(group: &Group<T>, length: &Length<T::Scalar>) -> (T, T) {
     let (mut q, mut v) = (-T::splat(length.zero), T::zero());
     for t in &length.terms {
         q = T::splat(t.coef).mul_add(group.qpos[t.qpos], q);

@@ -7,7 +7,7 @@ use super::broad::Broad;
 use super::contact_params::{ContactParams, declared, label, may_collide};
 use super::floor_points::{self, FloorPoint};
 use super::options::{SimError, SimOptions};
-use super::pairs::{self, Pair, PairSpec};
+use super::pairs::{self, GeomPair, PairSpec};
 use super::weld::BodyMount;
 use crate::lanes::Real;
 use crate::model::{Geom, GeomType, Model};
@@ -19,7 +19,7 @@ pub(crate) struct Contacts<C> {
     /// Points above level planes.
     pub floor: Vec<FloorPoint<C>>,
     /// Other pairs of geoms, those of a kind next to each other.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<GeomPair>,
     /// What those pairs are.
     pub specs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
@@ -90,7 +90,7 @@ pub(super) fn contacts<T: Real>(
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
             let geoms = [a as u32, b as u32];
             if let (false, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
-                out.pairs.push(Pair { geoms, spec: *spec });
+                out.pairs.push(GeomPair { geoms, spec: *spec });
                 continue;
             }
             let params = ContactParams::of(model, i, j);
@@ -105,7 +105,7 @@ pub(super) fn contacts<T: Real>(
                 );
             }
             let spec = out.specs.len() as u32 - 1;
-            out.pairs.push(Pair { geoms, spec });
+            out.pairs.push(GeomPair { geoms, spec });
             if !declared {
                 known.insert([kinds[a], kinds[b]], spec);
             }

@@ -31,7 +31,7 @@ pub(crate) use link::{Link, LinkJoint, Mount};
 pub(crate) use medium::{Drag, GravComp};
 pub(crate) use options::MOST_COUPLED_ROWS;
 pub use options::{SimError, SimOptions};
-pub(crate) use pairs::{Cull, Pair, PairOf, PairSpec, Test};
+pub(crate) use pairs::{Cull, GeomPair, GeomPairOf, PairSpec, ShapePair};
 pub(crate) use softness::{Cost, Softness, impedance, impedance_at};
 pub(crate) use tendon::TendonSpec;
 

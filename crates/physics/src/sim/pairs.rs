@@ -12,7 +12,7 @@ use crate::model::{Cone, Geom, GeomType, Model};
 
 /// Function that finds the contacts of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Test {
+pub(crate) enum ShapePair {
     PlaneSphere,
     PlaneCapsule,
     PlaneBox,
@@ -29,24 +29,24 @@ pub(crate) enum Test {
     FieldBox,
 }
 
-impl Test {
-    fn of(a: GeomType, b: GeomType) -> Option<Test> {
+impl ShapePair {
+    fn of(a: GeomType, b: GeomType) -> Option<ShapePair> {
         use GeomType as G;
         Some(match (a, b) {
-            (G::Plane, G::Sphere) => Test::PlaneSphere,
-            (G::Plane, G::Capsule) => Test::PlaneCapsule,
-            (G::Plane, G::Box) => Test::PlaneBox,
-            (G::Plane, G::Cylinder) => Test::PlaneCylinder,
-            (G::Plane, G::Ellipsoid) => Test::PlaneEllipsoid,
-            (G::Sphere, G::Sphere) => Test::SphereSphere,
-            (G::Sphere, G::Capsule) => Test::SphereCapsule,
-            (G::Sphere, G::Box) => Test::SphereBox,
-            (G::Sphere, G::Cylinder) => Test::SphereCylinder,
-            (G::Capsule, G::Capsule) => Test::CapsuleCapsule,
-            (G::Capsule, G::Box) => Test::CapsuleBox,
-            (G::Box, G::Box) => Test::BoxBox,
-            (G::Hfield, G::Sphere | G::Capsule) => Test::FieldCapsule,
-            (G::Hfield, G::Box) => Test::FieldBox,
+            (G::Plane, G::Sphere) => ShapePair::PlaneSphere,
+            (G::Plane, G::Capsule) => ShapePair::PlaneCapsule,
+            (G::Plane, G::Box) => ShapePair::PlaneBox,
+            (G::Plane, G::Cylinder) => ShapePair::PlaneCylinder,
+            (G::Plane, G::Ellipsoid) => ShapePair::PlaneEllipsoid,
+            (G::Sphere, G::Sphere) => ShapePair::SphereSphere,
+            (G::Sphere, G::Capsule) => ShapePair::SphereCapsule,
+            (G::Sphere, G::Box) => ShapePair::SphereBox,
+            (G::Sphere, G::Cylinder) => ShapePair::SphereCylinder,
+            (G::Capsule, G::Capsule) => ShapePair::CapsuleCapsule,
+            (G::Capsule, G::Box) => ShapePair::CapsuleBox,
+            (G::Box, G::Box) => ShapePair::BoxBox,
+            (G::Hfield, G::Sphere | G::Capsule) => ShapePair::FieldCapsule,
+            (G::Hfield, G::Box) => ShapePair::FieldBox,
             _ => return None,
         })
     }
@@ -65,7 +65,7 @@ pub(crate) enum Cull {
 
 /// Two geoms that may touch: there can be millions of these.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pair {
+pub(crate) struct GeomPair {
     /// In MuJoCo's order: the normal points from the first to the second.
     pub geoms: [u32; 2],
     /// Number of its [`PairSpec`].
@@ -74,7 +74,7 @@ pub(crate) struct Pair {
 
 /// A pair with everything that belongs to it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PairOf<'a, C> {
+pub(crate) struct GeomPairOf<'a, C> {
     pub geoms: [usize; 2],
     pub links: [Option<usize>; 2],
     spec: &'a PairSpec<C>,
@@ -87,7 +87,7 @@ pub(crate) struct PairSpec<C> {
     pub coupled: bool,
     /// In MJCF's order, and zero where there is none: a sphere is a capsule without length.
     pub sizes: [[C; 3]; 2],
-    pub test: Test,
+    pub shapes: ShapePair,
     /// Height field of the first.
     pub field: usize,
     pub cull: Cull,
@@ -107,21 +107,21 @@ pub(crate) struct PairSpec<C> {
 impl<C> Contacts<C> {
     /// A pair by its number.
     #[inline(always)]
-    pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> PairOf<'a, C> {
+    pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> GeomPairOf<'a, C> {
         let pair = &self.pairs[index];
         let ends = pair.geoms.map(|g| g as usize);
-        PairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
+        GeomPairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
     }
 }
 
-impl<C> PairOf<'_, C> {
+impl<C> GeomPairOf<'_, C> {
     /// The geom that moves, of a pair with the static world.
     pub fn moving(&self) -> usize {
         self.geoms[if self.links[1].is_some() { 1 } else { 0 }]
     }
 }
 
-impl<C> std::ops::Deref for PairOf<'_, C> {
+impl<C> std::ops::Deref for GeomPairOf<'_, C> {
     type Target = PairSpec<C>;
     #[inline(always)]
     fn deref(&self) -> &PairSpec<C> {
@@ -137,7 +137,7 @@ impl<C> PairSpec<C> {
 
     /// Both are spheres or capsules.
     pub fn round(&self) -> bool {
-        matches!(self.test, Test::SphereSphere | Test::SphereCapsule | Test::CapsuleCapsule)
+        matches!(self.shapes, ShapePair::SphereSphere | ShapePair::SphereCapsule | ShapePair::CapsuleCapsule)
     }
 }
 
@@ -152,7 +152,7 @@ pub(super) fn add<T: Real>(
 ) -> bool {
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
-    let Some(test) = Test::of(a.kind, b.kind) else { return false };
+    let Some(shapes) = ShapePair::of(a.kind, b.kind) else { return false };
     // planes and fields that move are not simulated
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
@@ -183,7 +183,7 @@ pub(super) fn add<T: Real>(
     contacts.specs.push(PairSpec {
         coupled: links[0].is_some() && links[1].is_some(),
         sizes: [sizes(a).map(c), sizes(b).map(c)],
-        test,
+        shapes,
         field: a.hfield.unwrap_or(0),
         cull,
         reach: c(if cull == Cull::Balls { radius(a) } else { 0.0 } + radius(b) + params.margin),
