@@ -5,7 +5,7 @@
 //!    included (acting, advantages, four epochs of updates, optimizer, waiting).
 
 use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
-use marathon_learn::mlp::{CHUNK, Mlp};
+use marathon_learn::nets::mlp::{CHUNK, Mlp};
 use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
 use std::time::Instant;

@@ -1,7 +1,7 @@
 //! Files, written whole or not at all: safetensors with one JSON document in the header, and JSON documents that know their
 //! own checksum.
 
-use crate::Error;
+use crate::error::Error;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;

@@ -46,88 +46,30 @@
 //! }
 //! ```
 
-mod a2c;
-mod acktr;
-mod activation;
-mod adam;
-mod advantage;
-mod agents;
-pub mod buffer;
-mod checkpoint;
-mod clock;
-mod config;
-pub mod curiosity;
+pub mod algorithms;
 mod error;
-mod eval;
 mod files;
-pub mod gaussian;
-mod init;
-pub mod kfac;
-mod learner;
-pub mod loss;
-mod memory;
-mod mirror;
-pub mod mlp;
-mod noise;
-mod normalize;
-mod observer;
-mod onnx;
-mod policy;
-mod ppo;
-mod remote;
-mod replay;
-pub mod rnd;
-mod rollout;
-mod run;
-mod sac;
-pub mod signal;
-pub mod squash;
-mod sums;
-mod sync;
-mod tiles;
-mod update;
+pub mod lanes;
+pub mod nets;
+pub mod optim;
+pub mod policy;
+pub mod rewards;
+pub mod rollout;
+mod trainer;
 
-pub use a2c::A2c;
-pub use acktr::Acktr;
-pub use activation::Activation;
-pub use checkpoint::Checkpoint;
-pub use config::{Algorithm, Init, PpoConfig, Ratio, Schedule};
+pub use algorithms::a2c::A2c;
+pub use algorithms::acktr::Acktr;
+pub use algorithms::sac::Sac;
 pub use error::Error;
-pub use eval::{EvalOptions, Evaluation, evaluate};
 pub use files::{read_description, write_atomic, write_description};
-pub use marathon_envs::BLOCK;
-pub use normalize::Normalizer;
-pub use observer::{Control, IterationStats, Observer, Snapshot};
+pub use lanes::BLOCK;
+pub use nets::activation::Activation;
+pub use nets::normalize::Normalizer;
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
-pub use remote::{Deliver, Player, Players};
-pub use run::{TrainOutput, train, train_with};
-pub use sac::Sac;
-pub use signal::{Signal, SignalKind};
-
-/// Runs `$body` with `$T` bound to the single-precision lane type of an `Isa`.
-macro_rules! f32_lanes {
-    ($isa:expr, $T:ident => $body:expr) => {{
-        use marathon_physics::lanes;
-        match $isa {
-            #[cfg(target_arch = "x86_64")]
-            lanes::Isa::X16 => {
-                type $T = lanes::F32x16;
-                $body
-            }
-            #[cfg(target_arch = "x86_64")]
-            lanes::Isa::X8 => {
-                type $T = lanes::F32x8;
-                $body
-            }
-            lanes::Isa::F32 => {
-                type $T = f32;
-                $body
-            }
-            _ => {
-                type $T = lanes::F32x4;
-                $body
-            }
-        }
-    }};
-}
-pub(crate) use f32_lanes;
+pub use rewards::{Signal, SignalKind};
+pub use trainer::checkpoint::Checkpoint;
+pub use trainer::config::{Algorithm, Init, PpoConfig, Ratio, Schedule};
+pub use trainer::evaluate::{EvalOptions, Evaluation, evaluate};
+pub use trainer::observer::{Control, IterationStats, Observer, Snapshot};
+pub use trainer::remote::{Deliver, Player, Players};
+pub use trainer::{TrainOutput, train, train_with};

@@ -5,7 +5,7 @@ mod common;
 
 use common::numbers::noise_f32 as noise;
 use common::{PuckTask, silent, small_config, small_of};
-use marathon_learn::mlp::Mlp;
+use marathon_learn::nets::mlp::Mlp;
 use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, PpoConfig, Schedule, Snapshot, train};
 use marathon_physics::lanes::Isa;
 

@@ -5,9 +5,9 @@ mod common;
 
 use common::numbers::{noise, worst};
 use common::{PuckTask, learning_config, silent, small_config};
-use marathon_learn::curiosity::Curiosity;
-use marathon_learn::rnd::Rnd;
-use marathon_learn::signal::Step;
+use marathon_learn::rewards::Step;
+use marathon_learn::rewards::curiosity::Curiosity;
+use marathon_learn::rewards::rnd::Rnd;
 use marathon_learn::{
     BLOCK, Checkpoint, Control, IterationStats, PpoConfig, Signal, SignalKind, Snapshot, evaluate, train,
 };

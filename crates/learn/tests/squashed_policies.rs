@@ -5,8 +5,8 @@ mod common;
 
 use common::numbers::noise;
 use marathon_learn::BLOCK;
-use marathon_learn::buffer::Blocks;
-use marathon_learn::squash::{Draw, Objective};
+use marathon_learn::lanes::buffer::Blocks;
+use marathon_learn::nets::squash::{Draw, Objective};
 use marathon_physics::lanes::Real;
 use std::marker::PhantomData;
 

@@ -5,9 +5,9 @@
 mod common;
 
 use common::numbers::noise_f32 as noise;
-use marathon_learn::buffer::Blocks;
-use marathon_learn::kfac::Layer;
-use marathon_learn::mlp::Mlp;
+use marathon_learn::lanes::buffer::Blocks;
+use marathon_learn::nets::mlp::Mlp;
+use marathon_learn::optim::kfac::Layer;
 use marathon_learn::{Activation, BLOCK};
 use marathon_physics::lanes::Isa;
 

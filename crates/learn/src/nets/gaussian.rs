@@ -1,0 +1,128 @@
+//! The policy's distribution: independent normal actions with a standard deviation that does not depend on the state.
+
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::noise::Noise;
+use crate::trainer::config::Ratio;
+use marathon_physics::lanes::{Kernel, Real};
+use std::marker::PhantomData;
+
+/// `ln(2 pi e) / 2`, the entropy of a standard normal number.
+pub const UNIT_ENTROPY: f64 = 1.418_938_533_204_672_7;
+
+/// Standard deviations of the actions, ready for use.
+///
+/// Log-probabilities leave out the constant `-ln(2 pi) / 2` per action: it cancels in every ratio, where its digits
+/// would only be lost.
+#[derive(Clone, Debug)]
+pub struct Gaussian<S> {
+    /// Standard deviation per action.
+    pub std: Vec<S>,
+    /// Its reciprocal.
+    pub inv_std: Vec<S>,
+    /// Its logarithm.
+    pub log_std: Vec<S>,
+    /// Sum of the logarithms.
+    pub log_sum: S,
+}
+
+struct Prepare<'a, S>(&'a [S]);
+
+impl<T: Real<Scalar = T>> Kernel<T> for Prepare<'_, T> {
+    type Output = Gaussian<T>;
+
+    #[inline(always)]
+    fn run(self) -> Gaussian<T> {
+        let mut log_sum = T::zero();
+        let (mut std, mut inv_std) = (Vec::new(), Vec::new());
+        for l in self.0 {
+            log_sum += *l;
+            std.push((*l).exp());
+            inv_std.push((-*l).exp());
+        }
+        Gaussian { std, inv_std, log_std: self.0.to_vec(), log_sum }
+    }
+}
+
+impl<S: Real<Scalar = S>> Gaussian<S> {
+    /// From the logarithms of the standard deviations (`S` is `f32` or `f64`).
+    pub fn new(log_std: &[S]) -> Self {
+        S::enter(Prepare(log_std))
+    }
+    /// Differential entropy, nats.
+    pub fn entropy(&self) -> f64 {
+        S::widen(self.log_sum) + UNIT_ENTROPY * self.std.len() as f64
+    }
+    /// Mean standard deviation over the actions.
+    pub fn mean_std(&self) -> f64 {
+        self.std.iter().map(|s| S::widen(*s)).sum::<f64>() / self.std.len() as f64
+    }
+}
+
+/// Log-probability of one column of actions: `-sum(z^2) / 2 - sum(log std)`; leaves `z = (action - mean) / std` in `z`.
+#[inline(always)]
+pub(crate) fn log_prob<T: Real>(
+    gaussian: &Gaussian<T::Scalar>,
+    action: &[T::Scalar],
+    mean: &[T::Scalar],
+    z: &mut [T::Scalar],
+    lane: usize,
+) -> T {
+    let mut lp = -T::splat(gaussian.log_sum);
+    for (k, inv_std) in gaussian.inv_std.iter().enumerate() {
+        let at = k * BLOCK + lane;
+        let e = (T::load(&action[at..]) - T::load(&mean[at..])) * T::splat(*inv_std);
+        e.store(&mut z[at..]);
+        lp = (e * T::lit(0.5)).neg_mul_add(e, lp);
+    }
+    lp
+}
+
+/// Draws actions for a chunk of blocks.
+pub(crate) struct Sample<'a, T> {
+    pub gaussian: &'a Gaussian<f32>,
+    /// Means, one block per stream.
+    pub mean: &'a Blocks<f32>,
+    pub noise: &'a mut [Noise],
+    /// Out: `[block][action][16]`.
+    pub action: &'a mut [f32],
+    /// Out: `[block][16]`, or with a row for each action `[block][action][16]`.
+    pub log_prob: &'a mut [f32],
+    /// Whether each action has a row there.
+    pub ratio: Ratio,
+    /// Work space: a row per action.
+    pub eps: &'a mut [[f32; BLOCK]],
+    pub lanes: PhantomData<T>,
+}
+
+impl<T: Real<Scalar = f32>> Kernel<T> for Sample<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let n = self.gaussian.std.len();
+        for (b, noise) in self.noise.iter_mut().enumerate() {
+            noise.normals::<T>(self.eps);
+            let mean = self.mean.block(b);
+            let action = &mut self.action[b * n * BLOCK..][..n * BLOCK];
+            let rows = self.ratio.rows(n) * BLOCK;
+            let log_prob = &mut self.log_prob[b * rows..][..rows];
+            for lane in (0..BLOCK).step_by(T::LANES) {
+                let mut lp = -T::splat(self.gaussian.log_sum);
+                for k in 0..n {
+                    let (at, e) = (k * BLOCK + lane, T::load(&self.eps[k][lane..]));
+                    lp = (e * T::lit(0.5)).neg_mul_add(e, lp);
+                    e.mul_add(T::splat(self.gaussian.std[k]), T::load(&mean[at..])).store(&mut action[at..]);
+                    if self.ratio == Ratio::PerAction {
+                        (e * T::lit(0.5))
+                            .neg_mul_add(e, -T::splat(self.gaussian.log_std[k]))
+                            .store(&mut log_prob[at..]);
+                    }
+                }
+                if self.ratio == Ratio::Joint {
+                    lp.store(&mut log_prob[lane..]);
+                }
+            }
+        }
+    }
+}

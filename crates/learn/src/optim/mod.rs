@@ -1,0 +1,4 @@
+//! Optimizers.
+
+pub(crate) mod adam;
+pub mod kfac;

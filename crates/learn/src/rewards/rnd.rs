@@ -1,0 +1,110 @@
+//! Random network distillation (Burda et al., 2018): a network learns what another one with fixed random parameters makes
+//! of an observation. Where observations are new, it errs, and the squared error is the reward.
+
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::noise::{SIGNALS, SplitMix};
+use crate::nets::activation::Activation;
+use crate::nets::init;
+use crate::nets::mlp::{CHUNK, Mlp, Tape};
+use crate::rewards::{Distance, Step, place};
+use marathon_physics::lanes::Real;
+use std::marker::PhantomData;
+
+/// The two networks, which have one shape, and the parameters of the fixed one.
+#[derive(Clone, Debug)]
+pub struct Rnd {
+    net: Mlp,
+    target: Vec<f32>,
+}
+
+/// Work space.
+pub struct RndSpace<S> {
+    /// The fixed network's parameters.
+    fixed: Vec<S>,
+    input: Blocks<S>,
+    target: Tape<S>,
+    guess: Tape<S>,
+    /// Half the squared error, a row per block.
+    half: Vec<S>,
+}
+
+impl Rnd {
+    /// For observations of a length, with the fixed parameters of a seed.
+    pub fn seeded(obs: usize, hidden: &[usize], seed: u64) -> Self {
+        Self::new(obs, hidden, &mut SplitMix::new(seed, SIGNALS))
+    }
+    /// As [`Rnd::seeded`], from a stream of random numbers; the last of the widths is the number of features.
+    pub(crate) fn new(obs: usize, hidden: &[usize], random: &mut SplitMix) -> Self {
+        let net = Mlp::new(&[&[obs], hidden].concat(), Activation::Swish);
+        let mut target = vec![0.0; net.len()];
+        init::orthogonal(&net, &mut target, 1.0, random);
+        Self { net, target }
+    }
+    /// Number of parameters that are learned.
+    pub fn count(&self) -> usize {
+        self.net.len()
+    }
+    /// Fills them for the start of a run.
+    pub(crate) fn init(&self, params: &mut [f32], random: &mut SplitMix) {
+        init::orthogonal(&self.net, params, 1.0, random);
+    }
+    /// Work space.
+    pub fn space<S: Copy + Default + From<f32>>(&self) -> RndSpace<S> {
+        RndSpace {
+            fixed: self.target.iter().map(|x| S::from(*x)).collect(),
+            input: self.net.input(),
+            target: self.net.inference_tape(),
+            guess: self.net.tape(),
+            half: vec![S::default(); CHUNK * BLOCK],
+        }
+    }
+
+    /// Runs both networks on the observations.
+    pub fn losses<T: Real>(
+        &self,
+        params: &[T::Scalar],
+        steps: &[Step<'_, T::Scalar>],
+        space: &mut RndSpace<T::Scalar>,
+    ) {
+        let RndSpace { fixed, input, target, guess, half } = space;
+        let n = steps.len();
+        for (b, step) in steps.iter().enumerate() {
+            place(input.block_mut(b), 0, step.obs);
+        }
+        self.net.forward_on::<T>(fixed, input, target, n);
+        self.net.forward_on::<T>(&params[..self.count()], input, guess, n);
+        let (output, delta) = guess.output_and_delta();
+        T::enter(Distance::<T> {
+            guess: output,
+            truth: target.output(),
+            weight: 2.0,
+            delta,
+            half,
+            blocks: n,
+            lanes: PhantomData,
+        });
+    }
+
+    /// The squared error after [`Rnd::losses`].
+    pub fn reward(&self, space: &RndSpace<f32>, blocks: usize, out: &mut [f32]) {
+        out[..blocks * BLOCK].iter_mut().zip(&space.half).for_each(|(out, half)| *out = 2.0 * half);
+    }
+
+    /// Gradient of its sum after [`Rnd::losses`].
+    pub fn gradient<T: Real>(
+        &self,
+        params: &[T::Scalar],
+        blocks: usize,
+        space: &mut RndSpace<T::Scalar>,
+        gradient: &mut [T::Scalar],
+    ) {
+        let n = self.count();
+        self.net.backward_on::<T>(&params[..n], &space.input, &mut space.guess, &mut gradient[..n], blocks);
+    }
+
+    /// The loss of one row after [`Rnd::losses`], for tests.
+    pub fn loss<S: Copy>(&self, space: &RndSpace<S>, at: usize) -> S {
+        space.half[at]
+    }
+}

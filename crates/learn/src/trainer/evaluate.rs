@@ -1,0 +1,185 @@
+//! Evaluation of a policy with its best actions.
+
+use crate::error::Error;
+use crate::lanes::BLOCK;
+use crate::policy::{BlockPolicy, Policy};
+use marathon_envs::{BlockStep, ShardFactory};
+use marathon_physics::lanes::Isa;
+use serde::{Deserialize, Serialize};
+
+/// Most agents that play side by side.
+const MAX_SLOTS: usize = 1024;
+
+/// How to evaluate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EvalOptions {
+    /// Number of episodes.
+    pub episodes: usize,
+    /// Seed of the environments.
+    pub seed: u64,
+    /// Threads; 0 means one per processor. The result does not depend on it.
+    pub threads: usize,
+}
+
+impl Default for EvalOptions {
+    fn default() -> Self {
+        Self { episodes: 64, seed: 1_000_003, threads: 0 }
+    }
+}
+
+/// Results over whole episodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Number of episodes.
+    pub episodes: u64,
+    /// Mean return.
+    pub return_mean: f64,
+    /// Standard deviation of the returns over the episodes.
+    pub return_std: f64,
+    /// Lowest return.
+    pub return_min: f64,
+    /// Highest return.
+    pub return_max: f64,
+    /// Mean length, decisions.
+    pub length_mean: f64,
+    /// Mean distance along +x, m.
+    pub distance_mean: f64,
+    /// Mean over the episodes of distance along +x by time, m/s.
+    pub speed_mean: f64,
+    /// Episodes that ended in a terminal state.
+    pub falls: u64,
+    /// Episodes whose simulation stopped being finite (they are falls too).
+    pub diverged: u64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Episode {
+    total: f64,
+    length: f64,
+    distance: f64,
+    fell: bool,
+    diverged: bool,
+}
+
+/// Plays episodes with the policy's best actions.
+///
+/// Agents play side by side, and each plays a number of episodes that is fixed before the start: counting whatever ends
+/// first would favor short episodes.
+///
+/// # Errors
+/// If the policy is for another task or the processor lacks the instruction set.
+pub fn evaluate(
+    factory: &dyn ShardFactory,
+    isa: Isa,
+    policy: &Policy,
+    options: &EvalOptions,
+) -> Result<Evaluation, Error> {
+    policy.check(factory.spec())?;
+    if isa == Isa::F64 || !isa.supported() {
+        return Err(Error::Isa(isa.name(), Isa::best().name()));
+    }
+    if options.episodes == 0 {
+        return Err(Error::config("episodes", 0, "at least 1"));
+    }
+    // agents that are stepped all at once are all there, needed or not
+    let crowd = factory.lockstep();
+    let slots = options.episodes.min(crowd.unwrap_or(MAX_SLOTS));
+    let blocks = crowd.unwrap_or(slots).div_ceil(BLOCK);
+    // slot i plays episodes i, i + slots, ...
+    let quota = |slot: usize| if slot < slots { (options.episodes - slot).div_ceil(slots) } else { 0 };
+    let threads = match options.threads {
+        // a thread whose agents are done must not leave the others waiting
+        _ if crowd.is_some() => 1,
+        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+        n => n,
+    };
+    let threads = threads.clamp(1, blocks);
+    let part = |id: usize| {
+        let (first, end) = (blocks * id / threads, blocks * (id + 1) / threads);
+        let quotas: Vec<usize> = (first * BLOCK..end * BLOCK).map(quota).collect();
+        play(factory, isa, policy, options.seed, first, &quotas)
+    };
+    let episodes: Vec<Episode> = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|id| scope.spawn(move || part(id))).collect();
+        let mut all = part(0);
+        for other in others {
+            all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        }
+        all
+    });
+    Ok(summarize(&episodes, factory.spec().dt))
+}
+
+/// Plays the episodes of consecutive blocks; returns them in the order of the agents.
+fn play(
+    factory: &dyn ShardFactory,
+    isa: Isa,
+    policy: &Policy,
+    seed: u64,
+    first_block: usize,
+    quotas: &[usize],
+) -> Vec<Episode> {
+    let (blocks, spec) = (quotas.len() / BLOCK, factory.spec());
+    let (obs_row, act_row) = (spec.obs * BLOCK, spec.act * BLOCK);
+    let mut shard = factory.shard(first_block, blocks, seed);
+    let mut pilot = BlockPolicy::new(policy, isa);
+    let (mut obs, mut action) = (vec![0.0; blocks * obs_row], vec![0.0; blocks * act_row]);
+    for (b, obs) in obs.chunks_exact_mut(obs_row).enumerate() {
+        shard.reset(b, !0, obs);
+    }
+    let mut current = vec![Episode::default(); quotas.len()];
+    let mut done: Vec<Vec<Episode>> = quotas.iter().map(|q| Vec::with_capacity(*q)).collect();
+    let mut out = BlockStep::default();
+    let busy = |done: &[Vec<Episode>], b: usize| {
+        let agents = b * BLOCK..(b + 1) * BLOCK;
+        agents.clone().any(|i| done[i].len() < quotas[i])
+    };
+    let mut playing: Vec<usize> = (0..blocks).filter(|b| busy(&done, *b)).collect();
+    while !playing.is_empty() {
+        pilot.act(&obs, &mut action);
+        shard.announce(&action);
+        for b in &playing {
+            let obs = &mut obs[b * obs_row..(b + 1) * obs_row];
+            shard.step(*b, &action[b * act_row..(b + 1) * act_row], obs, &mut out);
+            let ended = out.terminated | out.truncated | out.diverged;
+            for lane in 0..BLOCK {
+                let agent = b * BLOCK + lane;
+                let episode = &mut current[agent];
+                episode.total += out.reward[lane] as f64;
+                episode.length += 1.0;
+                episode.distance += out.forward[lane] as f64;
+                if ended >> lane & 1 == 1 {
+                    episode.diverged = out.diverged >> lane & 1 == 1;
+                    episode.fell = episode.diverged || out.terminated >> lane & 1 == 1;
+                    if done[agent].len() < quotas[agent] {
+                        done[agent].push(*episode);
+                    }
+                    *episode = Episode::default();
+                }
+            }
+            if ended != 0 {
+                shard.reset(*b, ended, obs);
+            }
+        }
+        playing.retain(|b| busy(&done, *b));
+    }
+    done.into_iter().flatten().collect()
+}
+
+fn summarize(episodes: &[Episode], dt: f64) -> Evaluation {
+    let n = episodes.len() as f64;
+    let mean = |f: &dyn Fn(&Episode) -> f64| episodes.iter().map(f).sum::<f64>() / n;
+    let return_mean = mean(&|e| e.total);
+    Evaluation {
+        episodes: episodes.len() as u64,
+        return_mean,
+        return_std: mean(&|e| (e.total - return_mean) * (e.total - return_mean)).sqrt(),
+        return_min: episodes.iter().map(|e| e.total).fold(f64::INFINITY, f64::min),
+        return_max: episodes.iter().map(|e| e.total).fold(f64::NEG_INFINITY, f64::max),
+        length_mean: mean(&|e| e.length),
+        distance_mean: mean(&|e| e.distance),
+        speed_mean: mean(&|e| e.distance / (e.length * dt)),
+        falls: episodes.iter().filter(|e| e.fell).count() as u64,
+        diverged: episodes.iter().filter(|e| e.diverged).count() as u64,
+    }
+}

@@ -1,0 +1,325 @@
+//! Rollouts that are played elsewhere: by other processes, on other machines.
+//!
+//! The learner keeps everything that lasts. For each rollout it sends out its *orders*, which are the networks and the
+//! statistics to act with, and to each player the *state* of the agents of its slice; back come what they experienced
+//! and their new state. A player keeps nothing between rollouts, so one that is lost is replaced by any other that gets
+//! the same orders and state and answers with the same bits. What is added up is added up per block, so the policy has
+//! the bits of [`train`](crate::train)'s, however many players there are.
+//!
+//! All messages are safetensors; nothing in them is code.
+
+use crate::algorithms::parameters::{Layout, Learner};
+use crate::error::Error;
+use crate::files::{TensorReader, TensorWriter};
+use crate::rollout::collect::{Actor, Rollout};
+use crate::rollout::states::Agents;
+use crate::rollout::sums::BlockSums;
+use crate::trainer::clock;
+use crate::trainer::config::Algorithm;
+use crate::trainer::config::PpoConfig;
+use crate::trainer::observer::Control;
+use crate::trainer::{Run, share};
+use marathon_envs::{ShardFactory, Spec};
+use marathon_physics::lanes::Isa;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::Path;
+
+const VERSION: u32 = 1;
+
+/// What a message says of itself.
+#[derive(Serialize, Deserialize)]
+struct About {
+    format: String,
+    version: u32,
+}
+
+/// Kinds of messages: their formats, and what errors call them.
+#[derive(Clone, Copy)]
+enum Message {
+    Orders,
+    Agents,
+    Rollout,
+}
+
+impl Message {
+    const fn format(self) -> &'static str {
+        match self {
+            Message::Orders => "marathon-orders",
+            Message::Agents => "marathon-agents",
+            Message::Rollout => "marathon-rollout",
+        }
+    }
+    fn close(self, file: &TensorWriter) -> Vec<u8> {
+        file.bytes(&About { format: self.format().into(), version: VERSION })
+    }
+    fn open(self, bytes: &[u8]) -> Result<TensorReader<'_>, Error> {
+        let file = TensorReader::new(Path::new(self.format()), bytes)?;
+        file.document::<About>(self.format(), VERSION)?;
+        Ok(file)
+    }
+}
+
+/// Takes in the answer of a slice, and refuses one that does not fit.
+pub type Deliver<'a> = &'a mut dyn FnMut(usize, &[u8]) -> Result<(), Error>;
+
+/// Those who play the agents of a run in the learner's place; see [`train_with`](crate::train_with).
+pub trait Players {
+    /// Number of slices that the agents are split into; at most one per block of sixteen agents is used.
+    fn slices(&self) -> usize;
+
+    /// Lets `states.len()` players play one horizon: slice `i` gets `orders` and `states[i]`, and its answer, the bytes
+    /// that [`Player::play`] returns, is given to `deliver(i, answer)`, in any order. An answer that `deliver` refuses
+    /// may be asked for again. [`Control::Stop`] ends the run before this rollout.
+    fn play(&mut self, orders: &[u8], states: &[Vec<u8>], deliver: Deliver<'_>) -> Control;
+}
+
+/// Plays the agents of one slice of a run.
+pub struct Player {
+    isa: Isa,
+    config: PpoConfig,
+    spec: Spec,
+    layout: Layout,
+    learner: Learner,
+    blocks: Range<usize>,
+    actor: Actor,
+    rollout: Rollout,
+}
+
+impl Player {
+    /// For slice `slice` of `slices` of a run.
+    ///
+    /// # Errors
+    /// If the configuration is invalid, or there is no such slice.
+    pub fn new(
+        factory: &dyn ShardFactory,
+        isa: Isa,
+        config: &PpoConfig,
+        (slice, slices): (usize, usize),
+    ) -> Result<Self, Error> {
+        config.validate()?;
+        check_algorithm(config)?;
+        if slice >= slices || slices > config.blocks() {
+            let expected = format!("a slice below their number, and at most {} of them", config.blocks());
+            return Err(Error::Mismatch {
+                what: "player".into(),
+                found: format!("slice {slice} of {slices}"),
+                expected,
+            });
+        }
+        let spec = factory.spec().clone();
+        let layout = Layout::new(&spec, config);
+        let blocks = share(config.blocks(), slices, slice);
+        let place = (blocks.start, blocks.len());
+        Ok(Self {
+            isa,
+            learner: Learner::new(&layout, &spec, config),
+            actor: Actor::new(factory, place, config.seed, &layout),
+            rollout: Rollout::new(blocks.len(), config.horizon, (spec.obs, spec.act), &layout),
+            config: config.clone(),
+            spec,
+            layout,
+            blocks,
+        })
+    }
+
+    /// Plays one horizon with the orders and from the state that a learner sent, and returns the answer. The same
+    /// arguments give the same bits, whatever was played before.
+    ///
+    /// # Errors
+    /// If the messages are damaged or belong to another task, network or slice.
+    pub fn play(&mut self, orders: &[u8], state: &[u8]) -> Result<Vec<u8>, Error> {
+        let cpu = clock::thread_cpu();
+        let learner = &mut self.learner;
+        let orders = Message::Orders.open(orders)?;
+        learner.params = orders.finite("params", &[self.layout.len])?;
+        learner.observations.mean = orders.get("obs_mean", &[self.spec.obs])?;
+        learner.observations.var = orders.get("obs_var", &[self.spec.obs])?;
+        let returns: Vec<f64> = orders.get("returns", &[2])?;
+        (learner.returns.mean[0], learner.returns.var[0]) = (returns[0], returns[1]);
+
+        let what = Message::Agents.format();
+        let agents = Agents::read(&Message::Agents.open(state)?)?;
+        agents.check(what, self.blocks.len(), self.spec.obs)?;
+        agents.put(what, self.blocks.clone(), &mut self.actor)?;
+
+        let (actor, rollout) = (&mut self.actor, &mut self.rollout);
+        let env = self.learner.acting(self.isa, &self.layout, &self.config, |acting| actor.collect(acting, rollout));
+
+        let mut file = TensorWriter::default();
+        write_rollout(&self.rollout, &mut file);
+        Agents::of([&*actor], self.blocks.clone()).write(&mut file);
+        file.list("seconds", &[env, clock::thread_cpu() - cpu]);
+        Ok(Message::Rollout.close(&file))
+    }
+}
+
+/// Refuses algorithms that learn from more than the last rollout.
+///
+/// # Errors
+/// If the algorithm is SAC, whose replay stays with the agents.
+pub fn check_algorithm(config: &PpoConfig) -> Result<(), Error> {
+    if matches!(config.algorithm, Algorithm::Sac(_)) {
+        return Err(Error::Mismatch {
+            what: "rollouts played elsewhere".into(),
+            found: "the trainer sac".into(),
+            expected: "ppo, a2c or acktr".into(),
+        });
+    }
+    Ok(())
+}
+
+/// Seconds spent on a rollout.
+#[derive(Clone, Copy, Default)]
+pub struct Spent {
+    /// In the environments, by each worker or player.
+    pub env: f64,
+    /// Of processor time, elsewhere.
+    pub cpu_elsewhere: f64,
+}
+
+/// The learner's side.
+pub struct Remote<'a> {
+    players: &'a mut dyn Players,
+    slices: Vec<Range<usize>>,
+    /// Why the run cannot go on.
+    pub error: Option<Error>,
+}
+
+impl<'a> Remote<'a> {
+    /// For a run with a configuration.
+    pub fn new(players: &'a mut dyn Players, config: &PpoConfig) -> Self {
+        let n = players.slices().clamp(1, config.blocks());
+        let slices = (0..n).map(|i| share(config.blocks(), n, i)).collect();
+        Self { players, slices, error: None }
+    }
+
+    /// Has one horizon played; fills the rollouts and brings the actors into the states in which their agents are then.
+    /// `None` if the run is to end: nothing has changed then, except after an error.
+    pub fn collect(&mut self, run: &Run<'_>, learner: &Learner) -> Option<Spent> {
+        let locked = || run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
+        let mut orders = TensorWriter::default();
+        orders.list("params", &learner.params);
+        orders.list("obs_mean", &learner.observations.mean);
+        orders.list("obs_var", &learner.observations.var);
+        orders.list("returns", &[learner.returns.mean[0], learner.returns.var[0]]);
+        let orders = Message::Orders.close(&orders);
+        let states = self.slices.iter().map(|slice| {
+            let mut file = TensorWriter::default();
+            Agents::of(locked(), slice.clone()).write(&mut file);
+            Message::Agents.close(&file)
+        });
+        let states: Vec<Vec<u8>> = states.collect();
+
+        let slices = &self.slices;
+        let mut answers: Vec<Option<Answer>> = slices.iter().map(|_| None).collect();
+        let control = self.players.play(&orders, &states, &mut |i, bytes| {
+            let none = || Error::Mismatch {
+                what: "rollout".into(),
+                found: format!("slice {i}"),
+                expected: format!("one below {}", slices.len()),
+            };
+            let blocks = slices.get(i).ok_or_else(none)?.len();
+            answers[i] = Some(Answer::read(bytes, run, blocks)?);
+            Ok(())
+        });
+        if control == Control::Stop {
+            return None;
+        }
+        let arrived = answers.iter().flatten().count();
+        if arrived < slices.len() {
+            let found = format!("{arrived} slices");
+            let expected = format!("those of {}", slices.len());
+            self.error = Some(Error::Mismatch { what: "the players' rollout".into(), found, expected });
+            return None;
+        }
+
+        let mut spent = Spent::default();
+        for (answer, slice) in answers.iter().flatten().zip(slices) {
+            for mut actor in locked() {
+                if let Err(error) = answer.agents.put(Message::Rollout.format(), slice.clone(), &mut actor) {
+                    self.error = Some(error);
+                    return None;
+                }
+            }
+            spent.env += answer.seconds[0] / slices.len() as f64;
+            spent.cpu_elsewhere += answer.seconds[1];
+        }
+        let mut all = answers.iter().flatten().flat_map(|a| (0..a.rollout.blocks()).map(|b| (&a.rollout, b)));
+        for rollout in &run.rollouts {
+            let mut rollout = rollout.write().expect("no worker has panicked");
+            rollout.sums.clear();
+            for b in 0..rollout.blocks() {
+                let (from, block) = all.next().expect("slices and rollouts have all blocks, in order");
+                rollout.copy_block(b, from, block);
+            }
+        }
+        Some(spent)
+    }
+}
+
+/// What a player has sent back.
+struct Answer {
+    rollout: Rollout,
+    agents: Agents,
+    seconds: Vec<f64>,
+}
+
+impl Answer {
+    fn read(bytes: &[u8], run: &Run<'_>, blocks: usize) -> Result<Self, Error> {
+        let spec = &run.spec;
+        let file = Message::Rollout.open(bytes)?;
+        let mut rollout = Rollout::new(blocks, run.config.horizon, (spec.obs, spec.act), &run.layout);
+        read_rollout(&mut rollout, &file, spec, run.config.signals.len())?;
+        let agents = Agents::read(&file)?;
+        agents.check(Message::Rollout.format(), blocks, spec.obs)?;
+        Ok(Self { rollout, agents, seconds: file.get("seconds", &[2])? })
+    }
+}
+
+/// Numbers of a block's sums, except for its observations, reward terms and signals.
+const SUMS: usize = 14;
+
+/// What a learner needs of a rollout.
+fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
+    for (name, rows) in rollout.rows() {
+        file.list(name, rows);
+    }
+    let sums = rollout.sums.iter().flat_map(|s| {
+        let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged];
+        let pairs = [s.discounted, s.advantages, s.targets, s.errors].into_iter().chain(s.observations.iter().copied());
+        let rest = s.terms.iter().chain(&s.signals).copied();
+        scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(rest).collect::<Vec<_>>()
+    });
+    file.list("sums", &sums.collect::<Vec<f64>>());
+}
+
+fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, signals: usize) -> Result<(), Error> {
+    for (name, rows) in rollout.rows_mut() {
+        rows.copy_from_slice(&file.get::<f32>(name, &[rows.len()])?);
+    }
+    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + signals;
+    let sums: Vec<f64> = file.get("sums", &[rollout.blocks() * row])?;
+    let read = |row: &[f64]| {
+        let (scalars, rest) = row.split_at(SUMS + 2 * spec.obs);
+        let (terms, signals) = rest.split_at(spec.reward_terms.len());
+        let pair = |i: usize| (scalars[i], scalars[i + 1]);
+        BlockSums {
+            episodes: scalars[0],
+            returns: scalars[1],
+            lengths: scalars[2],
+            speeds: scalars[3],
+            falls: scalars[4],
+            diverged: scalars[5],
+            discounted: pair(6),
+            advantages: pair(8),
+            targets: pair(10),
+            errors: pair(12),
+            observations: (0..spec.obs).map(|i| pair(SUMS + 2 * i)).collect(),
+            terms: terms.to_vec(),
+            signals: signals.to_vec(),
+        }
+    };
+    rollout.sums = sums.chunks_exact(row).map(read).collect();
+    Ok(())
+}
