@@ -2,7 +2,8 @@
 //! own checksum.
 
 use crate::error::Error;
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+pub use safetensors::tensor::Dtype;
+use safetensors::tensor::{SafeTensors, TensorView};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -112,7 +113,7 @@ impl<'a> TensorReader<'a> {
     }
     /// The JSON document.
     pub fn document<D: DeserializeOwned>(&self, format: &str, version: u32) -> Result<D, Error> {
-        parse(self.path, &self.document, format, version)
+        parse(self.path, &self.document, format, version, None)
     }
     /// A tensor of a known shape.
     pub fn get<N: Number>(&self, name: &str, shape: &[usize]) -> Result<Vec<N>, Error> {
@@ -137,14 +138,36 @@ impl<'a> TensorReader<'a> {
             Some(i) => Err(Error::file(self.path, format!("tensor '{name}', number {i}"), data[i], "a finite number")),
         }
     }
-    /// Length of a list of unknown length.
-    pub fn list_len(&self, name: &str) -> usize {
+    /// A list of unknown length.
+    pub fn list<N: Number>(&self, name: &str) -> Result<Vec<N>, Error> {
+        self.get(name, &[self.list_len(name)])
+    }
+    /// The same without infinities and NaN.
+    pub fn finite_list(&self, name: &str) -> Result<Vec<f32>, Error> {
+        self.finite(name, &[self.list_len(name)])
+    }
+    fn list_len(&self, name: &str) -> usize {
         self.tensors.tensor(name).map_or(0, |t| t.shape().iter().product())
+    }
+    /// Names of all tensors in order, with the kinds of their numbers.
+    pub fn names(&self) -> Vec<(&str, Dtype)> {
+        let mut names: Vec<_> = self.tensors.iter().map(|(name, tensor)| (name, tensor.dtype())).collect();
+        names.sort_by_key(|(name, _)| *name);
+        names
     }
 }
 
-/// Parses a JSON document that names its format and version.
-pub fn parse<D: DeserializeOwned>(path: &Path, json: &str, format: &str, version: u32) -> Result<D, Error> {
+/// Makes a document of an earlier version into one of this version.
+pub type Upgrade = fn(u64, Value) -> Value;
+
+/// Parses a JSON document that names its format and version; one of an earlier version, if there is a way to upgrade it.
+fn parse<D: DeserializeOwned>(
+    path: &Path,
+    json: &str,
+    format: &str,
+    version: u32,
+    upgrade: Option<Upgrade>,
+) -> Result<D, Error> {
     let expected = || format!("a {format} document");
     let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), expected());
     let mut value: Value = serde_json::from_str(json).map_err(bad)?;
@@ -152,7 +175,8 @@ pub fn parse<D: DeserializeOwned>(path: &Path, json: &str, format: &str, version
     if found != format {
         return Err(Error::file(path, "format", found, format!("\"{format}\"")));
     }
-    if *number != version {
+    let earlier = number.as_u64().filter(|n| upgrade.is_some() && (1..version as u64).contains(n));
+    if *number != version && earlier.is_none() {
         return Err(Error::file(path, "version", number, format!("{version}, the one that this program knows")));
     }
     // earlier versions wrote none
@@ -166,6 +190,9 @@ pub fn parse<D: DeserializeOwned>(path: &Path, json: &str, format: &str, version
                 format!("\"{sum}\"; the file has changed since it was written"),
             ));
         }
+    }
+    if let (Some(number), Some(upgrade)) = (earlier, upgrade) {
+        value = upgrade(number, value);
     }
     serde_path_to_error::deserialize(value).map_err(|e| {
         let place = e.path().to_string();
@@ -190,9 +217,22 @@ pub fn write_description(path: &Path, document: &impl Serialize) -> Result<(), E
 /// # Errors
 /// If the file cannot be read, has changed since it was written, or is of another format.
 pub fn read_description<D: DeserializeOwned>(path: &Path, format: &str, version: u32) -> Result<D, Error> {
+    read_versions(path, format, version, None)
+}
+
+/// As [`read_description`], also for earlier versions that can be upgraded.
+///
+/// # Errors
+/// The same.
+pub fn read_versions<D: DeserializeOwned>(
+    path: &Path,
+    format: &str,
+    version: u32,
+    upgrade: Option<Upgrade>,
+) -> Result<D, Error> {
     let json = std::fs::read(path).map_err(Error::io(path, "read"))?;
     let json = String::from_utf8(json).map_err(|e| Error::file(path, "text", e, "UTF-8"))?;
-    parse(path, &json, format, version)
+    parse(path, &json, format, version, upgrade)
 }
 
 /// Checksum of a document's values, whatever the order of its keys and the spelling of its numbers.

@@ -3,10 +3,11 @@
 mod common;
 
 use common::numbers::noise_f32 as noise;
-use marathon_learn::algorithms::loss::{Loss, LossSums, Objective, Samples};
+use marathon_learn::algorithms::loss::{Loss, LossSums, Objective};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::gaussian::Gaussian;
 use marathon_learn::nets::mlp::Mlp;
+use marathon_learn::rollout::data::Samples;
 use marathon_learn::{Activation, BLOCK, Ratio};
 use marathon_physics::lanes::{F32x4, Real};
 #[cfg(target_arch = "x86_64")]

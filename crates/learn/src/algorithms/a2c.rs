@@ -10,22 +10,42 @@
 //! The rollout was drawn from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of
 //! `A log pi`: the gradient comes from the same code as PPO's. The bound of its norm is for both networks together.
 
-use crate::algorithms::loss::{LossSums, Objective};
-use crate::lanes::f32_lanes;
-use crate::trainer::NETWORKS;
-use crate::trainer::config::Ratio;
-use crate::trainer::workers::Update;
-use marathon_physics::lanes::{Isa, Kernel, Real};
+use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
+use super::loss::{LossSums, Objective};
+use super::parameters::Places;
+use super::schedule::{Moving, Progress, Schedule};
+use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check};
+use crate::error::Error;
+use crate::nets::gaussian::Ratio;
+use crate::nets::normalize::Normalizer;
+use crate::optim::rmsprop::RmsProp;
+use crate::policy::{Policy, PolicyMeta};
+use crate::rollout::collect::Collecting;
+use crate::rollout::data::{Experience, Shape};
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
 use serde::{Deserialize, Serialize};
 
 /// Far outside of what the ratio of a policy to itself can reach by rounding.
 const NO_CLIP: f64 = 1e9;
 
-/// What only A2C has; the defaults are those of the paper's comparison (OpenAI Baselines with the weight of the value
-/// loss and the rate that its authors chose).
+/// Settings of A2C; the defaults are those of the paper's comparison (OpenAI Baselines with the weight of the value loss and
+/// the rate that its authors chose).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct A2c {
+    /// Learning rate of both networks.
+    pub lr: f64,
+    /// How it moves.
+    pub schedule: Schedule,
+    /// Bound of the gradient's norm, for both networks together.
+    pub max_grad_norm: f64,
+    /// Decay of generalized advantage estimation.
+    pub gae_lambda: f64,
+    /// Weight of the entropy bonus.
+    pub entropy_coef: Moving,
+    /// Standard deviations of the actions.
+    pub deviations: Deviations,
     /// Weight of the value function's squared error.
     pub value_coef: f64,
     /// Decay of RMSProp's mean square.
@@ -36,122 +56,160 @@ pub struct A2c {
 
 impl Default for A2c {
     fn default() -> Self {
-        Self { value_coef: 0.25, rms_decay: 0.99, rms_epsilon: 1e-5 }
+        Self {
+            lr: 3e-4,
+            schedule: Schedule::Linear,
+            max_grad_norm: 0.5,
+            gae_lambda: 1.0,
+            entropy_coef: Moving::still(0.01),
+            deviations: Deviations::FREE,
+            value_coef: 0.25,
+            rms_decay: 0.99,
+            rms_epsilon: 1e-5,
+        }
     }
 }
 
-/// One step on one rollout.
-pub fn update(mut update: Update<'_>, settings: &A2c) {
-    let items: Vec<u32> = (0..update.run.items() as u32).collect();
-    let objective = objective(&update);
-    let sums = update.gradient(&items, 0, objective);
-    update.learner.lr = update.run.config.lr * update.run.linear(update.learner);
-    step(&mut update, settings, &sums);
+impl A2c {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self, _: &Common<'_>) -> Result<(), Error> {
+        check::positive(&[
+            ("value_coef", self.value_coef),
+            ("rms_epsilon", self.rms_epsilon),
+            ("max_grad_norm", self.max_grad_norm),
+        ])?;
+        check::fraction("rms_decay", self.rms_decay)?;
+        refuse_adaptive(self.schedule, "a2c")?;
+        actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
+        self.deviations.validate()
+    }
+
+    /// What a run needs.
+    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
+        Layout::new(setup, Ratio::Joint).needs(setup.common.items(), 0)
+    }
 }
 
 /// The objective of an actor-critic method without a bound of the ratio.
-pub fn objective(update: &Update<'_>) -> Objective {
-    let config = update.run.config;
+pub fn objective(entropy_coef: f64) -> Objective {
     Objective {
         ratio: Ratio::Joint,
         clip: NO_CLIP,
         value_clip: None,
-        entropy_coef: update.run.moved(update.learner, config.entropy_coef, config.final_entropy_coef),
+        entropy_coef,
         advantage_mean: 0.0,
         advantage_scale: 1.0,
     }
 }
 
-fn step(update: &mut Update<'_>, settings: &A2c, sums: &LossSums) {
-    let (run, learner) = (update.run, &mut *update.learner);
-    // the gradient at hand is that of (V - R)^2 / 2
-    let weight = [1.0, 2.0 * settings.value_coef];
-    let [policy, value, ..] = run.squares();
-    let norm = (policy + weight[1] * weight[1] * value).sqrt() / sums.samples;
-    if !norm.is_finite() {
-        learner.skipped += 1;
-        return;
+/// What A2C learns with.
+pub struct A2cLearner {
+    settings: A2c,
+    nets: ActorCritic,
+    rms: RmsProp,
+    lr: f64,
+    skipped: u64,
+    space: Option<Box<Space>>,
+}
+
+impl A2cLearner {
+    /// At the start of a run.
+    pub fn new(settings: A2c, setup: &Setup<'_>) -> Self {
+        let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
+        let rms = RmsProp::new(nets.params.len(), settings.rms_decay, settings.rms_epsilon);
+        Self { settings, nets, rms, lr: settings.lr, skipped: 0, space: None }
     }
-    let bound = (run.config.max_grad_norm / norm).min(1.0) / sums.samples;
-    // each signal has a rate of its own, and its gradient is not bounded
-    let mut lr = [learner.lr; NETWORKS];
-    lr[2..].iter_mut().zip(&run.config.signals).for_each(|(lr, signal)| *lr = signal.lr);
-    run.pieces(|range, gradient| {
-        let net = run.layout.network(&range);
-        let rms = RmsProp {
-            params: &mut learner.params[range.clone()],
-            mean_square: &mut learner.adam.v[range.clone()],
-            gradient,
-            scale: (if net < 2 { bound * weight[net] } else { 1.0 / sums.samples }) as f32,
-            lr: lr[net] as f32,
-            decay: settings.rms_decay,
-            epsilon: settings.rms_epsilon,
-        };
-        rms.step(run.isa);
-    });
-    run.bound_std(learner);
-}
 
-/// RMSProp as TensorFlow has it: the constant is under the root, and the mean square starts at 1.
-struct RmsProp<'a> {
-    params: &'a mut [f32],
-    mean_square: &'a mut [f32],
-    gradient: &'a [f32],
-    scale: f32,
-    lr: f32,
-    decay: f64,
-    epsilon: f64,
-}
+    /// One step on one rollout.
+    fn learn(
+        &mut self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+        all: &mut LossSums,
+    ) {
+        let items: Vec<u32> = (0..experience.items() as u32).collect();
+        let objective = objective(progress.at(self.settings.entropy_coef));
+        let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
+        let sums = self.nets.gradient(workers, experience, &items, objective, None, space);
+        *all += sums;
+        self.lr = self.settings.lr * progress.rate(self.settings.schedule);
+        self.step(workers, progress, &sums);
+    }
 
-impl RmsProp<'_> {
-    fn step(self, isa: Isa) {
-        f32_lanes!(isa, T => <T as Real>::enter(self))
+    fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let Self { settings, nets, rms, lr, .. } = self;
+        // the gradient at hand is that of (V - R)^2 / 2
+        let weight = [1.0, 2.0 * settings.value_coef];
+        let squares = workers.squares();
+        let norm = (squares[0] + weight[1] * weight[1] * squares[1]).sqrt() / sums.samples;
+        if !norm.is_finite() {
+            self.skipped += 1;
+            return;
+        }
+        let bound = (settings.max_grad_norm / norm).min(1.0) / sums.samples;
+        // each reward's networks have a rate of their own, and their gradient is not bounded
+        let rates = nets.layout.rates(*lr, *lr);
+        workers.pieces(&mut |net, range, gradient| {
+            let scale = weight.get(net).map_or(1.0 / sums.samples, |weight| bound * weight);
+            rms.update(nets.isa, &mut nets.params, range, gradient, scale, rates[net]);
+        });
+        nets.bound_std(progress);
     }
 }
 
-impl<T: Real<Scalar = f32>> Kernel<T> for RmsProp<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (scale, lr, epsilon) = (T::splat(self.scale), T::splat(self.lr), T::lit(self.epsilon));
-        let (decay, rest) = (T::lit(self.decay), T::lit(1.0 - self.decay));
-        let squares = self.mean_square.chunks_exact_mut(T::LANES).zip(self.gradient.chunks_exact(T::LANES));
-        for (p, (s, g)) in self.params.chunks_exact_mut(T::LANES).zip(squares) {
-            let g = T::load(g) * scale;
-            let square = decay.mul_add(T::load(s), rest * g * g);
-            square.store(s);
-            (T::load(p) - (lr * g).div((square + epsilon).sqrt())).store(p);
+impl Learner for A2cLearner {
+    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
+        // the first rollout only fills the statistics
+        if now.progress.iteration > 0 {
+            self.learn(workers, experience, now.progress, sums);
         }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rms_prop_is_its_formula_on_every_width() {
-        let gradient: Vec<f32> = (0..48).map(|i| (i as f32 - 20.0) * 0.1).collect();
-        for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
-            let (mut params, mut mean_square) = (vec![0.5f32; 48], vec![1.0f32; 48]);
-            let (scale, lr) = (0.5, 0.01);
-            let step = RmsProp {
-                params: &mut params,
-                mean_square: &mut mean_square,
-                gradient: &gradient,
-                scale,
-                lr,
-                decay: 0.9,
-                epsilon: 1e-5,
-            };
-            step.step(isa);
-            for i in 0..48 {
-                let g = gradient[i] as f64 * 0.5;
-                let square = 0.9 + 0.1 * g * g;
-                let want = 0.5 - 0.01 * g / (square + 1e-5).sqrt();
-                assert!((params[i] as f64 - want).abs() < 1e-6 && (mean_square[i] as f64 - square).abs() < 1e-6);
-            }
-        }
+    fn replica(&self) -> Box<dyn Learner> {
+        let Self { settings, nets, rms, lr, skipped, .. } = self;
+        let (nets, rms) = (nets.clone(), rms.clone());
+        Box::new(Self { settings: *settings, nets, rms, lr: *lr, skipped: *skipped, space: None })
+    }
+    fn places(&self) -> &Places {
+        &self.nets.layout.places
+    }
+    fn params(&self) -> &[f32] {
+        &self.nets.params
+    }
+    fn params_mut(&mut self) -> &mut Vec<f32> {
+        &mut self.nets.params
+    }
+    fn shape(&self) -> Shape {
+        self.nets.shape()
+    }
+    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+        self.nets.collecting(statistics)
+    }
+    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
+        self.nets.follow(before, after);
+    }
+    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
+        self.nets.describe(totals, self.lr, self.skipped)
+    }
+    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
+        self.nets.policy(meta, normalizer)
+    }
+    fn save(&self) -> Saved {
+        let mut saved = Saved::default();
+        saved.list("params", &self.nets.params);
+        saved.list("mean_square", &self.rms.mean_square);
+        saved.scalar("lr", self.lr);
+        saved.scalar("skipped", self.skipped as f64);
+        saved
+    }
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
+        saved.copy("params", &mut self.nets.params)?;
+        saved.copy("mean_square", &mut self.rms.mean_square)?;
+        self.lr = saved.number("lr")?;
+        self.skipped = saved.number("skipped")? as u64;
+        Ok(())
     }
 }

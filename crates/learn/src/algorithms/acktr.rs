@@ -16,14 +16,38 @@
 //! Unlike OpenAI Baselines, no updates with another optimizer come first (the running means of the factors weigh the
 //! first rollouts alike instead), and the damping is split between the factors (Martens and Grosse, 2015, section 6.3).
 
-use crate::algorithms::a2c;
-use crate::trainer::workers::Update;
+use super::a2c;
+use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
+use super::loss::LossSums;
+use super::parameters::Places;
+use super::schedule::{Moving, Progress, Schedule};
+use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check};
+use crate::error::Error;
+use crate::nets::gaussian::Ratio;
+use crate::nets::normalize::Normalizer;
+use crate::optim::kfac::Kfac;
+use crate::policy::{Policy, PolicyMeta};
+use crate::rollout::collect::Collecting;
+use crate::rollout::data::{Experience, Shape};
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-/// What only ACKTR has; the defaults are those of OpenAI Baselines.
+/// Settings of ACKTR; the defaults are those of OpenAI Baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Acktr {
+    /// Largest step length.
+    pub lr: f64,
+    /// How it moves.
+    pub schedule: Schedule,
+    /// Decay of generalized advantage estimation.
+    pub gae_lambda: f64,
+    /// Weight of the entropy bonus.
+    pub entropy_coef: Moving,
+    /// Standard deviations of the actions.
+    pub deviations: Deviations,
     /// Weight of the value function's squared error.
     pub value_coef: f64,
     /// Divergence that a step may cause, nats; in the value network half the mean squared change.
@@ -40,54 +64,136 @@ pub struct Acktr {
 
 impl Default for Acktr {
     fn default() -> Self {
-        Self { value_coef: 0.5, kl_clip: 1e-3, momentum: 0.9, damping: 0.01, stats_decay: 0.99, inverse_every: 10 }
+        Self {
+            lr: 0.25,
+            schedule: Schedule::Linear,
+            gae_lambda: 1.0,
+            entropy_coef: Moving::still(0.01),
+            deviations: Deviations::FREE,
+            value_coef: 0.5,
+            kl_clip: 1e-3,
+            momentum: 0.9,
+            damping: 0.01,
+            stats_decay: 0.99,
+            inverse_every: 10,
+        }
     }
 }
 
-/// One step on one rollout.
-pub fn update(mut update: Update<'_>, settings: &Acktr) {
-    let run = update.run;
-    let kfac = run.kfac.as_ref().expect("a run with ACKTR has factors");
-    let items: Vec<u32> = (0..run.items() as u32).collect();
-    let objective = a2c::objective(&update);
-    let sums = update.gradient(&items, 0, objective);
-    let gradient = update.whole_gradient().to_vec();
-    let mean = 1.0 / sums.samples;
-    // the gradient at hand is that of (V - R)^2 / 2
-    let scale = [mean, mean * 2.0 * settings.value_coef];
-
-    // factors, inverses and natural gradients, a layer at a time, shared out among the workers
-    let count = update.learner.iteration;
-    let refresh = count <= settings.inverse_every || count.is_multiple_of(settings.inverse_every);
-    // all rollouts weigh the same at first
-    let decay = settings.stats_decay.min(1.0 - 1.0 / count as f64);
-    let partials = update.partials(items.len());
-    while let Some(l) = update.take(1, kfac.count()) {
-        let mut layer = kfac.layer(l);
-        layer.merge(partials.iter().map(|p| &p.moments[..]), sums.samples, decay);
-        if refresh {
-            layer.invert(settings.damping);
+impl Acktr {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+        check::positive(&[("value_coef", self.value_coef), ("kl_clip", self.kl_clip), ("damping", self.damping)])?;
+        check::fraction("momentum", self.momentum)?;
+        check::fraction("stats_decay", self.stats_decay)?;
+        if self.inverse_every == 0 {
+            return Err(Error::config("inverse_every", 0, "at least 1"));
         }
-        let scale = scale[layer.network];
-        layer.natural(run.isa, &gradient, scale);
+        // the factors are square
+        let network = common.network;
+        for (field, widths) in [("actor_hidden", &network.actor_hidden), ("critic_hidden", &network.critic_hidden)] {
+            if widths.iter().any(|w| *w > 2048) {
+                return Err(Error::config(field, format!("{widths:?}"), "widths up to 2048 with ACKTR"));
+            }
+        }
+        check::task_alone(common, "acktr")?;
+        refuse_adaptive(self.schedule, "acktr")?;
+        actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
+        self.deviations.validate()
     }
-    drop(partials);
-    update.wait();
 
-    let learner = &mut *update.learner;
-    learner.lr = run.config.lr * run.linear(learner);
-    let log_std = run.layout.log_std.clone();
-    let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
-    let mut products = [0.0; 2];
-    products[0] = log_std.clone().map(|i| of_std(i) * gradient[i] as f64 * scale[0]).sum();
-    (0..kfac.count()).map(|l| kfac.layer(l)).for_each(|layer| products[layer.network] += layer.product);
-    if products.iter().all(|p| p.is_finite() && *p >= 0.0) {
+    /// What a run needs.
+    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
+        let layout = Layout::new(setup, Ratio::Joint);
+        layout.needs(setup.common.items(), Kfac::moments_len(&layout.actor, &layout.critic))
+    }
+}
+
+/// What ACKTR learns with.
+pub struct AcktrLearner {
+    settings: Acktr,
+    nets: ActorCritic,
+    /// The factors, which all workers share.
+    kfac: Arc<Kfac>,
+    momentum: Vec<f32>,
+    lr: f64,
+    skipped: u64,
+    space: Option<Box<Space>>,
+}
+
+impl AcktrLearner {
+    /// At the start of a run.
+    pub fn new(settings: Acktr, setup: &Setup<'_>) -> Self {
+        let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
+        let Layout { actor, critic, critic_start, .. } = &nets.layout;
+        let kfac = Arc::new(Kfac::new(actor, critic, *critic_start));
+        let momentum = vec![0.0; nets.params.len()];
+        Self { settings, nets, kfac, momentum, lr: settings.lr, skipped: 0, space: None }
+    }
+
+    /// One step on one rollout.
+    fn learn(
+        &mut self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+        all: &mut LossSums,
+    ) {
+        let Self { settings, nets, kfac, space, .. } = self;
+        let items: Vec<u32> = (0..experience.items() as u32).collect();
+        let objective = a2c::objective(progress.at(settings.entropy_coef));
+        let layout = &nets.layout;
+        let space =
+            space.get_or_insert_with(|| Box::new(Space::new(layout, Kfac::moments_len(&layout.actor, &layout.critic))));
+        let sums = nets.gradient(workers, experience, &items, objective, Some(kfac), space);
+        *all += sums;
+        let gradient = &mut space.gradient;
+        workers.pieces(&mut |_, range, piece| gradient[range].copy_from_slice(piece));
+        let mean = 1.0 / sums.samples;
+        // the gradient at hand is that of (V - R)^2 / 2
+        let scale = [mean, mean * 2.0 * settings.value_coef];
+
+        // factors, inverses and natural gradients, a layer at a time, shared out among the workers
+        let count = progress.iteration;
+        let refresh = count <= settings.inverse_every || count.is_multiple_of(settings.inverse_every);
+        // all rollouts weigh the same at first
+        let decay = settings.stats_decay.min(1.0 - 1.0 / count as f64);
+        workers.divide(kfac.count(), &mut |l, partials| {
+            let mut layer = kfac.layer(l);
+            layer.merge(partials.iter().map(|p| &p.moments[..]), sums.samples, decay);
+            if refresh {
+                layer.invert(settings.damping);
+            }
+            let scale = scale[layer.network];
+            layer.natural(nets.isa, gradient, scale);
+        });
+        self.lr = settings.lr * progress.rate(settings.schedule);
+        self.step(progress, scale, &sums, all);
+        workers.wait();
+    }
+
+    /// The step on the worker's replica.
+    fn step(&mut self, progress: &Progress, scale: [f64; 2], sums: &LossSums, all: &mut LossSums) {
+        let Self { settings, nets, kfac, momentum, lr, space: Some(space), .. } = self else { return };
+        let gradient = &space.gradient;
+        let log_std = nets.layout.log_std.clone();
+        let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
+        let mut products = [0.0; 2];
+        products[0] = log_std.clone().map(|i| of_std(i) * gradient[i] as f64 * scale[0]).sum();
+        (0..kfac.count()).map(|l| kfac.layer(l)).for_each(|layer| products[layer.network] += layer.product);
+        if !products.iter().all(|p| p.is_finite() && *p >= 0.0) {
+            self.skipped += 1;
+            return;
+        }
         // a product of zero asks for no step: any length will do
-        let length = products.map(|p| learner.lr.min((2.0 * settings.kl_clip / p.max(1e-300)).sqrt()));
+        let length = products.map(|p| lr.min((2.0 * settings.kl_clip / p.max(1e-300)).sqrt()));
         let mut step = |i: usize, d: f64, length: f64| {
-            let m = &mut learner.adam.m[i];
+            let m = &mut momentum[i];
             *m = (settings.momentum * *m as f64 + (1.0 - settings.momentum) * length * d) as f32;
-            learner.params[i] -= *m;
+            nets.params[i] -= *m;
         };
         log_std.for_each(|i| step(i, of_std(i), length[0]));
         for l in 0..kfac.count() {
@@ -97,10 +203,73 @@ pub fn update(mut update: Update<'_>, settings: &Acktr) {
                 step(i, *d as f64, length[layer.network]);
             }
         }
-        run.bound_std(learner);
-        update.set_kl(0.5 * length[0] * length[0] * products[0], &sums);
-    } else {
-        learner.skipped += 1;
+        nets.bound_std(progress);
+        // the divergence is known without looking at samples
+        let kl = 0.5 * length[0] * length[0] * products[0];
+        all.kl += (kl * sums.samples) - sums.kl;
     }
-    update.wait();
+}
+
+impl Learner for AcktrLearner {
+    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
+        // the first rollout only fills the statistics
+        if now.progress.iteration > 0 {
+            self.learn(workers, experience, now.progress, sums);
+        }
+    }
+    fn replica(&self) -> Box<dyn Learner> {
+        let Self { settings, nets, kfac, momentum, lr, skipped, .. } = self;
+        let (nets, kfac, momentum) = (nets.clone(), kfac.clone(), momentum.clone());
+        Box::new(Self { settings: *settings, nets, kfac, momentum, lr: *lr, skipped: *skipped, space: None })
+    }
+    fn places(&self) -> &Places {
+        &self.nets.layout.places
+    }
+    fn params(&self) -> &[f32] {
+        &self.nets.params
+    }
+    fn params_mut(&mut self) -> &mut Vec<f32> {
+        &mut self.nets.params
+    }
+    fn shape(&self) -> Shape {
+        self.nets.shape()
+    }
+    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+        self.nets.collecting(statistics)
+    }
+    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
+        self.nets.follow(before, after);
+    }
+    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
+        self.nets.describe(totals, self.lr, self.skipped)
+    }
+    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
+        self.nets.policy(meta, normalizer)
+    }
+    fn save(&self) -> Saved {
+        let mut saved = Saved::default();
+        saved.list("params", &self.nets.params);
+        saved.list("momentum", &self.momentum);
+        let (factors, inverses) = self.kfac.save();
+        saved.list("kfac", &factors);
+        saved.list("kfac_inverse", &inverses);
+        saved.scalar("lr", self.lr);
+        saved.scalar("skipped", self.skipped as f64);
+        saved
+    }
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
+        saved.copy("params", &mut self.nets.params)?;
+        saved.copy("momentum", &mut self.momentum)?;
+        let factors: &[f64] = saved.get("kfac")?;
+        if !self.kfac.load(factors, saved.get("kfac_inverse")?) {
+            return Err(Error::Mismatch {
+                what: "checkpoint: kfac".into(),
+                found: format!("{} numbers", factors.len()),
+                expected: "those of the networks".into(),
+            });
+        }
+        self.lr = saved.number("lr")?;
+        self.skipped = saved.number("skipped")? as u64;
+        Ok(())
+    }
 }

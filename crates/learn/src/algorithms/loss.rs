@@ -13,8 +13,8 @@
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
-use crate::nets::gaussian::{Gaussian, log_prob};
-use crate::trainer::config::Ratio;
+use crate::nets::gaussian::{Gaussian, Ratio, log_prob};
+use crate::rollout::data::Samples;
 use marathon_physics::lanes::{Kernel, Real, sum16};
 use std::marker::PhantomData;
 
@@ -33,21 +33,6 @@ pub struct Objective {
     pub advantage_mean: f64,
     /// Multiplies the advantages after that.
     pub advantage_scale: f64,
-}
-
-/// What the rollout knows about a block of samples; rows of sixteen.
-#[derive(Clone, Copy)]
-pub struct Samples<'a, S> {
-    /// Actions taken, `[action][16]`.
-    pub action: &'a [S],
-    /// Their log-probabilities then (see [`Gaussian`] for the constant): of all actions, or with a ratio for each of each.
-    pub log_prob: &'a [S],
-    /// Advantages, not normalized.
-    pub advantage: &'a [S],
-    /// Values then, `[stream][16]`.
-    pub value: &'a [S],
-    /// Returns that the value function learns, `[stream][16]`.
-    pub target: &'a [S],
 }
 
 /// Sums over samples.

@@ -1,80 +1,269 @@
 //! Proximal policy optimization (Schulman et al., 2017): what it does with a rollout, from top to bottom.
 //!
 //! `epochs` times, the rollout of all workers is shuffled and split into minibatches; each gives one step of Adam on the
-//! clipped objective of [`loss`](crate::algorithms::loss). [`run`](crate::trainer) is what leads here: acting, advantages, threads.
+//! clipped objective of [`loss`](super::loss).
 
-use crate::algorithms::loss::{LossSums, Objective};
+use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space};
+use super::loss::{LossSums, Objective};
+use super::parameters::Places;
+use super::schedule::{Moving, Progress, Schedule};
+use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check, load_adam, save_adam, share};
+use crate::error::Error;
 use crate::lanes::noise::{SHUFFLES, SplitMix};
-use crate::trainer::config::Schedule;
-use crate::trainer::workers::Update;
-use crate::trainer::{NETWORKS, share};
+use crate::nets::gaussian::Ratio;
+use crate::nets::normalize::Normalizer;
+use crate::optim::adam::Adam;
+use crate::policy::{Policy, PolicyMeta};
+use crate::rollout::collect::Collecting;
+use crate::rollout::data::{Experience, Shape};
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
+use serde::{Deserialize, Serialize};
 
-/// All epochs over one rollout.
-pub fn update(mut update: Update<'_>) {
-    let config = update.run.config;
-    let objective = objective(&update);
-    let mut items: Vec<u32> = (0..update.run.items() as u32).collect();
-    if config.schedule == Schedule::Linear {
-        update.learner.lr = config.lr * update.run.linear(update.learner);
-    }
-    for epoch in 0..config.epochs {
-        let draw = update.learner.iteration * config.epochs as u64 + epoch as u64;
-        SplitMix::new(config.seed, draw | SHUFFLES).shuffle(&mut items);
-        for m in 0..config.minibatches {
-            let batch = &items[share(items.len(), config.minibatches, m)];
-            let sums = update.gradient(batch, epoch * config.minibatches + m, objective);
-            step(&mut update, &sums);
+/// Settings of PPO; the defaults solve the small tasks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Ppo {
+    /// Parts that the rollout is split into in every epoch. A part of fewer than 256 samples per thread leaves threads idle.
+    pub minibatches: usize,
+    /// Passes over each rollout.
+    pub epochs: usize,
+    /// Learning rate of the policy (where the adaptive schedule starts).
+    pub lr: f64,
+    /// Learning rate of the value function.
+    pub value_lr: f64,
+    /// How the policy's learning rate moves.
+    pub schedule: Schedule,
+    /// Divergence per update that the adaptive schedule aims at, nats. Small steps at the end settle a gait.
+    pub target_kl: Moving,
+    /// Bounds of the adaptive schedule.
+    pub lr_range: [f64; 2],
+    /// Added to the root of Adam's second moment: how small a gradient may be and still count.
+    pub adam_epsilon: f64,
+    /// Bound of the gradient's norm, for each network by itself.
+    pub max_grad_norm: f64,
+    /// Decay of generalized advantage estimation.
+    pub gae_lambda: f64,
+    /// Whose probability ratio is clipped.
+    pub ratio: Ratio,
+    /// Clip range of the probability ratio.
+    pub clip: Moving,
+    /// Clip range of the value's change (in units of the scaled return) at the start; it shrinks as that of the ratio does.
+    /// None by default.
+    pub value_clip: Option<f64>,
+    /// Weight of the entropy bonus.
+    pub entropy_coef: Moving,
+    /// Standard deviations of the actions.
+    pub deviations: Deviations,
+}
+
+impl Default for Ppo {
+    fn default() -> Self {
+        Self {
+            minibatches: 8,
+            epochs: 4,
+            lr: 1e-3,
+            value_lr: 1e-3,
+            schedule: Schedule::Adaptive,
+            target_kl: Moving::still(0.015),
+            lr_range: [1e-5, 3e-3],
+            adam_epsilon: 1e-5,
+            max_grad_norm: 1.0,
+            gae_lambda: 0.95,
+            ratio: Ratio::Joint,
+            clip: Moving::still(0.2),
+            value_clip: None,
+            entropy_coef: Moving::still(0.002),
+            deviations: Deviations::default(),
         }
     }
 }
 
-/// The objective with the settings of this moment; advantages are normalized over the rollout.
-fn objective(update: &Update<'_>) -> Objective {
-    let config = update.run.config;
-    let moved = |first, last| update.run.moved(update.learner, first, last);
-    let (mean, var) = update.totals.advantage();
-    let clip = moved(config.clip, config.final_clip);
-    Objective {
-        ratio: config.ratio,
-        clip,
-        value_clip: config.value_clip.map(|range| range * (clip / config.clip)),
-        entropy_coef: moved(config.entropy_coef, config.final_entropy_coef),
-        advantage_mean: mean,
-        advantage_scale: 1.0 / var.max(1e-12).sqrt(),
+impl Ppo {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+        for (field, n) in [("minibatches", self.minibatches), ("epochs", self.epochs)] {
+            if n == 0 {
+                return Err(Error::config(field, n, "at least 1"));
+            }
+        }
+        let items = common.items();
+        if self.minibatches > items {
+            let most = format!("at most {items}, one for every 16 of the rollout's {} samples", items * 16);
+            return Err(Error::config("minibatches", self.minibatches, most));
+        }
+        check::positive(&[
+            ("lr", self.lr),
+            ("value_lr", self.value_lr),
+            ("target_kl", self.target_kl.first),
+            ("final_target_kl", self.target_kl.last),
+            ("adam_epsilon", self.adam_epsilon),
+            ("max_grad_norm", self.max_grad_norm),
+            ("clip", self.clip.first),
+            ("final_clip", self.clip.last),
+            ("value_clip", self.value_clip.unwrap_or(1.0)),
+        ])?;
+        actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
+        self.deviations.validate()?;
+        let [low, high] = self.lr_range;
+        if !(low > 0.0 && low <= high && high.is_finite()) {
+            let found = format!("[{low}, {high}]");
+            return Err(Error::config("lr_range", found, "two positive numbers in ascending order"));
+        }
+        Ok(())
+    }
+
+    /// What a run needs.
+    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
+        Layout::new(setup, self.ratio).needs(setup.common.items().div_ceil(self.minibatches), 0)
     }
 }
 
-/// One step of Adam on the worker's replica, each network's gradient bounded by itself.
-fn step(update: &mut Update<'_>, sums: &LossSums) {
-    let (run, learner) = (update.run, &mut *update.learner);
-    let (config, isa) = (run.config, run.isa);
-    let squares = run.squares();
-    if !squares.iter().all(|s| s.is_finite()) {
-        learner.skipped += 1;
-        return;
+/// What PPO learns with.
+pub struct PpoLearner {
+    settings: Ppo,
+    seed: u64,
+    nets: ActorCritic,
+    adam: Adam,
+    lr: f64,
+    skipped: u64,
+    space: Option<Box<Space>>,
+}
+
+impl PpoLearner {
+    /// At the start of a run.
+    pub fn new(settings: Ppo, setup: &Setup<'_>) -> Self {
+        let nets = ActorCritic::new(setup, settings.ratio, settings.deviations, settings.gae_lambda);
+        let adam = Adam::new(nets.params.len(), settings.adam_epsilon);
+        Self { settings, seed: setup.common.seed, nets, adam, lr: settings.lr, skipped: 0, space: None }
     }
-    let mean = 1.0 / sums.samples;
-    let scale = squares.map(|s| mean * (config.max_grad_norm / (s.sqrt() * mean)).min(1.0));
 
-    learner.adam.advance();
-    let value_lr = if config.schedule == Schedule::Linear { learner.lr / config.lr } else { 1.0 } * config.value_lr;
-    // each signal has a rate of its own
-    let mut lr = [0.0; NETWORKS];
-    lr[..2].copy_from_slice(&[learner.lr, value_lr]);
-    lr[2..].iter_mut().zip(&config.signals).for_each(|(lr, signal)| *lr = signal.lr);
-    run.pieces(|range, gradient| {
-        let net = run.layout.network(&range);
-        learner.adam.update(isa, &mut learner.params, range, gradient, scale[net], lr[net]);
-    });
-    run.bound_std(learner);
-
-    if config.schedule == Schedule::Adaptive {
-        let kl = sums.kl * mean;
-        let target = run.moved(learner, config.target_kl, config.final_target_kl);
-        if kl > 2.0 * target {
-            learner.lr = (learner.lr / 1.5).max(config.lr_range[0]);
-        } else if kl < 0.5 * target {
-            learner.lr = (learner.lr * 1.2).min(config.lr_range[1]);
+    /// All epochs over one rollout.
+    fn epochs(
+        &mut self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+        all: &mut LossSums,
+    ) {
+        let Ppo { epochs, minibatches, .. } = self.settings;
+        let objective = self.objective(experience, progress);
+        let mut items: Vec<u32> = (0..experience.items() as u32).collect();
+        if self.settings.schedule == Schedule::Linear {
+            self.lr = self.settings.lr * progress.rate(Schedule::Linear);
         }
+        for epoch in 0..epochs {
+            let draw = progress.iteration * epochs as u64 + epoch as u64;
+            SplitMix::new(self.seed, draw | SHUFFLES).shuffle(&mut items);
+            for m in 0..minibatches {
+                let batch = &items[share(items.len(), minibatches, m)];
+                let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
+                let sums = self.nets.gradient(workers, experience, batch, objective, None, space);
+                *all += sums;
+                self.step(workers, progress, &sums);
+            }
+        }
+    }
+
+    /// The objective with the settings of this moment; advantages are normalized over the rollout.
+    fn objective(&self, experience: &Experience<'_>, progress: &Progress) -> Objective {
+        let settings = &self.settings;
+        let (mean, var) = experience.totals.advantage();
+        let clip = progress.at(settings.clip);
+        Objective {
+            ratio: settings.ratio,
+            clip,
+            value_clip: settings.value_clip.map(|range| range * (clip / settings.clip.first)),
+            entropy_coef: progress.at(settings.entropy_coef),
+            advantage_mean: mean,
+            advantage_scale: 1.0 / var.max(1e-12).sqrt(),
+        }
+    }
+
+    /// One step of Adam on the worker's replica, each network's gradient bounded by itself.
+    fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let Self { settings, nets, adam, lr, .. } = self;
+        let squares = workers.squares();
+        if !squares.iter().all(|s| s.is_finite()) {
+            self.skipped += 1;
+            return;
+        }
+        let mean = 1.0 / sums.samples;
+        let bound = |s: &f64| mean * (settings.max_grad_norm / (s.sqrt() * mean)).min(1.0);
+        let scale: Vec<f64> = squares.iter().map(bound).collect();
+
+        adam.advance();
+        let part = if settings.schedule == Schedule::Linear { *lr / settings.lr } else { 1.0 };
+        let rates = nets.layout.rates(*lr, part * settings.value_lr);
+        workers.pieces(&mut |net, range, gradient| {
+            adam.update(nets.isa, &mut nets.params, range, gradient, scale[net], rates[net]);
+        });
+        nets.bound_std(progress);
+
+        if settings.schedule == Schedule::Adaptive {
+            let kl = sums.kl * mean;
+            let target = progress.at(settings.target_kl);
+            if kl > 2.0 * target {
+                *lr = (*lr / 1.5).max(settings.lr_range[0]);
+            } else if kl < 0.5 * target {
+                *lr = (*lr * 1.2).min(settings.lr_range[1]);
+            }
+        }
+    }
+}
+
+impl Learner for PpoLearner {
+    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
+        // the first rollout only fills the statistics
+        if now.progress.iteration > 0 {
+            self.epochs(workers, experience, now.progress, sums);
+        }
+    }
+    fn replica(&self) -> Box<dyn Learner> {
+        let Self { settings, seed, nets, adam, lr, skipped, .. } = self;
+        let (nets, adam) = (nets.clone(), adam.clone());
+        Box::new(Self { settings: *settings, seed: *seed, nets, adam, lr: *lr, skipped: *skipped, space: None })
+    }
+    fn places(&self) -> &Places {
+        &self.nets.layout.places
+    }
+    fn params(&self) -> &[f32] {
+        &self.nets.params
+    }
+    fn params_mut(&mut self) -> &mut Vec<f32> {
+        &mut self.nets.params
+    }
+    fn shape(&self) -> Shape {
+        self.nets.shape()
+    }
+    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+        self.nets.collecting(statistics)
+    }
+    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
+        self.nets.follow(before, after);
+    }
+    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
+        self.nets.describe(totals, self.lr, self.skipped)
+    }
+    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
+        self.nets.policy(meta, normalizer)
+    }
+    fn save(&self) -> Saved {
+        let mut saved = Saved::default();
+        saved.list("params", &self.nets.params);
+        save_adam(&self.adam, &mut saved);
+        saved.scalar("lr", self.lr);
+        saved.scalar("skipped", self.skipped as f64);
+        saved
+    }
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
+        saved.copy("params", &mut self.nets.params)?;
+        load_adam(&mut self.adam, saved)?;
+        self.lr = saved.number("lr")?;
+        self.skipped = saved.number("skipped")? as u64;
+        Ok(())
     }
 }

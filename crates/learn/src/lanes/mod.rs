@@ -2,7 +2,7 @@
 
 pub mod buffer;
 pub(crate) mod mirror;
-pub(crate) mod noise;
+pub mod noise;
 pub(crate) mod tiles;
 
 pub use marathon_envs::BLOCK;

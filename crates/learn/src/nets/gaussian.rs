@@ -3,12 +3,37 @@
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::noise::Noise;
-use crate::trainer::config::Ratio;
 use marathon_physics::lanes::{Kernel, Real};
+use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
 /// `ln(2 pi e) / 2`, the entropy of a standard normal number.
 pub const UNIT_ENTROPY: f64 = 1.418_938_533_204_672_7;
+
+/// Whose probability ratio the objective bounds, and with it what is kept of the probability of actions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ratio {
+    /// That of all actions together, as Schulman et al. have it.
+    #[default]
+    Joint,
+    /// That of each action by itself, as ML-Agents has it: the objective is the mean over the actions. Each may move as far
+    /// as else all together, so steps are larger, the more so the more actions there are.
+    PerAction,
+}
+
+impl Ratio {
+    /// Names in configurations.
+    pub const NAMED: [(&str, Self); 2] = [("joint", Self::Joint), ("per_action", Self::PerAction)];
+
+    /// Numbers that a sample's log-probability is kept as.
+    pub fn rows(self, actions: usize) -> usize {
+        match self {
+            Ratio::Joint => 1,
+            Ratio::PerAction => actions,
+        }
+    }
+}
 
 /// Standard deviations of the actions, ready for use.
 ///
@@ -57,6 +82,12 @@ impl<S: Real<Scalar = S>> Gaussian<S> {
     pub fn mean_std(&self) -> f64 {
         self.std.iter().map(|s| S::widen(*s)).sum::<f64>() / self.std.len() as f64
     }
+}
+
+/// Keeps logarithms of standard deviations within the bounds `min` and `max` of the deviations.
+pub fn bound_std(log_std: &mut [f32], min: f64, max: f64) {
+    let [low, high] = [min, max].map(|s| Real::ln(s) as f32);
+    log_std.iter_mut().for_each(|l| *l = l.clamp(low, high));
 }
 
 /// Log-probability of one column of actions: `-sum(z^2) / 2 - sum(log std)`; leaves `z = (action - mean) / std` in `z`.

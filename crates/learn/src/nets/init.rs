@@ -3,6 +3,39 @@
 use crate::lanes::noise::SplitMix;
 use crate::nets::mlp::Mlp;
 use marathon_physics::lanes::Real;
+use serde::{Deserialize, Serialize};
+
+/// What the networks of policy and values start from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Init {
+    /// Orthogonal weights, a hundredth of that in the policy's last layer: actions hardly depend on the state.
+    #[default]
+    Orthogonal,
+    /// Normal numbers as ML-Agents draws them: smaller in the hidden layers, larger in the policy's last.
+    MlAgents,
+}
+
+impl Init {
+    /// Names in configurations.
+    pub const NAMED: [(&str, Self); 2] = [("orthogonal", Self::Orthogonal), ("ml_agents", Self::MlAgents)];
+
+    /// Fills the parameters of a policy's network.
+    pub(crate) fn policy(self, net: &Mlp, params: &mut [f32], random: &mut SplitMix) {
+        match self {
+            Init::Orthogonal => orthogonal(net, params, 0.01, random),
+            Init::MlAgents => ml_agents(net, params, |inputs| 0.2 / inputs.sqrt(), random),
+        }
+    }
+    /// Fills the parameters of a network of values.
+    pub(crate) fn value(self, net: &Mlp, params: &mut [f32], random: &mut SplitMix) {
+        match self {
+            Init::Orthogonal => orthogonal(net, params, 1.0, random),
+            // each stream of rewards has an output layer there
+            Init::MlAgents => ml_agents(net, params, |inputs| (2.0 / (inputs + 1.0)).sqrt(), random),
+        }
+    }
+}
 
 /// Fills the parameters of a network: orthogonal weights with gain sqrt 2 in hidden layers and `last_gain` in the last,
 /// biases zero.

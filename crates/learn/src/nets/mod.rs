@@ -1,8 +1,55 @@
 //! Networks, what they start from, and the distributions of actions that they give.
 
+pub mod acting;
 pub mod activation;
 pub mod gaussian;
-pub(crate) mod init;
+pub mod init;
 pub mod mlp;
 pub mod normalize;
 pub mod squash;
+
+use crate::error::Error;
+use activation::Activation;
+use init::Init;
+use serde::{Deserialize, Serialize};
+
+/// Shape and start of the networks of policy and values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NetworkConfig {
+    /// Widths of the policy's hidden layers.
+    pub actor_hidden: Vec<usize>,
+    /// Widths of the value function's hidden layers.
+    pub critic_hidden: Vec<usize>,
+    /// Activation of all hidden layers.
+    pub activation: Activation,
+    /// What the networks start from.
+    pub initialization: Init,
+}
+
+impl Default for NetworkConfig {
+    fn default() -> Self {
+        let hidden = vec![64, 64];
+        Self {
+            actor_hidden: hidden.clone(),
+            critic_hidden: hidden,
+            activation: Activation::Tanh,
+            initialization: Init::Orthogonal,
+        }
+    }
+}
+
+impl NetworkConfig {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self) -> Result<(), Error> {
+        for (field, widths) in [("actor_hidden", &self.actor_hidden), ("critic_hidden", &self.critic_hidden)] {
+            if widths.iter().any(|w| !(1..=65536).contains(w)) || widths.len() > 64 {
+                return Err(Error::config(field, format!("{widths:?}"), "up to 64 widths between 1 and 65536"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -10,8 +10,6 @@
 //! For the value, a normal distribution of deviation 1, `g` is the derivative of the value times a normal number; of the number only its
 //! square enters, whose mean is 1, so it is left out.
 
-use crate::algorithms::loss::Samples;
-use crate::algorithms::parameters::Layout;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::f32_lanes;
@@ -31,14 +29,14 @@ pub struct Kfac {
 }
 
 impl Kfac {
-    /// Identities for the networks of a layout.
-    pub fn new(layout: &Layout) -> Self {
+    /// Identities for the two networks; the value function's parameters begin at `value_start`.
+    pub fn new(policy: &Mlp, value: &Mlp, value_start: usize) -> Self {
         let mut layers = Vec::new();
-        let nets = [(&layout.actor, 0, 0), (&layout.critic, layout.critic_start, layout.actor.moments_len())];
+        let nets = [(policy, 0, 0), (value, value_start, policy.moments_len())];
         for (network, (net, params, moments)) in nets.into_iter().enumerate() {
             layers.extend(net.moments().map(|m| Mutex::new(Layer::new(network, &m, params, moments))));
         }
-        Self { policy: layout.actor.clone(), value: layout.critic.clone(), layers }
+        Self { policy: policy.clone(), value: value.clone(), layers }
     }
 
     /// Number of layers of both networks.
@@ -49,34 +47,27 @@ impl Kfac {
     pub fn layer(&self, l: usize) -> MutexGuard<'_, Layer> {
         self.layers[l].lock().expect("no worker has panicked")
     }
-    /// Numbers that [`Kfac::moments`] fills, a multiple of sixteen.
-    pub fn moments_len(&self) -> usize {
-        Self::moments_of_nets(&self.policy, &self.value)
-    }
-    /// The same for networks yet to be made.
-    pub fn moments_of(layout: &Layout) -> usize {
-        Self::moments_of_nets(&layout.actor, &layout.critic)
-    }
-    fn moments_of_nets(policy: &Mlp, value: &Mlp) -> usize {
+    /// Numbers that [`Kfac::moments`] fills for two networks, a multiple of sixteen.
+    pub fn moments_len(policy: &Mlp, value: &Mlp) -> usize {
         (policy.moments_len() + value.moments_len()).next_multiple_of(BLOCK)
     }
 
     /// Sums over samples of what the factors are means of, after the forward passes of both networks (their parameters,
-    /// tapes) on the same input.
+    /// tapes) on the same input; `actions` are those taken, `[action][16]` for each block.
     #[expect(clippy::too_many_arguments, reason = "both networks with everything that the forward pass had")]
     pub fn moments(
         &self,
         isa: Isa,
         (policy, value): (&[f32], &[f32]),
         gaussian: &Gaussian<f32>,
-        samples: &[Samples<'_, f32>],
+        actions: &[&[f32]],
         input: &Blocks<f32>,
         (of_policy, of_value): (&mut Tape<f32>, &mut Tape<f32>),
         out: &mut [f32],
     ) {
-        let n = samples.len();
+        let n = actions.len();
         let (mean, score) = of_policy.output_and_delta();
-        f32_lanes!(isa, T => <T as Real>::enter(Score::<T> { gaussian, samples, mean, score, lanes: PhantomData }));
+        f32_lanes!(isa, T => <T as Real>::enter(Score::<T> { gaussian, actions, mean, score, lanes: PhantomData }));
         for b in 0..n {
             of_value.output_delta().block_mut(b).fill(1.0);
         }
@@ -118,7 +109,7 @@ impl Kfac {
 /// Derivative of the log-probability of the actions taken with respect to their means, `(action - mean) / std^2`.
 struct Score<'a, T> {
     gaussian: &'a Gaussian<f32>,
-    samples: &'a [Samples<'a, f32>],
+    actions: &'a [&'a [f32]],
     mean: &'a Blocks<f32>,
     score: &'a mut Blocks<f32>,
     lanes: PhantomData<T>,
@@ -129,12 +120,12 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Score<'_, T> {
 
     #[inline(always)]
     fn run(self) {
-        for (b, s) in self.samples.iter().enumerate() {
+        for (b, action) in self.actions.iter().enumerate() {
             let (mean, score) = (self.mean.block(b), self.score.block_mut(b));
             for (k, inv_std) in self.gaussian.inv_std.iter().enumerate() {
                 let inv_var = T::splat(*inv_std) * T::splat(*inv_std);
                 for at in (k * BLOCK..(k + 1) * BLOCK).step_by(T::LANES) {
-                    ((T::load(&s.action[at..]) - T::load(&mean[at..])) * inv_var).store(&mut score[at..]);
+                    ((T::load(&action[at..]) - T::load(&mean[at..])) * inv_var).store(&mut score[at..]);
                 }
             }
         }

@@ -12,27 +12,23 @@
 //! with `[low, high]` from `action_range`. The action is in the units of the environment ([`Spec::action_low`]), so that
 //! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
 
+mod block;
+pub mod evaluation;
+mod file;
 mod onnx;
 
-use crate::algorithms::parameters::Learner;
+pub use block::BlockPolicy;
+
 use crate::error::Error;
-use crate::files::{TensorReader, TensorWriter, write_atomic};
-use crate::lanes::BLOCK;
-use crate::lanes::buffer::Blocks;
-use crate::lanes::f32_lanes;
 use crate::nets::activation::Activation;
-use crate::nets::gaussian::Gaussian;
-use crate::nets::mlp::{CHUNK, Mlp, Tape};
-use crate::nets::normalize::{Normalize, Normalizer};
-use crate::trainer::Run;
-use crate::trainer::config::PpoConfig;
-use crate::trainer::evaluate::Evaluation;
+use crate::nets::mlp::Mlp;
+use crate::nets::normalize::Normalizer;
+use evaluation::Evaluation;
 use marathon_envs::Spec;
 use marathon_envs::shard::scale_action;
-use marathon_physics::lanes::{Isa, Real};
+use marathon_physics::lanes::Real;
 use serde::{Deserialize, Serialize};
-use std::marker::PhantomData;
-use std::path::Path;
+use serde_json::Value;
 
 const FORMAT: &str = "marathon-policy";
 const VERSION: u32 = 1;
@@ -103,8 +99,9 @@ impl PolicyMeta {
 /// Summary of a policy's training: nothing that would tell equal policies apart, so without the time that it took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Training {
-    /// Configuration, without the number of threads, which is 0.
-    pub config: PpoConfig,
+    /// Configuration, without the number of threads, which is 0: a document that acting does not look into, so that a new
+    /// setting does not make older programs refuse a policy.
+    pub config: Value,
     /// Agent-steps.
     pub steps: u64,
     /// Rollouts.
@@ -122,46 +119,15 @@ pub struct Policy {
 }
 
 impl Policy {
-    pub(crate) fn of(run: &Run<'_>, learner: &Learner) -> Self {
-        let (spec, config, layout) = (&run.spec, run.config, &run.layout);
-        let training = Training {
-            config: PpoConfig { threads: 0, ..config.clone() },
-            steps: learner.steps,
-            iterations: learner.iteration,
-        };
-        let mut meta = PolicyMeta::of(spec, config.actor_hidden.clone(), config.activation);
-        if layout.twin.is_some() {
-            return Self::squashed(run, learner, PolicyMeta { training: Some(training), squash: true, ..meta });
-        }
-        meta.observation_clip = config.observation_clip as f32;
-        meta.training = Some(training);
-        let (net, mut params) = (layout.actor.clone(), layout.actor_params(&learner.params).to_vec());
-        let mut log_std = learner.params[layout.log_std.clone()].to_vec();
-        let scale = config.action_scale();
-        if scale != 1.0 {
-            // the last layer takes in the scale of the actions, so that every policy is bounded by 1
-            let (weights, biases) = net.layers().last().expect("a network has layers");
-            params[weights].iter_mut().for_each(|w| *w *= scale);
-            params[biases].iter_mut().for_each(|b| *b *= scale);
-            log_std.iter_mut().for_each(|l| *l += Real::ln(scale));
-        }
-        Self { meta, net, params, normalizer: learner.normalizer(config), log_std }
-    }
-
-    /// The means of SAC's policy; its deviations depend on the state and are left out.
-    fn squashed(run: &Run<'_>, learner: &Learner, mut meta: PolicyMeta) -> Self {
-        let (spec, layout) = (&run.spec, &run.layout);
-        meta.observation_clip = run.config.observation_clip as f32;
-        let sizes = [&[spec.obs], &meta.hidden[..], &[spec.act]].concat();
-        let net = Mlp::new(&sizes, meta.activation);
-        let all = layout.actor_params(&learner.params);
-        let mut params = Vec::with_capacity(net.len());
-        for ((weights, biases), (own_weights, own_biases)) in layout.actor.layers().zip(net.layers()) {
-            params.extend_from_slice(&all[weights][..own_weights.len()]);
-            params.extend_from_slice(&all[biases][..own_biases.len()]);
-        }
-        let log_std = learner.params[layout.log_std.clone()].to_vec();
-        Self { meta, net, params, normalizer: learner.normalizer(run.config), log_std }
+    /// Of parts that are known to fit.
+    pub(crate) fn assemble(
+        meta: PolicyMeta,
+        net: Mlp,
+        params: Vec<f32>,
+        normalizer: Normalizer,
+        log_std: Vec<f32>,
+    ) -> Self {
+        Self { meta, net, params, normalizer, log_std }
     }
 
     /// A policy from its parts: parameters of the network in the order of [`Mlp`], means and deviations of observations,
@@ -242,84 +208,6 @@ impl Policy {
         self.meta.action_range.get(i).map_or(nominal, |range| scale_action(*range, nominal))
     }
 
-    /// Writes the policy to a file.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), Error> {
-        write_atomic(path, &self.to_bytes())
-    }
-
-    /// The bytes of a file with the policy; [`Policy::from_bytes`] is the way back.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut file = TensorWriter::default();
-        file.list("obs_mean", self.normalizer.mean());
-        file.list("obs_std", self.normalizer.std());
-        file.list("log_std", &self.log_std);
-        for (l, (weights, biases)) in self.net.layers().enumerate() {
-            let shape = [self.net.sizes()[l + 1], self.net.sizes()[l]];
-            file.add(format!("layer.{l}.weight"), &shape, self.params[weights].iter().copied());
-            file.list(&format!("layer.{l}.bias"), &self.params[biases]);
-        }
-        file.bytes(&self.meta)
-    }
-
-    /// Reads a policy.
-    ///
-    /// # Errors
-    /// If the file cannot be read or is not a whole and finite policy.
-    pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::from_bytes(path, &std::fs::read(path).map_err(Error::io(path, "read"))?)
-    }
-
-    /// Reads a policy from the bytes of a file. `path` stands for it in messages.
-    ///
-    /// # Errors
-    /// If the bytes are not a whole and finite policy.
-    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
-        let file = TensorReader::new(path, bytes)?;
-        let meta: PolicyMeta = file.document(FORMAT, VERSION)?;
-        let positive = |x: f32| x.is_finite() && x > 0.0;
-        if !positive(meta.observation_clip) || !positive(meta.action_clip) {
-            let found = format!("{} and {}", meta.observation_clip, meta.action_clip);
-            return Err(Error::file(path, "observation_clip and action_clip", found, "positive numbers"));
-        }
-        let sound = |[low, high]: &[f32; 2]| low.is_finite() && high.is_finite() && low < high;
-        if !(meta.action_range.is_empty() || meta.action_range.len() == meta.act)
-            || !meta.action_range.iter().all(sound)
-        {
-            let found = format!("{:?}", meta.action_range);
-            return Err(Error::file(path, "action_range", found, "a low and a higher number per action, or nothing"));
-        }
-        let mean = file.finite("obs_mean", &[meta.obs])?;
-        let std = file.finite("obs_std", &[meta.obs])?;
-        if let Some(i) = std.iter().position(|s| !positive(*s)) {
-            return Err(Error::file(path, format!("tensor 'obs_std', number {i}"), std[i], "a positive number"));
-        }
-        let log_std = file.finite("log_std", &[meta.act])?;
-        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
-        let mut params = Vec::new();
-        for (l, pair) in sizes.windows(2).enumerate() {
-            params.extend(file.finite(&format!("layer.{l}.weight"), &[pair[1], pair[0]])?);
-            params.extend(file.finite(&format!("layer.{l}.bias"), &[pair[1]])?);
-        }
-        Self::from_parts(meta, params, (mean, std), log_std)
-            .map_err(|e| Error::file(path, "network", e, "tensors that fit the widths"))
-    }
-
-    /// Reads a policy for a given task.
-    ///
-    /// # Errors
-    /// As [`Policy::load`], or if the policy is for another agent.
-    pub fn load_for(path: &Path, spec: &Spec) -> Result<Self, Error> {
-        let policy = Self::load(path)?;
-        policy.check(spec).map_err(|e| match e {
-            Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),
-            other => other,
-        })?;
-        Ok(policy)
-    }
-
     /// Whether the policy fits a task.
     ///
     /// # Errors
@@ -339,87 +227,5 @@ impl Policy {
             }
         }
         Ok(())
-    }
-}
-
-/// A policy with work space to act for many blocks.
-pub struct BlockPolicy<'a> {
-    policy: &'a Policy,
-    isa: Isa,
-    input: Blocks<f32>,
-    tape: Tape<f32>,
-}
-
-impl<'a> BlockPolicy<'a> {
-    /// Work space for a policy.
-    ///
-    /// # Panics
-    /// If this processor lacks the instruction set, at the first use.
-    pub fn new(policy: &'a Policy, isa: Isa) -> Self {
-        Self { policy, isa, input: policy.net.input(), tape: policy.net.inference_tape() }
-    }
-
-    /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`.
-    ///
-    /// # Panics
-    /// If the lengths do not fit each other.
-    pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
-        let policy = self.policy;
-        let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
-        assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
-        for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
-            self.forward(raw);
-            for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
-                for (i, (out, x)) in out.iter_mut().zip(self.tape.output().block(b)).enumerate() {
-                    *out = policy.action(i / BLOCK, *x);
-                }
-            }
-        }
-    }
-
-    /// The best actions, `[n][act]`, for any number of raw observations, `[n][obs]`. With `noise`, `[n][act]` standard
-    /// normal numbers, the actions are drawn as in training.
-    ///
-    /// # Panics
-    /// If the lengths do not fit each other.
-    pub fn act_rows(&mut self, obs: &[f32], noise: Option<&[f32]>, action: &mut [f32]) {
-        let policy = self.policy;
-        let (n_obs, n_act) = (policy.meta.obs, policy.meta.act);
-        assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "whole rows");
-        assert!(noise.is_none_or(|noise| noise.len() == action.len()), "noise for every action");
-        let std = Gaussian::new(&policy.log_std).std;
-        let rows = CHUNK * BLOCK;
-        for (chunk, (obs, action)) in obs.chunks(rows * n_obs).zip(action.chunks_mut(rows * n_act)).enumerate() {
-            let mut raw = vec![0.0; (action.len() / n_act).div_ceil(BLOCK) * BLOCK * n_obs];
-            for (i, row) in obs.chunks_exact(n_obs).enumerate() {
-                let block = &mut raw[i / BLOCK * BLOCK * n_obs..];
-                for (k, x) in row.iter().enumerate() {
-                    block[k * BLOCK + i % BLOCK] = *x;
-                }
-            }
-            self.forward(&raw);
-            for (i, row) in action.chunks_exact_mut(n_act).enumerate() {
-                let mean = self.tape.output().block(i / BLOCK);
-                for (k, out) in row.iter_mut().enumerate() {
-                    let drawn = noise.map_or(0.0, |noise| std[k] * noise[(chunk * rows + i) * n_act + k]);
-                    *out = policy.action(k, mean[k * BLOCK + i % BLOCK] + drawn);
-                }
-            }
-        }
-    }
-
-    /// Runs the network for at most [`CHUNK`] blocks of raw observations.
-    fn forward(&mut self, raw: &[f32]) {
-        let policy = self.policy;
-        f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
-            normalizer: &policy.normalizer,
-            raw,
-            input: &mut self.input,
-            copy: None,
-            sums: None,
-            lanes: PhantomData,
-        }));
-        let blocks = raw.len() / (policy.meta.obs * BLOCK);
-        policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, blocks);
     }
 }

@@ -10,15 +10,17 @@
 //!
 //! All three learn from the whole loss (ML-Agents' weights). Actions are bounded to [-1, 1], as the environment takes them.
 
+use super::kernels::{Distance, Gather, place};
+use super::{Judge, Reward, Step};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
+use crate::lanes::f32_lanes;
 use crate::lanes::noise::SplitMix;
 use crate::nets::activation::Activation;
 use crate::nets::init;
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
-use crate::optim::adam::Add;
-use crate::rewards::{Distance, Gather, Step, place};
-use marathon_physics::lanes::{Kernel, Real};
+use crate::optim::sum::Add;
+use marathon_physics::lanes::{Isa, Kernel, Real};
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -56,6 +58,37 @@ pub struct CuriositySpace<S> {
     half: Vec<S>,
     inverse_half: Vec<S>,
     gradient: Vec<S>,
+}
+
+impl Reward for Curiosity {
+    fn count(&self) -> usize {
+        self.count()
+    }
+    fn init(&self, params: &mut [f32], random: &mut SplitMix) {
+        self.init(params, random);
+    }
+    fn judge(&self) -> Box<dyn Judge> {
+        Box::new(CuriosityJudge { nets: self.clone(), space: self.space() })
+    }
+}
+
+/// The networks at work.
+struct CuriosityJudge {
+    nets: Curiosity,
+    space: CuriositySpace<f32>,
+}
+
+impl Judge for CuriosityJudge {
+    fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]) {
+        f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
+        self.nets.reward(&self.space, steps.len(), out);
+    }
+    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]) {
+        f32_lanes!(isa, T => {
+            self.nets.losses::<T>(params, steps, &mut self.space);
+            self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);
+        });
+    }
 }
 
 impl Curiosity {

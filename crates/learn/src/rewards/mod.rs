@@ -1,70 +1,109 @@
-//! Rewards that a learner gives itself for what is new to it, beside the task's own: curiosity and random network
-//! distillation, each with a value stream and a discount of its own, as in ML-Agents.
+//! The rewards that a policy learns from: the task's own, and those that a learner gives itself. Each has a discount, a
+//! strength and a stream of values of its own, as in ML-Agents, and any number of them are added up.
 //!
-//! A signal has networks of its own. They judge each step of a rollout ([`SignalNets::reward`]), and learn from the same
-//! minibatches as policy and value function ([`SignalNets::gradient`]): where they have learned, the reward fades.
+//! Rewards for novelty, [curiosity] and [random network distillation](rnd), have networks of their own. They judge each step
+//! of a rollout ([`Judge::reward`]), and learn from the same minibatches as policy and value function
+//! ([`Judge::gradient`]): where they have learned, the reward fades. A new kind of reward implements [`Reward`].
 
 pub mod curiosity;
+mod kernels;
 pub mod rnd;
 
-use crate::lanes::BLOCK;
-use crate::lanes::buffer::Blocks;
-use crate::lanes::f32_lanes;
-use crate::lanes::noise::SplitMix;
-use crate::nets::mlp::CHUNK;
-use crate::rewards::curiosity::{Curiosity, CuriositySpace};
-use crate::rewards::rnd::{Rnd, RndSpace};
-use marathon_envs::Spec;
-use marathon_physics::lanes::{Isa, Kernel, Real};
+use crate::error::Error;
+use crate::lanes::noise::{SIGNALS, SplitMix};
+use curiosity::Curiosity;
+use marathon_physics::lanes::Isa;
+use rnd::Rnd;
 use serde::{Deserialize, Serialize};
-use std::marker::PhantomData;
+use std::ops::Range;
+use std::sync::Arc;
 
-/// Most signals beside the task's reward.
-pub const MAX_SIGNALS: usize = 2;
-
-/// What rewards novelty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// What is rewarded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum SignalKind {
+pub enum RewardKind {
+    /// What the task gives.
+    Task,
     /// The error of a prediction of the next state's features from this one's and the action; the features are those that
     /// tell the action (Pathak et al., "Curiosity-driven exploration by self-supervised prediction", 2017).
-    Curiosity,
+    Curiosity(Novelty),
     /// The error of a network that learns what another one with random parameters makes of the observation (Burda et al.,
     /// "Exploration by random network distillation", 2018).
-    Rnd,
+    Rnd(Novelty),
 }
 
-impl SignalKind {
+impl RewardKind {
     /// Name in configurations and reports.
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
-            SignalKind::Curiosity => "curiosity",
-            SignalKind::Rnd => "rnd",
+            RewardKind::Task => "task",
+            RewardKind::Curiosity(_) => "curiosity",
+            RewardKind::Rnd(_) => "rnd",
+        }
+    }
+    /// Its networks, if it has any.
+    pub fn networks(&self) -> Option<&Novelty> {
+        match self {
+            RewardKind::Task => None,
+            RewardKind::Curiosity(networks) | RewardKind::Rnd(networks) => Some(networks),
         }
     }
 }
 
-/// A reward signal; the defaults are ML-Agents'.
+/// Networks of a reward for novelty; the defaults are ML-Agents'.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Signal {
-    /// What rewards novelty.
-    pub kind: SignalKind,
-    /// Factor of the reward.
-    pub strength: f64,
-    /// Discount per decision. Such rewards do not end with an episode: its last state is worth what the value function
-    /// says.
-    pub gamma: f64,
+#[serde(default, deny_unknown_fields)]
+pub struct Novelty {
     /// Widths of the network that makes features of an observation; the last is their number.
     pub hidden: Vec<usize>,
-    /// Learning rate of the signal's networks.
+    /// Learning rate.
     pub lr: f64,
 }
 
-impl Signal {
+impl Default for Novelty {
+    fn default() -> Self {
+        Self { hidden: vec![128, 128], lr: 3e-4 }
+    }
+}
+
+/// A reward; the defaults are ML-Agents'.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RewardConfig {
+    /// What is rewarded.
+    pub kind: RewardKind,
+    /// Factor of the reward; that of the task's matters beside others.
+    pub strength: f64,
+    /// Discount per decision. Rewards for novelty do not end with an episode: its last state is worth what the value
+    /// function says.
+    pub gamma: f64,
+}
+
+impl RewardConfig {
     /// With ML-Agents' defaults.
-    pub fn new(kind: SignalKind) -> Self {
-        Self { kind, strength: 1.0, gamma: 0.99, hidden: vec![128, 128], lr: 3e-4 }
+    pub fn new(kind: RewardKind) -> Self {
+        Self { kind, strength: 1.0, gamma: 0.99 }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self) -> Result<(), Error> {
+        let positive = |field, x: f64| match (x as f32).is_finite() && x > 0.0 {
+            true => Ok(()),
+            false => Err(Error::config(field, x, "a positive number")),
+        };
+        positive("rewards: strength", self.strength)?;
+        if !(0.0..=1.0).contains(&self.gamma) {
+            return Err(Error::config("rewards: gamma", self.gamma, "a number between 0 and 1"));
+        }
+        let Some(Novelty { hidden, lr }) = self.kind.networks() else { return Ok(()) };
+        positive("rewards: lr", *lr)?;
+        if hidden.is_empty() || hidden.len() > 64 || hidden.iter().any(|w| !(1..=4096).contains(w)) {
+            return Err(Error::config("rewards: hidden", format!("{hidden:?}"), "1 to 64 widths between 1 and 4096"));
+        }
+        Ok(())
     }
 }
 
@@ -79,150 +118,91 @@ pub struct Step<'a, S> {
     pub next: &'a [S],
 }
 
-/// Networks of a signal.
-#[derive(Clone, Debug)]
-pub enum SignalNets {
-    /// Of curiosity.
-    Curiosity(Curiosity),
-    /// Of random network distillation.
-    Rnd(Rnd),
-}
-
-/// Work space of a signal.
-pub enum SignalSpace {
-    /// Of curiosity.
-    Curiosity(Box<CuriositySpace<f32>>),
-    /// Of random network distillation.
-    Rnd(Box<RndSpace<f32>>),
-}
-
-impl SignalNets {
-    /// For a task; the stream of random numbers is for parameters that are not learned.
-    pub(crate) fn new(spec: &Spec, signal: &Signal, random: &mut SplitMix) -> Self {
-        match signal.kind {
-            SignalKind::Curiosity => Self::Curiosity(Curiosity::new(spec.obs, spec.act, &signal.hidden)),
-            SignalKind::Rnd => Self::Rnd(Rnd::new(spec.obs, &signal.hidden, random)),
-        }
-    }
+/// A reward that a learner gives itself, by networks.
+pub trait Reward: Send + Sync {
     /// Number of parameters that are learned.
-    pub fn count(&self) -> usize {
-        match self {
-            Self::Curiosity(nets) => nets.count(),
-            Self::Rnd(nets) => nets.count(),
-        }
-    }
+    fn count(&self) -> usize;
     /// Fills them for the start of a run.
-    pub(crate) fn init(&self, params: &mut [f32], random: &mut SplitMix) {
-        match self {
-            Self::Curiosity(nets) => nets.init(params, random),
-            Self::Rnd(nets) => nets.init(params, random),
-        }
+    fn init(&self, params: &mut [f32], random: &mut SplitMix);
+    /// What gives the reward and learns, with its work space: one for each worker.
+    fn judge(&self) -> Box<dyn Judge>;
+    /// Whether the reward goes on beyond the end of an episode.
+    fn ignores_done(&self) -> bool {
+        true
     }
-    /// Work space.
-    pub fn space(&self) -> SignalSpace {
-        match self {
-            Self::Curiosity(nets) => SignalSpace::Curiosity(Box::new(nets.space())),
-            Self::Rnd(nets) => SignalSpace::Rnd(Box::new(nets.space())),
-        }
+    /// The most that a step is worth, times the strength.
+    fn bound(&self) -> f64 {
+        1.0
+    }
+}
+
+/// The networks of a [`Reward`] at work.
+pub trait Judge: Send {
+    /// Rewards of at most [`CHUNK`](crate::nets::mlp::CHUNK) blocks of steps, a row of sixteen each.
+    fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]);
+    /// Overwrites `gradient` with that of the networks' loss, summed over the steps.
+    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]);
+}
+
+/// A stream of rewards with its properties.
+#[derive(Clone)]
+pub struct Stream {
+    /// Factor.
+    pub strength: f64,
+    /// Discount per decision.
+    pub gamma: f64,
+    /// Whether it goes on beyond the end of an episode.
+    pub ignores_done: bool,
+    /// Its networks, unless it is the task's.
+    pub networks: Option<Networks>,
+}
+
+/// Networks of a reward among a learner's parameters.
+#[derive(Clone)]
+pub struct Networks {
+    /// The networks.
+    pub reward: Arc<dyn Reward>,
+    /// Their parameters' places.
+    pub place: Range<usize>,
+    /// Their learning rate.
+    pub lr: f64,
+}
+
+impl Stream {
+    /// Of configured rewards for an agent; `place` finds places for so many parameters. Parameters that are not learned
+    /// come from the seed.
+    pub fn all(
+        rewards: &[RewardConfig],
+        (obs, act): (usize, usize),
+        seed: u64,
+        mut place: impl FnMut(usize) -> Range<usize>,
+    ) -> Vec<Self> {
+        let mut random = streams_of_random_numbers(seed);
+        let stream = |config: &RewardConfig| {
+            let networks = config.kind.networks().map(|Novelty { hidden, lr }| {
+                let [fixed, _] = &mut random.next().expect("there is no last one");
+                let reward: Arc<dyn Reward> = match &config.kind {
+                    RewardKind::Rnd(_) => Arc::new(Rnd::new(obs, hidden, fixed)),
+                    _ => Arc::new(Curiosity::new(obs, act, hidden)),
+                };
+                Networks { place: place(reward.count()), reward, lr: *lr }
+            });
+            let ignores_done = networks.as_ref().is_some_and(|nets| nets.reward.ignores_done());
+            Stream { strength: config.strength, gamma: config.gamma, ignores_done, networks }
+        };
+        rewards.iter().map(stream).collect()
     }
 
-    /// Rewards of at most [`CHUNK`] blocks of steps, a row of sixteen each.
-    pub fn reward(&self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], space: &mut SignalSpace, out: &mut [f32]) {
-        match (self, space) {
-            (Self::Curiosity(nets), SignalSpace::Curiosity(space)) => {
-                f32_lanes!(isa, T => nets.losses::<T>(params, steps, space));
-                nets.reward(space, steps.len(), out);
-            }
-            (Self::Rnd(nets), SignalSpace::Rnd(space)) => {
-                f32_lanes!(isa, T => nets.losses::<T>(params, steps, space));
-                nets.reward(space, steps.len(), out);
-            }
-            _ => unreachable!("a signal makes its own space"),
-        }
-    }
-
-    /// Overwrites `gradient` with that of the signal's loss, summed over the steps.
-    pub fn gradient(
-        &self,
-        isa: Isa,
-        params: &[f32],
-        steps: &[Step<'_, f32>],
-        space: &mut SignalSpace,
-        gradient: &mut [f32],
-    ) {
-        match (self, space) {
-            (Self::Curiosity(nets), SignalSpace::Curiosity(space)) => f32_lanes!(isa, T => {
-                nets.losses::<T>(params, steps, space);
-                nets.gradient::<T>(params, steps.len(), space, gradient);
-            }),
-            (Self::Rnd(nets), SignalSpace::Rnd(space)) => f32_lanes!(isa, T => {
-                nets.losses::<T>(params, steps, space);
-                nets.gradient::<T>(params, steps.len(), space, gradient);
-            }),
-            _ => unreachable!("a signal makes its own space"),
+    /// Fills the parameters of all networks for the start of a run.
+    pub fn init(streams: &[Stream], params: &mut [f32], seed: u64) {
+        let networks = streams.iter().filter_map(|stream| stream.networks.as_ref());
+        for (networks, [_, mut random]) in networks.zip(streams_of_random_numbers(seed)) {
+            networks.reward.init(&mut params[networks.place.clone()], &mut random);
         }
     }
 }
 
-/// Copies rows of sixteen into features `first..` of a block.
-pub(crate) fn place<S: Copy + Default>(block: &mut [S], first: usize, rows: &[S]) {
-    block[first * BLOCK..first * BLOCK + rows.len()].copy_from_slice(rows);
-}
-
-/// Squared distances: `delta = weight (guess - truth)`, and `half = |guess - truth|^2 / 2` in a row of sixteen per block.
-pub(crate) struct Distance<'a, T: Real> {
-    pub guess: &'a Blocks<T::Scalar>,
-    pub truth: &'a Blocks<T::Scalar>,
-    pub weight: f64,
-    pub delta: &'a mut Blocks<T::Scalar>,
-    pub half: &'a mut [T::Scalar],
-    pub blocks: usize,
-    pub lanes: PhantomData<T>,
-}
-
-impl<T: Real> Kernel<T> for Distance<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (weight, features) = (T::lit(self.weight), self.guess.features());
-        for b in 0..self.blocks.min(CHUNK) {
-            let (guess, truth, delta) = (self.guess.block(b), self.truth.block(b), self.delta.block_mut(b));
-            for lane in (0..BLOCK).step_by(T::LANES) {
-                let mut sum = T::zero();
-                for k in 0..features {
-                    let at = k * BLOCK + lane;
-                    let d = T::load(&guess[at..]) - T::load(&truth[at..]);
-                    sum = (d * T::lit(0.5)).mul_add(d, sum);
-                    (d * weight).store(&mut delta[at..]);
-                }
-                sum.store(&mut self.half[b * BLOCK + lane..]);
-            }
-        }
-    }
-}
-
-/// Adds `factor` times features `first..` of one buffer to all features of another.
-pub(crate) struct Gather<'a, T: Real> {
-    pub from: &'a Blocks<T::Scalar>,
-    pub first: usize,
-    pub factor: f64,
-    pub to: &'a mut Blocks<T::Scalar>,
-    pub blocks: usize,
-    pub lanes: PhantomData<T>,
-}
-
-impl<T: Real> Kernel<T> for Gather<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let factor = T::lit(self.factor);
-        for b in 0..self.blocks.min(CHUNK) {
-            let (from, to) = (&self.from.block(b)[self.first * BLOCK..], self.to.block_mut(b));
-            for (to, from) in to.chunks_exact_mut(T::LANES).zip(from.chunks_exact(T::LANES)) {
-                factor.mul_add(T::load(from), T::load(to)).store(to);
-            }
-        }
-    }
+/// For each reward with networks: random numbers for parameters that are not learned, and for those that are.
+fn streams_of_random_numbers(seed: u64) -> impl Iterator<Item = [SplitMix; 2]> {
+    (0..).map(move |i: u64| [2 * i, 2 * i + 1].map(|n| SplitMix::new(seed, SIGNALS + n)))
 }

@@ -1,14 +1,16 @@
 //! Random network distillation (Burda et al., 2018): a network learns what another one with fixed random parameters makes
 //! of an observation. Where observations are new, it errs, and the squared error is the reward.
 
+use super::kernels::{Distance, place};
+use super::{Judge, Reward, Step};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
+use crate::lanes::f32_lanes;
 use crate::lanes::noise::{SIGNALS, SplitMix};
 use crate::nets::activation::Activation;
 use crate::nets::init;
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
-use crate::rewards::{Distance, Step, place};
-use marathon_physics::lanes::Real;
+use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
 
 /// The two networks, which have one shape, and the parameters of the fixed one.
@@ -27,6 +29,37 @@ pub struct RndSpace<S> {
     guess: Tape<S>,
     /// Half the squared error, a row per block.
     half: Vec<S>,
+}
+
+impl Reward for Rnd {
+    fn count(&self) -> usize {
+        self.count()
+    }
+    fn init(&self, params: &mut [f32], random: &mut SplitMix) {
+        self.init(params, random);
+    }
+    fn judge(&self) -> Box<dyn Judge> {
+        Box::new(RndJudge { nets: self.clone(), space: self.space() })
+    }
+}
+
+/// The networks at work.
+struct RndJudge {
+    nets: Rnd,
+    space: RndSpace<f32>,
+}
+
+impl Judge for RndJudge {
+    fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]) {
+        f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
+        self.nets.reward(&self.space, steps.len(), out);
+    }
+    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]) {
+        f32_lanes!(isa, T => {
+            self.nets.losses::<T>(params, steps, &mut self.space);
+            self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);
+        });
+    }
 }
 
 impl Rnd {

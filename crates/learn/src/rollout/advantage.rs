@@ -1,30 +1,23 @@
 //! Generalized advantage estimation (Schulman et al., "High-dimensional continuous control using generalized advantage
 //! estimation", 2016), sixteen agents at a time.
 
+use super::data::{Rewards, Rollout};
 use crate::lanes::BLOCK;
 use crate::lanes::f32_lanes;
-use crate::rewards::MAX_SIGNALS;
-use crate::rollout::collect::{Acting, Rewards, Rollout};
-use marathon_physics::lanes::{Kernel, Real};
+use marathon_physics::lanes::{Isa, Kernel, Real};
 use std::marker::PhantomData;
-
-/// The discounts.
-#[derive(Clone, Copy, Debug)]
-pub struct Discounts {
-    /// Discount of rewards per decision, for each stream of rewards.
-    pub gamma: [f64; 1 + MAX_SIGNALS],
-    /// Decay of the estimator.
-    pub lambda: f64,
-}
 
 /// Fills the advantages `A = sum (gamma lambda)^k delta_{t+k}` with `delta_t = r_t + gamma V_{t+1} - V_t`, broken off
 /// where an episode ends, the value targets `A + V`, and their sums. With several streams of rewards, each has its own
 /// values, and the advantages of all are added up.
-pub fn estimate(acting: &Acting<'_>, rollout: &mut Rollout) {
+///
+/// `gamma` has the discount per decision of each stream, `lambda` is the decay of the estimator.
+pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
     let mut rows = rollout.rewards();
-    f32_lanes!(acting.isa, T => <T as Real>::enter(Estimate::<T> {
+    f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> {
         rows: &mut rows,
-        discounts: acting.discounts,
+        gamma,
+        lambda,
         lanes: PhantomData,
     }));
     let blocks = rows.sums.len();
@@ -53,7 +46,8 @@ pub fn estimate(acting: &Acting<'_>, rollout: &mut Rollout) {
 
 struct Estimate<'a, 'b, T> {
     rows: &'a mut Rewards<'b>,
-    discounts: Discounts,
+    gamma: &'a [f64],
+    lambda: f64,
     lanes: PhantomData<T>,
 }
 
@@ -65,8 +59,8 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
         let rows = self.rows;
         let (blocks, streams) = (rows.sums.len(), rows.streams);
         for (b, stream) in (0..blocks).flat_map(|b| (0..streams).map(move |stream| (b, stream))) {
-            let gamma = self.discounts.gamma[stream];
-            let (gamma, decay) = (T::lit(gamma), T::lit(gamma * self.discounts.lambda));
+            let gamma = self.gamma[stream];
+            let (gamma, decay) = (T::lit(gamma), T::lit(gamma * self.lambda));
             for lane in (0..BLOCK).step_by(T::LANES) {
                 let mut next = T::load(&rows.last_value[(b * streams + stream) * BLOCK + lane..]);
                 let mut advantage = T::zero();
@@ -143,8 +137,9 @@ mod tests {
                 target: &mut target,
                 sums: &mut vec![BlockSums::default(); blocks],
             };
-            let discounts = Discounts { gamma: [gamma; 1 + MAX_SIGNALS], lambda };
-            f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> { rows: &mut rows, discounts, lanes: PhantomData }));
+            f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> {
+                rows: &mut rows, gamma: &[gamma], lambda, lanes: PhantomData,
+            }));
             for (b, lane) in [(0, 0), (1, 5), (2, 15)] {
                 let pick =
                     |x: &[f32]| (0..horizon).map(|t| x[(t * blocks + b) * BLOCK + lane] as f64).collect::<Vec<_>>();

@@ -1,204 +1,50 @@
-//! Acting: a worker's agents play one horizon, and what happened is kept for learning.
+//! Collecting: a worker's agents play one horizon, and what happened is kept for learning.
 //!
 //! A worker owns a run of consecutive blocks and goes through the whole rollout without waiting for anyone. Everything
 //! it adds up is kept per block, so that the totals, taken in the order of the blocks, do not depend on how blocks are
 //! spread over workers.
 
-use crate::algorithms::loss::Samples;
-use crate::algorithms::parameters::Layout;
+use super::advantage;
+use super::data::Rollout;
+use super::sums::BlockSums;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::{Aligned, Blocks};
-use crate::lanes::f32_lanes;
 use crate::lanes::mirror;
 use crate::lanes::noise::Noise;
-use crate::nets::gaussian::{Gaussian, Sample};
+use crate::nets::acting::{Acting, ActingSpace};
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
-use crate::nets::normalize::{Normalize, Normalizer};
-use crate::nets::squash::{Draw, Normals};
-use crate::rewards::{SignalNets, SignalSpace, Step};
-use crate::rollout::advantage::{self, Discounts};
-use crate::rollout::sums::BlockSums;
-use crate::trainer::clock;
-use crate::trainer::config::Ratio;
+use crate::rewards::{Judge, Step, Stream};
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use marathon_physics::lanes::{Isa, Real};
-use std::marker::PhantomData;
 
-/// What the agents act with in a rollout; the same for all workers.
-pub struct Acting<'a> {
-    pub isa: Isa,
-    pub actor: (&'a Mlp, &'a [f32]),
-    pub critic: (&'a Mlp, &'a [f32]),
-    pub gaussian: &'a Gaussian<f32>,
-    pub normalizer: &'a Normalizer,
-    /// Networks of the reward signals with their parameters, and the factors of their rewards.
-    pub signals: Vec<(&'a SignalNets, &'a [f32], f64)>,
-    /// Whether each action has a probability ratio of its own.
-    pub ratio: Ratio,
-    /// Multiplies the actions drawn before they are clipped.
-    pub action_scale: f32,
-    /// Whether the policy is SAC's, and observations are kept as they are.
-    pub squash: bool,
-    pub discounts: Discounts,
-    /// Divides the rewards.
+/// What a horizon is played with; the same for all workers.
+pub struct Collecting<'a> {
+    /// What acts.
+    pub acting: Acting<'a>,
+    /// The streams of rewards, the task's first.
+    pub streams: &'a [Stream],
+    /// All parameters, with those of the rewards' networks.
+    pub params: &'a [f32],
+    /// What judges observations. Without it, observations are kept as they are, for later.
+    pub values: Option<Values<'a>>,
+    /// Multiplies the task's rewards.
     pub reward_scale: f64,
     /// Center of the statistics of discounted returns.
     pub return_center: f32,
 }
 
-impl Acting<'_> {
-    /// Streams of rewards.
-    fn streams(&self) -> usize {
-        1 + self.signals.len()
-    }
+/// The value function, which has an output for each stream of rewards.
+pub struct Values<'a> {
+    /// Network.
+    pub net: &'a Mlp,
+    /// Its parameters.
+    pub params: &'a [f32],
+    /// Decay of the estimator of advantages.
+    pub lambda: f64,
 }
 
-/// What a worker's agents experienced in one horizon; item `t * blocks + b` is block `b` at decision `t`.
-pub struct Rollout {
-    blocks: usize,
-    obs_len: usize,
-    act_len: usize,
-    /// Normalized, `[item][obs][16]`.
-    obs: Aligned<f32>,
-    /// `[item][act][16]`.
-    action: Aligned<f32>,
-    /// What was observed next, normalized, where a reward signal asks for it; else nothing.
-    next_obs: Aligned<f32>,
-    /// `[item][16]`, or with a ratio for each action `[item][act][16]`.
-    log_prob: Aligned<f32>,
-    /// `[item][16]`.
-    advantage: Aligned<f32>,
-    /// `[item][stream][16]`.
-    reward: Aligned<f32>,
-    value: Aligned<f32>,
-    target: Aligned<f32>,
-    /// Streams of rewards.
-    streams: usize,
-    /// Agents in a block, which the other lanes mirror.
-    pub lanes: usize,
-    /// Agents whose episode ended with the item, and whose episode failed.
-    done: Vec<u16>,
-    failed: Vec<u16>,
-    /// Ended episodes whose last observation has a value: item, agents that were truncated, agents whose simulation did not
-    /// break, and the observation that they ended at. Without signals, truncated ones alone.
-    cut: Vec<(usize, [u16; 2])>,
-    cut_obs: Vec<f32>,
-    /// Value of the observation after the last decision, `[block][stream][16]`.
-    last_value: Aligned<f32>,
-    /// Per block.
-    pub sums: Vec<BlockSums>,
-}
-
-impl Rollout {
-    /// Room for `horizon` decisions of `blocks` blocks.
-    pub fn new(blocks: usize, horizon: usize, (obs_len, act_len): (usize, usize), layout: &Layout) -> Self {
-        let streams = layout.streams();
-        let items = blocks * horizon;
-        let (row, stream_rows) = (|| Aligned::rows(items), || Aligned::rows(items * streams));
-        let next_items = if streams > 1 || layout.twin.is_some() { items } else { 0 };
-        Self {
-            blocks,
-            obs_len,
-            act_len,
-            obs: Aligned::rows(items * obs_len),
-            action: Aligned::rows(items * act_len),
-            next_obs: Aligned::rows(next_items * obs_len),
-            log_prob: Aligned::rows(items * layout.ratio.rows(act_len)),
-            advantage: row(),
-            reward: stream_rows(),
-            value: stream_rows(),
-            target: stream_rows(),
-            streams,
-            lanes: layout.lanes,
-            done: vec![0; items],
-            failed: vec![0; items],
-            cut: Vec::new(),
-            cut_obs: Vec::new(),
-            last_value: Aligned::rows(blocks * streams),
-            sums: Vec::new(),
-        }
-    }
-
-    fn items(&self) -> usize {
-        self.done.len()
-    }
-    /// Number of blocks.
-    pub fn blocks(&self) -> usize {
-        self.blocks
-    }
-    /// Normalized observations of an item, `[obs][16]`.
-    pub fn obs(&self, item: usize) -> &[f32] {
-        &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
-    }
-    /// What a learner needs to know, `[item][..][16]`, by name.
-    pub fn rows(&self) -> [(&'static str, &[f32]); 7] {
-        [
-            ("normalized_obs", &self.obs),
-            ("next_normalized_obs", &self.next_obs),
-            ("action", &self.action),
-            ("log_prob", &self.log_prob),
-            ("value", &self.value),
-            ("advantage", &self.advantage),
-            ("target", &self.target),
-        ]
-    }
-    /// The same, to be filled.
-    pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 7] {
-        [
-            ("normalized_obs", &mut self.obs),
-            ("next_normalized_obs", &mut self.next_obs),
-            ("action", &mut self.action),
-            ("log_prob", &mut self.log_prob),
-            ("value", &mut self.value),
-            ("advantage", &mut self.advantage),
-            ("target", &mut self.target),
-        ]
-    }
-    /// Copies what a learner needs to know about a block, and adds its sums to the list of sums.
-    pub fn copy_block(&mut self, block: usize, from: &Rollout, its: usize) {
-        let (blocks, items) = (self.blocks, self.items());
-        for ((_, to), (_, rows)) in self.rows_mut().into_iter().zip(from.rows()) {
-            let row = to.len() / items;
-            for t in 0..items / blocks {
-                let (to_item, item) = (t * blocks + block, t * from.blocks + its);
-                to[to_item * row..(to_item + 1) * row].copy_from_slice(&rows[item * row..(item + 1) * row]);
-            }
-        }
-        self.sums.push(from.sums[its].clone());
-    }
-    /// What the objective needs to know about an item.
-    pub fn samples(&self, item: usize) -> Samples<'_, f32> {
-        let row = item * BLOCK..(item + 1) * BLOCK;
-        let log_prob = self.log_prob.len() / self.items();
-        let rows = item * self.streams * BLOCK..(item + 1) * self.streams * BLOCK;
-        Samples {
-            action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
-            log_prob: &self.log_prob[item * log_prob..(item + 1) * log_prob],
-            advantage: &self.advantage[row],
-            value: &self.value[rows.clone()],
-            target: &self.target[rows],
-        }
-    }
-    /// Rewards of an item, scaled, of the task alone.
-    pub fn reward(&self, item: usize) -> &[f32] {
-        &self.reward[item * self.streams * BLOCK..][..BLOCK]
-    }
-    /// Agents whose episode ended with each item, and whose episode failed.
-    pub fn ends(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
-        self.done.iter().copied().zip(self.failed.iter().copied())
-    }
-    /// What the reward signals need to know about an item.
-    pub fn step(&self, item: usize) -> Step<'_, f32> {
-        Step {
-            obs: self.obs(item),
-            action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
-            next: &self.next_obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK],
-        }
-    }
-}
-
-/// A worker's agents.
-pub struct Actor {
+/// Plays a worker's agents.
+pub struct Collector {
     shard: Box<dyn Shard>,
     first_block: usize,
     noise: Vec<Noise>,
@@ -208,28 +54,32 @@ pub struct Actor {
     pub(crate) tallies: [Vec<[f32; BLOCK]>; 4],
     /// Work space.
     obs_sums: [Aligned<f32>; 2],
-    input: Blocks<f32>,
-    tape: Tape<f32>,
-    critic_tape: Tape<f32>,
-    signal_spaces: Vec<SignalSpace>,
-    eps: Vec<[f32; BLOCK]>,
-    z: Vec<f32>,
+    space: ActingSpace,
+    tape: Option<Tape<f32>>,
+    judges: Vec<Option<Box<dyn Judge>>>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
     out: BlockStep,
 }
 
-impl Actor {
-    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode.
-    pub fn new(factory: &dyn ShardFactory, (first_block, blocks): (usize, usize), seed: u64, layout: &Layout) -> Self {
+impl Collector {
+    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode; `lanes` of a block count. They
+    /// will play with networks like those.
+    pub fn new(
+        factory: &dyn ShardFactory,
+        (first_block, blocks): (usize, usize),
+        seed: u64,
+        lanes: usize,
+        with: &Collecting<'_>,
+    ) -> Self {
         let n = factory.spec().obs * BLOCK;
         let mut shard = factory.shard(first_block, blocks, seed);
         let mut obs = Aligned::new(blocks * n);
         for b in 0..blocks {
             shard.reset(b, !0, &mut obs[b * n..(b + 1) * n]);
         }
-        mirror::rows(&mut obs, layout.lanes);
-        let noise = |b| Noise::new(seed, first_block + b).mirrored(layout.lanes);
+        mirror::rows(&mut obs, lanes);
+        let noise = |b| Noise::new(seed, first_block + b).mirrored(lanes);
         Self {
             shard,
             first_block,
@@ -237,12 +87,9 @@ impl Actor {
             obs,
             tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
-            input: layout.actor.input(),
-            tape: layout.actor.inference_tape(),
-            critic_tape: layout.critic.inference_tape(),
-            signal_spaces: layout.signals.iter().map(|(nets, _)| nets.space()).collect(),
-            eps: vec![[0.0; BLOCK]; factory.spec().act],
-            z: vec![0.0; CHUNK * factory.spec().act * BLOCK],
+            space: with.acting.space(factory.spec().act),
+            tape: with.values.as_ref().map(|values| values.net.inference_tape()),
+            judges: with.streams.iter().map(|s| s.networks.as_ref().map(|nets| nets.reward.judge())).collect(),
             action: vec![0.0; blocks * factory.spec().act * BLOCK],
             out: BlockStep::default(),
         }
@@ -283,35 +130,35 @@ impl Actor {
         &mut self.noise
     }
 
-    /// Plays one horizon and fills `rollout`, advantages included. Returns the seconds spent in the environments.
-    pub fn collect(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) -> f64 {
+    /// Plays one horizon and fills `rollout`, advantages included. Returns the seconds spent in the environments, by the
+    /// clock `now`.
+    pub fn collect(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, now: fn() -> f64) -> f64 {
         let blocks = self.blocks();
         let terms = self.shard.spec().reward_terms.len();
-        let signals = vec![0.0; acting.signals.len()];
-        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], signals, ..Default::default() }; blocks];
+        let rewards = vec![0.0; with.streams.len() - 1];
+        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], rewards, ..Default::default() }; blocks];
         rollout.cut.clear();
         rollout.cut_obs.clear();
         self.obs_sums.iter_mut().for_each(|s| s.fill(0.0));
         let mut env_seconds = 0.0;
         for t in 0..rollout.items() / blocks {
             for first in (0..blocks).step_by(CHUNK) {
-                self.act(acting, rollout, t * blocks, first, CHUNK.min(blocks - first));
+                self.act(with, rollout, t * blocks, first, CHUNK.min(blocks - first));
             }
-            let start = clock::wall();
+            let start = now();
             let row = blocks * rollout.act_len * BLOCK;
-            self.announce(&rollout.action[t * row..(t + 1) * row], acting.action_scale);
+            self.announce(&rollout.action[t * row..(t + 1) * row], with.acting.action_scale);
             for b in 0..blocks {
-                self.step(acting, rollout, t * blocks + b, b);
+                self.step(with, rollout, t * blocks + b, b);
             }
-            env_seconds += clock::wall() - start;
+            env_seconds += now() - start;
         }
         self.add_up_observations(rollout);
-        if acting.squash {
-            return env_seconds;
-        }
-        self.reward_novelty(acting, rollout);
-        self.evaluate(acting, rollout);
-        advantage::estimate(acting, rollout);
+        let Some(values) = &with.values else { return env_seconds };
+        self.judge(with, rollout);
+        self.evaluate(with, values, rollout);
+        let gamma: Vec<f64> = with.streams.iter().map(|stream| stream.gamma).collect();
+        advantage::estimate(with.acting.isa, &gamma, values.lambda, rollout);
         // exact, since the number of agents is a power of two
         let part = rollout.lanes as f64 / BLOCK as f64;
         rollout.sums.iter_mut().for_each(|sums| sums.scale(part));
@@ -319,42 +166,25 @@ impl Actor {
     }
 
     /// Normalizes the observations of `n` blocks, and draws and stores their actions.
-    fn act(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
+    fn act(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
+        let log_prob_row = rollout.log_prob.len() / rollout.items();
         let of = |row: usize| first * row..(first + n) * row;
         let at = |row: usize| (item + first) * row..(item + first + n) * row;
         let [sum, square] = &mut self.obs_sums;
-        f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
-            normalizer: acting.normalizer,
-            raw: &self.obs[of(obs_row)],
-            input: &mut self.input,
-            copy: if acting.squash { None } else { Some(&mut rollout.obs[at(obs_row)]) },
-            sums: Some((&mut sum[of(obs_row)], &mut square[of(obs_row)])),
-            lanes: PhantomData,
-        }));
-        acting.actor.0.forward(acting.isa, acting.actor.1, &self.input, &mut self.tape, n);
-        if acting.squash {
-            rollout.obs[at(obs_row)].copy_from_slice(&self.obs[of(obs_row)]);
-            let (act, action) = (rollout.act_len, &mut rollout.action[at(act_row)]);
-            let (z, output, log_prob) =
-                (&mut self.z[..n * act_row], self.tape.output(), &mut rollout.log_prob[at(BLOCK)]);
-            let noise = &mut self.noise[first..first + n];
-            f32_lanes!(acting.isa, T => {
-                <T as Real>::enter(Normals::<T> { noise, z: &mut *z, act, lanes: PhantomData });
-                <T as Real>::enter(Draw::<T> { output, z, act, action, log_prob, blocks: n, lanes: PhantomData });
-            });
-            return;
-        }
-        f32_lanes!(acting.isa, T => <T as Real>::enter(Sample::<T> {
-            gaussian: acting.gaussian,
-            mean: self.tape.output(),
-            noise: &mut self.noise[first..first + n],
-            action: &mut rollout.action[at(act_row)],
-            log_prob: &mut rollout.log_prob[at(acting.ratio.rows(rollout.act_len) * BLOCK)],
-            ratio: acting.ratio,
-            eps: &mut self.eps,
-            lanes: PhantomData,
-        }));
+        let (raw, kept) = (&self.obs[of(obs_row)], &mut rollout.obs[at(obs_row)]);
+        let copy = match with.values {
+            Some(_) => Some(kept),
+            None => {
+                kept.copy_from_slice(raw);
+                None
+            }
+        };
+        let sums = (&mut sum[of(obs_row)], &mut square[of(obs_row)]);
+        with.acting.normalize(raw, &mut self.space.input, copy, Some(sums));
+        let action = &mut rollout.action[at(act_row)];
+        let log_prob = &mut rollout.log_prob[at(log_prob_row)];
+        with.acting.draw(&mut self.noise[first..first + n], &mut self.space, action, log_prob);
     }
 
     /// Tells the environments the actions of all blocks, in their own units.
@@ -367,7 +197,7 @@ impl Actor {
     }
 
     /// One decision of one block, with all bookkeeping.
-    fn step(&mut self, acting: &Acting<'_>, rollout: &mut Rollout, item: usize, b: usize) {
+    fn step(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, b: usize) {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
         let out = &mut self.out;
         let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
@@ -382,8 +212,8 @@ impl Actor {
         let [discounted, returns, lengths, distances] = &mut self.tallies;
         let (discounted, returns) = (&mut discounted[b], &mut returns[b]);
         let (lengths, distances) = (&mut lengths[b], &mut distances[b]);
-        let (gamma, center) = (acting.discounts.gamma[0] as f32, acting.return_center);
-        let scale = acting.reward_scale as f32;
+        let (gamma, center) = (with.streams[0].gamma as f32, with.return_center);
+        let scale = with.reward_scale as f32;
         let reward = &mut rollout.reward[item * rollout.streams * BLOCK..][..BLOCK];
         let (mut first, mut second) = (0.0, 0.0);
         for i in 0..BLOCK {
@@ -402,17 +232,12 @@ impl Actor {
             *sum += term.iter().map(|x| *x as f64).sum::<f64>();
         }
 
-        if acting.squash {
-            rollout.next_obs[item * obs_row..(item + 1) * obs_row].copy_from_slice(obs);
-        } else if !acting.signals.is_empty() {
-            f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
-                normalizer: acting.normalizer,
-                raw: obs,
-                input: &mut self.input,
-                copy: Some(&mut rollout.next_obs[item * obs_row..(item + 1) * obs_row]),
-                sums: None,
-                lanes: PhantomData,
-            }));
+        if !rollout.next_obs.is_empty() {
+            let next = &mut rollout.next_obs[item * obs_row..(item + 1) * obs_row];
+            match with.values {
+                Some(_) => with.acting.normalize(obs, &mut self.space.input, Some(next), None),
+                None => next.copy_from_slice(obs),
+            }
         }
 
         // ended episodes
@@ -422,7 +247,8 @@ impl Actor {
             return;
         }
         let cut = out.truncated & !(out.terminated | out.diverged);
-        let whole = if acting.signals.is_empty() { cut } else { done & !out.diverged };
+        let goes_on = with.streams.iter().any(|stream| stream.ignores_done);
+        let whole = if goes_on { done & !out.diverged } else { cut };
         if whole != 0 {
             rollout.cut.push((item, [cut, whole]));
             rollout.cut_obs.extend_from_slice(obs);
@@ -452,59 +278,55 @@ impl Actor {
         }
     }
 
-    /// Rewards of the signals.
-    fn reward_novelty(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
+    /// Rewards that networks give.
+    fn judge(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
-        for (s, ((nets, params, strength), space)) in acting.signals.iter().zip(&mut self.signal_spaces).enumerate() {
-            // ML-Agents' bound: what a step gives is not worth more than 1
-            let (strength, most) = (*strength as f32, (1.0 / strength) as f32);
+        for (s, (stream, judge)) in with.streams.iter().zip(&mut self.judges).enumerate() {
+            let (Some(networks), Some(judge)) = (&stream.networks, judge) else { continue };
+            let params = &with.params[networks.place.clone()];
+            let (strength, most) = (stream.strength as f32, (networks.reward.bound() / stream.strength) as f32);
             for first in (0..items).step_by(CHUNK) {
                 let n = CHUNK.min(items - first);
                 let steps: Vec<Step<'_, f32>> = (first..first + n).map(|item| rollout.step(item)).collect();
-                nets.reward(acting.isa, params, &steps, space, &mut rows);
+                judge.reward(with.acting.isa, params, &steps, &mut rows);
                 for (item, row) in (first..first + n).zip(rows.chunks_exact(BLOCK)) {
-                    let out = &mut rollout.reward[(item * streams + 1 + s) * BLOCK..][..BLOCK];
+                    let out = &mut rollout.reward[(item * streams + s) * BLOCK..][..BLOCK];
                     for (out, x) in out.iter_mut().zip(row) {
                         *out = strength * Real::min(*x, most);
                     }
-                    rollout.sums[item % blocks].signals[s] += out.iter().map(|x| *x as f64).sum::<f64>();
+                    rollout.sums[item % blocks].rewards[s - 1] += out.iter().map(|x| *x as f64).sum::<f64>();
                 }
             }
         }
     }
 
     /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
-    /// episodes, and in the streams of signals to those of all.
-    fn evaluate(&mut self, acting: &Acting<'_>, rollout: &mut Rollout) {
-        let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, .. } = rollout;
-        let (row, streams) = (*obs_len * BLOCK, acting.streams());
+    /// episodes, and in the streams that go on beyond an episode's end to those of all.
+    fn evaluate(&mut self, with: &Collecting<'_>, values: &Values<'_>, rollout: &mut Rollout) {
+        let Self { space: ActingSpace { input, .. }, tape: Some(tape), .. } = self else { return };
+        let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, streams, .. } = rollout;
+        let (row, streams) = (*obs_len * BLOCK, *streams);
+        let isa = with.acting.isa;
         // values of normalized observations
         for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
             for (b, obs) in obs.chunks_exact(row).enumerate() {
-                self.input.block_mut(b).copy_from_slice(obs);
+                input.block_mut(b).copy_from_slice(obs);
             }
-            value_of_input(acting, &self.input, &mut self.critic_tape, value);
+            values.of(isa, input, tape, value);
         }
         // values of raw ones
         let mut cut_value = vec![0.0; cut.len() * streams * BLOCK];
         for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
             for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
-                f32_lanes!(acting.isa, T => <T as Real>::enter(Normalize::<T> {
-                    normalizer: acting.normalizer,
-                    raw,
-                    input: &mut self.input,
-                    copy: None,
-                    sums: None,
-                    lanes: PhantomData,
-                }));
-                value_of_input(acting, &self.input, &mut self.critic_tape, value);
+                with.acting.normalize(raw, input, None, None);
+                values.of(isa, input, tape, value);
             }
         }
         for ((item, [truncated, whole]), values) in cut.iter().zip(cut_value.chunks_exact(streams * BLOCK)) {
             let rewards = reward[item * streams * BLOCK..].chunks_exact_mut(BLOCK);
-            for (s, (reward, value)) in rewards.zip(values.chunks_exact(BLOCK)).enumerate() {
-                let (gamma, agents) = (acting.discounts.gamma[s] as f32, if s == 0 { truncated } else { whole });
+            for ((stream, reward), value) in with.streams.iter().zip(rewards).zip(values.chunks_exact(BLOCK)) {
+                let (gamma, agents) = (stream.gamma as f32, if stream.ignores_done { whole } else { truncated });
                 for i in (0..BLOCK).filter(|i| agents >> i & 1 == 1) {
                     reward[i] += gamma * value[i];
                 }
@@ -513,39 +335,14 @@ impl Actor {
     }
 }
 
-/// Values of the first blocks of `input`, as many as `out` has rows for.
-fn value_of_input(acting: &Acting<'_>, input: &Blocks<f32>, tape: &mut Tape<f32>, out: &mut [f32]) {
-    let row = acting.streams() * BLOCK;
-    acting.critic.0.forward(acting.isa, acting.critic.1, input, tape, out.len() / row);
-    for (b, out) in out.chunks_exact_mut(row).enumerate() {
-        out.copy_from_slice(tape.output().block(b));
-    }
-}
-
-/// Rows that the advantage estimator works on, as in [`Rollout`].
-pub struct Rewards<'a> {
-    pub streams: usize,
-    pub reward: &'a [f32],
-    pub value: &'a [f32],
-    pub last_value: &'a [f32],
-    pub done: &'a [u16],
-    pub advantage: &'a mut [f32],
-    pub target: &'a mut [f32],
-    pub sums: &'a mut [BlockSums],
-}
-
-impl Rollout {
-    /// What the advantage estimator reads and writes.
-    pub fn rewards(&mut self) -> Rewards<'_> {
-        Rewards {
-            streams: self.streams,
-            reward: &self.reward,
-            value: &self.value,
-            last_value: &self.last_value,
-            done: &self.done,
-            advantage: &mut self.advantage,
-            target: &mut self.target,
-            sums: &mut self.sums,
+impl Values<'_> {
+    /// Values of the first blocks of `input`, as many as `out` has rows for.
+    fn of(&self, isa: Isa, input: &Blocks<f32>, tape: &mut Tape<f32>, out: &mut [f32]) {
+        let sizes = self.net.sizes();
+        let row = sizes[sizes.len() - 1] * BLOCK;
+        self.net.forward(isa, self.params, input, tape, out.len() / row);
+        for (b, out) in out.chunks_exact_mut(row).enumerate() {
+            out.copy_from_slice(tape.output().block(b));
         }
     }
 }

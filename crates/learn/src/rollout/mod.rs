@@ -2,6 +2,8 @@
 
 pub(crate) mod advantage;
 pub(crate) mod collect;
+pub mod data;
 pub(crate) mod replay;
 pub(crate) mod states;
-pub(crate) mod sums;
+pub mod statistics;
+pub mod sums;

@@ -1,7 +1,7 @@
 //! What agents have experienced, for learning from it later: a ring of decisions, each of all blocks of a worker.
 
+use super::data::Rollout;
 use crate::lanes::BLOCK;
-use crate::rollout::collect::Rollout;
 
 /// The last decisions of a worker's blocks.
 pub struct Replay {
@@ -25,6 +25,11 @@ pub struct Replay {
     failed: Vec<u16>,
 }
 
+/// Names of the lists of [`Saved`].
+pub const NUMBERS: [&str; 4] = ["replay_obs", "replay_next", "replay_action", "replay_reward"];
+/// Names of its flags.
+pub const FLAGS: [&str; 2] = ["replay_done", "replay_failed"];
+
 /// Numbers of a replay, for a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Saved {
@@ -47,6 +52,14 @@ pub struct Batch {
     pub reward: Vec<f32>,
     /// Discount of the value of what followed; 0 where the episode failed.
     pub discount: Vec<f32>,
+}
+
+impl Batch {
+    /// Makes it empty.
+    pub fn clear(&mut self) {
+        let Batch { obs, next, action, reward, discount } = self;
+        [obs, next, action, reward, discount].into_iter().for_each(Vec::clear);
+    }
 }
 
 impl Replay {

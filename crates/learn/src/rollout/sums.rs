@@ -1,5 +1,8 @@
 //! What is added up over a rollout, block by block: totals taken in the order of the blocks do not depend on workers.
 
+use super::data::Rollout;
+use std::ops::Deref;
+
 /// Sums over the episodes that ended in a block, and over its rewards.
 #[derive(Clone, Debug, Default)]
 pub struct BlockSums {
@@ -27,8 +30,8 @@ pub struct BlockSums {
     pub targets: (f64, f64),
     /// Errors of the values against them, and their squares.
     pub errors: (f64, f64),
-    /// Sum of each signal's reward over the rollout.
-    pub signals: Vec<f64>,
+    /// Sum of each reward over the rollout, but for the task's.
+    pub rewards: Vec<f64>,
 }
 
 impl BlockSums {
@@ -52,17 +55,55 @@ impl BlockSums {
         pair(&mut self.advantages, &other.advantages);
         pair(&mut self.targets, &other.targets);
         pair(&mut self.errors, &other.errors);
-        self.signals.resize(other.signals.len(), 0.0);
-        self.signals.iter_mut().zip(&other.signals).for_each(|(a, b)| *a += b);
+        self.rewards.resize(other.rewards.len(), 0.0);
+        self.rewards.iter_mut().zip(&other.rewards).for_each(|(a, b)| *a += b);
     }
 
     /// Multiplies all by a factor.
     pub fn scale(&mut self, factor: f64) {
         let Self { episodes, returns, lengths, speeds, falls, diverged, terms, .. } = self;
-        let Self { discounted, observations, advantages, targets, errors, signals, .. } = self;
+        let Self { discounted, observations, advantages, targets, errors, rewards, .. } = self;
         let scalars = [episodes, returns, lengths, speeds, falls, diverged].into_iter();
         let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
-        let all = scalars.chain(terms).chain(signals).chain(pairs.flat_map(|(a, b)| [a, b]));
+        let all = scalars.chain(terms).chain(rewards).chain(pairs.flat_map(|(a, b)| [a, b]));
         all.for_each(|x| *x *= factor);
+    }
+}
+
+/// Sums over a whole rollout, added up in the order of the blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Totals {
+    /// Number of samples.
+    pub samples: f64,
+    /// The sums.
+    pub sums: BlockSums,
+}
+
+impl Totals {
+    /// Of the workers' rollouts, in order.
+    pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
+        let mut t = Totals::default();
+        for rollout in rollouts {
+            t.samples += (rollout.sums.len() * horizon * rollout.lanes) as f64;
+            rollout.sums.iter().for_each(|block| t.sums.add(block));
+        }
+        t
+    }
+    /// Takes in those of another rollout.
+    pub fn add(&mut self, other: &Totals) {
+        self.samples += other.samples;
+        self.sums.add(&other.sums);
+    }
+    /// Mean and variance of the advantages.
+    pub fn advantage(&self) -> (f64, f64) {
+        self.moments(self.sums.advantages)
+    }
+    /// Part of the variance of the value targets of the task's reward that the value function had foreseen.
+    pub fn explained_variance(&self) -> f64 {
+        1.0 - self.moments(self.sums.errors).1 / self.moments(self.sums.targets).1.max(1e-12)
+    }
+    fn moments(&self, (sum, square): (f64, f64)) -> (f64, f64) {
+        let mean = sum / self.samples;
+        (mean, (square / self.samples - mean * mean).max(0.0))
     }
 }

@@ -60,6 +60,14 @@ impl Barrier {
         assert!(!self.broken.load(Ordering::Acquire), "another worker has stopped");
     }
 
+    /// As [`wait`](Barrier::wait) for a thread that will not come again, which need not wait itself.
+    pub fn leave(&self) {
+        let round = self.round.load(Ordering::Acquire);
+        if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.n {
+            self.release(|| self.round.store(round.wrapping_add(1), Ordering::Release));
+        }
+    }
+
     /// Wakes sleepers after a change; under the lock, so that none goes to sleep in between.
     fn release(&self, change: impl FnOnce()) {
         let sleepers = self.sleepers.lock().unwrap_or_else(|e| e.into_inner());

@@ -4,43 +4,35 @@
 //! written first and the description last, each under a temporary name, so an interruption at any moment leaves the old
 //! or the new checkpoint, never half of one. Both have checksums.
 
-use crate::algorithms::parameters::Learner;
+use super::config::MAX_STEPS;
+use super::flat::{PpoConfig, Signal};
+use super::{Clocks, Trainer, states};
+use crate::algorithms::{Numbers, Saved};
 use crate::error::Error;
-use crate::files::{self, TensorReader, TensorWriter, read_description, write_atomic, write_description};
+use crate::files::{self, Dtype, TensorReader, TensorWriter, read_versions, write_atomic, write_description};
 use crate::nets::normalize::Moments;
-use crate::optim::kfac::Kfac;
-use crate::rewards::Signal;
-use crate::rollout::replay::Saved;
-use crate::rollout::states::Agents;
-use crate::trainer::config::Algorithm;
-use crate::trainer::config::MAX_STEPS;
-use crate::trainer::config::PpoConfig;
-use crate::trainer::{Clocks, Run};
+use crate::rollout::states::AgentStates;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 const FORMAT: &str = "marathon-checkpoint";
-const VERSION: u32 = 1;
-/// Tensors of a replay, see [`Saved`].
-const REPLAY: [&str; 4] = ["replay_obs", "replay_next", "replay_action", "replay_reward"];
-const REPLAY_FLAGS: [&str; 2] = ["replay_done", "replay_failed"];
+/// Since version 2, each algorithm keeps its own state by its own names.
+const VERSION: u32 = 2;
 const DESCRIPTION: &str = "checkpoint.json";
+/// Lists beside those of the learner and of the agents.
+const OBSERVATIONS: [&str; 2] = ["obs_mean", "obs_var"];
 
 /// Everything a run needs to go on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     about: About,
-    params: Vec<f32>,
-    adam_m: Vec<f32>,
-    adam_v: Vec<f32>,
-    /// Factors of the Fisher matrix and their inverses, of ACKTR.
-    kfac: (Vec<f64>, Vec<f32>),
-    /// Slow value networks and replay of SAC.
-    targets: Vec<f32>,
-    replay: Saved,
+    /// Lists of the learner.
+    lists: Vec<(String, Numbers)>,
     obs_mean: Vec<f64>,
     obs_var: Vec<f64>,
-    agents: Agents,
+    agents: AgentStates,
 }
 
 /// The description.
@@ -54,9 +46,8 @@ struct About {
     config: PpoConfig,
     iteration: u64,
     steps: u64,
-    skipped_minibatches: u64,
-    lr: f64,
-    adam_powers: [f64; 2],
+    /// Single numbers of the learner.
+    learner: BTreeMap<String, f64>,
     observation_count: f64,
     return_count: f64,
     return_mean: f64,
@@ -70,19 +61,20 @@ impl About {
     /// Refuses values that no run has: files of earlier versions have no checksum.
     fn check(&self, path: &Path) -> Result<(), Error> {
         self.config.validate().map_err(|e| e.in_file(path, "config"))?;
-        let positive = [
-            ("lr", self.lr),
+        let others = [
             ("observation_count", self.observation_count),
             ("return_count", self.return_count),
             ("return_var", self.return_var),
             ("wall_seconds", self.wall_seconds),
             ("cpu_seconds", self.cpu_seconds),
         ];
-        if let Some((key, x)) = positive.into_iter().find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
+        let learner = self.learner.iter().map(|(key, x)| (key.as_str(), *x));
+        let mut numbers = learner.clone().chain(others);
+        if let Some((key, x)) = numbers.find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
             return Err(Error::file(path, key, x, "a number not below 0"));
         }
-        if let Some(x) = self.adam_powers.into_iter().find(|x| !(0.0..=1.0).contains(x)) {
-            return Err(Error::file(path, "adam_powers", x, "a number between 0 and 1"));
+        if let Some((key, x)) = learner.clone().find(|(key, x)| key.starts_with("adam_power") && *x > 1.0) {
+            return Err(Error::file(path, key, x, "a number between 0 and 1"));
         }
         // rollouts may have had another horizon before
         let agents = self.config.agents as u64;
@@ -116,45 +108,64 @@ fn signals(config: &PpoConfig) -> String {
     config.signals.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
+/// Makes a description of version 1 into one of version 2.
+fn upgrade(_: u64, mut about: Value) -> Value {
+    let mut learner = serde_json::Map::new();
+    let Some(keys) = about.as_object_mut() else { return about };
+    let powers = keys.remove("adam_powers").unwrap_or_default();
+    let algorithm = keys["config"]["algorithm"].clone();
+    if algorithm == "ppo" || !algorithm["sac"].is_null() {
+        learner.insert("adam_power_1".into(), powers[0].clone());
+        learner.insert("adam_power_2".into(), powers[1].clone());
+    }
+    for (old, new) in [("lr", "lr"), ("skipped_minibatches", "skipped")] {
+        learner.insert(new.into(), keys.remove(old).unwrap_or_default());
+    }
+    keys.insert("learner".into(), learner.into());
+    keys.insert("version".into(), json!(VERSION));
+    about
+}
+
+/// The name today of a learner's list in a file of version 1, which had Adam's for every algorithm.
+fn renamed<'n>(name: &'n str, algorithm: &str) -> Option<&'n str> {
+    match (name, algorithm) {
+        ("adam_v", "a2c") => Some("mean_square"),
+        ("adam_m", "acktr") => Some("momentum"),
+        ("adam_m", "a2c") | ("adam_v", "acktr") => None,
+        (name, _) => Some(name),
+    }
+}
+
 impl Checkpoint {
-    pub(crate) fn of(run: &Run<'_>, learner: &Learner, clocks: &Clocks) -> Self {
+    pub(super) fn of(trainer: &Trainer) -> Self {
+        let Trainer { flat, shared, replica, clocks, .. } = trainer;
+        let (progress, statistics) = (&replica.progress, &replica.statistics);
+        let Saved { scalars, lists } = replica.learner.save();
         let about = About {
             format: FORMAT.into(),
             version: VERSION,
-            agent: run.spec.id.clone(),
-            obs: run.spec.obs,
-            act: run.spec.act,
-            config: run.config.clone(),
-            iteration: learner.iteration,
-            steps: learner.steps,
-            skipped_minibatches: learner.skipped,
-            lr: learner.lr,
-            adam_powers: learner.adam.powers,
-            observation_count: learner.observations.count,
-            return_count: learner.returns.count,
-            return_mean: learner.returns.mean[0],
-            return_var: learner.returns.var[0],
+            agent: shared.spec.id.clone(),
+            obs: shared.spec.obs,
+            act: shared.spec.act,
+            config: flat.clone(),
+            iteration: progress.iteration,
+            steps: progress.steps,
+            learner: scalars.into_iter().collect(),
+            observation_count: statistics.observations.count,
+            return_count: statistics.returns.count,
+            return_mean: statistics.returns.mean[0],
+            return_var: statistics.returns.var[0],
             wall_seconds: clocks.wall,
             cpu_seconds: clocks.cpu,
             state: StateFile::default(),
         };
-        let actors = run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
-        let mut replay = Saved::default();
-        for of_worker in run.sac.iter().flat_map(|sac| &sac.replays) {
-            let of_worker = of_worker.read().expect("no worker has panicked");
-            (0..of_worker.blocks()).for_each(|b| of_worker.save(b, &mut replay));
-        }
+        let collectors = shared.crew.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
         Self {
             about,
-            params: learner.params.clone(),
-            adam_m: learner.adam.m.clone(),
-            adam_v: learner.adam.v.clone(),
-            kfac: run.kfac.as_ref().map(Kfac::save).unwrap_or_default(),
-            targets: learner.targets.clone(),
-            replay,
-            obs_mean: learner.observations.mean.clone(),
-            obs_var: learner.observations.var.clone(),
-            agents: Agents::of(actors, 0..run.config.blocks()),
+            lists,
+            obs_mean: statistics.observations.mean.clone(),
+            obs_var: statistics.observations.var.clone(),
+            agents: AgentStates::of(collectors, 0..flat.blocks()),
         }
     }
 
@@ -180,12 +191,12 @@ impl Checkpoint {
     }
 
     /// Puts a fresh run into the state of the checkpoint.
-    pub(crate) fn restore(self, run: &Run<'_>, learner: &mut Learner, clocks: &mut Clocks) -> Result<(), Error> {
-        let (about, old, new) = (&self.about, &self.about.config, run.config);
+    pub(super) fn restore(self, trainer: &mut Trainer) -> Result<(), Error> {
+        let (about, old, new, spec) = (&self.about, &self.about.config, &trainer.flat, &trainer.shared.spec);
         let pairs = [
-            ("agent", about.agent.clone(), run.spec.id.clone()),
-            ("observation length", about.obs.to_string(), run.spec.obs.to_string()),
-            ("action length", about.act.to_string(), run.spec.act.to_string()),
+            ("agent", about.agent.clone(), spec.id.clone()),
+            ("observation length", about.obs.to_string(), spec.obs.to_string()),
+            ("action length", about.act.to_string(), spec.act.to_string()),
             ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
             ("agents", old.agents.to_string(), new.agents.to_string()),
             ("seed", old.seed.to_string(), new.seed.to_string()),
@@ -202,56 +213,25 @@ impl Checkpoint {
                 return mismatch(what, found, expected);
             }
         }
-        let (blocks, len) = (new.blocks(), run.layout.len);
-        let lengths = [
-            ("params", self.params.len(), len),
-            ("adam_m", self.adam_m.len(), len),
-            ("adam_v", self.adam_v.len(), len),
-            ("targets", self.targets.len(), learner.targets.len()),
-            ("obs_mean", self.obs_mean.len(), run.spec.obs),
-            ("obs_var", self.obs_var.len(), run.spec.obs),
-        ];
-        for (what, found, expected) in lengths {
-            if found != expected {
-                return mismatch(what, format!("{found} numbers"), format!("{expected}"));
+        for (what, found) in OBSERVATIONS.into_iter().zip([self.obs_mean.len(), self.obs_var.len()]) {
+            if found != spec.obs {
+                return mismatch(what, format!("{found} numbers"), format!("{}", spec.obs));
             }
         }
-        self.agents.check("checkpoint", blocks, run.spec.obs)?;
-        if let Some(kfac) = &run.kfac
-            && !kfac.load(&self.kfac.0, &self.kfac.1)
-        {
-            return mismatch("kfac", format!("{} numbers", self.kfac.0.len()), "those of the networks".into());
-        }
-
-        let mut block = 0;
-        for of_worker in run.sac.iter().flat_map(|sac| &sac.replays) {
-            let mut of_worker = of_worker.write().expect("no worker has panicked");
-            for b in 0..of_worker.blocks() {
-                if !of_worker.load(b, block, &self.replay) {
-                    let found = format!("{} decisions", self.replay.filled);
-                    return mismatch("replay", found, "what the settings make room for".into());
-                }
-                block += 1;
-            }
-        }
-        learner.targets.clone_from(&self.targets);
-
-        learner.adam.powers = about.adam_powers;
-        learner.lr = about.lr;
-        learner.observations = Moments { count: about.observation_count, mean: self.obs_mean, var: self.obs_var };
-        learner.returns =
+        let blocks = new.blocks();
+        self.agents.check("checkpoint", blocks, spec.obs)?;
+        let replica = &mut trainer.replica;
+        let about = self.about;
+        replica.learner.load(&Saved { scalars: about.learner.into_iter().collect(), lists: self.lists })?;
+        replica.statistics.observations =
+            Moments { count: about.observation_count, mean: self.obs_mean, var: self.obs_var };
+        replica.statistics.returns =
             Moments { count: about.return_count, mean: vec![about.return_mean], var: vec![about.return_var] };
-        learner.iteration = about.iteration;
-        learner.steps = about.steps;
-        learner.skipped = about.skipped_minibatches;
-        *clocks = Clocks { wall: about.wall_seconds, cpu: about.cpu_seconds };
-        learner.params = self.params;
-        learner.adam.m = self.adam_m;
-        learner.adam.v = self.adam_v;
-
-        for actor in &run.actors {
-            let actor = &mut *actor.lock().expect("no worker has panicked");
-            self.agents.put("checkpoint", 0..blocks, actor)?;
+        (replica.progress.iteration, replica.progress.steps) = (about.iteration, about.steps);
+        trainer.clocks = Clocks { wall: about.wall_seconds, cpu: about.cpu_seconds };
+        for collector in &trainer.shared.crew.collectors {
+            let collector = &mut *collector.lock().expect("no worker has panicked");
+            self.agents.put("checkpoint", 0..blocks, collector)?;
         }
         Ok(())
     }
@@ -263,26 +243,18 @@ impl Checkpoint {
     pub fn save(&self, folder: &Path) -> Result<(), Error> {
         std::fs::create_dir_all(folder).map_err(Error::io(folder, "create folder"))?;
         let mut file = TensorWriter::default();
-        file.list("params", &self.params);
-        file.list("adam_m", &self.adam_m);
-        file.list("adam_v", &self.adam_v);
-        if !self.kfac.0.is_empty() {
-            file.list("kfac", &self.kfac.0);
-            file.list("kfac_inverse", &self.kfac.1);
-        }
-        if !self.targets.is_empty() {
-            file.list("targets", &self.targets);
-            file.list("replay_filled", &[self.replay.filled]);
-            for (name, numbers) in REPLAY.into_iter().zip(&self.replay.numbers) {
-                file.list(name, numbers);
-            }
-            for (name, flags) in REPLAY_FLAGS.into_iter().zip(&self.replay.flags) {
-                file.list(name, flags);
+        for (name, numbers) in &self.lists {
+            match numbers {
+                Numbers::F32(list) => file.list(name, list),
+                Numbers::F64(list) => file.list(name, list),
+                Numbers::U32(list) => file.list(name, list),
+                Numbers::U64(list) => file.list(name, list),
             }
         }
-        file.list("obs_mean", &self.obs_mean);
-        file.list("obs_var", &self.obs_var);
-        self.agents.write(&mut file);
+        for (name, list) in OBSERVATIONS.into_iter().zip([&self.obs_mean, &self.obs_var]) {
+            file.list(name, list);
+        }
+        states::write(&self.agents, &mut file);
         let bytes = file.bytes(&serde_json::json!({ "format": FORMAT, "version": VERSION }));
         let checksum = files::checksum(&bytes);
         // a name of its own for every state: the old description must keep naming the old state
@@ -308,7 +280,7 @@ impl Checkpoint {
     /// If a file is missing, damaged or of another format.
     pub fn load(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(DESCRIPTION);
-        let about: About = read_description(&path, FORMAT, VERSION)?;
+        let about: About = read_versions(&path, FORMAT, VERSION, Some(upgrade))?;
         about.check(&path)?;
 
         let path = folder.join(&about.state.name);
@@ -321,35 +293,31 @@ impl Checkpoint {
             return Err(Error::file(&path, "checksum", checksum, &about.state.checksum));
         }
         let file = TensorReader::new(&path, &bytes)?;
-        fn list<N: files::Number>(file: &TensorReader<'_>, name: &str) -> Result<Vec<N>, Error> {
-            file.get(name, &[file.list_len(name)])
-        }
-        let finite = |name| file.finite(name, &[file.list_len(name)]);
-        let kfac = match about.config.algorithm {
-            Algorithm::Acktr(_) => (list(&file, "kfac")?, finite("kfac_inverse")?),
-            _ => Default::default(),
-        };
-        let (mut targets, mut replay) = (Vec::new(), Saved::default());
-        if let Algorithm::Sac(_) = about.config.algorithm {
-            targets = finite("targets")?;
-            replay.filled = list(&file, "replay_filled")?.first().copied().unwrap_or(0);
-            for (name, numbers) in REPLAY.into_iter().zip(&mut replay.numbers) {
-                *numbers = list(&file, name)?;
+        let others = states::NAMES.into_iter().chain(OBSERVATIONS);
+        let mut lists = Vec::new();
+        for (name, kind) in file.names() {
+            if others.clone().any(|other| other == name) {
+                continue;
             }
-            for (name, flags) in REPLAY_FLAGS.into_iter().zip(&mut replay.flags) {
-                *flags = list(&file, name)?;
+            // observations of a task may be anything
+            let finite = !name.starts_with("replay_");
+            let numbers = match kind {
+                Dtype::F32 if finite => Numbers::F32(file.finite_list(name)?),
+                Dtype::F32 => Numbers::F32(file.list(name)?),
+                Dtype::F64 => Numbers::F64(file.list(name)?),
+                Dtype::U32 => Numbers::U32(file.list(name)?),
+                _ => Numbers::U64(file.list(name)?),
+            };
+            if let Some(name) = renamed(name, about.config.algorithm.name()) {
+                lists.push((name.to_string(), numbers));
             }
         }
+        let [obs_mean, obs_var] = OBSERVATIONS;
         Ok(Self {
-            targets,
-            replay,
-            params: finite("params")?,
-            adam_m: finite("adam_m")?,
-            adam_v: finite("adam_v")?,
-            kfac,
-            obs_mean: list(&file, "obs_mean")?,
-            obs_var: list(&file, "obs_var")?,
-            agents: Agents::read(&file)?,
+            lists,
+            obs_mean: file.list(obs_mean)?,
+            obs_var: file.list(obs_var)?,
+            agents: states::read(&file)?,
             about,
         })
     }

@@ -2,10 +2,10 @@
 
 use crate::error::Error;
 use crate::lanes::BLOCK;
+use crate::policy::evaluation::Evaluation;
 use crate::policy::{BlockPolicy, Policy};
 use marathon_envs::{BlockStep, ShardFactory};
 use marathon_physics::lanes::Isa;
-use serde::{Deserialize, Serialize};
 
 /// Most agents that play side by side.
 const MAX_SLOTS: usize = 1024;
@@ -25,31 +25,6 @@ impl Default for EvalOptions {
     fn default() -> Self {
         Self { episodes: 64, seed: 1_000_003, threads: 0 }
     }
-}
-
-/// Results over whole episodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Evaluation {
-    /// Number of episodes.
-    pub episodes: u64,
-    /// Mean return.
-    pub return_mean: f64,
-    /// Standard deviation of the returns over the episodes.
-    pub return_std: f64,
-    /// Lowest return.
-    pub return_min: f64,
-    /// Highest return.
-    pub return_max: f64,
-    /// Mean length, decisions.
-    pub length_mean: f64,
-    /// Mean distance along +x, m.
-    pub distance_mean: f64,
-    /// Mean over the episodes of distance along +x by time, m/s.
-    pub speed_mean: f64,
-    /// Episodes that ended in a terminal state.
-    pub falls: u64,
-    /// Episodes whose simulation stopped being finite (they are falls too).
-    pub diverged: u64,
 }
 
 #[derive(Clone, Copy, Default)]

@@ -1,57 +1,50 @@
-//! A run: workers that collect, learn and report in step. What is the same for every algorithm that learns from its own
-//! rollouts is here; what is each one's own is in [`ppo`], [`a2c`] and [`acktr`].
+//! A run: workers that collect, learn and report in step.
 //!
 //! Workers run the same program on their own blocks of agents. One iteration:
 //!
-//! 1. *Collect*: every worker plays a horizon with its agents ([`Actor::collect`]) and estimates advantages.
-//! 2. *Update*: the algorithm. It asks for gradients of an objective over lists of samples ([`Update::gradient`]): a list
-//!    is split into groups; whichever worker is free takes the next group and leaves its gradient in that group's place.
-//!    Then each worker sums a slice of the gradient over the groups, and all workers apply the same step to their
-//!    replicas of the parameters.
-//! 3. *Report*: the first worker, which is the caller's thread, tells the observer. With `rollouts` above 1, steps 1 and
-//!    2 are done so many times first.
+//! 1. *Collect*: every worker plays a horizon with its agents ([`Collector::collect`]) and estimates advantages.
+//! 2. *Update*: the algorithm ([`Learner::update`]), which shares its work out among the [`workers`]. All workers apply the
+//!    same steps to their replicas.
+//! 3. *Report*: the numbers of the iteration. With `rollouts` above 1, steps 1 and 2 are done so many times first.
 //!
-//! The split into groups and the order of every sum depend on the configuration alone, so the result does not depend on
-//! the number of workers, nor on who did what. The first rollout has no update: it fills the statistics that normalize
-//! observations and rewards, without which the first updates would see inputs and losses of arbitrary size.
+//! The first worker is the caller's thread; with one worker there is no other. The first rollout has no update: it fills the
+//! statistics that normalize observations and rewards, without which the first updates would see inputs and losses of
+//! arbitrary size.
 
 mod barrier;
 pub mod checkpoint;
-pub mod clock;
+mod clock;
 pub mod config;
 pub mod evaluate;
+pub mod flat;
 mod memory;
 pub mod observer;
 pub mod remote;
-pub mod workers;
+mod states;
+pub mod stats;
+mod workers;
 
-use crate::algorithms::a2c;
-use crate::algorithms::acktr;
-use crate::algorithms::parameters::{Layout, Learner, Totals};
-use crate::algorithms::ppo;
-use crate::algorithms::sac;
+use crate::algorithms::loss::LossSums;
+use crate::algorithms::schedule::Progress;
+use crate::algorithms::{Learner, Needs, Now, share};
 use crate::error::Error;
-use crate::lanes::BLOCK;
-use crate::optim::kfac::Kfac;
-use crate::policy::Policy;
-use crate::rewards::MAX_SIGNALS;
-use crate::rollout::collect::{Actor, Rollout};
-use crate::trainer::barrier::Barrier;
-use crate::trainer::checkpoint::Checkpoint;
-use crate::trainer::config::Algorithm;
-use crate::trainer::config::PpoConfig;
-use crate::trainer::config::Schedule;
-use crate::trainer::observer::{Control, IterationStats, Observer, Snapshot};
-use crate::trainer::remote::{Players, Remote, Spent, check_algorithm};
-use crate::trainer::workers::{Means, Partial, Slice, Update, Workspace, group_count};
+use crate::policy::{Policy, PolicyMeta, Training};
+use crate::rollout::collect::Collector;
+use crate::rollout::data::{Experience, Rollout};
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
+use checkpoint::Checkpoint;
+use config::TrainConfig;
+use flat::PpoConfig;
 use marathon_envs::{ShardFactory, Spec};
-use marathon_physics::lanes::{Isa, Real};
-use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, RwLock};
-
-/// Networks of a run at most: policy, value function, signals.
-pub const NETWORKS: usize = 2 + MAX_SIGNALS;
+use marathon_physics::lanes::Isa;
+use observer::{Control, Observer, Snapshot};
+use remote::{Players, Remote, Spent, check_algorithm};
+use stats::IterationStats;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use workers::{Crew, Worker};
 
 /// What a finished run returns.
 #[derive(Debug)]
@@ -93,96 +86,93 @@ pub fn train(
 /// # Panics
 /// As [`train`].
 pub fn train_with(
-    players: Option<&mut dyn Players>,
+    mut players: Option<&mut dyn Players>,
     factory: &dyn ShardFactory,
     isa: Isa,
     config: &PpoConfig,
     resume: Option<Checkpoint>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutput, Error> {
-    config.validate()?;
-    if isa == Isa::F64 || !isa.supported() {
-        return Err(Error::Isa(isa.name(), Isa::best().name()));
-    }
     if players.is_some() {
+        config.validate()?;
         check_algorithm(config)?;
     }
-    memory::check(factory.spec(), config)?;
-    let (mut run, mut learner) = Run::new(factory, isa, config);
-    let mut remote = players.map(|players| Remote::new(players, config));
-    run.elsewhere = remote.is_some();
-    let mut clocks = Clocks::default();
-    if let Some(checkpoint) = resume {
-        checkpoint.restore(&run, &mut learner, &mut clocks)?;
-    }
-
-    let replicas: Vec<Learner> = (1..run.workers()).map(|_| learner.clone()).collect();
-    let (last, diverged) = std::thread::scope(|scope| {
-        for (id, replica) in (1..).zip(replicas) {
-            let run = &run;
-            scope.spawn(move || run.work(id, replica, None));
+    let mut trainer = match resume {
+        None => Trainer::new(factory, isa, config)?,
+        Some(checkpoint) => Trainer::resume(factory, isa, config, checkpoint)?,
+    };
+    let mut last = None;
+    while !trainer.is_done() {
+        let stats = match &mut players {
+            None => trainer.iterate()?,
+            Some(players) => match trainer.iterate_with(&mut **players)? {
+                Some(stats) => stats,
+                None => break,
+            },
+        };
+        let control = observer.iteration(&stats, &Snapshot(&trainer));
+        last = Some(stats);
+        if control == Control::Stop {
+            break;
         }
-        let remote = remote.as_mut();
-        let mut head =
-            Head { observer, clocks: &mut clocks, learner: &mut learner, remote, last: None, diverged: None };
-        let replica = head.learner.clone();
-        run.work(0, replica, Some(&mut head));
-        (head.last, head.diverged)
-    });
-    if let Some(error) = diverged {
-        return Err(error);
     }
-    if let Some(error) = remote.and_then(|remote| remote.error) {
-        return Err(error);
-    }
-    let snapshot = Snapshot::new(&run, &learner, &clocks);
-    Ok(TrainOutput { policy: snapshot.policy(), checkpoint: snapshot.checkpoint(), last })
+    Ok(TrainOutput { policy: trainer.policy(), checkpoint: trainer.checkpoint(), last })
+}
+
+/// A run that is made an iteration at a time.
+pub struct Trainer {
+    flat: PpoConfig,
+    shared: Arc<Shared>,
+    /// The first worker's.
+    replica: Replica,
+    /// The other workers.
+    threads: Vec<JoinHandle<()>>,
+    clocks: Clocks,
 }
 
 /// Seconds used by a run, over all its parts before and after interruptions.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Clocks {
-    /// Wall-clock time, without the observer's.
-    pub wall: f64,
-    /// Processor time of all workers, without the observer's.
-    pub cpu: f64,
+struct Clocks {
+    /// Wall-clock time of iterations.
+    wall: f64,
+    /// Processor time of all workers in them.
+    cpu: f64,
 }
 
-/// What the first worker has besides.
-struct Head<'a, 'p> {
-    observer: &'a mut dyn Observer,
-    clocks: &'a mut Clocks,
-    learner: &'a mut Learner,
-    remote: Option<&'a mut Remote<'p>>,
-    last: Option<IterationStats>,
-    /// Why there is nothing more to learn.
-    diverged: Option<Error>,
-}
-
-/// What the workers share.
-pub struct Run<'a> {
-    pub isa: Isa,
-    pub config: &'a PpoConfig,
-    pub spec: Spec,
-    pub layout: Layout,
-    pub actors: Vec<Mutex<Actor>>,
-    pub rollouts: Vec<RwLock<Rollout>>,
-    /// Gradients of the groups of the current list of samples.
-    pub partials: Vec<RwLock<Partial>>,
-    /// Sums over the groups, a slice per worker.
-    pub slices: Vec<RwLock<Slice>>,
-    pub norm_blocks: Vec<Range<usize>>,
-    /// Next part of a piece of shared work to be taken, for each piece of a rollout.
-    pub tickets: Vec<AtomicUsize>,
+/// What all threads of a run share.
+struct Shared {
+    config: TrainConfig,
+    spec: Spec,
+    crew: Crew,
     seconds: Vec<Mutex<Seconds>>,
-    pub barrier: Barrier,
+    /// Those who play elsewhere have given up.
     stop: AtomicBool,
-    /// Whether others play in the place of the actors, which then only keep the states of the agents.
-    elsewhere: bool,
-    /// What only ACKTR has.
-    pub kfac: Option<Kfac>,
-    /// What only SAC has.
-    pub sac: Option<sac::Shared>,
+    /// Whether others play in the place of the collectors, which then only keep the states of the agents.
+    elsewhere: AtomicBool,
+    /// The run is over for the other threads.
+    quit: AtomicBool,
+}
+
+/// What learning changes; every worker has the same.
+struct Replica {
+    learner: Box<dyn Learner>,
+    statistics: Statistics,
+    progress: Progress,
+}
+
+impl Replica {
+    fn copy(&self) -> Self {
+        Self { learner: self.learner.replica(), statistics: self.statistics.clone(), progress: self.progress }
+    }
+
+    /// Takes in the statistics of a rollout.
+    fn absorb(&mut self, totals: &Totals) {
+        if let Some([before, after]) = self.statistics.absorb(totals, self.progress.iteration == 0) {
+            self.learner.follow(&before, &after);
+        }
+        self.progress.iteration += 1;
+        self.progress.steps += totals.samples as u64;
+    }
 }
 
 /// Seconds that a worker spent in the current iteration.
@@ -194,247 +184,289 @@ struct Seconds {
     update: f64,
 }
 
-impl<'a> Run<'a> {
-    fn new(factory: &dyn ShardFactory, isa: Isa, config: &'a PpoConfig) -> (Self, Learner) {
-        let spec = factory.spec().clone();
-        let layout = Layout::new(&spec, config);
-        let (workers, blocks) = (config.worker_count(), config.blocks());
-        let mut actors = Vec::new();
-        let mut rollouts = Vec::new();
-        for id in 0..workers {
-            let share = share(blocks, workers, id);
-            let place = (share.start, share.len());
-            actors.push(Mutex::new(Actor::new(factory, place, config.seed, &layout)));
-            rollouts.push(RwLock::new(Rollout::new(share.len(), config.horizon, (spec.obs, spec.act), &layout)));
+/// Sums over an iteration.
+#[derive(Default)]
+struct Sums {
+    totals: Totals,
+    updates: LossSums,
+}
+
+impl Trainer {
+    /// A run at its start.
+    ///
+    /// # Errors
+    /// If the configuration is invalid, or the run needs more memory than there is.
+    pub fn new(factory: &dyn ShardFactory, isa: Isa, config: &PpoConfig) -> Result<Self, Error> {
+        Self::make(factory, isa, config, None)
+    }
+
+    /// A run that goes on from a checkpoint, with the same bits as if it had never stopped.
+    ///
+    /// # Errors
+    /// The same, and if the checkpoint belongs to another task, network or number of agents.
+    pub fn resume(
+        factory: &dyn ShardFactory,
+        isa: Isa,
+        config: &PpoConfig,
+        checkpoint: Checkpoint,
+    ) -> Result<Self, Error> {
+        Self::make(factory, isa, config, Some(checkpoint))
+    }
+
+    fn make(factory: &dyn ShardFactory, isa: Isa, flat: &PpoConfig, resume: Option<Checkpoint>) -> Result<Self, Error> {
+        flat.validate()?;
+        let config = TrainConfig::from(flat);
+        if isa == Isa::F64 || !isa.supported() {
+            return Err(Error::Isa(isa.name(), Isa::best().name()));
         }
-        let largest = (0..config.minibatches).map(|m| share(item_count(config), config.minibatches, m).len()).max();
-        let groups = group_count(largest.unwrap_or(1));
-        let kfac = match &config.algorithm {
-            Algorithm::Acktr(_) => Some(Kfac::new(&layout)),
-            _ => None,
+        let spec = factory.spec().clone();
+        let setup = config.setup(&spec, isa);
+        memory::check(&setup, &config)?;
+        let (workers, blocks) = (config.run.worker_count(), config.run.blocks());
+        let shares: Vec<_> = (0..workers).map(|id| share(blocks, workers, id)).collect();
+        let of_workers: Vec<usize> = shares.iter().map(|share| share.len()).collect();
+        let replica = Replica {
+            learner: config.algorithm.learner(&setup, &of_workers),
+            statistics: Statistics::new(spec.obs, config.statistics),
+            progress: Progress { iteration: 0, steps: 0, total_steps: config.run.total_steps },
         };
-        let sac = match &config.algorithm {
-            Algorithm::Sac(settings) => {
-                let of_workers: Vec<usize> = (0..workers).map(|id| share(blocks, workers, id).len()).collect();
-                Some(sac::Shared::new(settings, config.agents, &of_workers, (spec.obs, spec.act)))
-            }
-            _ => None,
+        let (with, shape) = (replica.learner.collecting(&replica.statistics), replica.learner.shape());
+        let collector = |share: &std::ops::Range<usize>| {
+            let place = (share.start, share.len());
+            Collector::new(factory, place, config.run.seed, shape.lanes, &with)
         };
-        let (pieces, groups) = match &config.algorithm {
-            Algorithm::Sac(sac) => (sac.updates, group_count(sac.batch / BLOCK)),
-            _ => (config.epochs * config.minibatches, groups),
-        };
-        let moments = kfac.as_ref().map_or(0, Kfac::moments_len);
-        let norm_blocks = layout.norm_blocks();
-        let slice = |id| Slice::new(&norm_blocks[share(norm_blocks.len(), workers, id)]);
-        let learner = Learner::new(&layout, &spec, config);
-        let run = Self {
-            isa,
-            config,
-            actors,
-            rollouts,
-            partials: (0..groups).map(|_| RwLock::new(Partial::new(layout.len, moments))).collect(),
-            slices: (0..workers).map(|id| RwLock::new(slice(id))).collect(),
-            norm_blocks,
-            // one more than minibatches: ACKTR shares the factors of the layers out as well
-            tickets: (0..=pieces).map(|_| AtomicUsize::new(0)).collect(),
+        let collectors = shares.iter().map(collector).collect();
+        let rollouts = shares.iter().map(|share| Rollout::new(share.len(), config.run.horizon, &shape)).collect();
+        let Needs { items, moments, .. } = config.algorithm.needs(&setup);
+        let crew = Crew::new(isa, &*replica.learner, (items, moments), collectors, rollouts);
+        let shared = Shared {
             seconds: (0..workers).map(|_| Mutex::default()).collect(),
-            barrier: Barrier::new(workers),
             stop: AtomicBool::new(false),
-            elsewhere: false,
-            kfac,
-            sac,
+            elsewhere: AtomicBool::new(false),
+            quit: AtomicBool::new(false),
+            crew,
             spec,
-            layout,
+            config,
         };
-        (run, learner)
-    }
-
-    /// Number of workers.
-    pub fn workers(&self) -> usize {
-        self.rollouts.len()
-    }
-
-    /// The program of worker `id`.
-    fn work(&self, id: usize, mut learner: Learner, mut head: Option<&mut Head<'_, '_>>) {
-        let _guard = self.barrier.guard();
-        let mut space = Workspace::new(self);
-        let mut done = learner.steps >= self.config.total_steps;
-        while !done {
-            let (cpu, start) = (clock::thread_cpu(), clock::wall());
-            let (mut seconds, mut totals, mut means) = (Seconds::default(), Totals::default(), Means::default());
-            let mut cpu_elsewhere = 0.0;
-            // a run that was given up halfway goes on there
-            let first = learner.iteration % self.config.rollouts as u64;
-            for n in first..self.config.rollouts as u64 {
-                let begin = clock::wall();
-                let spent = self.collect(id, &learner, head.as_deref_mut());
-                seconds.env += spent.env;
-                cpu_elsewhere += spent.cpu_elsewhere;
-                seconds.collect += clock::wall() - begin;
-                if id == 0 {
-                    self.tickets.iter().for_each(|t| t.store(0, Ordering::Relaxed));
-                }
-                self.barrier.wait();
-                if self.stop.load(Ordering::Acquire) {
-                    // those who play elsewhere have given up
-                    if n == first {
+        let mut trainer = Self {
+            flat: flat.clone(),
+            shared: Arc::new(shared),
+            replica,
+            threads: Vec::new(),
+            clocks: Clocks::default(),
+        };
+        if let Some(checkpoint) = resume {
+            checkpoint.restore(&mut trainer)?;
+        }
+        for id in 1..workers {
+            let (shared, mut replica) = (trainer.shared.clone(), trainer.replica.copy());
+            let work = move || {
+                let _guard = shared.crew.barrier.guard();
+                loop {
+                    shared.crew.barrier.wait();
+                    if shared.quit.load(Ordering::Acquire) {
                         return;
                     }
-                    break;
+                    shared.iterate(id, &mut replica, None);
                 }
-
-                let begin = clock::wall();
-                totals.add(&self.learn(id, &mut learner, &mut space, &mut means));
-                seconds.update += clock::wall() - begin;
-                seconds.cpu = clock::thread_cpu() - cpu + cpu_elsewhere;
-                *self.seconds[id].lock().expect("no worker has panicked") = seconds;
-                self.barrier.wait();
-            }
-            done = learner.steps >= self.config.total_steps;
-            if let Some(head) = &mut head {
-                self.report(head, &learner, &totals, &means, clock::wall() - start);
-            }
-            self.barrier.wait();
-            done |= self.stop.load(Ordering::Acquire);
+            };
+            trainer.threads.push(std::thread::spawn(work));
         }
+        Ok(trainer)
     }
 
-    /// Learns from the rollout of all workers.
-    fn learn(&self, id: usize, learner: &mut Learner, space: &mut Workspace, means: &mut Means) -> Totals {
-        let rollouts: Vec<_> = self.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
-        let totals = Totals::new(&rollouts, self.config.horizon);
-        // the first rollout only fills the statistics, and a replay
-        if learner.iteration > 0 || self.sac.is_some() {
-            let rollouts: Vec<&Rollout> = rollouts.iter().map(|r| &**r).collect();
-            // which rollout a block is in, and its place there
-            let place = rollouts.iter().enumerate().flat_map(|(r, x)| (0..x.blocks()).map(move |b| (r, b))).collect();
-            let update = Update { run: self, id, learner, totals: &totals, rollouts, place, space, means };
-            match &self.config.algorithm {
-                Algorithm::Ppo => ppo::update(update),
-                Algorithm::A2c(a2c) => a2c::update(update, a2c),
-                Algorithm::Acktr(acktr) => acktr::update(update, acktr),
-                Algorithm::Sac(sac) => sac::update(update, sac),
-            }
+    /// Whether all steps are done.
+    pub fn is_done(&self) -> bool {
+        self.replica.progress.steps >= self.shared.config.run.total_steps
+    }
+    /// The task.
+    pub fn spec(&self) -> &Spec {
+        &self.shared.spec
+    }
+
+    /// Makes the next iteration.
+    ///
+    /// # Errors
+    /// If a parameter is no longer finite; the run cannot go on then.
+    ///
+    /// # Panics
+    /// If an environment panics; all workers end.
+    pub fn iterate(&mut self) -> Result<IterationStats, Error> {
+        let (sums, seconds) = self.work(None).expect("nobody but players gives up");
+        self.report(&sums, seconds)
+    }
+
+    /// The same with rollouts that `players` play. None if they end the run before the iteration; an iteration of several
+    /// rollouts that they end halfway is reported as far as it got.
+    ///
+    /// # Errors
+    /// The same, and if what the players deliver does not fit.
+    pub fn iterate_with(&mut self, players: &mut dyn Players) -> Result<Option<IterationStats>, Error> {
+        check_algorithm(&self.flat)?;
+        let mut remote = Remote::new(players, &self.shared.config.run);
+        let made = self.work(Some(&mut remote));
+        if let Some(error) = remote.error {
+            return Err(error);
         }
-        learner.absorb(&totals, &self.layout, self.config);
-        totals
+        made.map(|(sums, seconds)| self.report(&sums, seconds)).transpose()
     }
 
-    /// Plays a horizon with the worker's agents. If others play, the first worker has them play all agents.
-    fn collect(&self, id: usize, learner: &Learner, head: Option<&mut Head<'_, '_>>) -> Spent {
-        if self.elsewhere {
-            let Some(remote) = head.and_then(|head| head.remote.as_mut()) else { return Spent::default() };
-            let spent = remote.collect(self, learner);
-            return spent.unwrap_or_else(|| {
-                self.stop.store(true, Ordering::Release);
-                Spent::default()
-            });
-        }
-        let mut actor = self.actors[id].lock().expect("no worker has panicked");
-        let mut rollout = self.rollouts[id].write().expect("no worker has panicked");
-        let env = learner.acting(self.isa, &self.layout, self.config, |acting| actor.collect(acting, &mut rollout));
-        Spent { env, cpu_elsewhere: 0.0 }
+    /// Has all workers make an iteration; returns its sums and its seconds, unless the players have ended the run before it.
+    fn work(&mut self, remote: Option<&mut Remote<'_>>) -> Option<(Sums, f64)> {
+        let start = clock::wall();
+        let shared = &self.shared;
+        let _guard = shared.crew.barrier.guard();
+        shared.stop.store(false, Ordering::Release);
+        shared.elsewhere.store(remote.is_some(), Ordering::Release);
+        shared.crew.barrier.wait();
+        let sums = shared.iterate(0, &mut self.replica, remote)?;
+        Some((sums, clock::wall() - start))
     }
 
-    /// A setting on its linear way from `first` to `last` over the run; it stays where there is no `last`.
-    pub fn moved(&self, learner: &Learner, first: f64, last: Option<f64>) -> f64 {
-        let progress = (learner.steps as f64 / self.config.total_steps as f64).min(1.0);
-        first + (last.unwrap_or(first) - first) * progress
+    /// The policy as it is now.
+    pub fn policy(&self) -> Policy {
+        let (config, Replica { learner, statistics, progress }) = (&self.shared.config, &self.replica);
+        let mut meta =
+            PolicyMeta::of(&self.shared.spec, config.network.actor_hidden.clone(), config.network.activation);
+        meta.observation_clip = config.statistics.observation_clip as f32;
+        let config = PpoConfig { threads: 0, ..self.flat.clone() };
+        meta.training = Some(Training {
+            config: serde_json::to_value(config).expect("a configuration is plain data"),
+            steps: progress.steps,
+            iterations: progress.iteration,
+        });
+        learner.policy(meta, statistics.normalizer())
     }
 
-    /// The part of its first value that a learning rate still has under the linear schedule; 1 under the others.
-    pub fn linear(&self, learner: &Learner) -> f64 {
-        match self.config.schedule {
-            // an iteration of several rollouts may lead beyond the end
-            Schedule::Linear => (1.0 - learner.steps as f64 / self.config.total_steps as f64).max(0.0),
-            Schedule::Constant | Schedule::Adaptive => 1.0,
-        }
+    /// Everything needed to go on from here.
+    pub fn checkpoint(&self) -> Checkpoint {
+        Checkpoint::of(self)
     }
 
-    /// Number of blocks of samples in a rollout.
-    pub fn items(&self) -> usize {
-        item_count(self.config)
-    }
-
-    /// Keeps the standard deviations of the actions within their bounds.
-    pub fn bound_std(&self, learner: &mut Learner) {
-        let min_std = self.moved(learner, self.config.min_std, self.config.final_min_std);
-        let [low, high] = [min_std, self.config.max_std].map(|s| Real::ln(s) as f32);
-        learner.params[self.layout.log_std.clone()].iter_mut().for_each(|l| *l = l.clamp(low, high));
-    }
-
-    /// Tells the observer about the iteration.
-    fn report(&self, head: &mut Head<'_, '_>, learner: &Learner, totals: &Totals, means: &Means, wall: f64) {
+    /// The numbers of an iteration.
+    fn report(&mut self, sums: &Sums, wall: f64) -> Result<IterationStats, Error> {
+        let (shared, Replica { learner, progress, .. }) = (&self.shared, &self.replica);
         let mut seconds = Seconds::default();
-        for of_worker in &self.seconds {
+        for of_worker in &shared.seconds {
             let s = of_worker.lock().expect("no worker has panicked");
             seconds.cpu += s.cpu;
             seconds.env += s.env;
             seconds.collect += s.collect;
             seconds.update += s.update;
         }
-        head.clocks.wall += wall;
-        head.clocks.cpu += seconds.cpu;
-        head.learner.clone_from(learner);
-        let count = learner.params.iter().filter(|x| !x.is_finite()).count();
+        self.clocks.wall += wall;
+        self.clocks.cpu += seconds.cpu;
+        let parameters = learner.params();
+        let count = parameters.iter().filter(|x| !x.is_finite()).count();
         if count > 0 {
-            let PpoConfig { lr, value_lr, .. } = *self.config;
-            let parameters = learner.params.len();
-            head.diverged = Some(Error::Diverged { count, parameters, steps: learner.steps, lr, value_lr });
-            self.stop.store(true, Ordering::Release);
-            return;
+            let PpoConfig { lr, value_lr, .. } = self.flat;
+            let parameters = parameters.len();
+            return Err(Error::Diverged { count, parameters, steps: progress.steps, lr, value_lr });
         }
 
-        let (sums, gaussian) = (&totals.sums, learner.gaussian(&self.layout));
+        let Sums { totals, updates } = sums;
+        let sums = &totals.sums;
         let per_episode = |x: f64| (sums.episodes > 0.0).then(|| x / sums.episodes);
-        let per_sample = |x: f64| if means.samples > 0.0 { x / means.samples } else { 0.0 };
-        let signals = self.config.signals.iter().zip(&sums.signals);
-        let (explained_variance, entropy, std_mean) = match self.sac {
-            // the deviations depend on the state, and the values are not those of a rollout
-            Some(_) => (0.0, per_sample(means.sums.entropy), per_sample(means.sums.std)),
-            None => (totals.explained_variance(), gaussian.entropy(), gaussian.mean_std()),
-        };
+        let per_sample = |x: f64| if updates.samples > 0.0 { x / updates.samples } else { 0.0 };
+        let signals = self.flat.signals.iter().zip(&sums.rewards);
+        let about = learner.describe(totals, updates);
         let worked = (seconds.collect + seconds.update).max(1e-12);
-        let stats = IterationStats {
-            iteration: learner.iteration,
-            steps: learner.steps,
-            wall_seconds: head.clocks.wall,
-            cpu_seconds: head.clocks.cpu,
+        Ok(IterationStats {
+            iteration: progress.iteration,
+            steps: progress.steps,
+            wall_seconds: self.clocks.wall,
+            cpu_seconds: self.clocks.cpu,
             env_share: seconds.env / worked,
             update_share: seconds.update / worked,
             episodes: sums.episodes as u64,
             return_mean: per_episode(sums.returns),
             length_mean: per_episode(sums.lengths),
-            speed_mean: per_episode(sums.speeds / self.spec.dt),
+            speed_mean: per_episode(sums.speeds / shared.spec.dt),
             fall_fraction: per_episode(sums.falls),
             diverged: sums.diverged as u64,
             reward_terms: sums.terms.iter().map(|x| x / totals.samples).collect(),
-            kl: per_sample(means.sums.kl),
-            clip_fraction: per_sample(means.sums.clipped),
-            policy_loss: per_sample(means.sums.policy),
-            value_loss: per_sample(means.sums.value),
-            explained_variance,
-            entropy,
-            std_mean,
-            lr: learner.lr,
-            skipped_minibatches: learner.skipped,
+            kl: per_sample(updates.kl),
+            clip_fraction: per_sample(updates.clipped),
+            policy_loss: per_sample(updates.policy),
+            value_loss: per_sample(updates.value),
+            explained_variance: about.explained_variance,
+            entropy: about.entropy,
+            std_mean: about.std_mean,
+            lr: about.lr,
+            skipped_minibatches: about.skipped,
             signal_rewards: signals.map(|(signal, x)| (signal.kind, x / totals.samples)).collect(),
-        };
-        let snapshot = Snapshot::new(self, head.learner, head.clocks);
-        if head.observer.iteration(&stats, &snapshot) == Control::Stop {
-            self.stop.store(true, Ordering::Release);
-        }
-        head.last = Some(stats);
+        })
     }
 }
 
-/// Pairs of decision and block in a rollout.
-fn item_count(config: &PpoConfig) -> usize {
-    config.blocks() * config.horizon
+impl Drop for Trainer {
+    /// Ends the other workers.
+    fn drop(&mut self) {
+        self.shared.quit.store(true, Ordering::Release);
+        self.shared.crew.barrier.leave();
+        for thread in self.threads.drain(..) {
+            // one that has panicked has said so, and the first worker has panicked with it
+            let _ = thread.join();
+        }
+    }
 }
 
-/// Part `i` of `0..n` split into `parts` nearly equal runs.
-pub fn share(n: usize, parts: usize, i: usize) -> Range<usize> {
-    n * i / parts..n * (i + 1) / parts
+impl Shared {
+    /// Worker `id`'s part in an iteration. None if the players have ended the run before it.
+    fn iterate(&self, id: usize, replica: &mut Replica, mut remote: Option<&mut Remote<'_>>) -> Option<Sums> {
+        let (cpu, mut cpu_elsewhere) = (clock::thread_cpu(), 0.0);
+        let (mut seconds, mut sums) = (Seconds::default(), Sums::default());
+        // a run that was given up halfway goes on there
+        let rollouts = self.config.run.rollouts as u64;
+        let first = replica.progress.iteration % rollouts;
+        for n in first..rollouts {
+            let begin = clock::wall();
+            let spent = self.collect(id, replica, remote.as_deref_mut());
+            seconds.env += spent.env;
+            cpu_elsewhere += spent.cpu_elsewhere;
+            seconds.collect += clock::wall() - begin;
+            self.crew.barrier.wait();
+            if self.stop.load(Ordering::Acquire) {
+                if n == first {
+                    return None;
+                }
+                break;
+            }
+
+            let begin = clock::wall();
+            sums.totals.add(&self.learn(id, replica, &mut sums.updates));
+            seconds.update += clock::wall() - begin;
+            seconds.cpu = clock::thread_cpu() - cpu + cpu_elsewhere;
+            *self.seconds[id].lock().expect("no worker has panicked") = seconds;
+            self.crew.barrier.wait();
+        }
+        Some(sums)
+    }
+
+    /// Learns from the rollout of all workers.
+    fn learn(&self, id: usize, replica: &mut Replica, sums: &mut LossSums) -> Totals {
+        let rollouts: Vec<_> = self.crew.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
+        let totals = Totals::new(&rollouts, self.config.run.horizon);
+        let experience = Experience::new(rollouts.iter().map(|r| &**r).collect(), &totals, id);
+        let now = Now { progress: &replica.progress, statistics: &replica.statistics };
+        replica.learner.update(&mut Worker::new(&self.crew, id), &experience, now, sums);
+        replica.absorb(&totals);
+        totals
+    }
+
+    /// Plays a horizon with the worker's agents. If others play, the first worker has them play all agents.
+    fn collect(&self, id: usize, replica: &Replica, remote: Option<&mut Remote<'_>>) -> Spent {
+        if self.elsewhere.load(Ordering::Acquire) {
+            let Some(remote) = remote else { return Spent::default() };
+            return remote.collect(self, replica).unwrap_or_else(|| {
+                self.stop.store(true, Ordering::Release);
+                Spent::default()
+            });
+        }
+        let mut collector = self.crew.collectors[id].lock().expect("no worker has panicked");
+        let mut rollout = self.crew.rollouts[id].write().expect("no worker has panicked");
+        let with = replica.learner.collecting(&replica.statistics);
+        let env = collector.collect(&with, &mut rollout, clock::wall);
+        Spent { env, cpu_elsewhere: 0.0 }
+    }
 }

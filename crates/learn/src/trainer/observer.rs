@@ -1,65 +1,9 @@
 //! What a caller sees of a run, and how it takes part.
 
-use crate::algorithms::parameters::Learner;
+use super::Trainer;
+use super::checkpoint::Checkpoint;
+use super::stats::IterationStats;
 use crate::policy::Policy;
-use crate::rewards::SignalKind;
-use crate::trainer::checkpoint::Checkpoint;
-use crate::trainer::{Clocks, Run};
-use serde::{Deserialize, Serialize};
-
-/// Numbers of one iteration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct IterationStats {
-    /// Iterations done, the first being 1.
-    pub iteration: u64,
-    /// Agent-steps done.
-    pub steps: u64,
-    /// Seconds since the start, without the observer's own and those between an interruption and its resumption.
-    pub wall_seconds: f64,
-    /// Processor seconds of all threads, in the same sense.
-    pub cpu_seconds: f64,
-    /// Part of the workers' time spent in the environments.
-    pub env_share: f64,
-    /// Part of the workers' time spent on gradients and waiting for each other.
-    pub update_share: f64,
-
-    /// Episodes that ended in this iteration.
-    pub episodes: u64,
-    /// Their mean return; none if no episode ended.
-    pub return_mean: Option<f64>,
-    /// Their mean length, decisions.
-    pub length_mean: Option<f64>,
-    /// Mean over them of distance along +x by time, m/s.
-    pub speed_mean: Option<f64>,
-    /// Part of them that ended in a terminal state.
-    pub fall_fraction: Option<f64>,
-    /// Agents whose simulation stopped being finite in this iteration.
-    pub diverged: u64,
-    /// Mean of each reward term per decision, in the order of the task's names.
-    pub reward_terms: Vec<f64>,
-
-    /// Estimated divergence of the policy from the one that acted, mean over the updates, nats.
-    pub kl: f64,
-    /// Part of the samples whose ratio was clipped.
-    pub clip_fraction: f64,
-    /// Mean policy objective, without the entropy.
-    pub policy_loss: f64,
-    /// Mean value loss, in units of the scaled return squared.
-    pub value_loss: f64,
-    /// Part of the returns' variance that the value function foresaw; 1 is perfect.
-    pub explained_variance: f64,
-    /// Entropy of the policy, nats.
-    pub entropy: f64,
-    /// Mean standard deviation of the actions.
-    pub std_mean: f64,
-    /// Learning rate of the policy.
-    pub lr: f64,
-    /// Minibatches left out in the whole run because their gradient was not finite.
-    pub skipped_minibatches: u64,
-    /// Mean reward of each signal per decision, in the order of the configuration.
-    #[serde(default)]
-    pub signal_rewards: Vec<(SignalKind, f64)>,
-}
 
 /// What an observer wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,22 +28,15 @@ impl<F: FnMut(&IterationStats, &Snapshot<'_>) -> Control> Observer for F {
 }
 
 /// The state of a run between two iterations.
-pub struct Snapshot<'a> {
-    run: &'a Run<'a>,
-    learner: &'a Learner,
-    clocks: &'a Clocks,
-}
+pub struct Snapshot<'a>(pub(super) &'a Trainer);
 
-impl<'a> Snapshot<'a> {
-    pub(crate) fn new(run: &'a Run<'a>, learner: &'a Learner, clocks: &'a Clocks) -> Self {
-        Self { run, learner, clocks }
-    }
+impl Snapshot<'_> {
     /// The policy as it is now.
     pub fn policy(&self) -> Policy {
-        Policy::of(self.run, self.learner)
+        self.0.policy()
     }
     /// Everything needed to go on from here.
     pub fn checkpoint(&self) -> Checkpoint {
-        Checkpoint::of(self.run, self.learner, self.clocks)
+        self.0.checkpoint()
     }
 }

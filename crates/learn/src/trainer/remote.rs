@@ -8,17 +8,19 @@
 //!
 //! All messages are safetensors; nothing in them is code.
 
-use crate::algorithms::parameters::{Layout, Learner};
+use super::config::{RunConfig, TrainConfig};
+use super::flat::{Algorithm, PpoConfig};
+use super::observer::Control;
+use super::{Replica, Shared, clock, states};
+use crate::algorithms::schedule::Progress;
+use crate::algorithms::share;
 use crate::error::Error;
 use crate::files::{TensorReader, TensorWriter};
-use crate::rollout::collect::{Actor, Rollout};
-use crate::rollout::states::Agents;
+use crate::rollout::collect::Collector;
+use crate::rollout::data::Rollout;
+use crate::rollout::states::AgentStates;
+use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::BlockSums;
-use crate::trainer::clock;
-use crate::trainer::config::Algorithm;
-use crate::trainer::config::PpoConfig;
-use crate::trainer::observer::Control;
-use crate::trainer::{Run, share};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
@@ -76,13 +78,10 @@ pub trait Players {
 
 /// Plays the agents of one slice of a run.
 pub struct Player {
-    isa: Isa,
-    config: PpoConfig,
     spec: Spec,
-    layout: Layout,
-    learner: Learner,
+    replica: Replica,
     blocks: Range<usize>,
-    actor: Actor,
+    collector: Collector,
     rollout: Rollout,
 }
 
@@ -108,19 +107,19 @@ impl Player {
             });
         }
         let spec = factory.spec().clone();
-        let layout = Layout::new(&spec, config);
-        let blocks = share(config.blocks(), slices, slice);
-        let place = (blocks.start, blocks.len());
-        Ok(Self {
-            isa,
-            learner: Learner::new(&layout, &spec, config),
-            actor: Actor::new(factory, place, config.seed, &layout),
-            rollout: Rollout::new(blocks.len(), config.horizon, (spec.obs, spec.act), &layout),
-            config: config.clone(),
-            spec,
-            layout,
-            blocks,
-        })
+        let config = TrainConfig::from(config);
+        let blocks = share(config.run.blocks(), slices, slice);
+        let replica = Replica {
+            learner: config.algorithm.learner(&config.setup(&spec, isa), &[blocks.len()]),
+            statistics: Statistics::new(spec.obs, config.statistics),
+            progress: Progress { iteration: 0, steps: 0, total_steps: config.run.total_steps },
+        };
+        let (shape, place) = (replica.learner.shape(), (blocks.start, blocks.len()));
+        let with = replica.learner.collecting(&replica.statistics);
+        let collector = Collector::new(factory, place, config.run.seed, shape.lanes, &with);
+        let rollout = Rollout::new(blocks.len(), config.run.horizon, &shape);
+        drop(with);
+        Ok(Self { replica, collector, rollout, spec, blocks })
     }
 
     /// Plays one horizon with the orders and from the state that a learner sent, and returns the answer. The same
@@ -130,25 +129,24 @@ impl Player {
     /// If the messages are damaged or belong to another task, network or slice.
     pub fn play(&mut self, orders: &[u8], state: &[u8]) -> Result<Vec<u8>, Error> {
         let cpu = clock::thread_cpu();
-        let learner = &mut self.learner;
+        let Replica { learner, statistics, .. } = &mut self.replica;
         let orders = Message::Orders.open(orders)?;
-        learner.params = orders.finite("params", &[self.layout.len])?;
-        learner.observations.mean = orders.get("obs_mean", &[self.spec.obs])?;
-        learner.observations.var = orders.get("obs_var", &[self.spec.obs])?;
+        *learner.params_mut() = orders.finite("params", &[learner.params().len()])?;
+        statistics.observations.mean = orders.get("obs_mean", &[self.spec.obs])?;
+        statistics.observations.var = orders.get("obs_var", &[self.spec.obs])?;
         let returns: Vec<f64> = orders.get("returns", &[2])?;
-        (learner.returns.mean[0], learner.returns.var[0]) = (returns[0], returns[1]);
+        (statistics.returns.mean[0], statistics.returns.var[0]) = (returns[0], returns[1]);
 
         let what = Message::Agents.format();
-        let agents = Agents::read(&Message::Agents.open(state)?)?;
+        let agents = states::read(&Message::Agents.open(state)?)?;
         agents.check(what, self.blocks.len(), self.spec.obs)?;
-        agents.put(what, self.blocks.clone(), &mut self.actor)?;
+        agents.put(what, self.blocks.clone(), &mut self.collector)?;
 
-        let (actor, rollout) = (&mut self.actor, &mut self.rollout);
-        let env = self.learner.acting(self.isa, &self.layout, &self.config, |acting| actor.collect(acting, rollout));
+        let env = self.collector.collect(&learner.collecting(statistics), &mut self.rollout, clock::wall);
 
         let mut file = TensorWriter::default();
         write_rollout(&self.rollout, &mut file);
-        Agents::of([&*actor], self.blocks.clone()).write(&mut file);
+        states::write(&AgentStates::of([&self.collector], self.blocks.clone()), &mut file);
         file.list("seconds", &[env, clock::thread_cpu() - cpu]);
         Ok(Message::Rollout.close(&file))
     }
@@ -188,25 +186,26 @@ pub struct Remote<'a> {
 
 impl<'a> Remote<'a> {
     /// For a run with a configuration.
-    pub fn new(players: &'a mut dyn Players, config: &PpoConfig) -> Self {
+    pub fn new(players: &'a mut dyn Players, config: &RunConfig) -> Self {
         let n = players.slices().clamp(1, config.blocks());
         let slices = (0..n).map(|i| share(config.blocks(), n, i)).collect();
         Self { players, slices, error: None }
     }
 
-    /// Has one horizon played; fills the rollouts and brings the actors into the states in which their agents are then.
+    /// Has one horizon played; fills the rollouts and brings the collectors into the states in which their agents are then.
     /// `None` if the run is to end: nothing has changed then, except after an error.
-    pub fn collect(&mut self, run: &Run<'_>, learner: &Learner) -> Option<Spent> {
-        let locked = || run.actors.iter().map(|actor| actor.lock().expect("no worker has panicked"));
+    pub(super) fn collect(&mut self, run: &Shared, replica: &Replica) -> Option<Spent> {
+        let Replica { learner, statistics, .. } = replica;
+        let locked = || run.crew.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
         let mut orders = TensorWriter::default();
-        orders.list("params", &learner.params);
-        orders.list("obs_mean", &learner.observations.mean);
-        orders.list("obs_var", &learner.observations.var);
-        orders.list("returns", &[learner.returns.mean[0], learner.returns.var[0]]);
+        orders.list("params", learner.params());
+        orders.list("obs_mean", &statistics.observations.mean);
+        orders.list("obs_var", &statistics.observations.var);
+        orders.list("returns", &[statistics.returns.mean[0], statistics.returns.var[0]]);
         let orders = Message::Orders.close(&orders);
         let states = self.slices.iter().map(|slice| {
             let mut file = TensorWriter::default();
-            Agents::of(locked(), slice.clone()).write(&mut file);
+            states::write(&AgentStates::of(locked(), slice.clone()), &mut file);
             Message::Agents.close(&file)
         });
         let states: Vec<Vec<u8>> = states.collect();
@@ -220,7 +219,7 @@ impl<'a> Remote<'a> {
                 expected: format!("one below {}", slices.len()),
             };
             let blocks = slices.get(i).ok_or_else(none)?.len();
-            answers[i] = Some(Answer::read(bytes, run, blocks)?);
+            answers[i] = Some(Answer::read(bytes, run, replica, blocks)?);
             Ok(())
         });
         if control == Control::Stop {
@@ -236,8 +235,8 @@ impl<'a> Remote<'a> {
 
         let mut spent = Spent::default();
         for (answer, slice) in answers.iter().flatten().zip(slices) {
-            for mut actor in locked() {
-                if let Err(error) = answer.agents.put(Message::Rollout.format(), slice.clone(), &mut actor) {
+            for mut collector in locked() {
+                if let Err(error) = answer.agents.put(Message::Rollout.format(), slice.clone(), &mut collector) {
                     self.error = Some(error);
                     return None;
                 }
@@ -246,7 +245,7 @@ impl<'a> Remote<'a> {
             spent.cpu_elsewhere += answer.seconds[1];
         }
         let mut all = answers.iter().flatten().flat_map(|a| (0..a.rollout.blocks()).map(|b| (&a.rollout, b)));
-        for rollout in &run.rollouts {
+        for rollout in &run.crew.rollouts {
             let mut rollout = rollout.write().expect("no worker has panicked");
             rollout.sums.clear();
             for b in 0..rollout.blocks() {
@@ -261,23 +260,23 @@ impl<'a> Remote<'a> {
 /// What a player has sent back.
 struct Answer {
     rollout: Rollout,
-    agents: Agents,
+    agents: AgentStates,
     seconds: Vec<f64>,
 }
 
 impl Answer {
-    fn read(bytes: &[u8], run: &Run<'_>, blocks: usize) -> Result<Self, Error> {
+    fn read(bytes: &[u8], run: &Shared, replica: &Replica, blocks: usize) -> Result<Self, Error> {
         let spec = &run.spec;
         let file = Message::Rollout.open(bytes)?;
-        let mut rollout = Rollout::new(blocks, run.config.horizon, (spec.obs, spec.act), &run.layout);
-        read_rollout(&mut rollout, &file, spec, run.config.signals.len())?;
-        let agents = Agents::read(&file)?;
+        let mut rollout = Rollout::new(blocks, run.config.run.horizon, &replica.learner.shape());
+        read_rollout(&mut rollout, &file, spec, run.config.rewards.len() - 1)?;
+        let agents = states::read(&file)?;
         agents.check(Message::Rollout.format(), blocks, spec.obs)?;
         Ok(Self { rollout, agents, seconds: file.get("seconds", &[2])? })
     }
 }
 
-/// Numbers of a block's sums, except for its observations, reward terms and signals.
+/// Numbers of a block's sums, except for its observations, reward terms and rewards.
 const SUMS: usize = 14;
 
 /// What a learner needs of a rollout.
@@ -288,21 +287,21 @@ fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
     let sums = rollout.sums.iter().flat_map(|s| {
         let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged];
         let pairs = [s.discounted, s.advantages, s.targets, s.errors].into_iter().chain(s.observations.iter().copied());
-        let rest = s.terms.iter().chain(&s.signals).copied();
+        let rest = s.terms.iter().chain(&s.rewards).copied();
         scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(rest).collect::<Vec<_>>()
     });
     file.list("sums", &sums.collect::<Vec<f64>>());
 }
 
-fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, signals: usize) -> Result<(), Error> {
+fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, rewards: usize) -> Result<(), Error> {
     for (name, rows) in rollout.rows_mut() {
         rows.copy_from_slice(&file.get::<f32>(name, &[rows.len()])?);
     }
-    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + signals;
+    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + rewards;
     let sums: Vec<f64> = file.get("sums", &[rollout.blocks() * row])?;
     let read = |row: &[f64]| {
         let (scalars, rest) = row.split_at(SUMS + 2 * spec.obs);
-        let (terms, signals) = rest.split_at(spec.reward_terms.len());
+        let (terms, rewards) = rest.split_at(spec.reward_terms.len());
         let pair = |i: usize| (scalars[i], scalars[i + 1]);
         BlockSums {
             episodes: scalars[0],
@@ -317,7 +316,7 @@ fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, sig
             errors: pair(12),
             observations: (0..spec.obs).map(|i| pair(SUMS + 2 * i)).collect(),
             terms: terms.to_vec(),
-            signals: signals.to_vec(),
+            rewards: rewards.to_vec(),
         }
     };
     rollout.sums = sums.chunks_exact(row).map(read).collect();

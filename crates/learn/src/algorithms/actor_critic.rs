@@ -1,0 +1,365 @@
+//! What the algorithms share that learn from their own rollouts: a policy and a value function as separate networks, the
+//! networks of the rewards, and the gradient of the objective on all of them.
+
+use super::loss::{Loss, LossSums, Objective};
+use super::parameters::Places;
+use super::schedule::{Moving, Progress, Schedule};
+use super::{Description, Needs, Partial, Setup, Workers, check};
+use crate::error::Error;
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::f32_lanes;
+use crate::lanes::noise::{PARAMETERS, SplitMix};
+use crate::nets::acting::{Acting, Distribution};
+use crate::nets::gaussian::{Gaussian, Ratio, bound_std};
+use crate::nets::mlp::{CHUNK, Mlp, Tape};
+use crate::nets::normalize::Normalizer;
+use crate::optim::kfac::Kfac;
+use crate::optim::sum;
+use crate::policy::{Policy, PolicyMeta};
+use crate::rewards::{Judge, Stream};
+use crate::rollout::collect::{Collecting, Values};
+use crate::rollout::data::{Experience, Rollout, Samples, Shape};
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
+use marathon_physics::lanes::{Isa, Real};
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+use std::ops::Range;
+
+/// Standard deviations of the actions, which do not depend on the state, and the bound of the actions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Deviations {
+    /// Bound of the actions drawn, which are then divided by it; standard deviations are those before that. ML-Agents has 3:
+    /// with a larger number the same step of the optimizer moves the actions less.
+    pub action_clip: f64,
+    /// Logarithm of the standard deviation of the actions at the start.
+    pub init_log_std: f64,
+    /// Smallest standard deviation: a floor keeps a policy that has found one safe way from ceasing to look for better ones.
+    pub min_std: Moving,
+    /// Largest standard deviation.
+    pub max_std: f64,
+}
+
+impl Default for Deviations {
+    fn default() -> Self {
+        Self { action_clip: 1.0, init_log_std: -0.5, min_std: Moving::still(0.05), max_std: 2.0 }
+    }
+}
+
+impl Deviations {
+    /// Hardly any bounds, from 1 on.
+    pub const FREE: Self = Self { action_clip: 1.0, init_log_std: 0.0, min_std: Moving::still(1e-3), max_std: 1e3 };
+
+    /// Checks every field.
+    pub fn validate(&self) -> Result<(), Error> {
+        let Moving { first, last } = self.min_std;
+        check::positive(&[("action_clip", self.action_clip), ("min_std", first), ("final_min_std", last)])?;
+        let largest_min = first.max(last);
+        if !(self.max_std.is_finite() && self.max_std >= largest_min) {
+            let expected = format!("a number not below the smallest deviation, {largest_min}");
+            return Err(Error::config("max_std", self.max_std, expected));
+        }
+        match self.init_log_std.is_finite() {
+            true => Ok(()),
+            false => Err(Error::config("init_log_std", self.init_log_std, "a finite number")),
+        }
+    }
+}
+
+/// Checks settings that all algorithms with an actor and a critic have.
+pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Moving) -> Result<(), Error> {
+    check::positive(&[("lr", lr)])?;
+    if !(0.0..=1.0).contains(&gae_lambda) {
+        return Err(Error::config("gae_lambda", gae_lambda, "a number between 0 and 1"));
+    }
+    let Moving { first, last } = entropy_coef;
+    for (field, x) in [("entropy_coef", first), ("final_entropy_coef", last)] {
+        if !(x.is_finite() && x >= 0.0) {
+            return Err(Error::config(field, x, "a number not below 0"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses the schedule that PPO alone has.
+pub fn refuse_adaptive(schedule: Schedule, name: &str) -> Result<(), Error> {
+    match schedule {
+        Schedule::Adaptive => Err(Error::config("schedule", "adaptive", format!("constant or linear with {name}"))),
+        Schedule::Constant | Schedule::Linear => Ok(()),
+    }
+}
+
+/// The networks without their parameters.
+#[derive(Clone)]
+pub struct Layout {
+    /// Policy network.
+    pub actor: Mlp,
+    /// Value network, which has an output for each stream of rewards.
+    pub critic: Mlp,
+    /// Logarithms of the standard deviations, after the policy network's parameters.
+    pub log_std: Range<usize>,
+    /// First parameter of the value network.
+    pub critic_start: usize,
+    /// The streams of rewards.
+    pub streams: Vec<Stream>,
+    /// All networks: the policy's, the value function's, those of the rewards.
+    pub places: Places,
+    ratio: Ratio,
+    shape: Shape,
+}
+
+impl Layout {
+    /// For a task.
+    pub fn new(setup: &Setup<'_>, ratio: Ratio) -> Self {
+        let (obs, act, network) = (setup.spec.obs, setup.spec.act, setup.common.network);
+        let net = |hidden: &[usize], out| Mlp::new(&[&[obs], hidden, &[out]].concat(), network.activation);
+        let actor = net(&network.actor_hidden, act);
+        let critic = net(&network.critic_hidden, setup.common.rewards.len());
+        let mut places = Places::default();
+        let of_actor = places.add(actor.len() + act);
+        let critic_start = places.add(critic.len()).start;
+        let streams = Stream::all(setup.common.rewards, (obs, act), setup.common.seed, |count| places.add(count));
+        let shape = Shape {
+            obs,
+            act,
+            log_probs: ratio.rows(act),
+            streams: streams.len(),
+            next_obs: streams.iter().any(|stream| stream.networks.is_some()),
+            lanes: setup.common.lanes(),
+        };
+        Self { log_std: actor.len()..of_actor.end, actor, critic, critic_start, streams, places, ratio, shape }
+    }
+
+    /// What a run needs, whose longest list of samples has so many items.
+    pub fn needs(&self, items: usize, moments: usize) -> Needs {
+        Needs { parameters: self.places.len(), moments, items, shape: self.shape, replay: 0 }
+    }
+
+    /// Rates of all networks: the policy's, the value function's, those of the rewards.
+    pub fn rates(&self, policy: f64, value: f64) -> Vec<f64> {
+        let of_rewards = self.streams.iter().filter_map(|stream| stream.networks.as_ref()).map(|nets| nets.lr);
+        [policy, value].into_iter().chain(of_rewards).collect()
+    }
+}
+
+/// The networks with their parameters.
+#[derive(Clone)]
+pub struct ActorCritic {
+    /// Where they are.
+    pub layout: Layout,
+    /// The parameters.
+    pub params: Vec<f32>,
+    /// Instruction set.
+    pub isa: Isa,
+    deviations: Deviations,
+    lambda: f64,
+}
+
+impl ActorCritic {
+    /// At the start of a run.
+    pub fn new(setup: &Setup<'_>, ratio: Ratio, deviations: Deviations, lambda: f64) -> Self {
+        let layout = Layout::new(setup, ratio);
+        let mut params = vec![0.0; layout.places.len()];
+        let mut random = SplitMix::new(setup.common.seed, PARAMETERS);
+        let init = setup.common.network.initialization;
+        init.policy(&layout.actor, &mut params, &mut random);
+        init.value(&layout.critic, &mut params[layout.critic_start..], &mut random);
+        params[layout.log_std.clone()].fill(deviations.init_log_std as f32);
+        Stream::init(&layout.streams, &mut params, setup.common.seed);
+        Self { layout, params, isa: setup.isa, deviations, lambda }
+    }
+
+    /// The policy network's parameters.
+    fn actor_params(&self) -> &[f32] {
+        &self.params[..self.layout.actor.len()]
+    }
+    /// The value network's parameters.
+    fn critic_params(&self) -> &[f32] {
+        &self.params[self.layout.critic_start..][..self.layout.critic.len()]
+    }
+    /// Current standard deviations.
+    pub fn gaussian(&self) -> Gaussian<f32> {
+        Gaussian::new(&self.params[self.layout.log_std.clone()])
+    }
+    /// Factor of the actions drawn, before they are clipped to [-1, 1].
+    fn action_scale(&self) -> f32 {
+        1.0 / self.deviations.action_clip as f32
+    }
+    /// What is to be kept of a decision.
+    pub fn shape(&self) -> Shape {
+        self.layout.shape
+    }
+
+    /// What a horizon is played with.
+    pub fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+        Collecting {
+            acting: Acting {
+                isa: self.isa,
+                net: &self.layout.actor,
+                params: self.actor_params(),
+                normalizer: statistics.normalizer(),
+                distribution: Distribution::Gaussian(self.gaussian(), self.layout.ratio),
+                action_scale: self.action_scale(),
+            },
+            streams: &self.layout.streams,
+            params: &self.params,
+            values: Some(Values { net: &self.layout.critic, params: self.critic_params(), lambda: self.lambda }),
+            reward_scale: statistics.reward_scale() * self.layout.streams[0].strength,
+            return_center: statistics.returns.mean[0] as f32,
+        }
+    }
+
+    /// Leaves the gradient of an objective, summed over a list of items of the rollout, with the workers; returns the sums
+    /// of the objective. With `kfac`, each group leaves sums for the factors of the Fisher matrix, too.
+    pub fn gradient(
+        &self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        items: &[u32],
+        objective: Objective,
+        kfac: Option<&Kfac>,
+        space: &mut Space,
+    ) -> LossSums {
+        let gaussian = self.gaussian();
+        workers.share_out(items.len(), &mut |group, partial| {
+            let mut chunks = items[group].chunks(CHUNK).map(|chunk| chunk.iter().map(|item| experience.item(*item)));
+            self.gradient_of_group(&gaussian, objective, &mut chunks, kfac, space, partial);
+        })
+    }
+
+    /// Gradient of the objective summed over a group of items, a chunk at a time.
+    fn gradient_of_group<'r, C>(
+        &self,
+        gaussian: &Gaussian<f32>,
+        objective: Objective,
+        chunks: &mut dyn Iterator<Item = C>,
+        kfac: Option<&Kfac>,
+        space: &mut Space,
+        partial: &mut Partial,
+    ) where
+        C: Iterator<Item = (&'r Rollout, usize)>,
+    {
+        let (layout, isa) = (&self.layout, self.isa);
+        let (actor, critic) = (self.actor_params(), self.critic_params());
+        partial.sums = LossSums::default();
+        for (i, chunk) in chunks.enumerate() {
+            let mut samples = [Samples { action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
+            let (mut n, mut steps) = (0, Vec::new());
+            for (rollout, item) in chunk {
+                space.input.block_mut(n).copy_from_slice(rollout.obs(item));
+                samples[n] = rollout.samples(item);
+                n += 1;
+                if layout.shape.next_obs {
+                    steps.push(rollout.step(item));
+                }
+            }
+            // the first chunk's gradient needs no sum
+            let gradient = if i == 0 { &mut partial.gradient } else { &mut space.gradient };
+            let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
+            for (networks, judge) in networks.zip(&mut space.judges) {
+                let place = networks.place.clone();
+                judge.gradient(isa, &self.params[place.clone()], &steps, &mut gradient[place]);
+            }
+            let (of_actor, of_critic) = gradient.split_at_mut(layout.critic_start);
+            let (of_net, of_std) = of_actor.split_at_mut(layout.actor.len());
+            layout.actor.forward(isa, actor, &space.input, &mut space.actor, n);
+            layout.critic.forward(isa, critic, &space.input, &mut space.critic, n);
+            partial.sums += f32_lanes!(isa, T => <T as Real>::enter(Loss::<T> {
+                objective,
+                gaussian,
+                samples: &samples[..n],
+                mean: space.actor.output_and_delta(),
+                value: space.critic.output_and_delta(),
+                d_log_std: &mut of_std[..layout.shape.act],
+                rows: &mut space.rows,
+                lanes: PhantomData,
+            }));
+            layout.actor.backward(isa, actor, &space.input, &mut space.actor, of_net, n);
+            let of_critic = &mut of_critic[..layout.critic.len()];
+            layout.critic.backward(isa, critic, &space.input, &mut space.critic, of_critic, n);
+            if i > 0 {
+                sum::add(isa, &mut partial.gradient, &space.gradient);
+            }
+            if let Some(kfac) = kfac {
+                let moments = if i == 0 { &mut partial.moments } else { &mut space.moments };
+                let tapes = (&mut space.actor, &mut space.critic);
+                let actions = samples.map(|s| s.action);
+                kfac.moments(isa, (actor, critic), gaussian, &actions[..n], &space.input, tapes, moments);
+                if i > 0 {
+                    sum::add(isa, &mut partial.moments, &space.moments);
+                }
+            }
+        }
+    }
+
+    /// Keeps the standard deviations of the actions within their bounds.
+    pub fn bound_std(&mut self, progress: &Progress) {
+        let log_std = &mut self.params[self.layout.log_std.clone()];
+        bound_std(log_std, progress.at(self.deviations.min_std), self.deviations.max_std);
+    }
+
+    /// Lets both networks make of an observation what they did with another map of observations.
+    pub fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
+        let (of_actor, of_critic) = self.params.split_at_mut(self.layout.critic_start);
+        self.layout.actor.follow(of_actor, before, after);
+        self.layout.critic.follow(of_critic, before, after);
+    }
+
+    /// What reports say of it.
+    pub fn describe(&self, totals: &Totals, lr: f64, skipped: u64) -> Description {
+        let gaussian = self.gaussian();
+        Description {
+            lr,
+            skipped,
+            explained_variance: totals.explained_variance(),
+            entropy: gaussian.entropy(),
+            std_mean: gaussian.mean_std(),
+        }
+    }
+
+    /// The policy to act with.
+    pub fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
+        let net = self.layout.actor.clone();
+        let mut params = self.actor_params().to_vec();
+        let mut log_std = self.params[self.layout.log_std.clone()].to_vec();
+        let scale = self.action_scale();
+        if scale != 1.0 {
+            // the last layer takes in the scale of the actions, so that every policy is bounded by 1
+            let (weights, biases) = net.layers().last().expect("a network has layers");
+            params[weights].iter_mut().for_each(|w| *w *= scale);
+            params[biases].iter_mut().for_each(|b| *b *= scale);
+            log_std.iter_mut().for_each(|l| *l += Real::ln(scale));
+        }
+        Policy::assemble(meta, net, params, normalizer, log_std)
+    }
+}
+
+/// A worker's space for computing gradients.
+pub struct Space {
+    input: Blocks<f32>,
+    actor: Tape<f32>,
+    critic: Tape<f32>,
+    judges: Vec<Box<dyn Judge>>,
+    /// Room for all parameters.
+    pub gradient: Vec<f32>,
+    moments: Vec<f32>,
+    rows: Vec<[f32; BLOCK]>,
+}
+
+impl Space {
+    /// For networks, and for so many moments.
+    pub fn new(layout: &Layout, moments: usize) -> Self {
+        let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
+        Self {
+            input: layout.actor.input(),
+            actor: layout.actor.tape(),
+            critic: layout.critic.tape(),
+            judges: networks.map(|networks| networks.reward.judge()).collect(),
+            gradient: vec![0.0; layout.places.len()],
+            moments: vec![0.0; moments],
+            rows: vec![[0.0; BLOCK]; layout.shape.act],
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Acting for many agents side by side.
+
+use super::Policy;
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::f32_lanes;
+use crate::nets::gaussian::Gaussian;
+use crate::nets::mlp::{CHUNK, Tape};
+use crate::nets::normalize::Normalize;
+use marathon_physics::lanes::{Isa, Real};
+use std::marker::PhantomData;
+
+/// A policy with work space to act for many blocks.
+pub struct BlockPolicy<'a> {
+    policy: &'a Policy,
+    isa: Isa,
+    input: Blocks<f32>,
+    tape: Tape<f32>,
+}
+
+impl<'a> BlockPolicy<'a> {
+    /// Work space for a policy.
+    ///
+    /// # Panics
+    /// If this processor lacks the instruction set, at the first use.
+    pub fn new(policy: &'a Policy, isa: Isa) -> Self {
+        Self { policy, isa, input: policy.net.input(), tape: policy.net.inference_tape() }
+    }
+
+    /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`.
+    ///
+    /// # Panics
+    /// If the lengths do not fit each other.
+    pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
+        let policy = self.policy;
+        let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
+        assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
+        for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
+            self.forward(raw);
+            for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
+                for (i, (out, x)) in out.iter_mut().zip(self.tape.output().block(b)).enumerate() {
+                    *out = policy.action(i / BLOCK, *x);
+                }
+            }
+        }
+    }
+
+    /// The best actions, `[n][act]`, for any number of raw observations, `[n][obs]`. With `noise`, `[n][act]` standard
+    /// normal numbers, the actions are drawn as in training.
+    ///
+    /// # Panics
+    /// If the lengths do not fit each other.
+    pub fn act_rows(&mut self, obs: &[f32], noise: Option<&[f32]>, action: &mut [f32]) {
+        let policy = self.policy;
+        let (n_obs, n_act) = (policy.meta.obs, policy.meta.act);
+        assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "whole rows");
+        assert!(noise.is_none_or(|noise| noise.len() == action.len()), "noise for every action");
+        let std = Gaussian::new(&policy.log_std).std;
+        let rows = CHUNK * BLOCK;
+        for (chunk, (obs, action)) in obs.chunks(rows * n_obs).zip(action.chunks_mut(rows * n_act)).enumerate() {
+            let mut raw = vec![0.0; (action.len() / n_act).div_ceil(BLOCK) * BLOCK * n_obs];
+            for (i, row) in obs.chunks_exact(n_obs).enumerate() {
+                let block = &mut raw[i / BLOCK * BLOCK * n_obs..];
+                for (k, x) in row.iter().enumerate() {
+                    block[k * BLOCK + i % BLOCK] = *x;
+                }
+            }
+            self.forward(&raw);
+            for (i, row) in action.chunks_exact_mut(n_act).enumerate() {
+                let mean = self.tape.output().block(i / BLOCK);
+                for (k, out) in row.iter_mut().enumerate() {
+                    let drawn = noise.map_or(0.0, |noise| std[k] * noise[(chunk * rows + i) * n_act + k]);
+                    *out = policy.action(k, mean[k * BLOCK + i % BLOCK] + drawn);
+                }
+            }
+        }
+    }
+
+    /// Runs the network for at most [`CHUNK`] blocks of raw observations.
+    fn forward(&mut self, raw: &[f32]) {
+        let policy = self.policy;
+        f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
+            normalizer: &policy.normalizer,
+            raw,
+            input: &mut self.input,
+            copy: None,
+            sums: None,
+            lanes: PhantomData,
+        }));
+        let blocks = raw.len() / (policy.meta.obs * BLOCK);
+        policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, blocks);
+    }
+}

@@ -1,0 +1,87 @@
+//! Policies as files.
+
+use super::{FORMAT, Policy, PolicyMeta, VERSION};
+use crate::error::Error;
+use crate::files::{TensorReader, TensorWriter, write_atomic};
+use marathon_envs::Spec;
+use std::path::Path;
+
+impl Policy {
+    /// Writes the policy to a file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
+        write_atomic(path, &self.to_bytes())
+    }
+
+    /// The bytes of a file with the policy; [`Policy::from_bytes`] is the way back.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut file = TensorWriter::default();
+        file.list("obs_mean", self.normalizer.mean());
+        file.list("obs_std", self.normalizer.std());
+        file.list("log_std", &self.log_std);
+        for (l, (weights, biases)) in self.net.layers().enumerate() {
+            let shape = [self.net.sizes()[l + 1], self.net.sizes()[l]];
+            file.add(format!("layer.{l}.weight"), &shape, self.params[weights].iter().copied());
+            file.list(&format!("layer.{l}.bias"), &self.params[biases]);
+        }
+        file.bytes(&self.meta)
+    }
+
+    /// Reads a policy.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not a whole and finite policy.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::from_bytes(path, &std::fs::read(path).map_err(Error::io(path, "read"))?)
+    }
+
+    /// Reads a policy from the bytes of a file. `path` stands for it in messages.
+    ///
+    /// # Errors
+    /// If the bytes are not a whole and finite policy.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
+        let file = TensorReader::new(path, bytes)?;
+        let meta: PolicyMeta = file.document(FORMAT, VERSION)?;
+        let positive = |x: f32| x.is_finite() && x > 0.0;
+        if !positive(meta.observation_clip) || !positive(meta.action_clip) {
+            let found = format!("{} and {}", meta.observation_clip, meta.action_clip);
+            return Err(Error::file(path, "observation_clip and action_clip", found, "positive numbers"));
+        }
+        let sound = |[low, high]: &[f32; 2]| low.is_finite() && high.is_finite() && low < high;
+        if !(meta.action_range.is_empty() || meta.action_range.len() == meta.act)
+            || !meta.action_range.iter().all(sound)
+        {
+            let found = format!("{:?}", meta.action_range);
+            return Err(Error::file(path, "action_range", found, "a low and a higher number per action, or nothing"));
+        }
+        let mean = file.finite("obs_mean", &[meta.obs])?;
+        let std = file.finite("obs_std", &[meta.obs])?;
+        if let Some(i) = std.iter().position(|s| !positive(*s)) {
+            return Err(Error::file(path, format!("tensor 'obs_std', number {i}"), std[i], "a positive number"));
+        }
+        let log_std = file.finite("log_std", &[meta.act])?;
+        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+        let mut params = Vec::new();
+        for (l, pair) in sizes.windows(2).enumerate() {
+            params.extend(file.finite(&format!("layer.{l}.weight"), &[pair[1], pair[0]])?);
+            params.extend(file.finite(&format!("layer.{l}.bias"), &[pair[1]])?);
+        }
+        Self::from_parts(meta, params, (mean, std), log_std)
+            .map_err(|e| Error::file(path, "network", e, "tensors that fit the widths"))
+    }
+
+    /// Reads a policy for a given task.
+    ///
+    /// # Errors
+    /// As [`Policy::load`], or if the policy is for another agent.
+    pub fn load_for(path: &Path, spec: &Spec) -> Result<Self, Error> {
+        let policy = Self::load(path)?;
+        policy.check(spec).map_err(|e| match e {
+            Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),
+            other => other,
+        })?;
+        Ok(policy)
+    }
+}
