@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Tests everything but the game and the packing of the wheel; `./test.sh --all` tests those as well, and compiles Bevy once.
+# Tests everything but the game, the packing of the wheel, and whether the fuzzers and the core for browsers compile. `./test.sh
+# --all` tests those as well, and compiles Bevy once.
 #
 # Sets up by itself what the tests need: Python environments with the oracles (MuJoCo, Gymnasium, dm_control, PyTorch) in
 # .venv and with ML-Agents in .venv-mlagents; with --all and as root the Debian packages of the game. Needs a Rust toolchain
@@ -28,7 +29,9 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
 cargo fmt --all --check
-cargo check --quiet --release --manifest-path fuzz/Cargo.toml --no-default-features --target-dir "${CARGO_TARGET_DIR:-target}"
+if [ -n "$game" ]; then
+  tests/types.sh
+fi
 # lints and checks documentation while it compiles
 export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"
 cargo build --release "${packages[@]}" --all-targets

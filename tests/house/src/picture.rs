@@ -22,7 +22,7 @@ pub fn svg(house: &House, order: &Order) -> String {
     let mut out = String::new();
     let head = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\" \
-         font-family=\"sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+         font-family=\"DejaVu Sans, sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
     out.push_str(&head);
     for (i, floor) in floors.iter().enumerate() {
@@ -73,7 +73,7 @@ fn draw_room(out: &mut String, room: &Room, (x, y, width): (f64, f64, f64), colo
     );
     // names stand upright where a room is too narrow for them
     let (cx, cy) = (x + width / 2.0, y + FLOOR / 2.0);
-    let fits = room.name.len() as f64 * 7.0 < width;
+    let fits = room.name.len() as f64 * 8.5 < width;
     let (turn, size) =
         if fits { (String::new(), 13) } else { (format!(" transform=\"rotate(-90 {cx:.1} {cy:.1})\""), 10) };
     let _ = writeln!(

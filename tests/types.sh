@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Checks the types of what the tests do not build: the fuzzers, and for browsers the crates that compute without files, threads
+# and clocks. Part of ./test.sh --all. Needs rustup, or a toolchain that has the target wasm32-unknown-unknown.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target="${CARGO_TARGET_DIR:-target}"
+cargo check --quiet --release --manifest-path fuzz/Cargo.toml --no-default-features --target-dir "$target"
+if command -v rustup > /dev/null; then
+  rustup --quiet target add wasm32-unknown-unknown
+fi
+core=(-p marathon-physics -p marathon-envs -p marathon-learn -p marathon-config)
+cargo check --quiet --release --target wasm32-unknown-unknown "${core[@]}"
