@@ -10,7 +10,7 @@ mod common;
 
 use common::numbers::{distance, largest, numbers};
 use marathon_physics::lanes::Real;
-use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Variation, Work, with_lanes};
+use marathon_physics::{Group, Isa, MeasurePlan, Model, Readings, Sim, SimOptions, Variation, Work, with_lanes};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -112,8 +112,8 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
             }
         }
         sim.forward(&mut work, &group);
-        sim.measure_bodies(&mut work, &group);
-        sim.measure_joints(&mut work);
+        let plan = MeasurePlan { of_last_step: true, bodies: true, joints: true, ..MeasurePlan::default() };
+        sim.measure(&mut work, &group, &plan);
         let r = Readings::new(&sim, &group, &work);
         let (bias, applied, constraint, mass) =
             (r.qfrc_bias(), r.applied_forces(), r.constraint_forces(), r.mass_matrix());

@@ -23,7 +23,7 @@ mod common;
 use common::compiled::differ;
 use common::numbers::{distance, largest};
 use marathon_physics::lanes::Real;
-use marathon_physics::{Group, Model, Readings, Sim, SimOptions, Work};
+use marathon_physics::{Group, MeasurePlan, Model, Readings, Sim, SimOptions, Work};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -115,8 +115,8 @@ fn ours<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> Quantities 
         group.push(sim, 0, body, [x[0], x[1], x[2]], [x[3], x[4], x[5]]);
     }
     sim.forward(work, &group);
-    sim.measure_bodies(work, &group);
-    sim.measure_joints(work);
+    let plan = MeasurePlan { of_last_step: true, bodies: true, joints: true, ..MeasurePlan::default() };
+    sim.measure(work, &group, &plan);
     let r = Readings::new(sim, &group, work);
     let mut out = Quantities::new();
     let mut put = |name: &str, values: Vec<T>| out.insert(name.to_owned(), widen(&values));

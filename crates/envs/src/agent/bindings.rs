@@ -2,7 +2,7 @@
 
 use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
-use marathon_physics::{Group, Readings, Sim, SimOptions, Work};
+use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
 
 use super::{Facts, ModelSource};
 use crate::error::{EnvError, nearest};
@@ -63,8 +63,8 @@ pub(crate) struct Bindings<T: Real> {
     pub bodies: Vec<usize>,
     /// Geoms with touch sensors.
     pub touch: Vec<usize>,
-    /// Sites with touch sensors.
-    pub touch_sites: Vec<usize>,
+    /// What is measured after every decision: what the facts have the agent see, and the sites with touch sensors.
+    pub measure: MeasurePlan,
     /// Geoms that may touch the ground.
     pub feet: Vec<usize>,
     /// Geoms that must not touch the ground.
@@ -195,7 +195,16 @@ impl<T: Real> Bindings<T> {
                 _ => {}
             }
         }
-        Ok(Bindings { parts, bodies, touch, touch_sites, feet, not_feet, pairs, motors, along_x })
+        let view = facts.view;
+        let measure = MeasurePlan {
+            of_last_step: view.of_last_step,
+            centers: view.bodies,
+            bodies: view.bodies,
+            actuators: view.actuators,
+            joints: view.joints,
+            touch_sites,
+        };
+        Ok(Bindings { parts, bodies, touch, measure, feet, not_feet, pairs, motors, along_x })
     }
 }
 

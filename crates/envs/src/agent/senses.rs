@@ -28,8 +28,6 @@ pub struct Senses<'a, T: Real> {
     /// The command that the present question is about.
     pub(crate) command: &'a [T],
     pub(crate) memory: &'a [T],
-    /// What touch sites feel.
-    pub(crate) pressed: &'a [T],
     /// An episode has just begun: there has been no physics step whose contacts could be felt.
     pub(crate) fresh: bool,
     /// Seconds between decisions.
@@ -81,7 +79,7 @@ impl<T: Real> Senses<'_, T> {
     /// at the last physics step. At the start of an episode, what it feels there without controls.
     #[inline(always)]
     pub fn touch_force(&self, i: usize) -> T {
-        self.pressed[i]
+        self.readings.touch_forces()[i]
     }
 
     /// Number of actuated pairs of bodies.

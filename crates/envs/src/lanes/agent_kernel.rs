@@ -102,14 +102,13 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             Occasion::Start(lanes) => (Some(lanes), None),
             Occasion::Rehearsal(names) => (Some(!0), Some(names)),
         };
-        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, pressed, feet, .. } = group;
+        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             bindings: &task.bindings,
             action,
             command: &commands.present,
             memory: &[],
-            pressed,
             fresh: fresh.is_some(),
             dt: task.spec.dt,
         };

@@ -1,7 +1,7 @@
 //! `L` agents side by side: one decision, from action to observation and reward, inside vector code.
 
 use marathon_physics::lanes::{Kernel, Real};
-use marathon_physics::{Group, Readings, Sim, Work};
+use marathon_physics::{Group, Sim, Work};
 
 use super::agent_kernel::{Occasion, Perceived};
 use super::context::Commands;
@@ -27,8 +27,6 @@ pub(crate) struct LaneGroup<T: Real> {
     /// Terms of the reward; the termination last, if it has a reward of its own.
     pub terms: Vec<T>,
     pub info: Vec<T>,
-    /// What touch sites feel, N.
-    pub pressed: Vec<T>,
     /// Per foot, the lanes in which it touched the ground during the last decision.
     pub feet: Vec<u32>,
     reward: T,
@@ -63,7 +61,6 @@ impl<T: Real> LaneGroup<T> {
             obs: vec![T::zero(); task.spec.obs],
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
-            pressed: vec![T::zero(); task.bindings.touch_sites.len()],
             feet: vec![0; task.bindings.feet.len()],
             reward: T::zero(),
             forward: T::zero(),
@@ -164,29 +161,9 @@ impl<T: Real> LaneGroup<T> {
 
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
     pub fn begin(&mut self, task: &Task<T>, work: &mut Work<T>, lanes: u32) {
-        self.look(task, work);
+        task.sim.measure_start(work, &self.physics, &task.bindings.measure);
         task.agent.perceive(task, self, work, Occasion::Start(lanes));
         T::enter(Settle { group: self, termination_reward: None, ended: Ended::default() });
-    }
-
-    /// Brings all readings up to date at the start of an episode.
-    fn look(&mut self, task: &Task<T>, work: &mut Work<T>) {
-        let sites = &task.bindings.touch_sites;
-        if task.facts.view.joints || !sites.is_empty() {
-            task.sim.forward(work, &self.physics);
-            if task.facts.view.joints {
-                task.sim.measure_joints(work);
-            }
-            T::enter(Feel { sim: &task.sim, group: self, work, sites });
-        } else if task.facts.view.actuators {
-            task.sim.refresh_actuators(work, &self.physics);
-            task.sim.measure_actuators(work);
-        } else {
-            task.sim.refresh(work, &self.physics);
-        }
-        if task.facts.view.bodies {
-            task.sim.measure_centers(work, &self.physics);
-        }
     }
 
     /// Writes the observations of `lanes` (a bit each) into a block's `obs`.
@@ -201,28 +178,12 @@ impl<T: Real> LaneGroup<T> {
 
     /// Makes one decision. `action` is the block's, `[act][16]`.
     pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
-        let (along_x, view) = (&task.bindings.along_x, task.facts.view);
+        let along_x = &task.bindings.along_x;
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(Act { group: self, along_x, action, first, clip });
         task.agent.control(task, self);
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
-        if view.joints {
-            task.sim.measure_joints(work);
-        } else if view.actuators {
-            task.sim.measure_actuators(work);
-        }
-        if view.bodies {
-            task.sim.measure_bodies(work, &self.physics);
-        }
-        if !self.pressed.is_empty() {
-            T::enter(Feel { sim: &task.sim, group: self, work, sites: &task.bindings.touch_sites });
-        }
-        if !view.of_last_step {
-            task.sim.refresh(work, &self.physics);
-            if view.bodies {
-                task.sim.measure_centers(work, &self.physics);
-            }
-        }
+        task.sim.measure(work, &self.physics, &task.bindings.measure);
         T::enter(Move { group: self, along_x });
         let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
         self.commands.advance();
@@ -238,7 +199,7 @@ impl<T: Real> LaneGroup<T> {
     /// Lets an agent do everything once.
     pub fn rehearse(&mut self, task: &Task<T>, work: &mut Work<T>) -> Rehearsal {
         let mut terms = Vec::new();
-        self.look(task, work);
+        task.sim.measure_start(work, &self.physics, &task.bindings.measure);
         let Perceived { observed, reported, .. } =
             task.agent.perceive(task, self, work, Occasion::Rehearsal(&mut terms));
         Rehearsal { observed, reported, terms }
@@ -319,26 +280,6 @@ impl<T: Real> Kernel<T> for Act<'_, T> {
             group.forward = group.physics.qpos[*i].neg_mul_add(T::splat(*axis), group.forward);
         }
         T::bits(T::not(ok))
-    }
-}
-
-/// Reads the touch sites, before the frames move on from where the forces acted.
-struct Feel<'a, T: Real> {
-    sim: &'a Sim<T>,
-    group: &'a mut LaneGroup<T>,
-    work: &'a Work<T>,
-    sites: &'a [usize],
-}
-
-impl<T: Real> Kernel<T> for Feel<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let LaneGroup { physics, pressed, .. } = self.group;
-        let readings = Readings::new(self.sim, physics, self.work);
-        for (force, site) in pressed.iter_mut().zip(self.sites) {
-            *force = readings.site_touch(*site);
-        }
     }
 }
 

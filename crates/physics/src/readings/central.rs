@@ -1,8 +1,7 @@
 //! MuJoCo's quantities about centers of mass, and its joint-space forces, in its own conventions: world axes, about the
 //! center of mass of the whole tree that hangs from a child of the world (`subtree_com[body_rootid]`).
 //!
-//! A step does not need them. [`Sim::measure_bodies`] and [`Sim::measure_joints`] compute them from what the last
-//! physics step left behind, into memory of [`Work`].
+//! A step does not need them. [`Sim::measure`] computes them from what the last physics step left behind.
 
 use super::Readings;
 use super::forces::{ContactForce, Wrench};
@@ -15,34 +14,32 @@ use crate::sim::{Mount, Sim};
 use crate::state::{Group, Work};
 
 impl<T: Real> Sim<T> {
-    /// Prepares [`Readings::cinert`] and [`Readings::cvel`] for the frames that `work` has now.
-    pub fn measure_centers(&self, work: &mut Work<T>, group: &Group<T>) {
+    /// Centers of mass for the frames that `work` has now.
+    pub(super) fn measure_centers(&self, work: &mut Work<T>, group: &Group<T>) {
         T::enter(Centers(self, group, work));
     }
 
-    /// Prepares [`Readings::cinert`], [`Readings::cvel`] and [`Readings::cfrc_ext`] (MuJoCo's `mj_rnePostConstraint`).
-    /// To be called after [`Sim::advance`] or [`Sim::forward`], before [`Sim::refresh`] moves the frames on.
-    pub fn measure_bodies(&self, work: &mut Work<T>, group: &Group<T>) {
+    /// Forces on bodies, and the centers of mass that they are about.
+    pub(super) fn measure_bodies(&self, work: &mut Work<T>, group: &Group<T>) {
         self.measure_centers(work, group);
         T::enter(Wrenches(self, group, work));
     }
 
-    /// Prepares [`Readings::qfrc_actuator`] and [`Readings::qfrc_constraint`]. To be called after [`Sim::advance`] or
-    /// [`Sim::forward`], before [`Sim::refresh`] moves the axes on.
-    pub fn measure_joints(&self, work: &mut Work<T>) {
+    /// Forces of actuators and constraints on the degrees of freedom.
+    pub(super) fn measure_joints(&self, work: &mut Work<T>) {
         self.measure_actuators(work);
         T::enter(JointForces(self, work));
     }
 
-    /// Prepares [`Readings::qfrc_actuator`] alone. To be called as [`Sim::measure_joints`].
-    pub fn measure_actuators(&self, work: &mut Work<T>) {
+    /// Forces of actuators on the degrees of freedom.
+    pub(super) fn measure_actuators(&self, work: &mut Work<T>) {
         T::enter(Actuation(self, work));
     }
 }
 
 impl<T: Real> Readings<'_, T> {
     /// Inertia of a body about the center of mass of its tree, world axes: xx, yy, zz, xy, xz, yz (kg m^2), mass times
-    /// the offset of its own center of mass (kg m), mass (kg). After [`Sim::measure_centers`].
+    /// the offset of its own center of mass (kg m), mass (kg). With [`MeasurePlan::centers`](super::MeasurePlan::centers).
     #[inline(always)]
     pub fn cinert(&self, body: usize) -> [T; 10] {
         let com = &self.sim.coms[body];
@@ -66,8 +63,8 @@ impl<T: Real> Readings<'_, T> {
         ]
     }
 
-    /// Velocity of a body: angular (rad/s), and linear at the center of mass of its tree (m/s). After
-    /// [`Sim::measure_centers`].
+    /// Velocity of a body: angular (rad/s), and linear at the center of mass of its tree (m/s). With
+    /// [`MeasurePlan::centers`](super::MeasurePlan::centers).
     #[inline(always)]
     pub fn cvel(&self, body: usize) -> V6<T> {
         let com = &self.sim.coms[body];
@@ -78,25 +75,25 @@ impl<T: Real> Readings<'_, T> {
     }
 
     /// What contacts, connect and weld constraints and pushes from outside do to a body: torque about the center of
-    /// mass of its tree (N m), and force (N). Zero for the world. After [`Sim::measure_bodies`].
+    /// mass of its tree (N m), and force (N). Zero for the world. With [`MeasurePlan::bodies`](super::MeasurePlan::bodies).
     #[inline(always)]
     pub fn cfrc_ext(&self, body: usize) -> V6<T> {
         self.work.readings.cfrc_ext[body]
     }
 
-    /// Force of all actuators on a degree of freedom, N or N m. After [`Sim::measure_joints`].
+    /// Force of all actuators on a degree of freedom, N or N m. With [`MeasurePlan::actuators`](super::MeasurePlan::actuators).
     #[inline(always)]
     pub fn qfrc_actuator(&self, dof: usize) -> T {
         self.work.readings.qfrc_actuator[dof]
     }
 
-    /// Force of all constraints on a degree of freedom, N or N m. After [`Sim::measure_joints`].
+    /// Force of all constraints on a degree of freedom, N or N m. With [`MeasurePlan::joints`](super::MeasurePlan::joints).
     #[inline(always)]
     pub fn qfrc_constraint(&self, dof: usize) -> T {
         self.work.readings.qfrc_constraint[dof]
     }
 
-    /// Center of mass of all bodies, m. After [`Sim::measure_centers`].
+    /// Center of mass of all bodies, m. With [`MeasurePlan::centers`](super::MeasurePlan::centers).
     #[inline(always)]
     pub fn center_of_mass(&self) -> V3<T> {
         let bodies = &self.sim.model.bodies;

@@ -36,7 +36,9 @@ impl<T: Real> Sim<T> {
         if !plan.of_last_step {
             self.refresh(work, group);
         }
-        if plan.centers || (plan.bodies && !plan.of_last_step) {
+        // those that forces on bodies are about belong to the last step
+        let measured = plan.bodies && plan.of_last_step;
+        if (plan.centers || plan.bodies) && !measured {
             self.measure_centers(work, group);
         }
     }

@@ -20,12 +20,10 @@ impl<T: Real> Readings<'_, T> {
         total
     }
 
-    /// What a touch sensor on a site feels, N: the normal forces of the contacts of the site's body in the site's volume,
-    /// at the last physics step. A contact is felt if the ray from its point against the force on the body meets the
-    /// volume, which one from inside always does. To be called after [`Sim::advance`](crate::sim::Sim::advance) or
-    /// [`Sim::forward`](crate::sim::Sim::forward), before [`Sim::refresh`](crate::sim::Sim::refresh) moves the site on.
+    /// What a touch sensor on a site feels, N, see [`Readings::touch_forces`]. The frames must be those from which the last
+    /// physics step computed its forces.
     #[inline(always)]
-    pub fn site_touch(&self, site: usize) -> T {
+    pub(super) fn site_touch(&self, site: usize) -> T {
         let mut total = T::zero();
         for row in &self.work.rows.contacts {
             total += self.felt(site, &self.floor_contact(row));

@@ -138,8 +138,8 @@ impl<T: Real> Sim<T> {
         fwd_velocity(self, group, work);
     }
 
-    /// The same, and the forces of the actuators there, which [`Sim::measure_actuators`] then makes readable.
-    pub fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
+    /// The same, and the forces of the actuators there.
+    pub(crate) fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
         passive(self, group, work);
         fwd_actuation(self, group, work);
