@@ -121,6 +121,7 @@ fn policies_must_fit_their_agent() {
     says(&fail(temp.path(), 1, &["eval", "a", "--agent", "ant"]), &["policy.safetensors", wrong]);
     says(&fail(temp.path(), 1, &["render", "a", "--agent", "ant", "--out", "x.gif"]), &[wrong]);
     says(&fail(temp.path(), 1, &["eval", "aa"]), &["aa: policy", "no such file", "did you mean 'a'?"]);
+    says(&fail(temp.path(), 1, &["eval", "a/polcy.safetensors"]), &["did you mean 'a/policy.safetensors'?"]);
     std::fs::write(temp.path().join("junk"), "junk").unwrap();
     says(&fail(temp.path(), 1, &["eval", "junk"]), &["junk", "a safetensors file"]);
     says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "0"]), &["--episodes", "1..=10000000"]);

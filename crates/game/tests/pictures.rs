@@ -118,7 +118,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
         (&["broken.safetensors"], 1, &["broken.safetensors"]),
-        (&["empty"], 1, &["no policy.safetensors", "marathon train"]),
+        (&["empty"], 1, &["no policy.safetensors", "the folder of a run"]),
         (&["broken.xml"], 1, &["broken.xml:1", "sphere"]),
         (&["--replay", "broken.safetensors"], 1, &["broken.safetensors", "not a recording"]),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
