@@ -29,6 +29,24 @@ fn a_custom_agent_creeps_forward() {
     assert!(out.contains(", 0 on their backs"), "{out}");
 }
 
+/// The number after some words.
+fn number(text: &str, words: &str) -> f64 {
+    let rest = text.split(words).nth(1).unwrap_or_else(|| panic!("no '{words}' in {text}"));
+    rest.split(' ').next().unwrap_or_default().parse().expect("a number")
+}
+
+#[test]
+fn a_rover_follows_its_schedule_and_its_caller() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = run(env!("CARGO_BIN_EXE_steer_an_agent"), folder.path(), &[]);
+    assert!(out.contains("command: velocity from -2 to 2 m/s"), "{out}");
+    // a command that changes every two seconds by more than 1 m/s on average
+    assert!((0.02..0.4).contains(&number(&out, "for 9 s: ")), "{out}");
+    assert!((number(&out, "told 1.5 m/s: ") - 1.5).abs() < 0.15, "{out}");
+    assert!((number(&out, "told -1.5 m/s: ") + 1.5).abs() < 0.15, "{out}");
+    assert!((0.02..0.4).contains(&number(&out, "again: ")), "{out}");
+}
+
 #[test]
 fn a_policy_is_trained_saved_and_drawn() {
     let folder = tempfile::tempdir().expect("a temporary folder");

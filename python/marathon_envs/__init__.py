@@ -24,6 +24,7 @@ The import registers every task with Gymnasium in the namespace `marathon_envs`:
 
 from marathon_envs import registration
 from marathon_envs._native import (
+    CommandRange,
     Model,
     Policy,
     Renderer,
@@ -44,6 +45,7 @@ from marathon_envs.tolerance import Tolerance
 from marathon_envs.vector import MarathonVectorEnv
 
 __all__ = [
+    "CommandRange",
     "MarathonAgent",
     "MarathonEnv",
     "MarathonVectorEnv",

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, final
+from typing import Any, Literal, Self, final
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from marathon_envs.agents import MarathonAgent
 
 __all__ = [
+    "CommandRange",
     "Model",
     "Player",
     "Policy",
@@ -32,6 +33,26 @@ __all__ = [
 ]
 
 __version__: str
+
+@final
+class CommandRange:
+    """One number of what an agent can be told to do: its name, range and unit."""
+
+    def __new__(cls, name: str, low: float, high: float, unit: str = "") -> Self: ...
+    @property
+    def name(self) -> str:
+        """Name, such as ``velocity``."""
+    @property
+    def low(self) -> float:
+        """Lowest value."""
+    @property
+    def high(self) -> float:
+        """Highest value."""
+    @property
+    def unit(self) -> str:
+        """Unit, such as ``m/s``; empty for a pure number."""
+    def __getnewargs__(self) -> tuple[str, float, float, str]: ...
+    def __eq__(self, other: object, /) -> bool: ...
 
 @final
 class Spec:
@@ -73,6 +94,15 @@ class Spec:
     @property
     def info(self) -> list[str]:
         """Names of the numbers in `VecEnv.info`."""
+    @property
+    def metrics(self) -> list[str]:
+        """Names of the numbers that tell how well the task is done: some of `VecEnv.info`, and ``forward``."""
+    @property
+    def observations(self) -> dict[str, slice]:
+        """Parts of the observation by name, in their order: ``obs[:, spec.observations["touch"]]``."""
+    @property
+    def command(self) -> list[CommandRange]:
+        """What agents can be told to do, a number each, see `VecEnv.set_command`."""
     @property
     def options(self) -> dict[str, bool | float | tuple[float, float] | str]:
         """Arguments that the task takes, with the values that it has."""
@@ -225,6 +255,19 @@ class VecEnv:
             friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
             strength: factors of the actuators' forces, ``(num_envs, nu)``.
             gravity: gravity, m/s^2, ``(num_envs, 3)``.
+            mask: the agents, ``(num_envs,)``; None means all.
+        """
+    @property
+    def command(self) -> npt.NDArray[np.float64]:
+        """What each agent was told by the observation that it has, ``(num_envs, len(spec.command))``, a new array."""
+    def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
+        """Tell agents, all or those of a mask, what to do in place of their own schedule; None gives them back to it.
+
+        They observe it at the end of the next step, or at the start of the next episode, and are rewarded for it from
+        there on. It lasts over resets, until changed, and belongs to snapshots.
+
+        Args:
+            command: numbers within the ranges of `spec.command`, ``(num_envs, len(spec.command))``.
             mask: the agents, ``(num_envs,)``; None means all.
         """
     def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from marathon_envs import _snapshots
 from marathon_envs._arrays import BoolArray, FloatArray, Streams
+from marathon_envs._native import CommandRange
 from marathon_envs.agents import MarathonAgent
 
 LARGEST = 1e6
@@ -17,6 +18,7 @@ TERMINATION_TERM = "termination"
 """Name of the reward term that replaces all others when an agent fails."""
 _AUTORESET = {"nextstep": "next_step", "samestep": "same_step", "disabled": "disabled"}
 _SAVED = ("memory", "seeds", "numbers", "episodes", "steps", "pending")
+_COMMANDS = ("command", "scheduled", "due", "given", "commanded")
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,9 @@ class AgentSpec:
     info: list[str]
     nq: int
     nv: int
+    metrics: list[str]
+    observations: dict[str, slice]
+    command: list[CommandRange]
     options: dict[str, Any]
     """Arguments of the agent's constructor that were given."""
 
@@ -96,6 +101,10 @@ class AgentVecEnv:
         self.episodes = np.zeros(num_envs, np.uint64)
         self.steps = np.zeros(num_envs, np.int64)
         self.pending = np.zeros(num_envs, np.bool_)
+        shape = self.agent.command.shape
+        # what the agents' schedule says, when it is asked again, and what a caller says in its place to whom
+        self.scheduled, self.due = np.zeros(shape), np.zeros(num_envs, np.int64)
+        self.given, self.commanded = np.zeros(shape), np.zeros(num_envs, np.bool_)
         self._ready = False
         self._rehearse()
         model = self.agent.model
@@ -114,6 +123,9 @@ class AgentVecEnv:
             max_episode_steps=limit,
             reward_terms=self._rewarded + [TERMINATION_TERM] * (agent.termination_reward is not None),
             info=self._reported,
+            metrics=self._metrics(),
+            observations=self._parts,
+            command=list(agent.commands),
             nq=model.nq,
             nv=model.nv,
             options=options,
@@ -126,13 +138,25 @@ class AgentVecEnv:
         self.forward: npt.NDArray[np.float32] = np.zeros(n, np.float32)
         self.diverged: BoolArray = np.zeros(n, np.bool_)
 
+    def _metrics(self) -> list[str]:
+        """Names of the metrics that there are; who cannot move along x has no "forward"."""
+        for name in self.agent.metrics:
+            if name != "forward" and name not in self._reported:
+                infos = self._reported
+                raise ValueError(f"{self._id}: its metric '{name}' is neither 'forward' nor one of its infos {infos}")
+        still = self.agent.x_position() is None
+        return [name for name in self.agent.metrics if name in self._reported or not still]
+
     def _rehearse(self) -> None:
         """Let the agents observe and reward once in the spawn pose, to find out how much they do."""
         agent, n = self.agent, self.num_envs
         if agent.model.nu == 0:
             raise ValueError(f"{self._id}: its model has no actuators, expected at least 1")
         self._put(np.tile(agent.spawn_qpos, (n, 1)), np.tile(agent.spawn_qvel, (n, 1)), np.ones(n, np.bool_))
-        self._obs_size = 0
+        names = [number.name for number in agent.commands]
+        if len(set(names)) < len(names):
+            raise ValueError(f"{self._id}: its commands are called {names}, expected names of their own")
+        self._obs_size, self._parts = 0, dict[str, slice]()
         self._obs_size = self._observe().shape[1]
         if self._obs_size == 0:
             raise ValueError(f"{self._id}: its observations are empty, expected at least 1 number")
@@ -149,7 +173,8 @@ class AgentVecEnv:
         """Observations, `(N, obs_size)`."""
         said = self.agent.observations()
         n = self.num_envs
-        parts = [said] if isinstance(said, np.ndarray) else list(said)
+        named = said if isinstance(said, Mapping) else {}
+        parts = [said] if isinstance(said, np.ndarray) else list(named.values() or said)
         for part in parts:
             if np.ndim(part) not in (1, 2) or len(part) != n:
                 found = np.shape(part)
@@ -157,6 +182,11 @@ class AgentVecEnv:
         obs: FloatArray = np.concatenate([np.reshape(part, (n, -1)) for part in parts], axis=1)
         if self._obs_size and obs.shape[1] != self._obs_size:
             raise ValueError(f"{self._id}: it observes {obs.shape[1]} numbers, but {self._obs_size} at first")
+        if not self._obs_size:
+            widths = [np.size(part) // n for part in parts] if named else [obs.shape[1]]
+            ends = np.cumsum([0, *widths]).tolist()
+            names = list(named) or ["observation"]
+            self._parts = {name: slice(*ends[i : i + 2], 1) for i, name in enumerate(names) if ends[i] < ends[i + 1]}
         return obs
 
     def _numbers(self, what: str, said: Mapping[str, FloatArray], names: list[str]) -> FloatArray:
@@ -168,6 +198,13 @@ class AgentVecEnv:
             if np.shape(numbers) != (n,):
                 raise ValueError(f"{self._id}: {what} '{name}' has the shape {np.shape(numbers)}, expected ({n},)")
         return np.stack(list(said.values()), axis=1) if said else np.zeros((n, 0))
+
+    def _ctrl(self) -> FloatArray:
+        """Controls, `(N, nu)`."""
+        ctrl = np.asarray(self.agent.ctrl())
+        if ctrl.shape != self.agent.action.shape:
+            raise ValueError(f"{self._id}: ctrl returns the shape {ctrl.shape}, expected {self.agent.action.shape}")
+        return ctrl
 
     def _failed(self) -> BoolArray:
         """Agents that have failed, `(N,)`."""
@@ -186,6 +223,51 @@ class AgentVecEnv:
         self.memory[mask] = 0.0
         self.steps[mask] = 0
         self.pending &= ~mask
+        self.agent.command[mask] = self._tell(mask, np.zeros(self.num_envs, np.int64))[mask]
+
+    def _tell(self, mask: BoolArray, steps: npt.NDArray[np.int64]) -> FloatArray:
+        """Find out what the agents in a mask are told in their observations of these numbers, 0 at a start."""
+        ranges = self.agent.commands
+        if not ranges:
+            return self.agent.command
+        due = mask & ((steps == 0) | (steps >= self.due))
+        if due.any():
+            streams = Streams(self.seeds[due], self.numbers[due], self.episodes[due], steps[due])
+            drawn, holds = self.agent.draw_command(streams, steps[due])
+            n, k = len(streams), len(ranges)
+            if np.shape(drawn) != (n, k) or np.shape(holds) != (n,):
+                found = f"{np.shape(drawn)} and {np.shape(holds)}"
+                raise ValueError(f"{self._id}: draw_command returns shapes {found}, expected ({n}, {k}) and ({n},)")
+            low, high = np.array([[number.low, number.high] for number in ranges]).T
+            self.scheduled[due] = np.clip(drawn, low, high)
+            self.due[due] = steps[due] + np.maximum(np.asarray(holds, np.int64), 1)
+        return np.where(self.commanded[:, None], self.given, self.scheduled)
+
+    def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
+        """Tell agents what to do, or give them back to their schedule with None, as `VecEnv.set_command`."""
+        chosen, ranges = self._mask(mask), self.agent.commands
+        if not ranges:
+            raise ValueError(f"the agents of {self._id} take no commands, spec.command is empty")
+        if command is None:
+            self.commanded[chosen] = False
+            return
+        numbers, expected = np.asarray(command, float), self.given.shape
+        if numbers.shape != expected:
+            raise ValueError(f"command has the shape {numbers.shape}, expected {expected}")
+        for i, number in enumerate(ranges):
+            # NaN is in no range
+            wrong = chosen & ~((numbers[:, i] >= number.low) & (numbers[:, i] <= number.high))
+            if wrong.any():
+                agent = int(wrong.argmax())
+                found = f"command {number.name} is {numbers[agent, i]}"
+                expects = f"expected {number.low:g} to {number.high:g} {number.unit}"
+                raise ValueError(f"agent {agent} of '{self._id}': {found}, {expects}")
+        self.given[chosen], self.commanded[chosen] = numbers[chosen], True
+
+    @property
+    def command(self) -> FloatArray:
+        """What each agent was told by the observation that it has, `(N, len(spec.command))`."""
+        return self.agent.command.copy()
 
     def _begin(self, mask: BoolArray) -> None:
         """Begin new episodes of the agents in a mask."""
@@ -196,7 +278,8 @@ class AgentVecEnv:
         starts = self.agent.agent_reset(random)
         model, n = self.agent.model, len(random)
         states = []
-        for name, start, columns in zip(("qpos", "qvel"), starts, (model.nq, model.nv), strict=True):
+        expected = (("qpos", model.nq), ("qvel", model.nv), ("memory", self.agent.memory_size))
+        for (name, columns), start in zip(expected[: len(starts)], starts, strict=True):
             if np.shape(start) != (n, columns):
                 found = np.shape(start)
                 raise ValueError(f"{self._id}: agent_reset returns {name} of shape {found}, expected ({n}, {columns})")
@@ -204,6 +287,8 @@ class AgentVecEnv:
             state[mask] = start
             states.append(state)
         self._put(states[0], states[1], mask)
+        if len(states) == len(expected):
+            self.memory[mask] = states[2][mask]
 
     def _show(self, mask: BoolArray) -> npt.NDArray[np.float32]:
         """Observe those in a mask, whose episodes have just begun; the rows of others stay."""
@@ -236,6 +321,22 @@ class AgentVecEnv:
         self._begin(chosen)
         return self._show(chosen)
 
+    def _perceive(self) -> tuple[FloatArray, BoolArray, FloatArray, FloatArray]:
+        """Observations, failures, terms and infos of the decision just made.
+
+        Observed is what to do from now on; rewarded is what the decision was made under.
+        """
+        agent = self.agent
+        present, following = agent.command, self._tell(np.ones(self.num_envs, np.bool_), self.steps + 1)
+        agent.command = following
+        obs = self._observe()
+        agent.command = present
+        failed = self._failed()
+        terms = self._numbers("reward", agent.step_reward(), self._rewarded)
+        reported = self._numbers("info", agent.info(), self._reported)
+        present[:] = following
+        return obs, failed, terms, reported
+
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], BoolArray, BoolArray]:
@@ -249,11 +350,9 @@ class AgentVecEnv:
         finite = np.isfinite(given)
         agent.action[:] = np.where(finite, np.clip(given, -1.0, 1.0) if self._clip else given, 0.0)
         before, begun = agent.x_position(), self.pending.copy()
-        broken = agent.sim.step(agent.action, agent.frame_skip)
+        broken = agent.sim.step(self._ctrl(), agent.frame_skip)
         agent.remember()
-        obs, failed = self._observe(), self._failed()
-        terms = self._numbers("reward", agent.step_reward(), self._rewarded)
-        reported = self._numbers("info", agent.info(), self._reported)
+        obs, failed, terms, reported = self._perceive()
 
         # quarantine: nothing that is not a sane number leaves its row
         sound = ~broken & finite.all(1)
@@ -327,11 +426,17 @@ class AgentVecEnv:
 
     def save(self) -> bytes:
         """Everything that the future depends on: NumPy's `.npz`, without pickles."""
-        return _snapshots.pack(self.agent.sim.save(), {name: getattr(self, name) for name in _SAVED})
+        return _snapshots.pack(self.agent.sim.save(), self._arrays())
+
+    def _arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """What a snapshot holds besides the physics; commands where there are any."""
+        named = {name: getattr(self, name) for name in (*_SAVED, *_COMMANDS)}
+        named["command"] = self.agent.command
+        return named if self.agent.commands else {name: named[name] for name in _SAVED}
 
     def load(self, snapshot: bytes) -> None:
         """Restore what `save` returned for the same task and number of agents."""
-        present = {name: getattr(self, name) for name in _SAVED}
+        present = self._arrays()
         simulation, saved = _snapshots.unpack(snapshot, self._id, present)
         self.agent.sim.load(simulation)
         for name, array in present.items():

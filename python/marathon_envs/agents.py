@@ -16,10 +16,11 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from marathon_envs._arrays import BoolArray, FloatArray, Streams
 from marathon_envs._joints import JointRotations
-from marathon_envs._native import Model, Simulation, learn
+from marathon_envs._native import CommandRange, Model, Simulation, learn
 
 if TYPE_CHECKING:
     from marathon_envs.agent_env import AgentVecEnv
@@ -78,6 +79,10 @@ class MarathonAgent:
     """What an action is. "nominal": a number in [-1, 1] per actuator, clipped. "raw": the actuator's control in its own
     units, within its `ctrlrange` but not clipped: the agent sees and pays for what was asked for, while the physics
     clamps what acts."""
+    commands: ClassVar[Sequence[CommandRange]] = ()
+    """What the agents can be told to do, a number each; see `draw_command`."""
+    metrics: ClassVar[Sequence[str]] = ("forward",)
+    """Numbers that tell, decision by decision, how well the task is done: names out of `info`, and "forward"."""
     memory_size: ClassVar[int] = 0
     """Number of variables that an agent keeps from decision to decision, see `remember`."""
 
@@ -89,7 +94,12 @@ class MarathonAgent:
         self.action: FloatArray = np.zeros((num_agents, self.model.nu))
         """Actions of the last decision, as `controls` says, `(N, nu)`; zero at the start of an episode."""
         self.memory: FloatArray = np.zeros((num_agents, self.memory_size))
-        """The agents' own variables, `(N, memory_size)`; zero at the start of an episode."""
+        """The agents' own variables, `(N, memory_size)`; at the start of an episode zero, or from `agent_reset`."""
+        self.command: FloatArray = np.zeros((num_agents, len(self.commands)))
+        """What the agents are told, `(N, len(commands))`.
+
+        In `observations` it is what to do from now on, elsewhere what the decision was made under.
+        """
         self._anatomy()
 
     def _anatomy(self) -> None:
@@ -139,8 +149,10 @@ class MarathonAgent:
 
     # ------------------------------------------------------------------------------------------------ to be overridden
 
-    def agent_reset(self, random: Streams) -> tuple[FloatArray, FloatArray]:
+    def agent_reset(self, random: Streams) -> tuple[FloatArray, FloatArray] | tuple[FloatArray, FloatArray, FloatArray]:
         """Return the states in which `len(random)` agents begin episodes: `qpos`, `(n, nq)`, and `qvel`, `(n, nv)`.
+
+        A third array, `(n, memory_size)`, is what their memory begins with.
 
         Random numbers come from `random`, row by row from each agent's own stream. This one is the spawn pose and
         velocity with `reset_noise`.
@@ -156,11 +168,31 @@ class MarathonAgent:
         qvel[:, self._root_dofs] += random.uniform(-noise.root_velocity, noise.root_velocity, len(self._root_dofs))
         return qpos, qvel
 
+    def draw_command(self, random: Streams, step: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return what `len(random)` agents are told, `(n, len(commands))`, and for how many decisions, `(n,)`.
+
+        It is the agents' own schedule, asked at the start of an episode and whenever a command has run out; `step`,
+        `(n,)`, is the number of each agent's observation in its episode. Random numbers come from `random`, row by row
+        from a stream that belongs to the agent, its episode and its step. A caller's `set_command` goes before it.
+        This one: the values nearest to 0, for ever.
+        """
+        nearest = [min(max(0.0, number.low), number.high) for number in self.commands]
+        return np.tile(nearest, (len(random), 1)), np.full(len(random), 2**62)
+
+    def ctrl(self) -> FloatArray:
+        """Return the controls of the actuators until the next decision, `(N, nu)`. This one: the actions.
+
+        It is called once per decision, before the physics: the place of scaling, delays and targets of servos.
+        """
+        return self.action
+
     def remember(self) -> None:
         """Update `memory`, once per decision, before `observations` and `step_reward` read it."""
 
-    def observations(self) -> FloatArray | Sequence[FloatArray]:
+    def observations(self) -> FloatArray | Sequence[FloatArray] | Mapping[str, FloatArray]:
         """Return what the agents see: `(N, obs_size)`, or arrays `(N,)` and `(N, k)` to be laid side by side.
+
+        The keys of a dictionary are the names in `spec.observations`.
 
         It may be called more than once for a state, and changes nothing.
         """

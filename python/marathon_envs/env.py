@@ -4,6 +4,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
 
 from marathon_envs import _snapshots, _spaces, _tasks, _window
 from marathon_envs._native import Renderer
@@ -158,6 +159,13 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         if self._window is not None:
             raise TypeError("an environment with a window cannot be copied or pickled, expected another render_mode")
         return {**self.__dict__, "_renderer": None}
+
+    def set_command(self, command: npt.ArrayLike | None) -> None:
+        """Tell the agent what to do, `(len(task_spec.command),)`, in place of its schedule; None gives it back.
+
+        It observes the command at the end of its next step, or at the start of its next episode.
+        """
+        self._env.set_command(None if command is None else np.asarray(command, float)[None])
 
     def get_state(self) -> tuple[FloatArray, FloatArray]:
         """`qpos`, `(nq,)`, and `qvel`, `(nv,)`, in MuJoCo's layout, float64."""

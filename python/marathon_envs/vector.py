@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -225,6 +226,10 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         infos["diverged"], infos["_diverged"] = diverged, mask
         if self._x is not None:
             infos["x_velocity"], infos["_x_velocity"] = distance / self.task_spec.dt, mask
+
+    def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
+        """Tell agents, all or those of a mask, what to do in place of their schedule, as `VecEnv.set_command`."""
+        self._env.set_command(command, mask)
 
     def save(self) -> bytes:
         """Everything that the episodes to come depend on; of wrappers, nothing."""

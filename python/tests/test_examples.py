@@ -50,6 +50,13 @@ def test_ppo_in_one_file_learns(tmp_path: Path) -> None:
     assert returns[0] < -5 and returns[-1] > 5
 
 
+def test_a_rover_learns_to_follow_its_schedule_and_its_caller(tmp_path: Path) -> None:
+    lines = run(tmp_path, "steer_an_agent")
+    assert number(r": ([-\d.]+) m/s off", lines[0]) < 0.5 and number(r": ([-\d.]+) m/s off", lines[3]) < 0.5
+    for line, target in zip(lines[1:3], (1.5, -1.5), strict=True):
+        assert number(r"m/s: ([-\d.]+) m/s after", line) == pytest.approx(target, abs=0.4)
+
+
 def test_hoppers_race_in_one_world(tmp_path: Path) -> None:
     words = ("--steps", "600000", "--runners", "4", "--seconds", "4", "--picture", "race.png")
     lines = run(tmp_path, "pettingzoo_race", *words)

@@ -45,5 +45,8 @@ pub use error::{EnvError, nearest};
 pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
-pub use shard::{AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
+pub use shard::{
+    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Metric, MetricSource, ObsGroup, Shard,
+    ShardFactory, Spec,
+};
 pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

@@ -2,7 +2,9 @@
 //! decision for all of its agents.
 
 use crate::error;
-use marathon_envs::{Crowd, CrowdError, Lockstep, Options, ShardFactory, Spec, StepMut};
+use marathon_envs::{
+    CommandRange, Crowd, CrowdError, Lockstep, Metric, MetricSource, ObsGroup, Options, ShardFactory, Spec, StepMut,
+};
 use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, train};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
@@ -89,8 +91,47 @@ pub fn spec(env: &Bound<'_, PyAny>) -> PyResult<Spec> {
         options: Options::new(),
         nq: spec.getattr("nq")?.extract()?,
         nv: spec.getattr("nv")?.extract()?,
-        ..Spec::default()
+        observations: parts(&spec.getattr("observations")?)?,
+        metrics: metrics(&spec.getattr("metrics")?, &spec.getattr("info")?)?,
+        command: commands(&spec.getattr("command")?)?,
     })
+}
+
+/// Parts of an observation: slices by name.
+fn parts(observations: &Bound<'_, PyAny>) -> PyResult<Vec<ObsGroup>> {
+    let mut parts = Vec::new();
+    for item in observations.call_method0("items")?.try_iter()? {
+        let (name, slice): (String, Bound<'_, PyAny>) = item?.extract()?;
+        let (start, stop): (usize, usize) = (slice.getattr("start")?.extract()?, slice.getattr("stop")?.extract()?);
+        parts.push(ObsGroup { name, range: start..stop });
+    }
+    Ok(parts)
+}
+
+/// Metrics by their names, which are infos or `forward`.
+fn metrics(names: &Bound<'_, PyAny>, info: &Bound<'_, PyAny>) -> PyResult<Vec<Metric>> {
+    let (names, info): (Vec<String>, Vec<String>) = (names.extract()?, info.extract()?);
+    let source = |name: &String| match info.iter().position(|known| known == name) {
+        Some(i) => MetricSource::Info(i),
+        None => MetricSource::Forward,
+    };
+    Ok(names.into_iter().map(|name| Metric { source: source(&name), name }).collect())
+}
+
+/// What agents can be told to do.
+fn commands(ranges: &Bound<'_, PyAny>) -> PyResult<Vec<CommandRange>> {
+    let mut out = Vec::new();
+    for range in ranges.try_iter()? {
+        let range = range?;
+        let number = |name| range.getattr(name)?.extract::<f64>();
+        out.push(CommandRange {
+            name: range.getattr("name")?.extract()?,
+            low: number("low")?,
+            high: number("high")?,
+            unit: range.getattr("unit")?.extract()?,
+        });
+    }
+    Ok(out)
 }
 
 /// The blocks of a Python object with the interface of `VecEnv`.

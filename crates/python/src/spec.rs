@@ -4,7 +4,43 @@ use crate::{error, options, task};
 use marathon_envs::{Options, registry};
 use marathon_physics::lanes::Isa;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PySlice};
+
+/// One number of what an agent can be told to do: its name, range and unit.
+#[pyclass(frozen, eq, get_all, module = "marathon_envs", skip_from_py_object)]
+#[derive(Clone, PartialEq)]
+pub struct CommandRange {
+    /// Name, such as `velocity`.
+    pub name: String,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+    /// Unit, such as `m/s`; empty for a pure number.
+    pub unit: String,
+}
+
+#[pymethods]
+impl CommandRange {
+    #[new]
+    #[pyo3(signature = (name, low, high, unit = ""))]
+    fn new(name: &str, low: f64, high: f64, unit: &str) -> PyResult<Self> {
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            return Err(error::value(format!("command '{name}' is from {low} to {high}, expected a range of finite numbers")));
+        }
+        Ok(CommandRange { name: name.into(), low, high, unit: unit.into() })
+    }
+
+    fn __getnewargs__(&self) -> (String, f64, f64, String) {
+        let CommandRange { name, low, high, unit } = self.clone();
+        (name, low, high, unit)
+    }
+
+    fn __repr__(&self) -> String {
+        let CommandRange { name, low, high, unit } = self;
+        format!("CommandRange({name:?}, {low}, {high}, {unit:?})")
+    }
+}
 
 /// Constant facts of a task.
 #[pyclass(frozen, module = "marathon_envs")]
@@ -45,6 +81,14 @@ pub struct Spec {
     /// Names of the numbers in `VecEnv.info`.
     #[pyo3(get)]
     pub info: Vec<String>,
+    /// Names of the numbers that tell, step by step, how well the task is done: those in `VecEnv.info`, and `forward`,
+    /// which is `VecEnv.forward`.
+    #[pyo3(get)]
+    pub metrics: Vec<String>,
+    /// Names of the observation's parts, and where they begin and end.
+    observations: Vec<marathon_envs::ObsGroup>,
+    /// What agents can be told to do, see `VecEnv.set_command`.
+    pub command: Vec<CommandRange>,
     /// Length of `qpos`.
     #[pyo3(get)]
     pub nq: usize,
@@ -61,6 +105,22 @@ impl Spec {
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::show(py, &self.options)
+    }
+
+    /// Parts of the observation by name, in their order: `obs[:, spec.observations["touch"]]`.
+    #[getter]
+    fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let parts = PyDict::new(py);
+        for group in &self.observations {
+            parts.set_item(&group.name, PySlice::new(py, group.range.start as isize, group.range.end as isize, 1))?;
+        }
+        Ok(parts)
+    }
+
+    /// What agents can be told to do, a number each, see `VecEnv.set_command`.
+    #[getter]
+    fn command(&self) -> Vec<CommandRange> {
+        self.command.clone()
     }
 
     /// For `copy` and `pickle`: what the facts follow from.
@@ -101,6 +161,13 @@ pub fn spec(id: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
     Spec::of(registry::factory_with(id, &options, Isa::F32).map_err(error::env)?.spec())
 }
 
+impl CommandRange {
+    fn of(range: &marathon_envs::CommandRange) -> Self {
+        let marathon_envs::CommandRange { name, low, high, unit } = range.clone();
+        CommandRange { name, low, high, unit }
+    }
+}
+
 impl Spec {
     /// From the facts that an environment goes by.
     pub fn of(spec: &marathon_envs::Spec) -> PyResult<Self> {
@@ -119,6 +186,9 @@ impl Spec {
             max_episode_steps: spec.max_episode_steps,
             reward_terms: spec.reward_terms.clone(),
             info: spec.info.clone(),
+            metrics: spec.metrics.iter().map(|metric| metric.name.clone()).collect(),
+            observations: spec.observations.clone(),
+            command: spec.command.iter().map(CommandRange::of).collect(),
             nq: spec.nq,
             nv: spec.nv,
             options: spec.options.clone(),

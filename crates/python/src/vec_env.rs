@@ -331,6 +331,48 @@ impl VecEnv {
         Ok(())
     }
 
+    /// What each agent was told by the observation that it has, `(num_envs, len(spec.command))`, a new array.
+    #[getter]
+    fn command<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (n, columns) = (self.num_envs, self.spec.get().command.len());
+        let mut all = Vec::with_capacity(n * columns);
+        for agent in 0..n {
+            all.extend(self.env().context(agent).map_err(error::env)?.command());
+        }
+        PyArray1::from_vec(py, all).reshape([n, columns])
+    }
+
+    /// Tells agents, all or those of a mask, what to do, `(num_envs, len(spec.command))`, in place of their own schedule;
+    /// with `None`, gives them back to it. They observe it at the end of the next step or at the start of the next episode,
+    /// and are rewarded for it from there on. It lasts over resets, until changed.
+    #[pyo3(signature = (command, mask = None))]
+    fn set_command(&mut self, command: Option<&Bound<'_, PyAny>>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let n = self.num_envs;
+        let mask = self::mask(mask, n)?;
+        let columns = self.spec.get().command.len();
+        if columns == 0 {
+            let id = &self.spec.get().id;
+            return Err(error::value(format!("the agents of {id} take no commands, spec.command is empty")));
+        }
+        let Some(command) = command else {
+            for agent in (0..n).filter(|i| mask[*i]) {
+                self.env().set_command(agent, None).map_err(error::env)?;
+            }
+            return Ok(());
+        };
+        let command = of_shape::<f64, Ix2, 2>("command has", command, [n, columns])?;
+        let command = rows(&command).into_owned();
+        let before = self.env().save();
+        for agent in (0..n).filter(|i| mask[*i]) {
+            if let Err(error) = self.env().set_command(agent, Some(&command[agent * columns..][..columns])) {
+                // all or nothing
+                self.env().load(&before).map_err(error::env)?;
+                return Err(error::value(error.to_string().replace("agent '", &format!("agent {agent} of '"))));
+            }
+        }
+        Ok(())
+    }
+
     /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
     /// the body's center of mass. Bodies are those of `model`.
     #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]

@@ -1,7 +1,7 @@
 //! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
 
 use marathon_physics::lanes::Real;
-use marathon_physics::model::{Actuator, JointType, Model};
+use marathon_physics::model::{Actuator, Geom, GeomType, JointType, Model};
 use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
 
 use super::{Facts, ModelSource};
@@ -69,6 +69,8 @@ pub(crate) struct Bindings<T: Real> {
     pub feet: Vec<usize>,
     /// Geoms that must not touch the ground.
     pub not_feet: Vec<usize>,
+    /// Planes and level height fields of the world that can be touched, planes first.
+    pub grounds: Vec<usize>,
     pub pairs: Vec<Pair<T::Scalar>>,
     pub motors: Vec<Motor<T::Scalar>>,
     /// Coordinates of the root that move the agent along +x, and how much.
@@ -170,6 +172,15 @@ impl<T: Real> Bindings<T> {
         let moves = |g: usize| model.bodies[model.geoms[g].body].weld_id != 0;
         let not_feet = (0..model.geoms.len()).filter(|g| moves(*g) && !feet.contains(g)).collect();
 
+        let still = |kind: GeomType| {
+            let ground = move |g: &usize| {
+                let Geom { kind: own, contype, conaffinity, .. } = &model.geoms[*g];
+                *own == kind && !moves(*g) && (*contype != 0 || *conaffinity != 0)
+            };
+            (0..model.geoms.len()).filter(ground)
+        };
+        let grounds = still(GeomType::Plane).chain(still(GeomType::Hfield)).collect();
+
         let mut driven: Vec<usize> = Vec::new();
         let mut motors = Vec::new();
         for joint in model.actuators.iter().filter_map(Actuator::joint) {
@@ -204,7 +215,7 @@ impl<T: Real> Bindings<T> {
             joints: view.joints,
             touch_sites,
         };
-        Ok(Bindings { parts, bodies, touch, measure, feet, not_feet, pairs, motors, along_x })
+        Ok(Bindings { parts, bodies, touch, measure, feet, not_feet, grounds, pairs, motors, along_x })
     }
 }
 

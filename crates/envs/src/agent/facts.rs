@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use super::CommandRange;
 
+/// Name of the metric that is the distance along +x.
+pub(crate) const FORWARD: &str = "forward";
+
 /// Constant facts of an agent. What is left to [`Facts::default`] is as the suite's own agents have it.
 #[derive(Clone, Debug)]
 pub struct Facts {
@@ -28,6 +31,9 @@ pub struct Facts {
     pub reward_terms: Vec<String>,
     /// Names of the numbers that [`Agent::info`] reports.
     pub info: Vec<String>,
+    /// Numbers that tell, decision by decision, how well the task is done: names out of `info`, and `forward`, the distance
+    /// moved along +x in the decision, m. Reports of a training may show their means.
+    pub metrics: Vec<String>,
     /// Geoms that the agent speaks of, see [`Part`].
     pub parts: Vec<String>,
     /// Bodies that the agent speaks of, see [`Body`].
@@ -61,6 +67,7 @@ impl Default for Facts {
             controls: Controls::Nominal,
             reward_terms: Vec::new(),
             info: Vec::new(),
+            metrics: vec![FORWARD.into()],
             parts: Vec::new(),
             bodies: Vec::new(),
             feet: Vec::new(),

@@ -21,6 +21,7 @@ use marathon_physics::lanes::Real;
 use crate::episode_rng::EpisodeRng;
 
 pub use command::{CommandRange, Ctrl};
+pub(crate) use facts::FORWARD;
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
 pub use outputs::{Obs, Terms};

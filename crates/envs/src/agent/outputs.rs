@@ -2,24 +2,35 @@
 
 use marathon_physics::lanes::Real;
 
-use super::Senses;
+use super::{Part, Senses};
 
 /// An observation in the making.
 pub struct Obs<'a, T> {
     values: &'a mut [T],
     len: usize,
+    groups: Option<&'a mut Vec<(&'static str, usize)>>,
 }
 
 impl<'a, T: Real> Obs<'a, T> {
+    /// `groups` also records names and where they begin, at registration.
     #[inline(always)]
-    pub(crate) fn new(values: &'a mut [T]) -> Self {
-        Obs { values, len: 0 }
+    pub(crate) fn new(values: &'a mut [T], groups: Option<&'a mut Vec<(&'static str, usize)>>) -> Self {
+        Obs { values, len: 0, groups }
     }
 
     /// How many numbers have been written, those beyond the end included.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.len
+    }
+
+    /// Names the numbers that follow, up to the next name: [`Spec::observations`](crate::Spec::observations). Observations
+    /// without any names are called `observation`.
+    #[inline(always)]
+    pub fn group(&mut self, name: &'static str) {
+        if let Some(groups) = &mut self.groups {
+            groups.push((name, self.len));
+        }
     }
 
     /// Appends one number.
@@ -55,6 +66,16 @@ impl<'a, T: Real> Obs<'a, T> {
             let [x, y, z, w] = s.joint_rotation(i);
             self.vector([x, y, z]);
             self.scalar(w);
+        }
+    }
+
+    /// Appends how far the ground is above the center of a part, m, mostly negative, at points `[ahead, left]` of it by its
+    /// heading, see [`Senses::ground_near`].
+    #[inline(always)]
+    pub fn height_scan(&mut self, s: &Senses<T>, part: Part, points: &[[f64; 2]]) {
+        let height = s.height(part);
+        for point in points {
+            self.scalar(s.ground_near(part, *point) - height);
         }
     }
 

@@ -118,6 +118,37 @@ impl<T: Real> Senses<'_, T> {
         self.action[i]
     }
 
+    /// Height of the ground at a place in the world, m: of planes and of height fields that lie level, with ground of the
+    /// agent's own. Beyond all of it, that of the nearest place; 0 if the model has none.
+    #[inline(always)]
+    pub fn ground_height(&self, x: T, y: T) -> T {
+        let mut height = T::zero();
+        for (i, geom) in self.bindings.grounds.iter().enumerate() {
+            let (own, on) = self.readings.elevation(*geom, x, y);
+            height = if i == 0 { own } else { T::select(on, height.max(own), height) };
+        }
+        height
+    }
+
+    /// Height of the ground `ahead` of a part's center and to its `left`, m, by its [heading](Senses::heading).
+    #[inline(always)]
+    pub fn ground_near(&self, part: Part, [ahead, left]: [f64; 2]) -> T {
+        let ([x, y, _], [c, s]) = (self.position(part), self.heading(part));
+        let (ahead, left) = (T::lit(ahead), T::lit(left));
+        self.ground_height(s.neg_mul_add(left, c.mul_add(ahead, x)), c.mul_add(left, s.mul_add(ahead, y)))
+    }
+
+    /// Which way a part's forward axis points along the ground: cosine and sine of the angle from +x. Of an axis that points
+    /// straight up or down, that of +x.
+    #[inline(always)]
+    pub fn heading(&self, part: Part) -> [T; 2] {
+        let [x, y, _] = self.forward(part);
+        let length = hypot(x, y);
+        let level = T::lit(1e-6).lt(length);
+        let scale = T::select(level, length, T::lit(1.0)).recip();
+        [T::select(level, x * scale, T::lit(1.0)), T::masked(level, y * scale)]
+    }
+
     /// Number `i` of the command, see [`Facts::command`](crate::Facts::command): to an observation, the one to follow from now
     /// on; to everything else, the one that the decision was made under.
     #[inline(always)]

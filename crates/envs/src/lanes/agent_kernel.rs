@@ -30,8 +30,17 @@ pub(crate) enum Occasion<'a> {
     Decision,
     /// The start of episodes in these lanes, a bit each; the reward is then not used.
     Start(u32),
-    /// A start in all lanes, to see which terms the reward gets.
-    Rehearsal(&'a mut Vec<&'static str>),
+    /// A start in all lanes, to see what the agent names.
+    Rehearsal(&'a mut Named),
+}
+
+/// What an agent gives names to.
+#[derive(Default)]
+pub(crate) struct Named {
+    /// Terms of the reward.
+    pub terms: Vec<&'static str>,
+    /// Parts of the observation, and where they begin.
+    pub groups: Vec<(&'static str, usize)>,
 }
 
 /// What an agent perceived.
@@ -97,10 +106,10 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
     #[inline(always)]
     fn run(self) -> Perceived {
         let Perceive { agent, task, group, work, occasion } = self;
-        let (fresh, names) = match occasion {
-            Occasion::Decision => (None, None),
-            Occasion::Start(lanes) => (Some(lanes), None),
-            Occasion::Rehearsal(names) => (Some(!0), Some(names)),
+        let (fresh, term_names, group_names) = match occasion {
+            Occasion::Decision => (None, None, None),
+            Occasion::Start(lanes) => (Some(lanes), None, None),
+            Occasion::Rehearsal(Named { terms, groups }) => (Some(!0), Some(terms), Some(groups)),
         };
         let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, .. } = group;
         let mut s = Senses {
@@ -125,15 +134,15 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             }
         }
         s.memory = memory;
-        let mut obs = Obs::new(obs);
+        let mut obs = Obs::new(obs, group_names);
         if fresh.is_none() {
             s.command = &commands.next;
         }
         agent.observe(&s, &mut obs);
         s.command = &commands.present;
         let own = task.facts.reward_terms.len();
-        agent.step_reward(&s, &mut Terms::new(&mut terms[..own], names));
-        let mut info = Obs::new(info);
+        agent.step_reward(&s, &mut Terms::new(&mut terms[..own], term_names));
+        let mut info = Obs::new(info, None);
         agent.info(&s, &mut info);
         for (lanes, geom) in feet.iter_mut().zip(&task.bindings.feet) {
             let touched = T::bits(s.readings.touched(*geom));

@@ -3,7 +3,7 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Sim, Work};
 
-use super::agent_kernel::{Occasion, Perceived};
+use super::agent_kernel::{Named, Occasion, Perceived};
 use super::context::Commands;
 use super::saved::{Body, Whole};
 use super::task::{EpisodeStart, Task};
@@ -39,8 +39,8 @@ pub(crate) struct Rehearsal {
     pub observed: usize,
     /// How many numbers it reported.
     pub reported: usize,
-    /// The terms that it added.
-    pub terms: Vec<&'static str>,
+    /// What it named.
+    pub named: Named,
 }
 
 /// Lanes whose episode ended in this decision, a bit each.
@@ -198,11 +198,11 @@ impl<T: Real> LaneGroup<T> {
 
     /// Lets an agent do everything once.
     pub fn rehearse(&mut self, task: &Task<T>, work: &mut Work<T>) -> Rehearsal {
-        let mut terms = Vec::new();
+        let mut named = Named::default();
         task.sim.measure_start(work, &self.physics, &task.bindings.measure);
         let Perceived { observed, reported, .. } =
-            task.agent.perceive(task, self, work, Occasion::Rehearsal(&mut terms));
-        Rehearsal { observed, reported, terms }
+            task.agent.perceive(task, self, work, Occasion::Rehearsal(&mut named));
+        Rehearsal { observed, reported, named }
     }
 }
 

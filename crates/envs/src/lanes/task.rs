@@ -9,13 +9,16 @@ use marathon_physics::{Model, Sim, Work};
 use super::agent_kernel::AgentKernel;
 use super::group::{LaneGroup, Rehearsal};
 use crate::agent::bindings::{Bindings, Blueprint, sim_options};
-use crate::agent::{CommandRange, Controls, Facts, Options, Start};
+use crate::agent::{CommandRange, Controls, FORWARD, Facts, Options, Start};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
-use crate::shard::{AgentState, Spec};
+use crate::shard::{AgentState, Metric, MetricSource, ObsGroup, Spec};
 
 /// Name of the reward term that replaces all others when an agent fails.
 pub const TERMINATION_TERM: &str = "termination";
+
+/// Name of the numbers of an observation that have none.
+const UNNAMED: &str = "observation";
 
 /// What all shards of an agent share.
 pub(crate) struct Task<T: Real> {
@@ -58,12 +61,16 @@ impl<T: Real> AgentFactory<T> {
             reward_terms,
             info: facts.info.clone(),
             command: facts.command.clone(),
+            observations: Vec::new(),
+            metrics: metrics(&facts, !bindings.along_x.is_empty())
+                .map_err(|problem| EnvError::Agent { id: id(), problem })?,
             nq: blueprint.model.nq,
             nv: blueprint.model.nv,
             options,
         };
         let mut task = Task { agent, facts, spec, blueprint, bindings, sim };
-        task.spec.obs = task.rehearse()?;
+        task.spec.observations = task.rehearse()?;
+        task.spec.obs = task.spec.observations.last().map_or(0, |group| group.range.end);
         Ok(AgentFactory { task: Arc::new(task) })
     }
 }
@@ -87,6 +94,43 @@ fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
     [bound(0), bound(1)]
 }
 
+/// Where the numbers are that tell how well the task is done.
+fn metrics(facts: &Facts, moves_along_x: bool) -> Result<Vec<Metric>, String> {
+    let mut out = Vec::new();
+    for name in &facts.metrics {
+        let source = match facts.info.iter().position(|info| info == name) {
+            Some(i) => MetricSource::Info(i),
+            // what cannot move along x has no such number
+            None if name == FORWARD && !moves_along_x => continue,
+            None if name == FORWARD => MetricSource::Forward,
+            None => {
+                return Err(format!(
+                    "its metric '{name}' is neither '{FORWARD}' nor one of its infos {:?}",
+                    facts.info
+                ));
+            }
+        };
+        out.push(Metric { name: name.clone(), source });
+    }
+    Ok(out)
+}
+
+/// The parts of an observation of so many numbers, from their names and where they begin.
+fn parts(begun: &[(&'static str, usize)], observed: usize) -> Result<Vec<ObsGroup>, String> {
+    let mut out: Vec<ObsGroup> = Vec::new();
+    let unnamed = [(UNNAMED, 0)];
+    let ends = begun.iter().map(|(_, at)| *at).chain([observed]);
+    for ((name, start), end) in unnamed.iter().chain(begun).zip(ends) {
+        if out.iter().any(|group| group.name == *name) {
+            return Err(format!("two parts of its observation are called '{name}', expected names of their own"));
+        }
+        if *start < end {
+            out.push(ObsGroup { name: (*name).into(), range: *start..end });
+        }
+    }
+    Ok(out)
+}
+
 /// Whether a command has names of its own and ranges that are ranges.
 fn check_command(ranges: &[CommandRange]) -> Result<(), String> {
     for (i, CommandRange { name, low, high, .. }) in ranges.iter().enumerate() {
@@ -101,9 +145,9 @@ fn check_command(ranges: &[CommandRange]) -> Result<(), String> {
 }
 
 impl<T: Real> Task<T> {
-    /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the
-    /// length of its observation.
-    fn rehearse(&self) -> Result<usize, EnvError> {
+    /// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the parts
+    /// of its observation.
+    fn rehearse(&self) -> Result<Vec<ObsGroup>, EnvError> {
         let facts = &self.facts;
         let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
         let (mut start, id) = (EpisodeStart::new(), EpisodeId { seed: 0, agent: 0, episode: 0 });
@@ -114,8 +158,8 @@ impl<T: Real> Task<T> {
         if let Some(x) = start.memory.iter().find(|x| !x.is_finite()) {
             return wrong(format!("its episodes start with a memory of {x}, expected finite numbers"));
         }
-        check_command(&facts.command).or_else(|problem| wrong(problem).map(|_: usize| ()))?;
-        let Rehearsal { observed, reported, terms } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
+        check_command(&facts.command).or_else(|problem| wrong(problem).map(|_: Vec<ObsGroup>| ()))?;
+        let Rehearsal { observed, reported, named } = LaneGroup::new(self).rehearse(self, &mut Work::new(&self.sim));
         if let Some(expected) = facts.observation.filter(|n| *n != observed) {
             return wrong(format!("it observes {observed} numbers, but its facts say {expected}"));
         }
@@ -125,10 +169,11 @@ impl<T: Real> Task<T> {
         if reported != facts.info.len() {
             return wrong(format!("it reports {reported} numbers, but its facts name {:?}", facts.info));
         }
-        if terms != facts.reward_terms {
+        let terms = &named.terms;
+        if *terms != facts.reward_terms {
             return wrong(format!("it adds the reward terms {terms:?}, but its facts say {:?}", facts.reward_terms));
         }
-        Ok(observed)
+        parts(&named.groups, observed).or_else(wrong)
     }
 
     /// Lets the agent draw the start of an episode into `out`.

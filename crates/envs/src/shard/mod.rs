@@ -12,7 +12,7 @@ mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
-pub use spec::{Spec, scale_action};
+pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
 use crate::error::EnvError;
 
@@ -37,6 +37,16 @@ pub struct BlockStep {
     pub terms: Vec<f32>,
     /// Further numbers about the state reached, `[info][16]`.
     pub info: Vec<f32>,
+}
+
+impl BlockStep {
+    /// A metric of [`Spec::metrics`], per agent.
+    pub fn metric(&self, metric: &Metric) -> &[f32] {
+        match metric.source {
+            MetricSource::Forward => &self.forward,
+            MetricSource::Info(i) => &self.info[i * BLOCK..][..BLOCK],
+        }
+    }
 }
 
 /// A run of blocks owned by one thread.

@@ -1,5 +1,7 @@
 //! Constant facts of a task, as learners and tools see them.
 
+use std::ops::Range;
+
 use crate::agent::{CommandRange, Options};
 
 /// Constant facts of a task.
@@ -33,6 +35,10 @@ pub struct Spec {
     pub reward_terms: Vec<String>,
     /// Names of further numbers for logs, in the order of [`BlockStep::info`].
     pub info: Vec<String>,
+    /// Names of the observation's parts, in their order, and where they lie; together they are all of it.
+    pub observations: Vec<ObsGroup>,
+    /// Numbers that tell how well the task is done, see [`BlockStep::metric`](crate::BlockStep::metric).
+    pub metrics: Vec<Metric>,
     /// What the agent can be told to do: names, ranges and units of its command.
     pub command: Vec<CommandRange>,
     /// Arguments that the agent takes, with the values that it has.
@@ -41,6 +47,33 @@ pub struct Spec {
     pub nq: usize,
     /// Length of a velocity, `qvel`.
     pub nv: usize,
+}
+
+/// A part of an observation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObsGroup {
+    /// Name, such as `touch`.
+    pub name: String,
+    /// Which numbers of the observation.
+    pub range: Range<usize>,
+}
+
+/// A number that tells, decision by decision, how well a task is done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Metric {
+    /// Name.
+    pub name: String,
+    /// Where it is.
+    pub source: MetricSource,
+}
+
+/// Where a metric is to be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MetricSource {
+    /// It is the distance along +x, [`BlockStep::forward`](crate::BlockStep::forward).
+    Forward,
+    /// It is a number of [`BlockStep::info`](crate::BlockStep::info).
+    Info(usize),
 }
 
 impl Spec {

@@ -71,6 +71,34 @@ impl<S: Real> HeightField<S> {
     }
 }
 
+impl<S: Real<Scalar = S>> HeightField<S> {
+    /// Height of the surface at a place in the field's frame; beyond the border, that of the nearest place.
+    #[inline(always)]
+    pub(crate) fn elevation(&self, at: [S; 2]) -> S {
+        let (mut first, mut part) = ([0; 2], [S::zero(); 2]);
+        for (i, lines) in [self.cols, self.rows].into_iter().enumerate() {
+            let last = (lines - 1) as f64;
+            let lines_in = ((at[i] + self.half[i]) * self.per_cell[i]).max(S::zero()).min(S::lit(last));
+            let line = S::widen(lines_in.floor()).max(0.0).min(last - 1.0);
+            first[i] = line as usize;
+            part[i] = lines_in - S::lit(line);
+        }
+        let height = |column: usize, row: usize| self.heights[(first[1] + row) * self.cols + first[0] + column];
+        let (corner, across, [x, y]) = (height(0, 0), height(1, 1), part);
+        // the diagonal goes from the lower left to the upper right
+        let (right, upper) = (height(1, 0), height(0, 1));
+        let lower_right = y.mul_add(across - right, x.mul_add(right - corner, corner));
+        let upper_left = x.mul_add(across - upper, y.mul_add(upper - corner, corner));
+        S::select(y.lt(x), lower_right, upper_left)
+    }
+
+    /// Whether a place in the field's frame is within its border.
+    #[inline(always)]
+    pub(crate) fn covers(&self, at: [S; 2]) -> S::Mask {
+        S::and(at[0].abs().lt(self.half[0]), at[1].abs().lt(self.half[1]))
+    }
+}
+
 /// A height field in its place: the same grid in every lane, with heights of each lane's own.
 #[derive(Clone, Copy)]
 pub(crate) struct Terrain<'a, T: Real> {

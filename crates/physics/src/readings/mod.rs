@@ -4,6 +4,7 @@
 
 mod central;
 mod contacts;
+mod elevation;
 mod energy;
 mod forces;
 mod frames;

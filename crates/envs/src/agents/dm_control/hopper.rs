@@ -103,6 +103,7 @@ impl Agent for Hopper {
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         super::observe_positions(s, out, 1);
         super::observe_velocities(s, out);
+        out.group("touch");
         for i in 0..TOUCH.len() {
             out.scalar((s.touch_force(i) + T::lit(1.0)).ln());
         }

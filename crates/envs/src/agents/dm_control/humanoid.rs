@@ -142,12 +142,17 @@ impl Agent for Humanoid {
         if self.arguments.pure_state {
             super::observe_positions(s, out, 0);
         } else {
-            super::observe_positions(s, out, ROOT);
+            out.group("joint_angles");
+            crate::agents::observe_positions(s, out, ROOT);
+            out.group("head_height");
             out.scalar(self.head_height(s));
+            out.group("extremities");
             for body in EXTREMITIES {
                 out.vector(self.seen_from_torso(s, body));
             }
+            out.group("torso_vertical");
             out.vector(self.vertical(s));
+            out.group("com_velocity");
             out.vector(self.velocity(s));
         }
         super::observe_velocities(s, out);

@@ -18,8 +18,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::JointType;
 
-use super::{observe_positions, observe_velocities};
-use crate::agent::{Controls, Facts, ModelSource, Senses, Sigmoid, Start, Terms, Tolerance, names};
+use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Sigmoid, Start, Terms, Tolerance, names};
 use crate::any_agent::AnyAgent;
 
 /// All of them, in the order of listings.
@@ -78,6 +77,7 @@ impl Domain {
             controls: Controls::Raw,
             reward_terms: names([REWARD]),
             info: names(self.info),
+            metrics: names(["forward", "speed"]),
             termination_reward: None,
             ..Facts::default()
         }
@@ -124,6 +124,20 @@ fn randomize_joints(start: &mut Start) {
             (JointType::Slide, None) | (JointType::Ball, _) => {}
         }
     }
+}
+
+/// Coordinates from `skip` on, by dm_control's name.
+#[inline(always)]
+fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
+    out.group("position");
+    super::observe_positions(s, out, skip);
+}
+
+/// All velocities.
+#[inline(always)]
+fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    out.group("velocity");
+    super::observe_velocities(s, out);
 }
 
 /// Worth of a speed: 1 from `goal` on, `value` at `goal - margin`, falling in a line.

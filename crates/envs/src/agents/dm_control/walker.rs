@@ -105,11 +105,13 @@ impl Agent for Walker {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let r = s.readings();
+        out.group("orientations");
         for body in 1..r.sim.model().bodies.len() {
             let axes = r.body_axes(body);
             out.scalar(axes[0][0]);
             out.scalar(axes[2][0]);
         }
+        out.group("height");
         out.scalar(self.height(s));
         super::observe_velocities(s, out);
     }

@@ -152,6 +152,7 @@ impl Agent for Ant {
         super::observe_positions(s, out, 2 * usize::from(self.exclude_current_positions_from_observation));
         super::observe_velocities(s, out);
         if self.include_cfrc_ext_in_observation {
+            out.group("cfrc_ext");
             for body in 1..s.readings().sim.model().bodies.len() {
                 for x in self.clipped_wrench(s, body) {
                     out.scalar(x);

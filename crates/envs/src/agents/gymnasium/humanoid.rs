@@ -76,6 +76,7 @@ impl Sight {
         super::observe_positions(s, out, if self.position { 0 } else { 2 });
         super::observe_velocities(s, out);
         if self.cinert {
+            out.group("cinert");
             for body in 1..bodies {
                 for x in r.cinert(body) {
                     out.scalar(x);
@@ -83,6 +84,7 @@ impl Sight {
             }
         }
         if self.cvel {
+            out.group("cvel");
             for body in 1..bodies {
                 for x in r.cvel(body) {
                     out.scalar(x);
@@ -90,11 +92,13 @@ impl Sight {
             }
         }
         if self.qfrc_actuator {
+            out.group("qfrc_actuator");
             for dof in ROOT..nv {
                 out.scalar(r.qfrc_actuator(dof));
             }
         }
         if self.cfrc_ext {
+            out.group("cfrc_ext");
             for body in 1..bodies {
                 for x in s.contact_wrench(body) {
                     out.scalar(x);

@@ -48,6 +48,7 @@ impl Agent for HumanoidStandup {
             // the last is not in Gymnasium's info, but it is in its reward
             reward_terms: names(["reward_linup", "reward_quadctrl", "reward_impact", "reward_alive"]),
             info: names(["x_position", "y_position", "z_distance_from_origin"]),
+            metrics: names(["z_distance_from_origin"]),
             view: Sight::view(),
             ..super::facts(id, "Gymnasium's humanoid that is to stand up", &self.xml_file, self.frame_skip)
         }

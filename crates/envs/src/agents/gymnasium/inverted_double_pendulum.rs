@@ -65,14 +65,18 @@ impl Agent for InvertedDoublePendulum {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let r = s.readings();
+        out.group("cart_position");
         out.scalar(r.qpos(0));
+        out.group("sin");
         for i in 1..r.sim.model().nq {
             out.scalar(r.qpos(i).sin_cos().0);
         }
+        out.group("cos");
         for i in 1..r.sim.model().nq {
             out.scalar(r.qpos(i).sin_cos().1);
         }
         super::observe_clipped_velocities(s, out);
+        out.group("qfrc_constraint");
         out.scalar(clamp(r.qfrc_constraint(0), -10.0, 10.0));
     }
 

@@ -23,7 +23,6 @@ use std::sync::Arc;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::{observe_positions, observe_velocities};
 use crate::agent::senses::clamp;
 use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Start, View};
 use crate::any_agent::AnyAgent;
@@ -107,9 +106,24 @@ enum Noise {
     Normal,
 }
 
+/// Coordinates from `skip` on, by Gymnasium's name.
+#[inline(always)]
+fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
+    out.group("qpos");
+    super::observe_positions(s, out, skip);
+}
+
+/// All velocities.
+#[inline(always)]
+fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    out.group("qvel");
+    super::observe_velocities(s, out);
+}
+
 /// All velocities, clipped to [-10, 10].
 #[inline(always)]
 fn observe_clipped_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    out.group("qvel");
     for i in 0..s.readings().sim.model().nv {
         out.scalar(clamp(s.readings().qvel(i), -10.0, 10.0));
     }

@@ -70,12 +70,19 @@ impl Agent for HopperV0 {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.group("velocity");
         out.vector(s.linear_velocity(TORSO));
+        out.group("forward");
         out.vector(s.forward(TORSO));
+        out.group("up");
         out.vector(s.up(TORSO));
+        out.group("touch");
         out.touch_sensors(s);
+        out.group("joint_rotations");
         out.joint_rotations(s);
+        out.group("joint_velocities");
         out.joint_velocities(s);
+        out.group("foot_height");
         out.scalar(s.height(FOOT));
     }
 

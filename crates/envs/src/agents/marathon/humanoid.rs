@@ -137,13 +137,21 @@ impl Agent for HumanoidV0 {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.group("velocity");
         out.vector(s.linear_velocity(BUTT));
+        out.group("forward");
         out.vector(s.forward(BUTT));
+        out.group("up");
         out.vector(s.up(BUTT));
+        out.group("torso_forward");
         out.vector(s.forward(TORSO));
+        out.group("torso_up");
         out.vector(s.up(TORSO));
+        out.group("touch");
         out.touch_sensors(s);
+        out.group("joint_rotations");
         out.joint_rotations(s);
+        out.group("joint_velocities");
         out.joint_velocities(s);
     }
 
@@ -192,6 +200,7 @@ impl Agent for HumanoidV1 {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         HumanoidV0.observe(s, out);
+        out.group("foot_heights");
         for sole in SOLES {
             out.scalar(s.height(sole));
         }

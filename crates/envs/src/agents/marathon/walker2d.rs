@@ -72,11 +72,17 @@ impl Agent for Walker2dV0 {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.group("velocity");
         out.vector(s.linear_velocity(TORSO));
+        out.group("forward");
         out.vector(s.forward(TORSO));
+        out.group("up");
         out.vector(s.up(TORSO));
+        out.group("touch");
         out.touch_sensors(s);
+        out.group("joint_rotations");
         out.joint_rotations(s);
+        out.group("joint_velocities");
         out.joint_velocities(s);
     }
 
@@ -111,6 +117,7 @@ impl Agent for Walker2dV1 {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         Walker2dV0.observe(s, out);
+        out.group("foot_heights");
         out.scalar(s.height(LEFT_FOOT));
         out.scalar(s.height(RIGHT_FOOT));
     }
