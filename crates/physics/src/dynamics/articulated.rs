@@ -12,7 +12,7 @@ use crate::algebra::planar::Space;
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::Sim;
-use crate::state::Work;
+use crate::state::{Work, net_bias_force};
 
 /// Factorizes the stale links and brings their forces inward.
 ///
@@ -21,13 +21,14 @@ use crate::state::Work;
 /// applied in either case.
 #[inline(always)]
 pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
+    let applied = work.forces.acts_on_links();
     for l in (0..sim.links.len()).rev() {
         if !work.solver.stale[l] {
             continue;
         }
         let link = &sim.links[l];
         let mut k: Sym6<T> = sym6_of_inertia(&work.motion.inertia[l]);
-        let mut f: V6<T> = work.net_bias_force(l);
+        let mut f: V6<T> = net_bias_force(&work.motion, &work.forces, applied, l);
         if work.solver.in_contact[l] {
             if with_stiffness {
                 S::add_sym(&mut k, &work.solver.stiffness[l]);

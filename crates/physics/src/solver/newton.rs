@@ -7,7 +7,7 @@ use crate::dynamics::{accelerate, bring_inward, factorize, link_accelerations};
 use crate::lanes::Real;
 use crate::rows::NewtonStep;
 use crate::sim::Sim;
-use crate::state::{Group, Work};
+use crate::state::{Group, Work, net_bias_force};
 
 /// Solves for the constrained acceleration, into `acc`; rows end with their true forces.
 #[inline(always)]
@@ -254,9 +254,10 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
     }
     apply_forces::<T, S>(work);
     link_accelerations::<T, S>(sim, work);
+    let applied = work.forces.acts_on_links();
     for l in 0..sim.links.len() {
         let mut f = S::momentum(&work.motion.inertia[l], &work.solver.link_acc[l]);
-        S::add(&mut f, &work.net_bias_force(l));
+        S::add(&mut f, &net_bias_force(&work.motion, &work.forces, applied, l));
         if work.solver.in_contact[l] {
             S::sub(&mut f, &work.solver.wrench[l]);
         }

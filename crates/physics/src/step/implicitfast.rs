@@ -8,7 +8,7 @@ use crate::dynamics::{accelerate, bring_inward, factorize};
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
 use crate::solver::apply_forces;
-use crate::state::{Group, Work};
+use crate::state::{Group, Work, net_bias_force};
 
 kernel_fn! {
     /// Acceleration with the joint damping taken at the end of the step.
@@ -96,7 +96,7 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     // symmetric, so rows are columns
     let inertia = [[jxx, jxy, jxz], [jxy, jyy, jyz], [jxz, jyz, jzz]];
     let spin = rotate(&inertia, &w);
-    let mut wrench = work.net_bias_force(l);
+    let mut wrench = net_bias_force(&work.motion, &work.forces, work.forces.acts_on_links(), l);
     if work.solver.in_contact[l] {
         for i in 0..6 {
             wrench[i] -= work.solver.wrench[l][i];

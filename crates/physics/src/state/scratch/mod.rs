@@ -58,13 +58,6 @@ impl<T: Real> Work<T> {
         }
     }
 
-    /// What the bias force of a link leaves to joints and constraints, after the forces that act on the link from
-    /// outside: gravity compensation, fluid and pushes.
-    #[inline(always)]
-    pub(crate) fn net_bias_force(&self, link: usize) -> V6<T> {
-        net_bias_force(&self.motion, &self.forces, link)
-    }
-
     /// Makes room for new rows; those of before become the [past](Work::past).
     #[inline(always)]
     pub(crate) fn put_rows_aside(&mut self) {
@@ -81,13 +74,15 @@ impl<T: Real> Work<T> {
     }
 }
 
-/// See [`Work::net_bias_force`].
+/// What the bias force of a link leaves to joints and constraints, after the forces that act on the link from outside:
+/// gravity compensation, fluid and pushes. `applied` says whether there are such forces
+/// ([`Forces::acts_on_links`]): asked once, not for every link.
 #[inline(always)]
-pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, link: usize) -> V6<T> {
+pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, applied: bool, link: usize) -> V6<T> {
     let mut f = motion.bias_force[link];
-    if let Some(applied) = forces.link_applied.get(link) {
+    if applied {
         for i in 0..6 {
-            f[i] -= applied[i];
+            f[i] -= forces.link_applied[link][i];
         }
     }
     f
