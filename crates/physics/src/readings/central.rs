@@ -9,8 +9,7 @@ use super::joint_space::{constraint_wrenches, joint_space};
 use crate::algebra::spatial::*;
 use crate::lanes::{Kernel, Real};
 use crate::rows::Source;
-use crate::sim::TransmissionSpec;
-use crate::sim::{Mount, Sim};
+use crate::sim::{Mount, Sim, TransmissionSpec};
 use crate::state::{Group, Work};
 
 impl<T: Real> Sim<T> {
@@ -273,10 +272,10 @@ impl<T: Real> Kernel<T> for JointForces<'_, T> {
     #[inline(always)]
     fn run(self) {
         let JointForces(sim, work) = self;
-        let mut links = std::mem::take(&mut work.solver.link_force);
+        let mut links = std::mem::take(&mut work.readings.link_force);
         let mut joints = std::mem::take(&mut work.readings.qfrc_constraint);
         constraint_wrenches(work, &mut links, &mut joints);
         joint_space(sim, work, &mut links, &mut joints);
-        (work.solver.link_force, work.readings.qfrc_constraint) = (links, joints);
+        (work.readings.link_force, work.readings.qfrc_constraint) = (links, joints);
     }
 }

@@ -1,4 +1,4 @@
-//! What carries and brakes links from outside: compensation of gravity, and the medium.
+//! Gravity compensation, and bodies in a fluid.
 
 use super::weld::BodyMount;
 use crate::algebra::rigid::rotate;

@@ -18,6 +18,7 @@
 //! (`docs/physics.md` has the numbers).
 
 use crate::algebra::planar::{Full, Planar, Space};
+use crate::algebra::spatial::V6;
 use crate::dynamics::reduce_free_root;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, at};
@@ -59,7 +60,8 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
             mark_path(sim, &work.rows.blocks[b], &mut c.on_path);
             for k in 0..dim {
                 let from = (first + k) * nv;
-                inward::<T, S>(sim, work, b, k, &mut c.rhs, &c.on_path, &mut c.columns[from..from + nv]);
+                let unit = (&mut c.rhs[..], &mut c.link_force[..]);
+                inward::<T, S>(sim, work, b, k, unit, &c.on_path, &mut c.columns[from..from + nv]);
             }
         }
         scale_rows(&work.rows.blocks[b], &mut c, first, nv);
@@ -153,10 +155,10 @@ fn mark_path<T: Real>(sim: &Sim<T>, block: &Block<T>, on_path: &mut [bool]) {
 #[inline(always)]
 fn inward<T: Real, S: Space>(
     sim: &Sim<T>,
-    work: &mut Work<T>,
+    work: &Work<T>,
     b: usize,
     k: usize,
-    rhs: &mut [T],
+    (rhs, link_force): (&mut [T], &mut [V6<T>]),
     on_path: &[bool],
     out: &mut [T],
 ) {
@@ -165,7 +167,7 @@ fn inward<T: Real, S: Space>(
     out.fill(z);
     for l in 0..sim.links.len() {
         if on_path[l] {
-            work.solver.link_force[l] = [z; 6];
+            link_force[l] = [z; 6];
         }
     }
     let block = &work.rows.blocks[b];
@@ -177,7 +179,7 @@ fn inward<T: Real, S: Space>(
                     for i in 0..6 {
                         // link forces are what the motion needs: minus what is applied
                         let x = T::masked(*lanes, w[i]);
-                        work.solver.link_force[*link][i] += if s == 0 { x } else { -x };
+                        link_force[*link][i] += if s == 0 { x } else { -x };
                     }
                 }
             }
@@ -193,7 +195,7 @@ fn inward<T: Real, S: Space>(
             continue;
         }
         let link = &sim.links[l];
-        let mut f = work.solver.link_force[l];
+        let mut f = link_force[l];
         let dofs = link.dofs.clone();
         if link.free_block {
             let reduced = reduce_free_root(dofs.start, &work.solver.root_factor[link.tree], &work.motion.axis, rhs, &f);
@@ -206,7 +208,7 @@ fn inward<T: Real, S: Space>(
             out[d] = force;
         }
         if let Some(p) = link.parent {
-            S::add(&mut work.solver.link_force[p], &f);
+            S::add(&mut link_force[p], &f);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Memory of the correction for blocks that tie branches of a tree together.
 
+use crate::algebra::spatial::V6;
 use crate::lanes::Real;
 
 /// Columns of the coupled rows and the factors of the small matrix.
@@ -16,8 +17,9 @@ pub(crate) struct Coupling<T: Real> {
     pub y: Vec<T>,
     /// Number of rows.
     pub rows: usize,
-    /// Scratch: joint forces of one row.
+    /// Unit force along one row: on joints and on links, and the links whose joints it can move.
     pub rhs: Vec<T>,
+    pub link_force: Vec<V6<T>>,
     pub on_path: Vec<bool>,
 }
 
@@ -31,6 +33,7 @@ impl<T: Real> Coupling<T> {
             y: Vec::new(),
             rows: 0,
             rhs: vec![T::zero(); nv],
+            link_force: vec![[T::zero(); 6]; links],
             on_path: vec![false; links],
         }
     }

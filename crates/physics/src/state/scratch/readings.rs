@@ -14,6 +14,8 @@ pub(crate) struct Measured<T: Real> {
     /// Per degree of freedom: forces of actuators and constraints.
     pub qfrc_actuator: Vec<T>,
     pub qfrc_constraint: Vec<T>,
+    /// Constraint forces on links, which [`qfrc_constraint`](Measured::qfrc_constraint) is made of.
+    pub link_force: Vec<V6<T>>,
     /// What touch sensors feel on the sites that were asked for, N.
     pub touch_forces: Vec<T>,
 }
@@ -27,6 +29,7 @@ impl<T: Real> Measured<T> {
             cfrc_ext: vec![[z; 6]; sim.model.bodies.len()],
             qfrc_actuator: vec![z; nv],
             qfrc_constraint: vec![z; nv],
+            link_force: vec![[z; 6]; sim.links.len()],
             touch_forces: Vec::new(),
         }
     }

@@ -37,7 +37,7 @@ pub(crate) struct Solver<T: Real> {
     pub stale: Vec<bool>,
     /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
     pub root_factor: Vec<[[T; 6]; 6]>,
-    /// Forces on links for `bring_inward`.
+    /// Forces that links need, for `bring_inward`: a residual.
     pub link_force: Vec<V6<T>>,
     pub coupling: Coupling<T>,
     /// Per lane, once one has had a crowd: its factorization.
