@@ -1,11 +1,11 @@
 //! The same configurations in `mlagents-learn` and in our own trainer.
 
 use super::Options;
-use super::chart::Chart;
 use super::peers;
 use super::record::{Record, Run, mean_curve, train_one};
 use crate::error::CliError;
 use marathon_config as config;
+use marathon_runs::report::chart::Chart;
 use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";

@@ -1,11 +1,11 @@
 //! How many agents: speed and score at equal steps with 16 to 4096 of them.
 
 use super::Options;
-use super::chart::Chart;
 use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_one};
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_learn::PpoConfig;
+use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
 const AGENTS: [usize; 4] = [16, 64, 512, 4096];

@@ -1,7 +1,6 @@
 //! Decision period: a decision after every physics step against one after every few, with physics-only steps between.
 
 use super::Options;
-use super::chart::Chart;
 use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_on};
 use crate::bench::env;
 use crate::error::CliError;
@@ -9,6 +8,7 @@ use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::PpoConfig;
 use marathon_physics::lanes::Isa;
+use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
 
 const AGENT: &str = "Hopper-v0";

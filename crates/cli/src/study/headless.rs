@@ -1,11 +1,11 @@
 //! With and without pictures.
 
 use super::Options;
-use super::chart::Chart;
 use super::record::{Record, plus_minus, spread};
 use crate::error::CliError;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_render::{Follow, Renderer, Scene};
+use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
 use std::time::Instant;
 

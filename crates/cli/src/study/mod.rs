@@ -2,7 +2,6 @@
 //! command, the version and the processor, so that somebody else can make it again.
 
 mod agreement;
-mod chart;
 mod concurrency;
 mod decision_period;
 mod headless;

@@ -1,7 +1,6 @@
 //! The paper's three ways: one agent, many agents in one world, several processes.
 
 use super::Options;
-use super::chart::Chart;
 use super::record::{Record, Run, each_seed, plus_minus, spread, train_on};
 use crate::error::CliError;
 use crate::program;
@@ -10,6 +9,7 @@ use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_learn::{BLOCK, Players, PpoConfig};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
+use marathon_runs::report::chart::Chart;
 use std::time::Instant;
 
 const AGENT: &str = "Hopper-v0";

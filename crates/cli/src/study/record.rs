@@ -1,7 +1,6 @@
 //! What a study has found, and its files.
 
 use super::Options;
-use super::chart::Chart;
 use crate::console::note;
 use crate::error::CliError;
 use marathon_envs::ShardFactory;
@@ -10,6 +9,7 @@ use marathon_learn::{
     Control, EvalOptions, Evaluation, IterationStats, Players, PpoConfig, Snapshot, evaluate, train_with, write_atomic,
 };
 use marathon_physics::lanes::Isa;
+use marathon_runs::report::chart::Chart;
 use marathon_runs::text;
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! Table 1: how fast the four agents train with the paper's own settings, sixteen agents each.
 
-use super::chart::Chart;
 use super::record::{Record, each_seed, plus_minus, spread, train_one};
 use super::{Options, Peers, peers};
 use crate::error::CliError;
 use marathon_config as config;
+use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
 use std::path::Path;
 

@@ -1,12 +1,12 @@
 //! Table 2: training on the processor and on a GPU.
 
 use super::Options;
-use super::chart::Chart;
 use super::peers::{self, Sb3};
 use super::record::{Record, Run, each_seed, plus_minus, spread, train_one};
 use super::table3::ppo2;
 use crate::error::CliError;
 use marathon_learn::PpoConfig;
+use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
 /// Agents, decisions, passes: the same in every row of an algorithm.

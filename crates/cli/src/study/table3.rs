@@ -1,12 +1,12 @@
 //! Table 3: PPO, A2C and ACKTR on the hopper, time and score at equal steps, all agents and several seeds.
 
-use super::chart::Chart;
 use super::peers::{self, Sb3};
 use super::record::{Record, Run, each_seed, mean_curve, plus_minus, spread, train_one};
 use super::{Options, Peers};
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_learn::{PpoConfig, Schedule};
+use marathon_runs::report::chart::Chart;
 use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";

@@ -1,6 +1,7 @@
 //! What a run leaves behind: rows, events, checkpoints, the curve, the summary.
 
-pub mod canvas;
+mod canvas;
+pub mod chart;
 pub mod csv;
 pub mod curve;
 pub mod progress;

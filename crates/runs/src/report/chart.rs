@@ -1,10 +1,9 @@
-//! The pictures of studies: lines over steps, or bars.
+//! Pictures that compare runs: lines over steps, or bars.
 
-use crate::error::CliError;
-use marathon_runs::RunError;
-use marathon_runs::report::canvas::{
+use super::canvas::{
     DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
 };
+use crate::error::RunError;
 use plotters::prelude::*;
 use plotters::style::FontStyle;
 use std::path::Path;
@@ -40,9 +39,9 @@ impl Chart {
     ///
     /// # Errors
     /// If it cannot be drawn or written.
-    pub fn draw(&self, path: &Path) -> Result<(), CliError> {
+    pub fn draw(&self, path: &Path) -> Result<(), RunError> {
         let rgb = self.picture().map_err(|e| RunError::Draw { path: path.into(), reason: e.to_string() })?;
-        Ok(write_png(path, &rgb)?)
+        write_png(path, &rgb)
     }
 
     fn picture(&self) -> Result<Vec<u8>, DrawError> {
@@ -105,7 +104,7 @@ impl Chart {
                         let (left, color) = (i as f64, COLORS[i % COLORS.len()]);
                         let corners = [(left + 0.2, 0.0), (left + 0.8, *y)];
                         chart.draw_series(std::iter::once(Rectangle::new(corners, color.filled())))?;
-                        let (text, label) = (style(14, INK, FontStyle::Normal), marathon_runs::text::short(*y));
+                        let (text, label) = (style(14, INK, FontStyle::Normal), crate::text::short(*y));
                         chart.draw_series(std::iter::once(Text::new(label, (left + 0.2, *y + 0.4 * room), text)))?;
                         // the name below, as wide as there is room
                         let (x, y) = chart.backend_coord(&(left + 0.06, bottom));
