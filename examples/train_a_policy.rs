@@ -1,7 +1,7 @@
 //! Training as a library call: no command line, no files until one asks for them.
 //!
 //! [`train`] takes a task (a [`ShardFactory`](marathon_envs::ShardFactory), by name from the registry), an instruction
-//! set, a [`PpoConfig`] and an observer, and returns a [`Policy`](marathon_learn::Policy) and a checkpoint. The observer
+//! set, a [`TrainConfig`] and an observer, and returns a [`Policy`](marathon_learn::Policy) and a checkpoint. The observer
 //! is called once per iteration with its numbers; it may look at the policy as it is, and it may stop the run. Here it
 //! prints a line and stops early, once the walker is fast and hardly ever falls.
 //!
@@ -12,7 +12,10 @@
 //! cargo run --release -p marathon-examples --bin train_a_policy -- 100000 walker.safetensors
 //! ```
 
-use marathon_learn::{Activation, Control, EvalOptions, IterationStats, PpoConfig, Snapshot, evaluate, train};
+use marathon_learn::{
+    Activation, Algorithm, Control, Deviations, EvalOptions, IterationStats, Moving, Ppo, Snapshot, TrainConfig,
+    evaluate, train,
+};
 use marathon_physics::Isa;
 use std::error::Error;
 use std::path::PathBuf;
@@ -26,20 +29,24 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = PathBuf::from(args.next().unwrap_or_else(|| "walker2d.safetensors".into()));
 
     let factory = marathon_envs::factory("walker2d", Isa::best())?;
-    // the rest of the settings has defaults; every field is explained in `PpoConfig`
-    let config = PpoConfig {
-        total_steps,
-        actor_hidden: vec![32, 32],
-        critic_hidden: vec![32, 32],
-        activation: Activation::Tanh,
-        gamma: 0.98,
-        entropy_coef: 0.0,
-        init_log_std: -0.7,
-        min_std: 0.35,
-        final_min_std: Some(0.05),
-        seed: 1,
+    // the rest of the settings has defaults; every field is explained in `TrainConfig`
+    let ppo = Ppo {
+        entropy_coef: Moving::still(0.0),
+        deviations: Deviations {
+            init_log_std: -0.7,
+            // it looks for ways at the start and settles on one at the end
+            min_std: Moving { first: 0.35, last: 0.05 },
+            ..Default::default()
+        },
         ..Default::default()
     };
+    let config = TrainConfig::default().with(|config| {
+        (config.run.total_steps, config.run.seed) = (total_steps, 1);
+        (config.network.actor_hidden, config.network.critic_hidden) = (vec![32, 32], vec![32, 32]);
+        config.network.activation = Activation::Tanh;
+        config.rewards[0].gamma = 0.98;
+        config.algorithm = Algorithm::Ppo(ppo);
+    });
 
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
         let (speed, falls) = (stats.speed_mean.unwrap_or(0.0), stats.fall_fraction.unwrap_or(1.0));

@@ -64,7 +64,7 @@ def test_the_same_seed_gives_the_same_policy_here_and_by_the_command(tmp_path: P
 def test_configurations() -> None:
     result = train("hopper", CONFIG)
     assert result.policy.meta["hidden"] == [16] and result.policy.meta["activation"] == "elu"
-    assert result.policy.meta["training"]["config"]["epochs"] == 2
+    assert result.policy.meta["training"]["config"]["algorithm"]["ppo"]["epochs"] == 2
     result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, agents=16)
     assert result.policy.meta["hidden"] == [32, 32]
     wrong = {"behaviors": {"Hopper": {**CONFIG["behaviors"]["Hopper"], "time_horizn": 3}}}

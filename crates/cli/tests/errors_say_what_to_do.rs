@@ -77,15 +77,15 @@ fn a_changed_description_is_refused() {
         run.to_string()
     };
     for (pointer, value, text) in [
-        ("/config/lr", (-1.0).into(), "config.lr: found -1, expected a positive number"),
-        ("/config/horizon", 0.into(), "config.horizon: found 0, expected at least 1"),
-        ("/config/horizon", 32.into(), "config.horizon: found 32, expected 64, as in checkpoint"),
-        ("/config/gamma", 0.5.into(), "config.gamma: found 0.5, expected 0.9"),
-        ("/config/seed", (-1).into(), "config.seed: found 'invalid value: integer `-1`"),
+        ("/config/algorithm/ppo/lr", (-1.0).into(), "config.algorithm.ppo.lr: found -1, expected a positive number"),
+        ("/config/run/horizon", 0.into(), "config.run.horizon: found 0, expected at least 1"),
+        ("/config/run/horizon", 32.into(), "config.run.horizon: found 32, expected 64, as in checkpoint"),
+        ("/config/rewards/0/gamma", 0.5.into(), "config.rewards[0].gamma: found 0.5, expected 0.9"),
+        ("/config/run/seed", (-1).into(), "config.run.seed: found 'invalid value: integer `-1`"),
         (
-            "/config/total_steps",
+            "/config/run/total_steps",
             (1_u64 << 63).into(),
-            "config.total_steps: found 9223372036854775808, expected at most",
+            "config.run.total_steps: found 9223372036854775808, expected at most",
         ),
         ("/summary_freq", 0.into(), "summary_freq: found 0, expected at least 1"),
         ("/checkpoint_interval", 0.into(), "checkpoint_interval: found 0, expected at least 1"),

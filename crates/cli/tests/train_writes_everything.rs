@@ -49,7 +49,7 @@ fn a_run_leaves_every_file() {
     let curve = std::fs::read(folder.join("curve.png")).unwrap();
     assert!(curve.starts_with(b"\x89PNG") && curve.len() > 5_000, "the curve has {} bytes", curve.len());
     assert!(folder.join("checkpoint/checkpoint.json").is_file());
-    assert_eq!(read_json(&folder.join("run.json"))["config"]["agents"], 64);
+    assert_eq!(read_json(&folder.join("run.json"))["config"]["run"]["agents"], 64);
     assert_eq!(event_files(&folder).len(), 1);
 }
 
@@ -157,5 +157,6 @@ fn another_number_of_agents_keeps_the_buffer() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/configs/hopper-mlagents.yaml");
     succeed(folder.path(), &["train", "hopper", "--config", file, "--agents", "16", "--steps", "1", "--out", "x"]);
     let config = &read_json(&folder.path().join("x/run.json"))["config"];
-    assert_eq!((&config["agents"], &config["horizon"], &config["minibatches"]), (&16.into(), &640.into(), &5.into()));
+    assert_eq!((&config["run"]["agents"], &config["run"]["horizon"]), (&16.into(), &640.into()));
+    assert_eq!(config["algorithm"]["ppo"]["minibatches"], 5);
 }

@@ -4,7 +4,7 @@ use super::error::{ConfigError, shown};
 use super::names;
 use super::section::{Entry, Section};
 use marathon_envs::nearest;
-use marathon_learn::{PpoConfig, Signal};
+use marathon_learn::{RewardConfig, TrainConfig};
 use std::path::Path;
 
 /// The two formats of ML-Agents.
@@ -20,7 +20,7 @@ pub enum Format {
 pub struct Behavior<'a> {
     pub format: Format,
     /// What holds where the file is silent; it knows the trainer.
-    pub base: PpoConfig,
+    pub base: TrainConfig,
     /// Settings that stand in no section.
     pub top: Section<'a>,
     pub hyperparameters: Section<'a>,
@@ -28,7 +28,7 @@ pub struct Behavior<'a> {
     /// Of the reward that the task gives.
     pub extrinsic: Section<'a>,
     /// Rewards for novelty.
-    pub signals: Vec<Signal>,
+    pub signals: Vec<RewardConfig>,
     pub marathon: Section<'a>,
     /// Whether steps are counted for each agent by itself, not for all together.
     pub steps_per_agent: bool,

@@ -5,7 +5,10 @@ use super::behavior::{Behavior, Notes};
 use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
-use marathon_learn::{A2c, Acktr, Activation, Algorithm, BLOCK, Init, PpoConfig, Ratio, Sac, Schedule};
+use marathon_learn::{
+    A2c, Acktr, Activation, Algorithm, BLOCK, Deviations, Init, Moving, NetworkConfig, Ppo, Ratio, RewardConfig,
+    RewardKind, RunConfig, Sac, Schedule, StatisticsConfig, TrainConfig,
+};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -19,31 +22,15 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads, with any algorithm.
-const COMMON: [&str; 32] = [
+const COMMON: [&str; 16] = [
     "agents",
     "horizon",
     "rollouts",
-    "minibatches",
     "actor_hidden",
     "critic_hidden",
     "activation",
-    "value_lr",
-    "schedule",
-    "target_kl",
-    "final_target_kl",
-    "lr_range",
-    "max_grad_norm",
-    "adam_epsilon",
-    "value_clip",
-    "ratio",
     "initialization",
-    "action_clip",
-    "final_clip",
-    "final_entropy_coef",
-    "init_log_std",
-    "min_std",
-    "final_min_std",
-    "max_std",
+    "schedule",
     "follow_statistics",
     "observation_clip",
     "scale_rewards",
@@ -54,10 +41,25 @@ const COMMON: [&str; 32] = [
     "steps_per_agent",
 ];
 
-/// Those of the algorithms' own settings.
-const A2C: [&str; 3] = ["value_coef", "rms_decay", "rms_epsilon"];
+/// Those of the algorithms that learn from their own rollouts.
+const ON_POLICY: [&str; 6] =
+    ["final_entropy_coef", "action_clip", "init_log_std", "min_std", "final_min_std", "max_std"];
+/// Those of each algorithm's own settings.
+const PPO: [&str; 10] = [
+    "minibatches",
+    "value_lr",
+    "target_kl",
+    "final_target_kl",
+    "lr_range",
+    "max_grad_norm",
+    "adam_epsilon",
+    "value_clip",
+    "ratio",
+    "final_clip",
+];
+const A2C: [&str; 4] = ["max_grad_norm", "value_coef", "rms_decay", "rms_epsilon"];
 const ACKTR: [&str; 6] = ["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"];
-const SAC: [&str; 2] = ["updates", "n_step"];
+const SAC: [&str; 4] = ["value_lr", "adam_epsilon", "updates", "n_step"];
 
 /// The trainer's configuration, with the values of its base for all that the file leaves out.
 ///
@@ -67,113 +69,74 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     let settings = Settings::read(&behavior)?;
     let Behavior { top, hyperparameters, marathon, mut notes, seed, base, signals, extrinsic, .. } = behavior;
     let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
-    marathon.only(&[&COMMON[..], &A2C, &ACKTR, &SAC].concat())?;
+    marathon.only(&[&COMMON[..], &ON_POLICY, &PPO, &A2C, &ACKTR, &SAC].concat())?;
 
     let steps_per_agent = marathon.flag("steps_per_agent", behavior.steps_per_agent)?;
     let agents = agents(&marathon, &settings, &base, steps_per_agent)?;
     // an update waits until the buffer is full
     let is_sac = matches!(base.algorithm, Algorithm::Sac(_));
-    let rollout = if is_sac { base.horizon as u64 } else { settings.buffer_size.div_ceil(agents) };
+    let rollout = if is_sac { base.run.horizon as u64 } else { settings.buffer_size.div_ceil(agents) };
     let horizon = marathon.count("horizon", 1..=1 << 31, rollout)?;
     if let Some(entry) = hyperparameters.get("buffer_size").filter(|_| horizon != rollout) {
         notes.ignored(&entry, &format!("'horizon' of the 'marathon:' section makes rollouts of {}", agents * horizon));
     }
-    let is_ppo = base.algorithm == Algorithm::Ppo;
-    for key in ["epsilon", "epsilon_schedule"] {
-        if let Some(entry) = hyperparameters.get(key).filter(|_| !is_ppo) {
-            notes.ignored(&entry, &format!("{} bounds no ratio", base.algorithm.name()));
-        }
-    }
-    note_others(&marathon, base.algorithm, &mut notes);
+    note_others(&hyperparameters, &marathon, &base.algorithm, &mut notes);
     if let Some(entry) = top.get("time_horizon").filter(|_| settings.time_horizon != horizon && !is_sac) {
         let why = "each of the N agents adds M decisions to a rollout and the values of the states reached stand for the rest";
         notes.ignored(&entry, &why.replace("N", &agents.to_string()).replace("M", &horizon.to_string()));
     }
-    let minibatches = if is_sac { 1 } else { (settings.buffer_size / settings.batch_size).max(1) };
     let scale = if steps_per_agent { agents } else { 1 };
     if let Some(entry) = top.get("max_steps").filter(|_| scale > 1) {
         let all = settings.max_steps.saturating_mul(scale);
         notes.about(&entry, &format!("counts the steps of each agent: {all} steps of {scale} agents in all"));
     }
 
+    let schedule = schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?;
+    let from = From { marathon: &marathon, hyperparameters: &hyperparameters, settings: &settings, schedule };
+    let algorithm = match base.algorithm {
+        Algorithm::Ppo(base) => Algorithm::Ppo(from.ppo(base)?),
+        Algorithm::A2c(base) => Algorithm::A2c(from.a2c(base)?),
+        Algorithm::Acktr(base) => Algorithm::Acktr(from.acktr(base)?),
+        Algorithm::Sac(base) => Algorithm::Sac(from.sac(base, agents * horizon)?),
+    };
     let hidden = vec![settings.hidden_units as usize; settings.num_layers as usize];
     let actor_hidden = widths(&marathon, "actor_hidden", hidden)?;
-    let last_epsilon = settings.epsilon.min(LAST_EPSILON);
-    let last_beta = settings.beta.min(LAST_BETA);
-    let [min_std, max_std] = [base.min_std, base.max_std];
-    let ppo = PpoConfig {
-        algorithm: match base.algorithm {
-            Algorithm::Sac(_) => sac(&marathon, &hyperparameters, &settings, agents * horizon)?,
-            other => on_policy(&marathon, other)?,
+    let (network, statistics) = (&base.network, &base.statistics);
+    // alone, its scale cancels
+    let strength = if signals.is_empty() { 1.0 } else { strength };
+    let task = RewardConfig { kind: RewardKind::Task, strength, gamma: settings.gamma };
+    let config = TrainConfig {
+        run: RunConfig {
+            agents: agents as usize,
+            horizon: horizon as usize,
+            rollouts: marathon.count("rollouts", 1..=1 << 31, base.run.rollouts as u64)? as usize,
+            total_steps: settings.max_steps.saturating_mul(scale),
+            seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(base.run.seed))?,
+            threads: marathon.count("threads", 0..=65_536, base.run.threads as u64)? as usize,
         },
-        agents: agents as usize,
-        horizon: horizon as usize,
-        rollouts: marathon.count("rollouts", 1..=1 << 31, base.rollouts as u64)? as usize,
-        minibatches: marathon.count("minibatches", 1..=1 << 31, minibatches)? as usize,
-        epochs: settings.num_epoch as usize,
-        total_steps: settings.max_steps.saturating_mul(scale),
-
-        critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
-        actor_hidden,
-        activation: one_of(&marathon, "activation", Activation::ALL.map(|a| (a.name(), a)), base.activation)?,
-        initialization: one_of(&marathon, "initialization", Init::NAMED, base.initialization)?,
-
-        lr: settings.learning_rate,
-        value_lr: marathon.number("value_lr", Range::Positive, settings.learning_rate)?,
-        schedule: schedule(&marathon, &hyperparameters, settings.learning_rate_schedule, &mut notes)?,
-        target_kl: marathon.number("target_kl", Range::Positive, base.target_kl)?,
-        final_target_kl: end(&marathon, "final_target_kl", Range::Positive, Decay::Constant, base.target_kl)?,
-        lr_range: lr_range(&marathon, base.lr_range)?,
-        adam_epsilon: marathon.number("adam_epsilon", Range::Positive, base.adam_epsilon)?,
-        max_grad_norm: marathon.number("max_grad_norm", Range::Positive, base.max_grad_norm)?,
-
-        gamma: settings.gamma,
-        // alone, its scale cancels
-        reward_strength: if signals.is_empty() { 1.0 } else { strength },
-        signals,
-        gae_lambda: settings.lambd,
-        ratio: one_of(&marathon, "ratio", Ratio::NAMED, base.ratio)?,
-        clip: settings.epsilon,
-        final_clip: match is_ppo {
-            true => end(&marathon, "final_clip", Range::Positive, settings.epsilon_schedule, last_epsilon)?,
-            false => None,
+        network: NetworkConfig {
+            critic_hidden: widths(&marathon, "critic_hidden", actor_hidden.clone())?,
+            actor_hidden,
+            activation: one_of(&marathon, "activation", Activation::ALL.map(|a| (a.name(), a)), network.activation)?,
+            initialization: one_of(&marathon, "initialization", Init::NAMED, network.initialization)?,
         },
-        value_clip: match marathon.get("value_clip") {
-            Some(entry) if entry.node.is_null() => None,
-            Some(entry) => Some(entry.number(Range::Positive)?),
-            None => base.value_clip,
+        statistics: StatisticsConfig {
+            normalize_observations: settings.normalize,
+            follow_statistics: marathon.flag("follow_statistics", statistics.follow_statistics)?,
+            observation_clip: marathon.number("observation_clip", Range::Positive, statistics.observation_clip)?,
+            scale_rewards: marathon.flag("scale_rewards", statistics.scale_rewards)?,
+            statistics_cap: marathon.number("statistics_cap", Range::Positive, statistics.statistics_cap)?,
         },
-        entropy_coef: settings.beta,
-        final_entropy_coef: end(
-            &marathon,
-            "final_entropy_coef",
-            Range::NotNegative,
-            settings.beta_schedule,
-            last_beta,
-        )?,
-
-        action_clip: marathon.number("action_clip", Range::Positive, base.action_clip)?,
-        init_log_std: marathon.number("init_log_std", Range::Finite, base.init_log_std)?,
-        min_std: marathon.number("min_std", Range::Positive, min_std)?,
-        final_min_std: end(&marathon, "final_min_std", Range::Positive, Decay::Constant, min_std)?,
-        max_std: marathon.number("max_std", Range::Positive, max_std)?,
-
-        normalize_observations: settings.normalize,
-        follow_statistics: marathon.flag("follow_statistics", base.follow_statistics)?,
-        observation_clip: marathon.number("observation_clip", Range::Positive, base.observation_clip)?,
-        scale_rewards: marathon.flag("scale_rewards", base.scale_rewards)?,
-        statistics_cap: marathon.number("statistics_cap", Range::Positive, base.statistics_cap)?,
-
-        seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(base.seed))?,
-        threads: marathon.count("threads", 0..=65_536, base.threads as u64)? as usize,
+        rewards: [task].into_iter().chain(signals).collect(),
+        algorithm,
     };
-    ppo.validate().map_err(|source| ConfigError::Combination {
+    config.validate().map_err(|source| ConfigError::Combination {
         path: path.into(),
         agent: top.name().to_string(),
         source,
     })?;
     Ok(Loaded {
-        ppo,
+        config,
         buffer: (!is_sac && marathon.get("horizon").is_none()).then_some(settings.buffer_size),
         summary_freq: settings.summary_freq.saturating_mul(scale),
         checkpoint_interval: settings.checkpoint_interval.saturating_mul(scale),
@@ -186,18 +149,18 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
 fn agents(
     marathon: &Section<'_>,
     settings: &Settings,
-    base: &PpoConfig,
+    base: &TrainConfig,
     steps_per_agent: bool,
 ) -> Result<u64, ConfigError> {
     let block = BLOCK as u64;
     let default = match base.algorithm {
-        Algorithm::A2c(_) | Algorithm::Acktr(_) | Algorithm::Sac(_) => base.agents as u64,
-        Algorithm::Ppo if steps_per_agent => PAPER_AGENTS,
-        Algorithm::Ppo => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
+        Algorithm::A2c(_) | Algorithm::Acktr(_) | Algorithm::Sac(_) => base.run.agents as u64,
+        Algorithm::Ppo(_) if steps_per_agent => PAPER_AGENTS,
+        Algorithm::Ppo(_) => (settings.buffer_size / settings.time_horizon).clamp(block, MOST_AGENTS) / block * block,
     };
     let Some(entry) = marathon.get("agents") else { return Ok(default) };
     let agents = entry.count(1..=1 << 31)?;
-    if !PpoConfig::fills_lanes(agents as usize) {
+    if !RunConfig::fills_lanes(agents as usize) {
         let expected = format!("a multiple of {block}, such as {}, or 1, 2, 4 or 8", agents.next_multiple_of(block));
         return Err(ConfigError::value(entry.place, entry.node.describe(), expected));
     }
@@ -210,60 +173,156 @@ fn widths(marathon: &Section<'_>, key: &str, default: Vec<usize>) -> Result<Vec<
     items.iter().map(|item| Ok(item.count(1..=65_536)? as usize)).collect()
 }
 
-/// Notes settings of other algorithms, which are without effect.
-fn note_others(marathon: &Section<'_>, algorithm: Algorithm, notes: &mut Notes) {
-    let own: &[&str] = match algorithm {
-        Algorithm::Ppo => &[],
-        Algorithm::A2c(_) => &A2C,
-        Algorithm::Acktr(_) => &ACKTR,
-        Algorithm::Sac(_) => &SAC,
+/// Notes settings that mean nothing to the algorithm.
+fn note_others(hyperparameters: &Section<'_>, marathon: &Section<'_>, algorithm: &Algorithm, notes: &mut Notes) {
+    let own: &[&[&str]] = match algorithm {
+        Algorithm::Ppo(_) => &[&ON_POLICY, &PPO],
+        Algorithm::A2c(_) => &[&ON_POLICY, &A2C],
+        Algorithm::Acktr(_) => &[&ON_POLICY, &ACKTR],
+        Algorithm::Sac(_) => &[&SAC],
     };
-    let others: BTreeSet<&str> = A2C.into_iter().chain(ACKTR).chain(SAC).filter(|key| !own.contains(key)).collect();
+    let all = [&ON_POLICY[..], &PPO, &A2C, &ACKTR, &SAC].concat();
+    let others: BTreeSet<&str> = all.into_iter().filter(|key| !own.concat().contains(key)).collect();
+    let name = algorithm.name();
     for entry in others.into_iter().filter_map(|key| marathon.get(key)) {
-        notes.ignored(&entry, &format!("{} has no such setting", algorithm.name()));
+        notes.ignored(&entry, &format!("{name} has no such setting"));
+    }
+    if let Algorithm::A2c(_) | Algorithm::Acktr(_) = algorithm {
+        for (keys, why) in [
+            (["epsilon", "epsilon_schedule"], "bounds no ratio"),
+            (["num_epoch", "batch_size"], "makes one step on each rollout"),
+        ] {
+            for entry in keys.into_iter().filter_map(|key| hyperparameters.get(key)) {
+                notes.ignored(&entry, &format!("{name} {why}"));
+            }
+        }
     }
 }
 
-/// An algorithm that learns from its own rollouts, with what the section says of its settings.
-fn on_policy(marathon: &Section<'_>, base: Algorithm) -> Result<Algorithm, ConfigError> {
-    let positive = |key, default| marathon.number(key, Range::Positive, default);
-    let fraction = |key, default| marathon.number(key, Range::Fraction, default);
-    Ok(match base {
-        Algorithm::Ppo | Algorithm::Sac(_) => base,
-        Algorithm::A2c(a2c) => Algorithm::A2c(A2c {
-            value_coef: positive("value_coef", a2c.value_coef)?,
-            rms_decay: fraction("rms_decay", a2c.rms_decay)?,
-            rms_epsilon: positive("rms_epsilon", a2c.rms_epsilon)?,
-        }),
-        Algorithm::Acktr(acktr) => Algorithm::Acktr(Acktr {
-            value_coef: positive("value_coef", acktr.value_coef)?,
-            kl_clip: positive("kl_clip", acktr.kl_clip)?,
-            momentum: fraction("momentum", acktr.momentum)?,
-            damping: positive("damping", acktr.damping)?,
-            stats_decay: fraction("stats_decay", acktr.stats_decay)?,
-            inverse_every: marathon.count("inverse_every", 1..=1 << 31, acktr.inverse_every)?,
-        }),
-    })
+/// What the algorithms' settings are read from.
+struct From<'f, 'a> {
+    marathon: &'f Section<'a>,
+    hyperparameters: &'f Section<'a>,
+    settings: &'f Settings,
+    schedule: Schedule,
 }
 
-/// SAC's settings; `rollout` is the number of steps of a rollout.
-fn sac(
-    marathon: &Section<'_>,
-    hyperparameters: &Section<'_>,
-    settings: &Settings,
-    rollout: u64,
-) -> Result<Algorithm, ConfigError> {
-    let steps_per_update = hyperparameters.number("steps_per_update", Range::Positive, 1.0)?;
-    let updates = (rollout as f64 / steps_per_update).round().max(1.0) as u64;
-    Ok(Algorithm::Sac(Sac {
-        replay: settings.buffer_size as usize,
-        warmup: hyperparameters.count("buffer_init_steps", 0..=1 << 53, 0)?,
-        batch: settings.batch_size as usize,
-        updates: marathon.count("updates", 1..=1 << 31, updates)? as usize,
-        tau: hyperparameters.number("tau", Range::Positive, 0.005)?,
-        n_step: marathon.count("n_step", 1..=1 << 16, 1)? as usize,
-        init_alpha: hyperparameters.number("init_entcoef", Range::Positive, 1.0)?,
-    }))
+impl From<'_, '_> {
+    fn positive(&self, key: &str, default: f64) -> Result<f64, ConfigError> {
+        self.marathon.number(key, Range::Positive, default)
+    }
+    fn fraction(&self, key: &str, default: f64) -> Result<f64, ConfigError> {
+        self.marathon.number(key, Range::Fraction, default)
+    }
+
+    fn ppo(&self, base: Ppo) -> Result<Ppo, ConfigError> {
+        let Self { marathon, settings, .. } = self;
+        let minibatches = (settings.buffer_size / settings.batch_size).max(1);
+        let last_epsilon = settings.epsilon.min(LAST_EPSILON);
+        let target_kl = self.positive("target_kl", base.target_kl.first)?;
+        Ok(Ppo {
+            minibatches: marathon.count("minibatches", 1..=1 << 31, minibatches)? as usize,
+            epochs: settings.num_epoch as usize,
+            lr: settings.learning_rate,
+            value_lr: self.positive("value_lr", settings.learning_rate)?,
+            schedule: self.schedule,
+            target_kl: self.moving(target_kl, "final_target_kl", Range::Positive, None)?,
+            lr_range: lr_range(marathon, base.lr_range)?,
+            adam_epsilon: self.positive("adam_epsilon", base.adam_epsilon)?,
+            max_grad_norm: self.positive("max_grad_norm", base.max_grad_norm)?,
+            gae_lambda: settings.lambd,
+            ratio: one_of(marathon, "ratio", Ratio::NAMED, base.ratio)?,
+            clip: self.moving(
+                settings.epsilon,
+                "final_clip",
+                Range::Positive,
+                (settings.epsilon_schedule == Decay::Linear).then_some(last_epsilon),
+            )?,
+            value_clip: match marathon.get("value_clip") {
+                Some(entry) if entry.node.is_null() => None,
+                Some(entry) => Some(entry.number(Range::Positive)?),
+                None => base.value_clip,
+            },
+            entropy_coef: self.entropy_coef()?,
+            deviations: self.deviations(base.deviations)?,
+        })
+    }
+
+    fn a2c(&self, base: A2c) -> Result<A2c, ConfigError> {
+        Ok(A2c {
+            lr: self.settings.learning_rate,
+            schedule: self.schedule,
+            max_grad_norm: self.positive("max_grad_norm", base.max_grad_norm)?,
+            gae_lambda: self.settings.lambd,
+            entropy_coef: self.entropy_coef()?,
+            deviations: self.deviations(base.deviations)?,
+            value_coef: self.positive("value_coef", base.value_coef)?,
+            rms_decay: self.fraction("rms_decay", base.rms_decay)?,
+            rms_epsilon: self.positive("rms_epsilon", base.rms_epsilon)?,
+        })
+    }
+
+    fn acktr(&self, base: Acktr) -> Result<Acktr, ConfigError> {
+        Ok(Acktr {
+            lr: self.settings.learning_rate,
+            schedule: self.schedule,
+            gae_lambda: self.settings.lambd,
+            entropy_coef: self.entropy_coef()?,
+            deviations: self.deviations(base.deviations)?,
+            value_coef: self.positive("value_coef", base.value_coef)?,
+            kl_clip: self.positive("kl_clip", base.kl_clip)?,
+            momentum: self.fraction("momentum", base.momentum)?,
+            damping: self.positive("damping", base.damping)?,
+            stats_decay: self.fraction("stats_decay", base.stats_decay)?,
+            inverse_every: self.marathon.count("inverse_every", 1..=1 << 31, base.inverse_every)?,
+        })
+    }
+
+    /// `rollout` is the number of steps of a rollout.
+    fn sac(&self, base: Sac, rollout: u64) -> Result<Sac, ConfigError> {
+        let Self { marathon, hyperparameters, settings, .. } = self;
+        let steps_per_update = hyperparameters.number("steps_per_update", Range::Positive, 1.0)?;
+        let updates = (rollout as f64 / steps_per_update).round().max(1.0) as u64;
+        Ok(Sac {
+            lr: settings.learning_rate,
+            value_lr: self.positive("value_lr", settings.learning_rate)?,
+            schedule: self.schedule,
+            adam_epsilon: self.positive("adam_epsilon", base.adam_epsilon)?,
+            replay: settings.buffer_size as usize,
+            warmup: hyperparameters.count("buffer_init_steps", 0..=1 << 53, 0)?,
+            batch: settings.batch_size as usize,
+            updates: marathon.count("updates", 1..=1 << 31, updates)? as usize,
+            tau: hyperparameters.number("tau", Range::Positive, 0.005)?,
+            n_step: marathon.count("n_step", 1..=1 << 16, 1)? as usize,
+            init_alpha: hyperparameters.number("init_entcoef", Range::Positive, 1.0)?,
+        })
+    }
+
+    fn entropy_coef(&self) -> Result<Moving, ConfigError> {
+        let Settings { beta, beta_schedule, .. } = *self.settings;
+        let last = (beta_schedule == Decay::Linear).then_some(beta.min(LAST_BETA));
+        self.moving(beta, "final_entropy_coef", Range::NotNegative, last)
+    }
+
+    fn deviations(&self, base: Deviations) -> Result<Deviations, ConfigError> {
+        let min_std = self.positive("min_std", base.min_std.first)?;
+        Ok(Deviations {
+            action_clip: self.positive("action_clip", base.action_clip)?,
+            init_log_std: self.marathon.number("init_log_std", Range::Finite, base.init_log_std)?,
+            min_std: self.moving(min_std, "final_min_std", Range::Positive, None)?,
+            max_std: self.positive("max_std", base.max_std)?,
+        })
+    }
+
+    /// A setting that ends at Marathon's own key, or where ML-Agents' decay ends, or stays.
+    fn moving(&self, first: f64, key: &str, range: Range, decayed: Option<f64>) -> Result<Moving, ConfigError> {
+        let last = match self.marathon.get(key) {
+            Some(entry) if entry.node.is_null() => None,
+            Some(entry) => Some(entry.number(range)?),
+            None => decayed,
+        };
+        Ok(Moving { first, last: last.unwrap_or(first) })
+    }
 }
 
 /// A choice by its name.
@@ -298,15 +357,6 @@ fn schedule(
         notes.about(&entry, "does not move the learning rate: 'schedule' of the 'marathon:' section does");
     }
     Ok(chosen)
-}
-
-/// A value at the end of the run: Marathon's own, or where ML-Agents' decay ends, or none.
-fn end(marathon: &Section<'_>, key: &str, range: Range, decay: Decay, last: f64) -> Result<Option<f64>, ConfigError> {
-    match marathon.get(key) {
-        Some(entry) if entry.node.is_null() => Ok(None),
-        Some(entry) => entry.number(range).map(Some),
-        None => Ok((decay == Decay::Linear).then_some(last)),
-    }
 }
 
 fn lr_range(marathon: &Section<'_>, default: [f64; 2]) -> Result<[f64; 2], ConfigError> {

@@ -4,7 +4,10 @@
 use super::behavior::Notes;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
-use marathon_learn::{Activation, Algorithm, Init, PpoConfig, Ratio, Schedule, Signal, SignalKind};
+use marathon_learn::{
+    Activation, Algorithm, Deviations, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig, RewardKind, Sac,
+    Schedule, StatisticsConfig, TrainConfig,
+};
 
 /// Keys of a network's section.
 pub const NETWORK: [&str; 8] = [
@@ -81,12 +84,12 @@ impl<'a> Without<'a> {
 ///
 /// # Errors
 /// If the entry names a trainer that is not here.
-pub fn trainer(entry: Option<Entry<'_>>) -> Result<PpoConfig, ConfigError> {
+pub fn trainer(entry: Option<Entry<'_>>) -> Result<TrainConfig, ConfigError> {
     let Some(entry) = entry else { return Ok(ml_agents()) };
     match entry.word(&Algorithm::NAMES).map(|i| Algorithm::NAMES[i]) {
         Ok("ppo") => Ok(ml_agents()),
         Ok("sac") => Ok(ml_agents_sac()),
-        Ok(name) => Ok(PpoConfig::of(name).expect("the name of an algorithm")),
+        Ok(name) => Ok(TrainConfig::of(name).expect("the name of an algorithm")),
         Err(_) => Err(ConfigError::Unsupported {
             feature: "this trainer",
             found: entry.node.describe(),
@@ -97,50 +100,61 @@ pub fn trainer(entry: Option<Entry<'_>>) -> Result<PpoConfig, ConfigError> {
 }
 
 /// SAC with ML-Agents' defaults, which [`convert`](super::convert) completes, and networks as for PPO.
-fn ml_agents_sac() -> PpoConfig {
-    let sac = PpoConfig::sac();
-    PpoConfig {
-        agents: 16,
-        lr: 3e-4,
-        value_lr: 3e-4,
-        actor_hidden: vec![128; 2],
-        critic_hidden: vec![128; 2],
-        activation: Activation::Swish,
-        normalize_observations: false,
-        observation_clip: 5.0,
-        ..sac
-    }
+fn ml_agents_sac() -> TrainConfig {
+    TrainConfig::sac().with(|config| {
+        config.run.agents = 16;
+        config.network = NetworkConfig { initialization: Init::Orthogonal, ..network() };
+        config.statistics.normalize_observations = false;
+        config.statistics.observation_clip = 5.0;
+        config.algorithm = Algorithm::Sac(Sac { lr: 3e-4, value_lr: 3e-4, ..Default::default() });
+    })
 }
 
 /// PPO with ML-Agents' defaults, and with what it does without saying so in a file.
-fn ml_agents() -> PpoConfig {
-    PpoConfig {
+fn ml_agents() -> TrainConfig {
+    let ppo = Ppo {
         epochs: 3,
-        actor_hidden: vec![128; 2],
-        critic_hidden: vec![128; 2],
-        activation: Activation::Swish,
         lr: 3e-4,
         schedule: Schedule::Linear,
-        entropy_coef: 5e-3,
+        entropy_coef: Moving::still(5e-3),
         ratio: Ratio::PerAction,
-        normalize_observations: false,
-        follow_statistics: true,
-        // normalized observations lie within this
-        observation_clip: 5.0,
-        initialization: Init::MlAgents,
-        action_clip: 3.0,
-        init_log_std: 0.0,
-        // neither the deviation nor the gradient is bounded: far out
-        min_std: 1e-3,
-        max_std: 1e3,
+        deviations: Deviations {
+            action_clip: 3.0,
+            init_log_std: 0.0,
+            // neither the deviation nor the gradient is bounded: far out
+            min_std: Moving::still(1e-3),
+            max_std: 1e3,
+        },
         max_grad_norm: 1e9,
         // PyTorch's
         adam_epsilon: 1e-8,
         // ML-Agents means to bound the value's change by epsilon, but reads the returns where it stored the old values
         // (`RewardSignalUtil.value_estimates_key` of 1.1.0): nothing is bounded
         value_clip: None,
-        scale_rewards: false,
-        ..PpoConfig::default()
+        ..Default::default()
+    };
+    TrainConfig {
+        network: network(),
+        statistics: StatisticsConfig {
+            normalize_observations: false,
+            follow_statistics: true,
+            // normalized observations lie within this
+            observation_clip: 5.0,
+            scale_rewards: false,
+            ..Default::default()
+        },
+        algorithm: Algorithm::Ppo(ppo),
+        ..Default::default()
+    }
+}
+
+/// ML-Agents' networks.
+fn network() -> NetworkConfig {
+    NetworkConfig {
+        actor_hidden: vec![128; 2],
+        critic_hidden: vec![128; 2],
+        activation: Activation::Swish,
+        initialization: Init::MlAgents,
     }
 }
 
@@ -202,7 +216,7 @@ pub fn reward_signals<'a>(
     top: &Section<'a>,
     without: &Without<'_>,
     notes: &mut Notes,
-) -> Result<(Section<'a>, Vec<Signal>), ConfigError> {
+) -> Result<(Section<'a>, Vec<RewardConfig>), ConfigError> {
     let signals = top.section("reward_signals")?;
     let mut novelty = Vec::new();
     let Some(whole) = top.set("reward_signals") else { return Ok((signals, novelty)) };
@@ -217,8 +231,8 @@ pub fn reward_signals<'a>(
         match name {
             "gail" => without.feature(name, &entry, "strength 0 or no such section", notes)?,
             _ if without.leaves_out(name, &entry, notes) => {}
-            "curiosity" => novelty.push(signal(SignalKind::Curiosity, &section, notes)?),
-            _ => novelty.push(signal(SignalKind::Rnd, &section, notes)?),
+            "curiosity" => novelty.push(novelty_of(RewardKind::Curiosity, &section, notes)?),
+            _ => novelty.push(novelty_of(RewardKind::Rnd, &section, notes)?),
         }
     }
     if signals.get("extrinsic").is_none() {
@@ -242,9 +256,13 @@ pub fn reward_signals<'a>(
 }
 
 /// A reward for novelty.
-fn signal(kind: SignalKind, section: &Section<'_>, notes: &mut Notes) -> Result<Signal, ConfigError> {
+fn novelty_of(
+    kind: fn(Novelty) -> RewardKind,
+    section: &Section<'_>,
+    notes: &mut Notes,
+) -> Result<RewardConfig, ConfigError> {
     section.only(&["gamma", "strength", "network_settings", "learning_rate", "encoding_size"])?;
-    let defaults = Signal::new(kind);
+    let defaults = Novelty::default();
     let network = section.section("network_settings")?;
     network.only(&NETWORK)?;
     // the name that the width had before version 0.18
@@ -257,11 +275,12 @@ fn signal(kind: SignalKind, section: &Section<'_>, notes: &mut Notes) -> Result<
             notes.ignored(&entry, "the network of a signal sees what the policy sees, and is a plain one");
         }
     }
-    Ok(Signal {
-        kind,
+    let networks =
+        Novelty { hidden: vec![width; layers], lr: section.number("learning_rate", Range::Positive, defaults.lr)? };
+    let defaults = RewardConfig::new(kind(networks));
+    Ok(RewardConfig {
         strength: section.number("strength", Range::Positive, defaults.strength)?,
         gamma: section.number("gamma", Range::Fraction, defaults.gamma)?,
-        hidden: vec![width; layers],
-        lr: section.number("learning_rate", Range::Positive, defaults.lr)?,
+        ..defaults
     })
 }

@@ -8,7 +8,7 @@ use super::error::{ConfigError, Place};
 use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
 use marathon_envs::nearest;
-use marathon_learn::{Algorithm, Signal, SignalKind};
+use marathon_learn::{Algorithm, Novelty, RewardConfig, RewardKind};
 use std::path::Path;
 
 /// Keys of a section.
@@ -104,7 +104,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
 }
 
 /// Curiosity as it was asked for before version 0.9.
-fn curiosity(top: &Section<'_>, without: &Without<'_>, notes: &mut Notes) -> Result<Option<Signal>, ConfigError> {
+fn curiosity(top: &Section<'_>, without: &Without<'_>, notes: &mut Notes) -> Result<Option<RewardConfig>, ConfigError> {
     let strength = top.number("curiosity_strength", Range::NotNegative, 0.01)?;
     let size = top.count("curiosity_enc_size", 1..=4096, 128)? as usize;
     let Some(entry) = top.set("use_curiosity") else { return Ok(None) };
@@ -113,5 +113,6 @@ fn curiosity(top: &Section<'_>, without: &Without<'_>, notes: &mut Notes) -> Res
     }
     notes.about(&entry, "has a value stream of its own; versions before 0.9 added it to the task's reward");
     let gamma = top.number("gamma", Range::Fraction, 0.99)?;
-    Ok(Some(Signal { strength, gamma, hidden: vec![size; 2], ..Signal::new(SignalKind::Curiosity) }))
+    let kind = RewardKind::Curiosity(Novelty { hidden: vec![size; 2], ..Default::default() });
+    Ok(Some(RewardConfig { kind, strength, gamma }))
 }

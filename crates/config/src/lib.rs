@@ -22,7 +22,7 @@ mod settings;
 
 pub use error::ConfigError;
 
-use marathon_learn::PpoConfig;
+use marathon_learn::TrainConfig;
 use std::path::Path;
 
 /// For Gymnasium's own tasks.
@@ -57,7 +57,7 @@ const FAST: [(&str, (&str, &str)); 18] = [
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The trainer's configuration; it is valid.
-    pub ppo: PpoConfig,
+    pub config: TrainConfig,
     /// Steps of a rollout of all agents, where the file says that and not `horizon`: with more agents, each makes fewer
     /// decisions.
     pub buffer: Option<u64>,
@@ -75,7 +75,7 @@ impl Default for Loaded {
     /// The trainer's own defaults.
     fn default() -> Self {
         Loaded {
-            ppo: PpoConfig::default(),
+            config: TrainConfig::default(),
             buffer: None,
             summary_freq: 50_000,
             checkpoint_interval: 500_000,
@@ -105,8 +105,8 @@ pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigErr
 /// # Panics
 /// If there is no such algorithm, which the command line rules out.
 pub fn default_of(algorithm: &str) -> Loaded {
-    let ppo = PpoConfig::of(algorithm).expect("the name of an algorithm");
-    Loaded { ppo, ..Loaded::default() }
+    let config = TrainConfig::of(algorithm).expect("the name of an algorithm");
+    Loaded { config, ..Loaded::default() }
 }
 
 /// The configuration that trains an agent fast; the trainer's own defaults for agents that have none.

@@ -48,13 +48,13 @@ impl Settings {
         let Behavior { top, hyperparameters, network, extrinsic, format, base, .. } = behavior;
         // ML-Agents' sizes for PPO; the others learn from each rollout at once
         let (buffer, horizon) = match &base.algorithm {
-            Algorithm::Ppo => (10_240, 64),
+            Algorithm::Ppo(_) => (10_240, 64),
             Algorithm::Sac(_) => (50_000, 64),
-            _ => (base.rollout_steps(), base.horizon as u64),
+            _ => (base.run.rollout_steps(), base.run.horizon as u64),
         };
         let buffer_size = hyperparameters.count("buffer_size", 16..=MOST, buffer)?;
         let batch = match &base.algorithm {
-            Algorithm::Ppo => 1024,
+            Algorithm::Ppo(_) => 1024,
             Algorithm::Sac(_) => 128,
             _ => buffer_size,
         };
@@ -67,7 +67,7 @@ impl Settings {
         let learning_rate_schedule = decay(hyperparameters, "learning_rate_schedule", schedule)?;
         // Baselines moves nothing but the rate
         let beta_schedule = match &base.algorithm {
-            Algorithm::Ppo => learning_rate_schedule,
+            Algorithm::Ppo(_) => learning_rate_schedule,
             _ => Decay::Constant,
         };
         let max_steps = top.count("max_steps", 1..=1 << 53, max_steps)?;
@@ -77,25 +77,32 @@ impl Settings {
             true => (max_steps / keep_checkpoints).max(1),
             false => top.count("checkpoint_interval", 1..=1 << 53, checkpoint_interval)?,
         };
+        // those that an algorithm has no use for may be any
+        let (lr, beta, epsilon, lambd, epochs) = match &base.algorithm {
+            Algorithm::Ppo(ppo) => (ppo.lr, ppo.entropy_coef.first, ppo.clip.first, ppo.gae_lambda, ppo.epochs),
+            Algorithm::A2c(a2c) => (a2c.lr, a2c.entropy_coef.first, 0.2, a2c.gae_lambda, 1),
+            Algorithm::Acktr(acktr) => (acktr.lr, acktr.entropy_coef.first, 0.2, acktr.gae_lambda, 1),
+            Algorithm::Sac(sac) => (sac.lr, 0.0, 0.2, 0.95, 1),
+        };
         Ok(Settings {
             batch_size: hyperparameters.count("batch_size", 16..=MOST, batch)?,
             buffer_size,
-            learning_rate: hyperparameters.number("learning_rate", Range::Positive, base.lr)?,
+            learning_rate: hyperparameters.number("learning_rate", Range::Positive, lr)?,
             learning_rate_schedule,
-            beta: hyperparameters.number("beta", Range::NotNegative, base.entropy_coef)?,
+            beta: hyperparameters.number("beta", Range::NotNegative, beta)?,
             beta_schedule: decay(hyperparameters, "beta_schedule", beta_schedule)?,
-            epsilon: hyperparameters.number("epsilon", Range::Positive, base.clip)?,
+            epsilon: hyperparameters.number("epsilon", Range::Positive, epsilon)?,
             epsilon_schedule: decay(hyperparameters, "epsilon_schedule", learning_rate_schedule)?,
-            lambd: hyperparameters.number("lambd", Range::Fraction, base.gae_lambda)?,
-            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, base.epochs as u64)?,
-            normalize: network.flag("normalize", base.normalize_observations)?,
+            lambd: hyperparameters.number("lambd", Range::Fraction, lambd)?,
+            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, epochs as u64)?,
+            normalize: network.flag("normalize", base.statistics.normalize_observations)?,
             hidden_units: network.count(
                 "hidden_units",
                 1..=65_536,
-                base.actor_hidden.first().map_or(128, |w| *w as u64),
+                base.network.actor_hidden.first().map_or(128, |w| *w as u64),
             )?,
             num_layers: network.count("num_layers", 1..=64, 2)?,
-            gamma: extrinsic.number("gamma", Range::Fraction, base.gamma)?,
+            gamma: extrinsic.number("gamma", Range::Fraction, base.task_reward().gamma)?,
             max_steps,
             time_horizon: top.count("time_horizon", 1..=MOST, horizon)?,
             summary_freq: top.count("summary_freq", 1..=1 << 53, summary_freq)?,

@@ -1,7 +1,9 @@
 //! Every key of a configuration file reaches the trainer, in both formats of ML-Agents.
 
 use marathon_config::{Loaded, default_for, parse};
-use marathon_learn::{Acktr, Activation, Algorithm, Init, PpoConfig, Ratio, Sac, Schedule, Signal, SignalKind};
+use marathon_learn::{
+    Acktr, Activation, Algorithm, Init, Moving, Novelty, Ratio, RewardConfig, RewardKind, Sac, Schedule, TrainConfig,
+};
 use std::path::{Path, PathBuf};
 
 fn read(text: &str, agent: &str) -> Loaded {
@@ -22,10 +24,102 @@ fn current(lines: &str) -> Loaded {
     read(&format!("behaviors:\n  Hopper:\n    trainer_type: ppo\n{lines}"), "hopper")
 }
 
+/// All settings of a configuration of PPO side by side.
+#[derive(Debug, PartialEq)]
+struct Flat {
+    agents: usize,
+    horizon: usize,
+    rollouts: usize,
+    total_steps: u64,
+    seed: u64,
+    threads: usize,
+    actor_hidden: Vec<usize>,
+    critic_hidden: Vec<usize>,
+    activation: Activation,
+    initialization: Init,
+    normalize_observations: bool,
+    follow_statistics: bool,
+    observation_clip: f64,
+    scale_rewards: bool,
+    statistics_cap: f64,
+    gamma: f64,
+    reward_strength: f64,
+    minibatches: usize,
+    epochs: usize,
+    lr: f64,
+    value_lr: f64,
+    schedule: Schedule,
+    target_kl: f64,
+    final_target_kl: Option<f64>,
+    lr_range: [f64; 2],
+    adam_epsilon: f64,
+    max_grad_norm: f64,
+    gae_lambda: f64,
+    ratio: Ratio,
+    clip: f64,
+    final_clip: Option<f64>,
+    value_clip: Option<f64>,
+    entropy_coef: f64,
+    final_entropy_coef: Option<f64>,
+    action_clip: f64,
+    init_log_std: f64,
+    min_std: f64,
+    final_min_std: Option<f64>,
+    max_std: f64,
+}
+
+fn flat(loaded: &Loaded) -> Flat {
+    let TrainConfig { run, network, statistics, rewards, algorithm } = loaded.config.clone();
+    let Algorithm::Ppo(ppo) = algorithm else { panic!("a configuration of {}", algorithm.name()) };
+    let last = |moving: Moving| (moving.last != moving.first).then_some(moving.last);
+    assert_eq!((rewards.len(), &rewards[0].kind), (1, &RewardKind::Task));
+    Flat {
+        agents: run.agents,
+        horizon: run.horizon,
+        rollouts: run.rollouts,
+        total_steps: run.total_steps,
+        seed: run.seed,
+        threads: run.threads,
+        actor_hidden: network.actor_hidden,
+        critic_hidden: network.critic_hidden,
+        activation: network.activation,
+        initialization: network.initialization,
+        normalize_observations: statistics.normalize_observations,
+        follow_statistics: statistics.follow_statistics,
+        observation_clip: statistics.observation_clip,
+        scale_rewards: statistics.scale_rewards,
+        statistics_cap: statistics.statistics_cap,
+        gamma: rewards[0].gamma,
+        reward_strength: rewards[0].strength,
+        minibatches: ppo.minibatches,
+        epochs: ppo.epochs,
+        lr: ppo.lr,
+        value_lr: ppo.value_lr,
+        schedule: ppo.schedule,
+        target_kl: ppo.target_kl.first,
+        final_target_kl: last(ppo.target_kl),
+        lr_range: ppo.lr_range,
+        adam_epsilon: ppo.adam_epsilon,
+        max_grad_norm: ppo.max_grad_norm,
+        gae_lambda: ppo.gae_lambda,
+        ratio: ppo.ratio,
+        clip: ppo.clip.first,
+        final_clip: last(ppo.clip),
+        value_clip: ppo.value_clip,
+        entropy_coef: ppo.entropy_coef.first,
+        final_entropy_coef: last(ppo.entropy_coef),
+        action_clip: ppo.deviations.action_clip,
+        init_log_std: ppo.deviations.init_log_std,
+        min_std: ppo.deviations.min_std.first,
+        final_min_std: last(ppo.deviations.min_std),
+        max_std: ppo.deviations.max_std,
+    }
+}
+
 #[test]
 fn what_is_left_out_has_the_value_of_ml_agents() {
     let loaded = current("");
-    let expected = PpoConfig {
+    let expected = Flat {
         agents: 160,
         horizon: 64,
         minibatches: 10,
@@ -56,9 +150,9 @@ fn what_is_left_out_has_the_value_of_ml_agents() {
         follow_statistics: true,
         observation_clip: 5.0,
         scale_rewards: false,
-        ..PpoConfig::default()
+        ..flat(&Loaded::default())
     };
-    assert_eq!(loaded.ppo, expected);
+    assert_eq!(flat(&loaded), expected);
     assert_eq!((loaded.summary_freq, loaded.checkpoint_interval, loaded.keep_checkpoints), (50_000, 500_000, 5));
     assert_eq!(loaded.notes, Vec::<String>::new());
 }
@@ -87,9 +181,9 @@ fn every_key_of_ml_agents_counts() {
 env_settings: {seed: 77}
 ",
     );
-    let PpoConfig { agents, horizon, minibatches, epochs, total_steps, .. } = loaded.ppo;
+    let Flat { agents, horizon, minibatches, epochs, total_steps, .. } = flat(&loaded);
     assert_eq!((agents, horizon, minibatches, epochs, total_steps), (64, 128, 16, 5, 2_000_000));
-    let ppo = loaded.ppo;
+    let ppo = flat(&loaded);
     assert_eq!((ppo.lr, ppo.value_lr, ppo.schedule), (2e-3, 2e-3, Schedule::Constant));
     assert_eq!((ppo.entropy_coef, ppo.final_entropy_coef), (1e-2, Some(1e-5)));
     assert_eq!((ppo.clip, ppo.final_clip, ppo.value_clip), (0.3, Some(0.1), None));
@@ -102,12 +196,12 @@ env_settings: {seed: 77}
 
 #[test]
 fn schedules_follow_that_of_the_learning_rate_unless_they_have_their_own() {
-    let ppo = current("    hyperparameters: {learning_rate_schedule: constant}\n").ppo;
+    let ppo = flat(&current("    hyperparameters: {learning_rate_schedule: constant}\n"));
     assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Constant, None, None));
-    let ppo = current("    hyperparameters: {epsilon_schedule: constant, beta_schedule: constant}\n").ppo;
+    let ppo = flat(&current("    hyperparameters: {epsilon_schedule: constant, beta_schedule: constant}\n"));
     assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Linear, None, None));
     // a decay never raises
-    let ppo = current("    hyperparameters: {epsilon: 0.05, beta: 0}\n").ppo;
+    let ppo = flat(&current("    hyperparameters: {epsilon: 0.05, beta: 0}\n"));
     assert_eq!((ppo.final_clip, ppo.final_entropy_coef), (Some(0.05), Some(0.0)));
 }
 
@@ -147,11 +241,9 @@ fn every_key_of_marathon_counts() {
       threads: 2
 ",
     );
-    let expected = PpoConfig {
-        algorithm: Algorithm::Ppo,
+    let expected = Flat {
         rollouts: 1,
         reward_strength: 1.0,
-        signals: Vec::new(),
         agents: 48,
         horizon: 7,
         minibatches: 6,
@@ -190,22 +282,22 @@ fn every_key_of_marathon_counts() {
         seed: 5,
         threads: 2,
     };
-    assert_eq!(loaded.ppo, expected);
-    let none = current("    marathon: {value_clip: null, final_clip: ~, final_entropy_coef: null}\n").ppo;
+    assert_eq!(flat(&loaded), expected);
+    let none = flat(&current("    marathon: {value_clip: null, final_clip: ~, final_entropy_coef: null}\n"));
     assert_eq!((none.value_clip, none.final_clip, none.final_entropy_coef), (None, None, None));
     // the critic is as wide as the actor unless it has widths of its own
-    assert_eq!(current("    marathon: {actor_hidden: [40]}\n").ppo.critic_hidden, [40]);
+    assert_eq!(flat(&current("    marathon: {actor_hidden: [40]}\n")).critic_hidden, [40]);
 }
 
 #[test]
 fn the_buffer_is_filled_by_as_many_agents_as_needed() {
     for (agents, horizon) in [(16, 640), (256, 40), (512, 20), (1024, 10), (4096, 3), (16384, 1)] {
-        let ppo = current(&format!("    marathon: {{agents: {agents}}}\n")).ppo;
+        let ppo = flat(&current(&format!("    marathon: {{agents: {agents}}}\n")));
         assert_eq!((ppo.agents, ppo.horizon, ppo.minibatches), (agents, horizon, 10));
     }
-    let ppo = current("    time_horizon: 1000\n").ppo;
+    let ppo = flat(&current("    time_horizon: 1000\n"));
     assert_eq!((ppo.agents, ppo.horizon), (16, 640));
-    let ppo = current("    hyperparameters: {batch_size: 4096, buffer_size: 2048}\n").ppo;
+    let ppo = flat(&current("    hyperparameters: {batch_size: 4096, buffer_size: 2048}\n"));
     assert_eq!(ppo.minibatches, 1);
 }
 
@@ -224,15 +316,15 @@ behaviors:
     network_settings: {memory: null}
     max_steps: 3000
 ";
-    let hopper = read(file, "Hopper-v0").ppo;
+    let hopper = flat(&read(file, "Hopper-v0"));
     assert_eq!((hopper.entropy_coef, hopper.clip, hopper.total_steps), (0.5, 0.3, 1000));
     assert_eq!(hopper.actor_hidden, [20, 20]);
-    let ant = read(file, "ant").ppo;
+    let ant = flat(&read(file, "ant"));
     assert_eq!((ant.clip, ant.total_steps), (0.4, 3000));
     // who is not in the file at all has the defaults
     let file = "default_settings: {max_steps: 1000}\nbehaviors: {Ant: {max_steps: 2000}}";
     let walker = read(file, "walker");
-    assert_eq!(walker.ppo.total_steps, 1000);
+    assert_eq!(flat(&walker).total_steps, 1000);
     assert!(
         walker.notes[0].contains("nothing about Walker2d-v0 itself: default_settings applies"),
         "{:?}",
@@ -253,11 +345,11 @@ behaviors:
       <<: *h
       num_epoch: 8
 ";
-    let (walker, hopper) = (read(file, "walker").ppo, read(file, "hopper").ppo);
+    let (walker, hopper) = (flat(&read(file, "walker")), flat(&read(file, "hopper")));
     assert_eq!((walker.entropy_coef, walker.epochs, walker.normalize_observations), (0.01, 7, true));
     assert_eq!((hopper.entropy_coef, hopper.epochs, hopper.normalize_observations), (0.01, 8, true));
     let bom = "\u{feff}behaviors: {Hopper: {max_steps: 1.e4}}\r\n";
-    assert_eq!(read(bom, "hopper").ppo.total_steps, 10_000);
+    assert_eq!(flat(&read(bom, "hopper")).total_steps, 10_000);
 }
 
 #[test]
@@ -275,16 +367,16 @@ fn agents_are_found_under_the_names_of_other_systems() {
         ("MyRobot", "MyRobot-v3"),
     ] {
         assert_eq!(
-            read(&format!("behaviors: {{{name}: {{max_steps: 7}}}}"), agent).ppo.total_steps,
+            flat(&read(&format!("behaviors: {{{name}: {{max_steps: 7}}}}"), agent)).total_steps,
             7,
             "{name} {agent}"
         );
-        assert_eq!(read(&format!("{name}: {{num_epoch: 9}}"), agent).ppo.epochs, 9, "{name} {agent}");
+        assert_eq!(flat(&read(&format!("{name}: {{num_epoch: 9}}"), agent)).epochs, 9, "{name} {agent}");
     }
     // the more particular name wins
     let file = "behaviors: {DeepMindHopperBrain: {max_steps: 1}, Hopper: {max_steps: 2}, Hopper-v1: {max_steps: 3}}";
-    assert_eq!(read(file, "Hopper-v0").ppo.total_steps, 2);
-    assert_eq!(read(file, "Hopper-v1").ppo.total_steps, 3);
+    assert_eq!(flat(&read(file, "Hopper-v0")).total_steps, 2);
+    assert_eq!(flat(&read(file, "Hopper-v1")).total_steps, 3);
 }
 
 #[test]
@@ -308,14 +400,17 @@ DeepMindHopperBrain:
     max_steps: 3e5
 ";
     let hopper = read(file, "hopper");
-    assert_eq!((hopper.ppo.entropy_coef, hopper.ppo.gamma), (0.01, 0.995));
-    assert_eq!((hopper.ppo.actor_hidden, hopper.ppo.agents, hopper.ppo.horizon), (vec![90, 90], 16, 640));
+    assert_eq!((flat(&hopper).entropy_coef, flat(&hopper).gamma), (0.01, 0.995));
+    assert_eq!((flat(&hopper).actor_hidden, flat(&hopper).agents, flat(&hopper).horizon), (vec![90, 90], 16, 640));
     // steps of each of the 16 agents
-    assert_eq!((hopper.ppo.total_steps, hopper.summary_freq), (4_800_000, 16_000));
+    assert_eq!((flat(&hopper).total_steps, hopper.summary_freq), (4_800_000, 16_000));
     assert_eq!((hopper.checkpoint_interval, hopper.keep_checkpoints), (800_000, 5));
     assert!(hopper.notes[0].contains("max_steps counts the steps of each agent: 4800000"), "{:?}", hopper.notes);
     let ant = read(file, "ant");
-    assert_eq!((ant.ppo.entropy_coef, ant.ppo.total_steps, ant.ppo.schedule), (0.005, 800_000, Schedule::Linear));
+    assert_eq!(
+        (flat(&ant).entropy_coef, flat(&ant).total_steps, flat(&ant).schedule),
+        (0.005, 800_000, Schedule::Linear)
+    );
 }
 
 #[test]
@@ -324,11 +419,11 @@ fn the_old_format_with_reward_signals_counts_all_steps_together() {
 default: {trainer: ppo, reward_signals: {extrinsic: {strength: 1.0, gamma: 0.98}}, vis_encode_type: simple}
 Hopper-v0: {max_steps: 1e6, buffer_size: 5120, batch_size: 16, time_horizon: 100}
 ";
-    let hopper = read(file, "hopper").ppo;
+    let hopper = flat(&read(file, "hopper"));
     assert_eq!((hopper.total_steps, hopper.gamma, hopper.agents, hopper.horizon), (1_000_000, 0.98, 48, 107));
     assert_eq!(hopper.minibatches, 320);
     let each = file.replace("max_steps", "marathon: {steps_per_agent: true}, max_steps");
-    assert_eq!(read(&each, "hopper").ppo.total_steps, 16_000_000);
+    assert_eq!(flat(&read(&each, "hopper")).total_steps, 16_000_000);
 }
 
 #[test]
@@ -340,7 +435,8 @@ fn appendix_b_of_the_paper_loads_for_all_its_agents() {
         ("ant", vec![53; 3], 1e-3, 5e-3, 0.99, 10240, 4_800_000),
         ("humanoid", vec![512; 2], 3e-4, 1e-2, 0.995, 20480, 32_000_000),
     ] {
-        let Loaded { ppo, notes, .. } = load(&file, agent);
+        let loaded = load(&file, agent);
+        let (ppo, notes) = (flat(&loaded), loaded.notes);
         assert_eq!(
             (ppo.actor_hidden.clone(), ppo.lr, ppo.entropy_coef, ppo.gamma),
             (widths, lr, beta, gamma),
@@ -357,7 +453,7 @@ fn appendix_b_of_the_paper_loads_for_all_its_agents() {
 #[test]
 fn appendix_c_of_the_paper_loads() {
     let loaded = load(&asset("paper-appendix-c.yaml"), "hopper");
-    let ppo = loaded.ppo;
+    let ppo = flat(&loaded);
     assert_eq!((ppo.lr, ppo.epochs, ppo.actor_hidden, ppo.total_steps), (3e-3, 10, vec![64, 64], 1_000_000));
     assert_eq!((ppo.agents * ppo.horizon, ppo.minibatches, ppo.entropy_coef), (10240, 5, 5e-3));
 }
@@ -367,29 +463,29 @@ fn every_agent_has_a_valid_default() {
     let ids = marathon_envs::ids();
     assert!(ids.len() >= 8);
     for id in &ids {
-        let Loaded { ppo, notes, .. } = default_for(id);
-        ppo.validate().unwrap_or_else(|e| panic!("{id}: {e}"));
+        let loaded = default_for(id);
+        loaded.config.validate().unwrap_or_else(|e| panic!("{id}: {e}"));
+        let (ppo, notes) = (flat(&loaded), loaded.notes);
         assert!(notes.is_empty(), "{id}: {notes:?}");
         assert!(ppo.scale_rewards && ppo.normalize_observations && ppo.value_clip.is_none(), "{id}");
         assert_eq!(ppo.schedule, Schedule::Adaptive, "{id}");
     }
-    assert_eq!(default_for("walker").ppo, default_for("Walker2d-v0").ppo);
-    assert_ne!(default_for("hopper").ppo, default_for("humanoid").ppo);
+    assert_eq!(default_for("walker").config, default_for("Walker2d-v0").config);
+    assert_ne!(default_for("hopper").config, default_for("humanoid").config);
     // Gymnasium's tasks have settings of their own
-    assert_ne!(default_for("hopper").ppo, default_for("Hopper-v5").ppo);
-    assert_eq!((default_for("Walker2d-v5").ppo.gamma, default_for("Ant-v5").ppo.total_steps), (0.99, 10_000_000));
+    assert_ne!(default_for("hopper").config, default_for("Hopper-v5").config);
+    assert_eq!((flat(&default_for("Walker2d-v5")).gamma, flat(&default_for("Ant-v5")).total_steps), (0.99, 10_000_000));
     // and so have dm_control's
     assert_eq!(default_for("dm_control/walker-walk-v0"), default_for("walker-walk"));
-    assert_ne!(default_for("walker-walk").ppo, default_for("walker").ppo);
+    assert_ne!(default_for("walker-walk").config, default_for("walker").config);
     // an agent of somebody else's
     assert_eq!(default_for("MyRobot-v3"), Loaded::default());
 }
 
 #[test]
 fn other_trainers_start_from_the_settings_of_baselines() {
-    let a2c = read("behaviors: {Hopper: {trainer_type: a2c}}", "hopper").ppo;
-    let defaults = PpoConfig { total_steps: 500_000, ..PpoConfig::a2c() };
-    assert_eq!(a2c, defaults);
+    let a2c = read("behaviors: {Hopper: {trainer_type: a2c}}", "hopper").config;
+    assert_eq!(a2c, TrainConfig::a2c().with(|config| config.run.total_steps = 500_000));
     let text = "
 behaviors:
   Hopper:
@@ -399,24 +495,17 @@ behaviors:
     max_steps: 2e6
     marathon: {kl_clip: 0.002, inverse_every: 5, rollouts: 3}
 ";
-    let acktr = read(text, "hopper").ppo;
-    let settings = Acktr { kl_clip: 0.002, inverse_every: 5, ..Acktr::default() };
-    let want = PpoConfig {
-        algorithm: Algorithm::Acktr(settings),
-        horizon: 40,
-        rollouts: 3,
-        lr: 0.1,
-        value_lr: 0.1,
-        gae_lambda: 0.9,
-        actor_hidden: vec![32, 32],
-        critic_hidden: vec![32, 32],
-        total_steps: 2_000_000,
-        ..PpoConfig::acktr()
-    };
+    let acktr = read(text, "hopper").config;
+    let settings = Acktr { lr: 0.1, gae_lambda: 0.9, kl_clip: 0.002, inverse_every: 5, ..Default::default() };
+    let want = TrainConfig::acktr().with(|config| {
+        (config.run.horizon, config.run.rollouts, config.run.total_steps) = (40, 3, 2_000_000);
+        (config.network.actor_hidden, config.network.critic_hidden) = (vec![32, 32], vec![32, 32]);
+        config.algorithm = Algorithm::Acktr(settings);
+    });
     assert_eq!(acktr, want);
     // the format of the paper calls it by another name
-    let old = read("Hopper: {trainer: a2c, max_steps: 1e5}", "hopper").ppo;
-    assert_eq!((old.algorithm.name(), old.total_steps, old.horizon), ("a2c", 1_600_000, 5));
+    let old = read("Hopper: {trainer: a2c, max_steps: 1e5}", "hopper").config;
+    assert_eq!((old.algorithm.name(), old.run.total_steps, old.run.horizon), ("a2c", 1_600_000, 5));
 }
 
 #[test]
@@ -429,17 +518,17 @@ behaviors:
       curiosity: {strength: 0.02, gamma: 0.95, learning_rate: 1e-3, network_settings: {hidden_units: 256, num_layers: 1}}
       rnd: {encoding_size: 64}
 ";
-    let ppo = read(text, "hopper").ppo;
-    let curiosity = Signal { kind: SignalKind::Curiosity, strength: 0.02, gamma: 0.95, hidden: vec![256], lr: 1e-3 };
-    let rnd = Signal { kind: SignalKind::Rnd, strength: 1.0, gamma: 0.99, hidden: vec![64, 64], lr: 3e-4 };
-    assert_eq!(ppo.signals, [curiosity, rnd]);
-    assert_eq!((ppo.gamma, ppo.reward_strength), (0.98, 0.5));
+    let rewards = read(text, "hopper").config.rewards;
+    let curiosity = RewardKind::Curiosity(Novelty { hidden: vec![256], lr: 1e-3 });
+    let rnd = RewardKind::Rnd(Novelty { hidden: vec![64, 64], lr: 3e-4 });
+    let reward = |kind, strength, gamma| RewardConfig { kind, strength, gamma };
+    let task = reward(RewardKind::Task, 0.5, 0.98);
+    assert_eq!(rewards, [task, reward(curiosity, 0.02, 0.95), reward(rnd, 1.0, 0.99)]);
     // the paper's own way
     let text = "Hopper: {use_curiosity: true, curiosity_strength: 0.01, curiosity_enc_size: 256, gamma: 0.995}";
     let old = read(text, "hopper");
-    let curiosity =
-        Signal { strength: 0.01, gamma: 0.995, hidden: vec![256, 256], ..Signal::new(SignalKind::Curiosity) };
-    assert_eq!(old.ppo.signals, [curiosity]);
+    let curiosity = RewardKind::Curiosity(Novelty { hidden: vec![256, 256], lr: 3e-4 });
+    assert_eq!(old.config.rewards[1..], [reward(curiosity, 0.01, 0.995)]);
     assert!(old.notes[0].contains("a value stream of its own"), "{:?}", old.notes);
 }
 
@@ -462,13 +551,62 @@ behaviors:
     marathon: {agents: 64, n_step: 3}
 ";
     let loaded = read(text, "hopper");
-    let ppo = &loaded.ppo;
-    let sac = Sac { replay: 200_000, warmup: 1000, batch: 512, updates: 32, tau: 0.01, n_step: 3, init_alpha: 0.5 };
-    assert_eq!(ppo.algorithm, Algorithm::Sac(sac));
-    assert_eq!((ppo.agents, ppo.horizon, ppo.minibatches, ppo.total_steps), (64, 4, 1, 200_000));
-    assert_eq!((ppo.lr, ppo.schedule, ppo.normalize_observations), (1e-3, Schedule::Constant, true));
-    assert_eq!((&ppo.actor_hidden[..], &ppo.critic_hidden[..]), (&[256, 256][..], &[256, 256][..]));
-    let defaults = read("behaviors: {Hopper: {trainer_type: sac}}", "hopper").ppo;
-    let sac = Sac { replay: 50_000, warmup: 0, batch: 128, updates: 64, tau: 0.005, n_step: 1, init_alpha: 1.0 };
-    assert_eq!((defaults.algorithm, defaults.agents, defaults.lr), (Algorithm::Sac(sac), 16, 3e-4));
+    let config = &loaded.config;
+    let sac = Sac {
+        lr: 1e-3,
+        value_lr: 1e-3,
+        schedule: Schedule::Constant,
+        adam_epsilon: 1e-5,
+        replay: 200_000,
+        warmup: 1000,
+        batch: 512,
+        updates: 32,
+        tau: 0.01,
+        n_step: 3,
+        init_alpha: 0.5,
+    };
+    assert_eq!(config.algorithm, Algorithm::Sac(sac));
+    assert_eq!((config.run.agents, config.run.horizon, config.run.total_steps), (64, 4, 200_000));
+    assert!(config.statistics.normalize_observations);
+    assert_eq!(
+        (&config.network.actor_hidden[..], &config.network.critic_hidden[..]),
+        (&[256, 256][..], &[256, 256][..])
+    );
+    let defaults = read("behaviors: {Hopper: {trainer_type: sac}}", "hopper").config;
+    let sac = Sac {
+        lr: 3e-4,
+        value_lr: 3e-4,
+        replay: 50_000,
+        warmup: 0,
+        batch: 128,
+        updates: 64,
+        tau: 0.005,
+        n_step: 1,
+        init_alpha: 1.0,
+        ..sac
+    };
+    assert_eq!((defaults.algorithm, defaults.run.agents), (Algorithm::Sac(sac), 16));
+}
+
+/// What means nothing to the trainer of a file is noted.
+#[test]
+fn settings_of_another_trainer_are_noted() {
+    let text = "
+behaviors:
+  Hopper:
+    trainer_type: a2c
+    hyperparameters: {num_epoch: 3, epsilon: 0.3}
+    marathon: {target_kl: 0.1, kl_clip: 0.2, rms_decay: 0.9}
+";
+    let Loaded { notes, config, .. } = read(text, "hopper");
+    for part in ["num_epoch has no effect: a2c makes one step", "epsilon has no effect: a2c bounds no ratio"] {
+        assert!(notes.iter().any(|note| note.contains(part)), "{part}: {notes:?}");
+    }
+    for key in ["target_kl", "kl_clip"] {
+        let part = format!("{key} has no effect: a2c has no such setting");
+        assert!(notes.iter().any(|note| note.contains(&part)), "{part}: {notes:?}");
+    }
+    assert_eq!(notes.len(), 4, "{notes:?}");
+    let Algorithm::A2c(a2c) = config.algorithm else { panic!("{config:?}") };
+    assert_eq!(a2c.rms_decay, 0.9);
 }

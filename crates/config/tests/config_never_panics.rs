@@ -53,7 +53,7 @@ const PIECES: [&str; 36] = [
 fn check(bytes: &[u8]) {
     for agent in ["hopper", "no such agent"] {
         match parse(Path::new("f.yaml"), bytes, agent) {
-            Ok(loaded) => loaded.ppo.validate().unwrap(),
+            Ok(loaded) => loaded.config.validate().unwrap(),
             Err(error) => assert!(error.to_string().starts_with("f.yaml"), "{error}"),
         }
     }

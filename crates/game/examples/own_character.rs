@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use marathon_envs::{Agent, Body, Facts, Motors, Obs, Senses, Terms, names, register};
 use marathon_game::prelude::*;
-use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Control, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::{Isa, Real};
 use std::sync::Arc;
 use std::time::Duration;
@@ -67,8 +67,10 @@ impl Agent for Snail {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     register(Arc::new(Snail))?;
     let factory = marathon_envs::factory("snail", Isa::best())?;
-    let config =
-        PpoConfig { agents: 32, horizon: 32, total_steps: 30_000, actor_hidden: vec![8], ..Default::default() };
+    let config = TrainConfig::default().with(|config| {
+        (config.run.agents, config.run.horizon, config.run.total_steps) = (32, 32, 30_000);
+        config.network.actor_hidden = vec![8];
+    });
     let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
     let policy = train(&*factory, Isa::best(), &config, None, &mut quiet)?.policy;
 

@@ -6,7 +6,7 @@
 
 use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
 use marathon_learn::nets::mlp::{CHUNK, Mlp};
-use marathon_learn::{Activation, Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Activation, Control, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use std::time::Instant;
 
@@ -89,13 +89,12 @@ fn training() {
 }
 
 fn run(obs: usize, act: usize, hidden: &[usize], isa: Isa, threads: usize) {
-    let config = PpoConfig {
-        total_steps: 600_000,
-        actor_hidden: hidden.to_vec(),
-        critic_hidden: hidden.to_vec(),
-        threads,
-        ..Default::default()
-    };
+    let config = TrainConfig::default().with(|c| {
+        c.run.total_steps = 600_000;
+        c.network.actor_hidden = hidden.to_vec();
+        c.network.critic_hidden = hidden.to_vec();
+        c.run.threads = threads;
+    });
     let mut seen: Vec<IterationStats> = Vec::new();
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
         seen.push(stats.clone());
@@ -106,7 +105,7 @@ fn run(obs: usize, act: usize, hidden: &[usize], isa: Isa, threads: usize) {
         return;
     }
     // the best of the iterations with an update: others disturb the machine, never the other way round
-    let steps = config.rollout_steps() as f64;
+    let steps = config.run.rollout_steps() as f64;
     let cost = |p: &[IterationStats]| (p[1].cpu_seconds - p[0].cpu_seconds) / steps;
     let mut costs: Vec<f64> = seen.windows(2).map(cost).collect();
     costs.sort_by(f64::total_cmp);

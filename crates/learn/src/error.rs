@@ -15,6 +15,14 @@ pub enum Error {
         /// What would do, with the nearest valid choice where there is one.
         expected: String,
     },
+    /// A setting by its name is none, or of the wrong kind.
+    #[error("configuration: {place}: {why}")]
+    Settings {
+        /// The setting.
+        place: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The instruction set is not one that networks run on, or not there.
     #[error("instruction set {0} cannot train networks on this processor; use {1}")]
     Isa(&'static str, &'static str),
@@ -29,7 +37,7 @@ pub enum Error {
     /// Learning has led to parameters that are not finite.
     #[error(
         "training has diverged: {count} of {parameters} parameters are not finite after {steps} steps; a smaller learning rate \
-         (lr is {lr:e}, value_lr {value_lr:e}) keeps them finite"
+         ({rates}) keeps them finite"
     )]
     Diverged {
         /// Parameters that are not finite.
@@ -38,10 +46,8 @@ pub enum Error {
         parameters: usize,
         /// Agent-steps done.
         steps: u64,
-        /// Learning rate of the policy, as configured.
-        lr: f64,
-        /// Learning rate of the value function.
-        value_lr: f64,
+        /// Learning rates, as configured.
+        rates: String,
     },
     /// A file cannot be read or written.
     #[error("{}: {action}: {source}", path.display())]

@@ -157,8 +157,8 @@ impl<'a> TensorReader<'a> {
     }
 }
 
-/// Makes a document of an earlier version into one of this version.
-pub type Upgrade = fn(u64, Value) -> Value;
+/// Makes a document of an earlier version into one of this version; or says where it is none, and what is found there.
+pub type Upgrade = fn(u64, Value) -> Result<Value, (String, String)>;
 
 /// Parses a JSON document that names its format and version; one of an earlier version, if there is a way to upgrade it.
 fn parse<D: DeserializeOwned>(
@@ -192,7 +192,8 @@ fn parse<D: DeserializeOwned>(
         }
     }
     if let (Some(number), Some(upgrade)) = (earlier, upgrade) {
-        value = upgrade(number, value);
+        value = upgrade(number, value)
+            .map_err(|(place, found)| Error::file(path, place, format!("'{found}'"), expected()))?;
     }
     serde_path_to_error::deserialize(value).map_err(|e| {
         let place = e.path().to_string();

@@ -4,7 +4,7 @@
 //! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
 //! transposed or copied to a device.
 //!
-//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`PpoConfig`] says how,
+//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`TrainConfig`] says how,
 //!   its [`Algorithm`] by what, an [`Observer`] follows it and may stop it.
 //! * [`train_with`] does the same with rollouts that others play, such as [`Player`]s on other machines.
 //! * [`Policy`] is the result: it acts, and it is a file. [`evaluate`] tells how good it is.
@@ -31,11 +31,11 @@
 //! # Example
 //!
 //! ```no_run
-//! use marathon_learn::{Control, IterationStats, PpoConfig, Snapshot, evaluate, train};
+//! use marathon_learn::{Control, IterationStats, TrainConfig, Snapshot, evaluate, train};
 //! use marathon_physics::lanes::Isa;
 //!
 //! fn learn(factory: &dyn marathon_envs::ShardFactory) -> Result<(), marathon_learn::Error> {
-//!     let config = PpoConfig { total_steps: 4_000_000, seed: 7, ..Default::default() };
+//!     let config = TrainConfig { total_steps: 4_000_000, seed: 7, ..Default::default() };
 //!     let mut progress = |stats: &IterationStats, _: &Snapshot<'_>| {
 //!         println!("{:9} steps, return {:.1?}", stats.steps, stats.return_mean);
 //!         Control::Continue
@@ -57,20 +57,28 @@ pub mod rewards;
 pub mod rollout;
 mod trainer;
 
-pub use algorithms::schedule::Schedule;
+pub use algorithms::Algorithm;
+pub use algorithms::a2c::A2c;
+pub use algorithms::acktr::Acktr;
+pub use algorithms::actor_critic::Deviations;
+pub use algorithms::ppo::Ppo;
+pub use algorithms::sac::Sac;
+pub use algorithms::schedule::{Moving, Schedule};
 pub use error::Error;
-pub use files::{read_description, write_atomic, write_description};
+pub use files::{Upgrade, read_description, read_versions, write_atomic, write_description};
 pub use lanes::BLOCK;
+pub use nets::NetworkConfig;
 pub use nets::activation::Activation;
 pub use nets::gaussian::Ratio;
 pub use nets::init::Init;
 pub use nets::normalize::Normalizer;
 pub use policy::evaluation::Evaluation;
 pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
+pub use rewards::{Novelty, RewardConfig, RewardKind};
+pub use rollout::statistics::StatisticsConfig;
 pub use trainer::checkpoint::Checkpoint;
 pub use trainer::config::{RunConfig, TrainConfig};
 pub use trainer::evaluate::{EvalOptions, evaluate};
-pub use trainer::flat::{A2c, Acktr, Algorithm, PpoConfig, Sac, Signal, SignalKind};
 pub use trainer::observer::{Control, Observer, Snapshot};
 pub use trainer::remote::{Deliver, Player, Players};
 pub use trainer::stats::IterationStats;

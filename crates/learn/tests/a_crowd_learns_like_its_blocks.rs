@@ -9,7 +9,7 @@ use marathon_envs::{
     registry,
 };
 use marathon_learn::{
-    Checkpoint, Control, EvalOptions, IterationStats, PpoConfig, Snapshot, TrainOutput, evaluate, train,
+    Checkpoint, Control, EvalOptions, IterationStats, Snapshot, TrainConfig, TrainOutput, evaluate, train,
 };
 use marathon_physics::lanes::Isa;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -17,19 +17,22 @@ use std::sync::Arc;
 
 const TASK: &str = "Hopper-v0";
 
-fn config(threads: usize) -> PpoConfig {
-    PpoConfig { threads, total_steps: 3 * small_config().rollout_steps(), ..small_config() }
+fn config(threads: usize) -> TrainConfig {
+    small_config().with(|c| {
+        c.run.threads = threads;
+        c.run.total_steps = 3 * small_config().run.rollout_steps();
+    })
 }
 
 fn crowd() -> VecEnv {
     // an end in each rollout, and a seed that must not matter
-    let agents = small_config().agents;
+    let agents = small_config().run.agents;
     let options = VecEnvOptions { agents, seed: 99, max_episode_steps: Some(20), ..Default::default() };
     VecEnv::new(TASK, &options).unwrap()
 }
 
 fn lockstep(crowd: impl Crowd + 'static) -> Lockstep {
-    Lockstep::new(Box::new(crowd), self::crowd().spec().clone(), small_config().agents)
+    Lockstep::new(Box::new(crowd), self::crowd().spec().clone(), small_config().run.agents)
 }
 
 /// The task's own blocks, with the crowd's limit.
@@ -84,7 +87,7 @@ fn the_same_evaluation_however_often() {
     let factory = lockstep(crowd());
     // the factory that was trained on evaluates, too
     let policy = train(&factory, Isa::best(), &config(2), None, &mut silent).unwrap().policy;
-    for episodes in [small_config().agents, 5] {
+    for episodes in [small_config().run.agents, 5] {
         let options = EvalOptions { episodes, seed: 3, threads: 2 };
         let want = evaluate(&blocks, Isa::best(), &policy, &options).unwrap();
         assert_eq!(want.episodes, episodes as u64);

@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{PuckTask, silent, small_config};
-use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, train};
+use common::{PuckTask, ppo, silent, small_config};
+use marathon_learn::{Checkpoint, Control, IterationStats, Moving, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 
-fn parameters(config: &PpoConfig, resume: Option<Checkpoint>) -> Vec<f32> {
+fn parameters(config: &TrainConfig, resume: Option<Checkpoint>) -> Vec<f32> {
     let output = train(&PuckTask::new(), Isa::best(), config, resume, &mut silent).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("policy.safetensors");
@@ -19,9 +19,15 @@ fn parameters(config: &PpoConfig, resume: Option<Checkpoint>) -> Vec<f32> {
 
 /// A run of `rollouts` rollouts; the first has no update, so update `i` happens at `i / rollouts` of the way. A fast rate,
 /// so that ratios do reach the clip range.
-fn config(rollouts: u64, clip: f64, final_clip: Option<f64>) -> PpoConfig {
-    let base = PpoConfig { lr: 1e-2, lr_range: [1e-2, 1e-2], ..small_config() };
-    PpoConfig { total_steps: rollouts * base.rollout_steps(), clip, final_clip, ..base }
+fn config(rollouts: u64, clip: f64, final_clip: Option<f64>) -> TrainConfig {
+    let base = small_config().with(|c| {
+        ppo(c).lr = 1e-2;
+        ppo(c).lr_range = [1e-2, 1e-2];
+    });
+    base.with(|c| {
+        c.run.total_steps = rollouts * c.run.rollout_steps();
+        ppo(c).clip = Moving { first: clip, last: final_clip.unwrap_or(clip) };
+    })
 }
 
 #[test]

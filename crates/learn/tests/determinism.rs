@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{PuckTask, silent, small_config, small_of};
-use marathon_learn::{Activation, PpoConfig, Schedule, TrainOutput, train};
+use common::{PuckTask, ppo, silent, small_config, small_of};
+use marathon_learn::{Activation, Schedule, TrainConfig, TrainOutput, train};
 use marathon_physics::lanes::Isa;
 
-fn run(config: &PpoConfig, isa: Isa) -> TrainOutput {
+fn run(config: &TrainConfig, isa: Isa) -> TrainOutput {
     train(&PuckTask::with_limit(20), isa, config, None, &mut silent).unwrap()
 }
 
@@ -21,15 +21,23 @@ fn threads_do_not_change_the_policy() {
     // five blocks, so that threads get unequal shares and fewer groups than threads are possible
     for config in [
         small_config(),
-        PpoConfig { minibatches: 1, horizon: 40, value_clip: Some(0.2), ..small_config() },
-        PpoConfig { minibatches: 17, schedule: Schedule::Linear, activation: Activation::Elu, ..small_config() },
+        small_config().with(|c| {
+            ppo(c).minibatches = 1;
+            c.run.horizon = 40;
+            ppo(c).value_clip = Some(0.2);
+        }),
+        small_config().with(|c| {
+            ppo(c).minibatches = 17;
+            ppo(c).schedule = Schedule::Linear;
+            c.network.activation = Activation::Elu;
+        }),
         small_of("a2c"),
         small_of("acktr"),
         small_of("sac"),
     ] {
         let one = run(&config, Isa::best());
         for threads in [2, 3, 5, 9] {
-            let many = run(&PpoConfig { threads, ..config.clone() }, Isa::best());
+            let many = run(&config.clone().with(|c| c.run.threads = threads), Isa::best());
             assert_eq!(bits(&one), bits(&many), "{threads} threads");
             let (a, b) = (one.last.as_ref().unwrap(), many.last.as_ref().unwrap());
             assert_eq!((a.kl, a.value_loss, a.return_mean), (b.kl, b.value_loss, b.return_mean));
@@ -41,7 +49,10 @@ fn threads_do_not_change_the_policy() {
 #[test]
 fn vector_width_does_not_change_the_policy() {
     for activation in Activation::ALL {
-        let config = PpoConfig { activation, total_steps: 3 * 80 * 24, ..small_config() };
+        let config = small_config().with(|c| {
+            c.network.activation = activation;
+            c.run.total_steps = 3 * 80 * 24;
+        });
         let want = run(&config, Isa::F32);
         for isa in [Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
             assert_eq!(bits(&want), bits(&run(&config, isa)), "{} {}", activation.name(), isa.name());
@@ -57,6 +68,6 @@ fn vector_width_does_not_change_the_policy() {
 
 #[test]
 fn seed_changes_the_policy() {
-    let other = PpoConfig { seed: 2, ..small_config() };
+    let other = small_config().with(|c| c.run.seed = 2);
     assert_ne!(bits(&run(&small_config(), Isa::best())), bits(&run(&other, Isa::best())));
 }

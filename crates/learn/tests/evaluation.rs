@@ -4,12 +4,12 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_envs::{BLOCK, BlockStep, ShardFactory};
-use marathon_learn::{BlockPolicy, EvalOptions, Policy, PpoConfig, evaluate, train};
+use marathon_learn::{BlockPolicy, EvalOptions, Policy, evaluate, train};
 use marathon_physics::lanes::Isa;
 
 /// A bad policy, so that episodes differ in length.
 fn policy() -> Policy {
-    let config = PpoConfig { total_steps: 1, ..small_config() };
+    let config = small_config().with(|c| c.run.total_steps = 1);
     train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy
 }
 

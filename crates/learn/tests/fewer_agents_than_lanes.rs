@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::{PuckTask, learning_config, silent, small_config};
+use common::{PuckTask, learning_config, ppo, silent, small_config};
 use marathon_envs::{BLOCK, BlockStep, EnvError, Shard, ShardFactory, Spec};
-use marathon_learn::{Algorithm, Control, IterationStats, PpoConfig, Ratio, Snapshot, evaluate, train};
+use marathon_learn::{Algorithm, Control, IterationStats, Ratio, Snapshot, TrainConfig, evaluate, train};
 use marathon_physics::lanes::Isa;
 
 /// Every agent's reward is its number, every agent's first observation too.
@@ -57,8 +57,12 @@ impl Shard for NumberedShard {
 fn what_is_reported_is_theirs_alone() {
     const LIMIT: usize = 8;
     for agents in [1, 2, 4, 8, 16, 32] {
-        let config =
-            PpoConfig { agents, horizon: 24, minibatches: 1, total_steps: 24 * agents as u64, ..small_config() };
+        let config = small_config().with(|c| {
+            c.run.agents = agents;
+            c.run.horizon = 24;
+            ppo(c).minibatches = 1;
+            c.run.total_steps = 24 * agents as u64;
+        });
         let mut seen = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
             seen.push((stats.steps, stats.episodes, stats.return_mean, stats.reward_terms[0]));
@@ -77,8 +81,12 @@ fn what_is_reported_is_theirs_alone() {
 
 #[test]
 fn one_agent_solves_the_task() {
-    let config = PpoConfig { agents: 1, horizon: 1024, total_steps: 100_000, ..learning_config() };
-    for config in [PpoConfig { ratio: Ratio::PerAction, ..config.clone() }, config] {
+    let config = learning_config().with(|c| {
+        c.run.agents = 1;
+        c.run.horizon = 1024;
+        c.run.total_steps = 100_000;
+    });
+    for config in [config.clone().with(|c| ppo(c).ratio = Ratio::PerAction), config] {
         let task = PuckTask::new();
         let output = train(&task, Isa::best(), &config, None, &mut silent).unwrap();
         let result = evaluate(&task, Isa::best(), &output.policy, &Default::default()).unwrap();
@@ -90,9 +98,19 @@ fn one_agent_solves_the_task() {
 fn vector_width_and_interruptions_change_nothing() {
     let task = PuckTask::with_limit(20);
     for config in [
-        PpoConfig { agents: 2, horizon: 96, total_steps: 4 * 192, ..small_config() },
-        PpoConfig { agents: 1, total_steps: 4 * 50 * 5, ..PpoConfig::a2c() },
-        PpoConfig { agents: 4, total_steps: 4 * 10 * 80, ..PpoConfig::acktr() },
+        small_config().with(|c| {
+            c.run.agents = 2;
+            c.run.horizon = 96;
+            c.run.total_steps = 4 * 192;
+        }),
+        TrainConfig::a2c().with(|c| {
+            c.run.agents = 1;
+            c.run.total_steps = 4 * 50 * 5;
+        }),
+        TrainConfig::acktr().with(|c| {
+            c.run.agents = 4;
+            c.run.total_steps = 4 * 10 * 80;
+        }),
     ] {
         let whole = train(&task, Isa::best(), &config, None, &mut silent).unwrap();
         for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
@@ -108,8 +126,13 @@ fn vector_width_and_interruptions_change_nothing() {
 
 #[test]
 fn what_does_not_divide_sixteen_is_refused() {
-    for (agents, algorithm) in [(3, Algorithm::Ppo), (12, Algorithm::Ppo), (1, PpoConfig::sac().algorithm)] {
-        let config = PpoConfig { agents, algorithm, ..learning_config() };
+    for (agents, algorithm) in
+        [(3, Algorithm::default()), (12, Algorithm::default()), (1, TrainConfig::sac().algorithm)]
+    {
+        let config = learning_config().with(|c| {
+            c.run.agents = agents;
+            c.algorithm = algorithm;
+        });
         let error = train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).err().unwrap().to_string();
         assert!(error.contains(&format!("agents is {agents}, expected a multiple of 16, such as 16")), "{error}");
     }

@@ -2,14 +2,15 @@
 
 mod common;
 
-use common::{PuckTask, learning_config};
+use common::{PuckTask, learning_config, ppo};
 use marathon_learn::{
-    Acktr, Activation, Algorithm, Control, IterationStats, PpoConfig, Sac, Schedule, Snapshot, evaluate, train,
+    A2c, Acktr, Activation, Algorithm, Control, IterationStats, Moving, Sac, Schedule, Snapshot, TrainConfig, evaluate,
+    train,
 };
 use marathon_physics::lanes::Isa;
 
 /// Return of the best policy is about 64 (holding still at the origin) less the way there and the effort against drift.
-fn learned(config: &PpoConfig) -> f64 {
+fn learned(config: &TrainConfig) -> f64 {
     let task = PuckTask::new();
     let mut returns = Vec::new();
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
@@ -33,34 +34,47 @@ fn adaptive_rate_solves_the_task() {
 
 #[test]
 fn linear_rate_with_value_clipping_and_swish_solves_the_task() {
-    let config = PpoConfig {
-        schedule: Schedule::Linear,
-        value_clip: Some(0.5),
-        final_entropy_coef: Some(0.0),
-        activation: Activation::Swish,
-        ..learning_config()
-    };
+    let config = learning_config().with(|c| {
+        ppo(c).schedule = Schedule::Linear;
+        ppo(c).value_clip = Some(0.5);
+        c.network.activation = Activation::Swish;
+        ppo(c).entropy_coef.last = 0.0;
+    });
     assert!(learned(&config) > 52.0);
 }
 
 #[test]
 fn constant_rate_with_elu_solves_the_task() {
     assert!(
-        learned(&PpoConfig { schedule: Schedule::Constant, activation: Activation::Elu, ..learning_config() }) > 52.0
+        learned(&learning_config().with(|c| {
+            ppo(c).schedule = Schedule::Constant;
+            c.network.activation = Activation::Elu;
+        })) > 52.0
     );
 }
 
 /// With a rate ten times that of the paper's comparison, which takes ten times as many steps.
 #[test]
 fn a2c_solves_the_task() {
-    let base = PpoConfig { lr: 3e-3, entropy_coef: 0.0, init_log_std: -0.5, ..PpoConfig::a2c() };
-    assert!(learned(&PpoConfig { total_steps: 400_000, threads: 1, ..base }) > 52.0);
+    let mut a2c = A2c { lr: 3e-3, entropy_coef: Moving::still(0.0), ..Default::default() };
+    a2c.deviations.init_log_std = -0.5;
+    let config = TrainConfig::a2c().with(|c| {
+        c.run.total_steps = 400_000;
+        c.run.threads = 1;
+        c.algorithm = Algorithm::A2c(a2c);
+    });
+    assert!(learned(&config) > 52.0);
 }
 
 /// With half the steps, and with the settings of OpenAI Baselines as they are.
 #[test]
 fn acktr_solves_the_task_in_half_the_steps() {
-    assert!(learned(&PpoConfig { total_steps: 200_000, threads: 1, ..PpoConfig::acktr() }) > 55.0);
+    assert!(
+        learned(&TrainConfig::acktr().with(|c| {
+            c.run.total_steps = 200_000;
+            c.run.threads = 1;
+        })) > 55.0
+    );
 }
 
 /// With a quarter of PPO's steps.
@@ -68,14 +82,13 @@ fn acktr_solves_the_task_in_half_the_steps() {
 fn sac_solves_the_task_in_a_quarter_of_the_steps() {
     let task = PuckTask::new();
     let sac = Sac { warmup: 2000, ..Sac::default() };
-    let config = PpoConfig {
-        algorithm: Algorithm::Sac(sac),
-        total_steps: 100_000,
-        actor_hidden: vec![32, 32],
-        critic_hidden: vec![64, 64],
-        threads: 1,
-        ..PpoConfig::sac()
-    };
+    let config = TrainConfig::sac().with(|c| {
+        c.algorithm = Algorithm::Sac(sac);
+        c.run.total_steps = 100_000;
+        c.network.actor_hidden = vec![32, 32];
+        c.network.critic_hidden = vec![64, 64];
+        c.run.threads = 1;
+    });
     let output = train(&task, Isa::best(), &config, None, &mut common::silent).unwrap();
     let result = evaluate(&task, Isa::best(), &output.policy, &Default::default()).unwrap();
     println!("{result:?} {:?}", output.last);
@@ -112,24 +125,36 @@ fn poisoned_observation_is_contained() {
 
 #[test]
 fn impossible_settings_are_refused_with_the_nearest_possible_one() {
-    let refuse = |config: PpoConfig| {
+    let refuse = |config: TrainConfig| {
         let result = train(&PuckTask::new(), Isa::best(), &config, None, &mut common::silent);
         result.expect_err("an error").to_string()
     };
     assert_eq!(
-        refuse(PpoConfig { agents: 100, ..learning_config() }),
+        refuse(learning_config().with(|c| c.run.agents = 100)),
         "configuration: agents is 100, expected a multiple of 16, such as 96, or 1, 2, 4 or 8"
     );
-    assert!(refuse(PpoConfig { minibatches: 5000, ..learning_config() }).contains("at most 256"));
-    assert!(refuse(PpoConfig { gamma: 1.5, ..learning_config() }).contains("gamma is 1.5"));
-    assert!(refuse(PpoConfig { lr: f64::NAN, ..learning_config() }).contains("lr is NaN"));
+    assert!(refuse(learning_config().with(|c| ppo(c).minibatches = 5000)).contains("at most 256"));
+    assert!(refuse(learning_config().with(|c| c.rewards[0].gamma = 1.5)).contains("gamma is 1.5"));
+    assert!(refuse(learning_config().with(|c| ppo(c).lr = f64::NAN)).contains("lr is NaN"));
     let isa = train(&PuckTask::new(), Isa::F64, &learning_config(), None, &mut common::silent);
     assert!(isa.err().unwrap().to_string().contains("f64"));
-    assert_eq!(
-        refuse(PpoConfig { epochs: 3, ..PpoConfig::a2c() }),
-        "configuration: epochs is 3, expected 1: a2c makes one step on each rollout"
-    );
-    assert!(refuse(PpoConfig { schedule: Schedule::Adaptive, ..PpoConfig::acktr() }).contains("constant or linear"));
+    let acktr = Algorithm::Acktr(Acktr { schedule: Schedule::Adaptive, ..Default::default() });
+    assert!(refuse(TrainConfig::acktr().with(|c| c.algorithm = acktr)).contains("constant or linear"));
     let acktr = Algorithm::Acktr(Acktr { kl_clip: 0.0, ..Default::default() });
-    assert!(refuse(PpoConfig { algorithm: acktr, ..PpoConfig::acktr() }).contains("kl_clip is 0"));
+    assert!(refuse(TrainConfig::acktr().with(|c| c.algorithm = acktr)).contains("kl_clip is 0"));
+}
+
+/// A setting of another algorithm is refused by its name.
+#[test]
+fn settings_that_mean_nothing_to_an_algorithm_are_refused() {
+    for (json, name) in [
+        (r#"{"algorithm": {"a2c": {"epochs": 3}}}"#, "epochs"),
+        (r#"{"algorithm": {"acktr": {"max_grad_norm": 0.5}}}"#, "max_grad_norm"),
+        (r#"{"algorithm": {"sac": {"gae_lambda": 0.9}}}"#, "gae_lambda"),
+        (r#"{"algorithm": {"ppo": {"kl_clip": 0.1}}}"#, "kl_clip"),
+        (r#"{"run": {"lr": 0.1}}"#, "lr"),
+    ] {
+        let error = serde_json::from_str::<TrainConfig>(json).unwrap_err().to_string();
+        assert!(error.contains(&format!("unknown field `{name}`")), "{error}");
+    }
 }

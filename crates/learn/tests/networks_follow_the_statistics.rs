@@ -4,23 +4,21 @@
 mod common;
 
 use common::numbers::noise_f32 as noise;
-use common::{PuckTask, silent, small_config, small_of};
+use common::{PuckTask, ppo, silent, small_config, small_of};
 use marathon_learn::nets::mlp::Mlp;
-use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, PpoConfig, Schedule, Snapshot, train};
+use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, Schedule, Snapshot, train};
 use marathon_physics::lanes::Isa;
 
 /// Actions for a row of raw observations after each of four rollouts, whose updates move no parameter by as much as a bit.
 fn actions(follow_statistics: bool) -> Vec<Vec<f32>> {
     let base = small_config();
-    let config = PpoConfig {
-        follow_statistics,
-        schedule: Schedule::Constant,
-        lr: 1e-30,
-        value_lr: 1e-30,
-        // larger weights at the start than ours, with which a policy hardly looks at what it sees
-        initialization: Init::MlAgents,
-        ..base
-    };
+    let config = base.with(|c| {
+        c.statistics.follow_statistics = follow_statistics;
+        ppo(c).schedule = Schedule::Constant;
+        ppo(c).lr = 1e-30;
+        ppo(c).value_lr = 1e-30;
+        c.network.initialization = Init::MlAgents;
+    });
     let mut all = Vec::new();
     let mut observer = |_: &IterationStats, snapshot: &Snapshot<'_>| {
         all.push(snapshot.policy().act(&[12.0, 20.0, 3.0, -9.0, 40.0, -30.0]));
@@ -107,9 +105,12 @@ fn noise_params(net: &Mlp) -> Vec<f32> {
 #[test]
 fn every_algorithm_and_number_of_threads_gives_the_same_bits() {
     for algorithm in ["ppo", "a2c", "acktr"] {
-        let base = PpoConfig { agents: 64, ..small_of(algorithm) };
+        let base = small_of(algorithm).with(|c| c.run.agents = 64);
         let params = |follow_statistics, threads| {
-            let config = PpoConfig { follow_statistics, threads, ..base.clone() };
+            let config = base.clone().with(|c| {
+                c.statistics.follow_statistics = follow_statistics;
+                c.run.threads = threads;
+            });
             train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy.params().to_vec()
         };
         let one = params(true, 1);
@@ -117,7 +118,10 @@ fn every_algorithm_and_number_of_threads_gives_the_same_bits() {
         assert_ne!(one, params(false, 1), "{algorithm}");
         // nothing moves where nothing is normalized
         let raw = |follow_statistics| {
-            let config = PpoConfig { follow_statistics, normalize_observations: false, ..base.clone() };
+            let config = base.clone().with(|c| {
+                c.statistics.follow_statistics = follow_statistics;
+                c.statistics.normalize_observations = false;
+            });
             train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy.params().to_vec()
         };
         assert_eq!(raw(true), raw(false), "{algorithm}");
@@ -126,6 +130,6 @@ fn every_algorithm_and_number_of_threads_gives_the_same_bits() {
 
 #[test]
 fn sac_refuses() {
-    let error = PpoConfig { follow_statistics: true, ..small_of("sac") }.validate().unwrap_err().to_string();
+    let error = small_of("sac").with(|c| c.statistics.follow_statistics = true).validate().unwrap_err().to_string();
     assert!(error.contains("follow_statistics is true, expected false with sac"), "{error}");
 }

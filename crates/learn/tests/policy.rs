@@ -4,11 +4,15 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_envs::ShardFactory;
-use marathon_learn::{Activation, BLOCK, BlockPolicy, EvalOptions, Policy, PpoConfig, evaluate, train};
+use marathon_learn::{Activation, BLOCK, BlockPolicy, EvalOptions, Policy, evaluate, train};
 use marathon_physics::lanes::Isa;
 
 fn trained(activation: Activation) -> Policy {
-    let config = PpoConfig { activation, actor_hidden: vec![37, 19], total_steps: 5000, ..small_config() };
+    let config = small_config().with(|c| {
+        c.network.activation = activation;
+        c.network.actor_hidden = vec![37, 19];
+        c.run.total_steps = 5000;
+    });
     train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy
 }
 

@@ -4,14 +4,14 @@
 mod common;
 
 use common::{PuckTask, silent, small_config, small_of};
-use marathon_learn::{Checkpoint, Control, Error, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Checkpoint, Control, Error, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use serde_json::json;
 use std::path::Path;
 
 const LIMIT: usize = 30;
 
-fn run(config: &PpoConfig, resume: Option<Checkpoint>) -> Result<Checkpoint, Error> {
+fn run(config: &TrainConfig, resume: Option<Checkpoint>) -> Result<Checkpoint, Error> {
     let output = train(&PuckTask::with_limit(LIMIT), Isa::best(), config, resume, &mut silent)?;
     Ok(output.checkpoint)
 }
@@ -24,7 +24,7 @@ fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
         assert!(about[clock].is_number());
         about[clock] = 0.into();
     }
-    about["config"]["threads"] = 0.into();
+    about["config"]["run"]["threads"] = 0.into();
     // that of the clocks too
     assert!(about["checksum"].take().is_string());
     let state = std::fs::read(folder.join(about["state"]["name"].as_str().unwrap())).unwrap();
@@ -33,7 +33,7 @@ fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
 
 #[test]
 fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
-    resumed_run_is_whole(&PpoConfig { total_steps: 5 * small_config().rollout_steps(), ..small_config() }, 1);
+    resumed_run_is_whole(&small_config().with(|c| c.run.total_steps = 5 * small_config().run.rollout_steps()), 1);
 }
 
 #[test]
@@ -43,11 +43,11 @@ fn so_have_those_of_the_other_algorithms() {
     }
 }
 
-fn resumed_run_is_whole(config: &PpoConfig, rollouts: u64) {
+fn resumed_run_is_whole(config: &TrainConfig, rollouts: u64) {
     let dir = tempfile::tempdir().unwrap();
     let whole = dir.path().join("whole");
     run(config, None).unwrap().save(&whole).unwrap();
-    let iterations = config.total_steps / (rollouts * config.rollout_steps());
+    let iterations = config.run.total_steps / (rollouts * config.run.rollout_steps());
     for stop_at in (1..iterations.min(5)).map(|i| i * rollouts) {
         // interrupted by the observer, saved, loaded, and resumed with another number of threads
         let folder = dir.path().join(format!("part-{stop_at}"));
@@ -62,7 +62,7 @@ fn resumed_run_is_whole(config: &PpoConfig, rollouts: u64) {
         let checkpoint = Checkpoint::load(&folder).unwrap();
         assert_eq!((checkpoint.iteration(), checkpoint.agent()), (stop_at, "Puck-v0"));
         assert_eq!(checkpoint.config(), config);
-        run(&PpoConfig { threads: 2, ..config.clone() }, Some(checkpoint)).unwrap().save(&folder).unwrap();
+        run(&config.clone().with(|c| c.run.threads = 2), Some(checkpoint)).unwrap().save(&folder).unwrap();
         assert_eq!(contents(&folder), contents(&whole), "interrupted after iteration {stop_at}");
         // the old state is gone
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
@@ -78,17 +78,20 @@ fn finished_run_resumes_to_itself() {
 #[test]
 fn checkpoint_of_something_else_is_refused() {
     let checkpoint = run(&small_config(), None).unwrap();
-    let refuse = |config: PpoConfig, text: &str| {
+    let refuse = |config: TrainConfig, text: &str| {
         let error = run(&config, Some(checkpoint.clone())).expect_err("an error").to_string();
         assert!(error.contains(text), "{error}");
     };
-    refuse(PpoConfig { agents: 96, ..small_config() }, "checkpoint: agents is for 80, expected 96");
-    refuse(PpoConfig { actor_hidden: vec![7], ..small_config() }, "actor_hidden is for [13, 8], expected [7]");
+    refuse(small_config().with(|c| c.run.agents = 96), "checkpoint: agents is for 80, expected 96");
+    refuse(small_config().with(|c| c.network.actor_hidden = vec![7]), "actor_hidden is for [13, 8], expected [7]");
     refuse(
-        PpoConfig { agents: 80, horizon: 24, ..small_of("acktr") },
+        small_of("acktr").with(|c| {
+            c.run.agents = 80;
+            c.run.horizon = 24;
+        }),
         "checkpoint: algorithm is for ppo, expected acktr",
     );
-    refuse(PpoConfig { seed: 9, ..small_config() }, "seed is for 1, expected 9");
+    refuse(small_config().with(|c| c.run.seed = 9), "seed is for 1, expected 9");
     let task = PuckTask::new().renamed("Puck-v1");
     let error = train(&task, Isa::best(), &small_config(), Some(checkpoint.clone()), &mut silent).err().unwrap();
     assert!(error.to_string().contains("agent is for Puck-v0, expected Puck-v1"), "{error}");
@@ -129,9 +132,9 @@ fn damaged_checkpoints_are_refused() {
     assert_eq!(Checkpoint::load(folder).unwrap(), whole);
     for (from, to, text) in [
         ("marathon-checkpoint", "marathon-policy", "format: found"),
-        ("\"version\": 1", "\"version\": 7", "version: found 7, expected 1"),
-        ("\"agents\": 80", "\"agents\": 81", "config.agents: found 81, expected a multiple of 16, such as 80"),
-        ("\"horizon\": 24", "\"horizon\": -24", "config.horizon: found 'invalid value: integer `-24`"),
+        ("\"version\": 2", "\"version\": 7", "version: found 7, expected 2"),
+        ("\"agents\": 80", "\"agents\": 81", "config.run.agents: found 81, expected a multiple of 16, such as 80"),
+        ("\"horizon\": 24", "\"horizon\": -24", "config.run.horizon: found 'invalid value: integer `-24`"),
         ("\"lr\"", "\"lrr\"", "lr"),
         ("state-", "../state-", "a file in the same folder"),
         ("{", "[", "JSON"),
@@ -141,12 +144,12 @@ fn damaged_checkpoints_are_refused() {
         assert!(error().contains(text), "{}", error());
     }
     for (key, value, text) in [
-        ("lr", json!(-1.0), "lr: found -1, expected a number not below 0"),
+        ("learner/lr", json!(-1.0), "lr: found -1, expected a number not below 0"),
         ("observation_count", json!(-5.0), "observation_count: found -5, expected a number not below 0"),
         ("return_count", json!(-1e-9), "return_count: found -0.000000001, expected a number not below 0"),
         ("return_var", json!(-2.0), "return_var: found -2, expected a number not below 0"),
         ("wall_seconds", json!(-1.0), "wall_seconds: found -1, expected a number not below 0"),
-        ("adam_powers", json!([0.5, 1.5]), "adam_powers: found 1.5, expected a number between 0 and 1"),
+        ("learner/adam_power_2", json!(1.5), "adam_power_2: found 1.5, expected a number between 0 and 1"),
         ("steps", json!(1_u64 << 63), "steps: found 9223372036854775808, expected"),
         ("steps", json!(steps + 1), "expected a multiple of the 80 agents"),
         ("iteration", json!(0), "steps: found"),
@@ -154,7 +157,7 @@ fn damaged_checkpoints_are_refused() {
         ("obs", json!(1.5), "obs: found 'invalid type"),
     ] {
         let mut changed = about.clone();
-        changed[key] = value;
+        *changed.pointer_mut(&format!("/{key}")).unwrap() = value;
         std::fs::write(&description, changed.to_string()).unwrap();
         assert!(error().contains(&format!("checkpoint.json: {text}")) || error().contains(text), "{key}: {}", error());
     }

@@ -6,8 +6,8 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_learn::{
-    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Player, Players, PpoConfig, Schedule, Signal,
-    SignalKind, TrainOutput, train_with,
+    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Novelty, Player, Players, RewardConfig, RewardKind,
+    Schedule, TrainConfig, TrainOutput, train_with,
 };
 use marathon_physics::lanes::Isa;
 
@@ -15,7 +15,7 @@ const LIMIT: usize = 20;
 
 /// Players in this process, who answer in reverse order.
 struct Team {
-    config: PpoConfig,
+    config: TrainConfig,
     slices: usize,
     players: Vec<Option<Player>>,
     /// Rollouts played.
@@ -27,8 +27,8 @@ struct Team {
 }
 
 impl Team {
-    fn new(config: &PpoConfig, slices: usize) -> Self {
-        let players = (0..config.blocks()).map(|_| None).collect();
+    fn new(config: &TrainConfig, slices: usize) -> Self {
+        let players = (0..config.run.blocks()).map(|_| None).collect();
         Team { config: config.clone(), slices, players, rollouts: 0, losses: Vec::new(), until: usize::MAX }
     }
     fn player(&self, i: usize, slices: usize) -> Player {
@@ -59,7 +59,7 @@ impl Players for Team {
     }
 }
 
-fn run(players: Option<&mut dyn Players>, config: &PpoConfig, resume: Option<Checkpoint>) -> TrainOutput {
+fn run(players: Option<&mut dyn Players>, config: &TrainConfig, resume: Option<Checkpoint>) -> TrainOutput {
     train_with(players, &PuckTask::with_limit(LIMIT), Isa::best(), config, resume, &mut silent).unwrap()
 }
 
@@ -80,7 +80,7 @@ fn players_do_not_change_the_policy() {
     let want = run(None, &small_config(), None);
     // five blocks: more players than blocks are too many
     for (slices, threads) in [(1, 1), (2, 1), (3, 2), (5, 3), (9, 1)] {
-        let config = PpoConfig { threads, ..small_config() };
+        let config = small_config().with(|c| c.run.threads = threads);
         let got = run(Some(&mut Team::new(&config, slices)), &config, None);
         assert_eq!(bits(&got), bits(&want), "{slices} players, {threads} threads");
         assert_eq!(numbers(got.last.as_ref()), numbers(want.last.as_ref()));
@@ -89,9 +89,10 @@ fn players_do_not_change_the_policy() {
 
 #[test]
 fn rewards_for_novelty_are_played_elsewhere_too() {
-    let signals = [SignalKind::Curiosity, SignalKind::Rnd];
-    let signals = signals.map(|kind| Signal { strength: 0.1, hidden: vec![11, 7], ..Signal::new(kind) }).to_vec();
-    let config = PpoConfig { signals, ..small_config() };
+    let kinds = [RewardKind::Curiosity, RewardKind::Rnd];
+    let kinds = kinds.map(|kind| kind(Novelty { hidden: vec![11, 7], ..Default::default() }));
+    let rewards = kinds.map(|kind| RewardConfig { strength: 0.1, ..RewardConfig::new(kind) });
+    let config = small_config().with(|c| c.rewards.extend(rewards));
     let want = run(None, &config, None);
     let got = run(Some(&mut Team::new(&config, 3)), &config, None);
     assert_eq!(bits(&got), bits(&want));
@@ -100,14 +101,10 @@ fn rewards_for_novelty_are_played_elsewhere_too() {
 
 #[test]
 fn iterations_of_several_rollouts_can_be_given_up_halfway() {
-    let config = PpoConfig {
-        algorithm: Algorithm::A2c(A2c::default()),
-        rollouts: 2,
-        epochs: 1,
-        minibatches: 1,
-        schedule: Schedule::Constant,
-        ..small_config()
-    };
+    let config = small_config().with(|c| {
+        c.algorithm = Algorithm::A2c(A2c { schedule: Schedule::Constant, ..Default::default() });
+        c.run.rollouts = 2;
+    });
     let want = run(None, &config, None);
     let mut team = Team::new(&config, 2);
     team.until = 3;
@@ -183,7 +180,7 @@ fn players_refuse_what_is_not_theirs() {
     let (task, config) = (PuckTask::with_limit(LIMIT), small_config());
     let error = Player::new(&task, Isa::best(), &config, (2, 2)).err().unwrap().to_string();
     assert!(error.contains("slice 2 of 2, expected a slice below their number, and at most 5"), "{error}");
-    let sac = PpoConfig::sac();
+    let sac = TrainConfig::sac();
     let error = Player::new(&task, Isa::best(), &sac, (0, 1)).err().unwrap().to_string();
     assert!(error.contains("the trainer sac, expected ppo, a2c or acktr"), "{error}");
     let mut player = Player::new(&task, Isa::best(), &config, (0, 2)).unwrap();

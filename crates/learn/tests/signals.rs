@@ -9,7 +9,8 @@ use marathon_learn::rewards::Step;
 use marathon_learn::rewards::curiosity::Curiosity;
 use marathon_learn::rewards::rnd::Rnd;
 use marathon_learn::{
-    BLOCK, Checkpoint, Control, IterationStats, PpoConfig, Signal, SignalKind, Snapshot, evaluate, train,
+    BLOCK, Checkpoint, Control, IterationStats, Novelty, RewardConfig, RewardKind, Snapshot, TrainConfig, evaluate,
+    train,
 };
 use marathon_physics::lanes::Isa;
 
@@ -66,24 +67,25 @@ fn gradient_of_distillation_equals_finite_differences() {
     assert!(error < 1e-7, "{error}");
 }
 
-fn signals() -> Vec<Signal> {
-    [SignalKind::Curiosity, SignalKind::Rnd]
-        .map(|kind| Signal { strength: 0.1, gamma: 0.95, hidden: vec![11, 7], ..Signal::new(kind) })
+fn signals() -> Vec<RewardConfig> {
+    [RewardKind::Curiosity, RewardKind::Rnd]
+        .map(|kind| kind(Novelty { hidden: vec![11, 7], ..Default::default() }))
+        .map(|kind| RewardConfig { kind, strength: 0.1, gamma: 0.95 })
         .into()
 }
 
-fn bits(config: &PpoConfig, isa: Isa) -> Vec<u32> {
+fn bits(config: &TrainConfig, isa: Isa) -> Vec<u32> {
     let output = train(&PuckTask::with_limit(20), isa, config, None, &mut silent).unwrap();
     output.policy.params().iter().chain(output.policy.log_std()).map(|x| x.to_bits()).collect()
 }
 
 #[test]
 fn neither_threads_nor_vector_width_change_the_policy() {
-    let config = PpoConfig { signals: signals(), ..small_config() };
+    let config = small_config().with(|c| c.rewards.extend(signals()));
     let want = bits(&config, Isa::best());
     assert_ne!(want, bits(&small_config(), Isa::best()), "signals do something");
     for threads in [2, 5] {
-        assert_eq!(want, bits(&PpoConfig { threads, ..config.clone() }, Isa::best()), "{threads} threads");
+        assert_eq!(want, bits(&config.clone().with(|c| c.run.threads = threads), Isa::best()), "{threads} threads");
     }
     for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
         assert_eq!(want, bits(&config, isa), "{}", isa.name());
@@ -92,7 +94,7 @@ fn neither_threads_nor_vector_width_change_the_policy() {
 
 #[test]
 fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
-    let config = PpoConfig { signals: signals(), ..small_config() };
+    let config = small_config().with(|c| c.rewards.extend(signals()));
     let run = |resume: Option<Checkpoint>, stop_at: u64| {
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| match stats.iteration == stop_at {
             true => Control::Stop,
@@ -106,20 +108,21 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
     half.save(dir.path()).unwrap();
     let resumed = run(Some(Checkpoint::load(dir.path()).unwrap()), 0);
     assert_eq!(resumed.policy.params(), whole.policy.params());
-    let other = PpoConfig { signals: Vec::new(), ..config.clone() };
+    let other = config.clone().with(|c| c.rewards.truncate(1));
     let error = train(&PuckTask::with_limit(30), Isa::best(), &other, Some(half), &mut silent).err().unwrap();
-    assert!(error.to_string().contains("checkpoint: signals is for curiosity [11, 7], rnd [11, 7]"), "{error}");
+    assert!(error.to_string().contains("checkpoint: rewards is for task, curiosity [11, 7], rnd [11, 7]"), "{error}");
 }
 
 /// The rewards of both fade while their networks learn, and the task is learned beside them.
 #[test]
 fn novelty_fades_and_the_task_is_solved() {
-    for kind in [SignalKind::Curiosity, SignalKind::Rnd] {
-        let signal = Signal { strength: 0.01, hidden: vec![32, 32], lr: 1e-3, ..Signal::new(kind) };
-        let config = PpoConfig { signals: vec![signal], ..learning_config() };
+    for kind in [RewardKind::Curiosity, RewardKind::Rnd] {
+        let kind = kind(Novelty { hidden: vec![32, 32], lr: 1e-3 });
+        let reward = RewardConfig { strength: 0.01, ..RewardConfig::new(kind.clone()) };
+        let config = learning_config().with(|c| c.rewards.push(reward));
         let mut rewards = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
-            assert_eq!(stats.signal_rewards[0].0, kind);
+            assert_eq!(stats.signal_rewards[0].0, kind.name());
             rewards.push(stats.signal_rewards[0].1);
             Control::Continue
         };
@@ -134,7 +137,7 @@ fn novelty_fades_and_the_task_is_solved() {
 
 #[test]
 fn a_signal_twice_is_refused() {
-    let twice = vec![Signal::new(SignalKind::Rnd); 2];
-    let config = PpoConfig { signals: twice, ..small_config() };
+    let twice = vec![RewardConfig::new(RewardKind::Rnd(Novelty::default())); 2];
+    let config = small_config().with(|c| c.rewards.extend(twice));
     assert!(config.validate().unwrap_err().to_string().contains("rnd twice, expected each kind once"));
 }

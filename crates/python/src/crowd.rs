@@ -5,7 +5,7 @@ use crate::error;
 use marathon_envs::{
     CommandRange, Crowd, CrowdError, Lockstep, Metric, MetricSource, ObsGroup, Options, ShardFactory, Spec, StepMut,
 };
-use marathon_learn::{Checkpoint, Control, IterationStats, PpoConfig, Snapshot, train};
+use marathon_learn::{Checkpoint, Control, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::conversion::FromPyObjectOwned;
@@ -180,8 +180,9 @@ pub fn learn(
     callback: Option<Py<PyAny>>,
     checkpoint: Option<PathBuf>,
 ) -> PyResult<Option<Py<PyAny>>> {
-    let config: PpoConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
-    let config = PpoConfig { agents: env.len()?, ..config };
+    let settings = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
+    let mut config = TrainConfig::from_settings(settings).map_err(error::learn)?;
+    config.run.agents = env.len()?;
     let factory = lockstep(env)?;
     let begun = checkpoint.as_ref().filter(|folder| folder.join("checkpoint.json").exists());
     let resume = begun.map(|folder| Checkpoint::load(folder)).transpose().map_err(error::learn)?;

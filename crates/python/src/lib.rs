@@ -28,8 +28,8 @@ mod _native {
     #[pymodule_export]
     use super::{
         crowd::learn, main, model::Model, players::Player, policy::_policy, policy::Policy, policy::evaluate,
-        policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec, spec::CommandRange, spec::Spec, spec::ids,
-        spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec, spec::CommandRange, spec::Spec,
+        spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
     };
     use pyo3::prelude::*;
 

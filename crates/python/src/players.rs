@@ -2,7 +2,7 @@
 
 use crate::error;
 use marathon_envs::registry;
-use marathon_learn::{Control, Deliver, Players, PpoConfig};
+use marathon_learn::{Control, Deliver, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -20,7 +20,7 @@ pub struct Player {
 impl Player {
     #[new]
     fn new(py: Python<'_>, task: &str, config: &str, slice: usize, slices: usize) -> PyResult<Self> {
-        let config: PpoConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
+        let config: TrainConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
         let factory = registry::factory(task, Isa::best()).map_err(error::env)?;
         let make = || marathon_learn::Player::new(&*factory, Isa::best(), &config, (slice, slices));
         Ok(Player { player: Mutex::new(py.detach(make).map_err(error::learn)?) })
@@ -51,7 +51,7 @@ pub struct PyPlayers {
 
 impl PyPlayers {
     /// Tells the object the task and the configuration of the run; it says how many slices it wants.
-    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &str, config: &PpoConfig) -> PyResult<Self> {
+    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &str, config: &TrainConfig) -> PyResult<Self> {
         let config = serde_json::to_string(config).map_err(error::any)?;
         let slices = object.bind(py).call_method1("begin", (task, config))?.extract()?;
         Ok(PyPlayers { object, slices, failure: None })

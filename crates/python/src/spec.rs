@@ -26,7 +26,9 @@ impl CommandRange {
     #[pyo3(signature = (name, low, high, unit = ""))]
     fn new(name: &str, low: f64, high: f64, unit: &str) -> PyResult<Self> {
         if !(low.is_finite() && high.is_finite() && low <= high) {
-            return Err(error::value(format!("command '{name}' is from {low} to {high}, expected a range of finite numbers")));
+            return Err(error::value(format!(
+                "command '{name}' is from {low} to {high}, expected a range of finite numbers"
+            )));
         }
         Ok(CommandRange { name: name.into(), low, high, unit: unit.into() })
     }

@@ -3,15 +3,17 @@
 use crate::error::RunError;
 use crate::text;
 use marathon_config::Loaded;
-use marathon_learn::{Checkpoint, PpoConfig, read_description, write_atomic, write_description};
+use marathon_learn::{Checkpoint, RunConfig, TrainConfig, read_versions, write_atomic, write_description};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
-const VERSION: u32 = 1;
+/// Since version 2, each algorithm has settings of its own.
+const VERSION: u32 = 2;
 const RUN: &str = "run.json";
 const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";
@@ -37,7 +39,7 @@ pub struct RunFile {
     /// Policies kept in `policies/`.
     pub keep_checkpoints: usize,
     /// The trainer's configuration.
-    pub config: PpoConfig,
+    pub config: TrainConfig,
 }
 
 impl RunFile {
@@ -50,14 +52,14 @@ impl RunFile {
             summary_freq: loaded.summary_freq,
             checkpoint_interval: loaded.checkpoint_interval,
             keep_checkpoints: loaded.keep_checkpoints,
-            config: loaded.ppo.clone(),
+            config: loaded.config.clone(),
         }
     }
 
     /// Reads a description and looks at every value.
     fn read(path: &Path) -> Result<Self, RunError> {
-        let run: RunFile = read_description(path, FORMAT, VERSION)?;
-        run.config.validate().map_err(|e| e.in_file(path, "config"))?;
+        let run: RunFile = read_versions(path, FORMAT, VERSION, Some(upgrade))?;
+        run.config.validate_in(path, "config")?;
         for (key, n) in [("summary_freq", run.summary_freq), ("checkpoint_interval", run.checkpoint_interval)] {
             if n == 0 {
                 return Err(RunError::file(path, key, n, "at least 1"));
@@ -69,19 +71,42 @@ impl RunFile {
     /// Refuses a configuration that is not the one of a checkpoint of the run: only steps and threads may differ.
     fn check(&self, path: &Path, checkpoint: &Checkpoint) -> Result<(), RunError> {
         let known = checkpoint.config();
-        let PpoConfig { total_steps, threads, .. } = self.config;
-        let known = PpoConfig { total_steps, threads, ..known.clone() };
-        let keys = |config: &PpoConfig| serde_json::to_value(config).unwrap_or_default();
+        let RunConfig { total_steps, threads, .. } = self.config.run;
+        let known = known.clone().with(|c| {
+            c.run.total_steps = total_steps;
+            c.run.threads = threads;
+        });
+        let keys = |config: &TrainConfig| serde_json::to_value(config).unwrap_or_default();
         let (found, expected) = (keys(&self.config), keys(&known));
-        let differs = found.as_object().into_iter().flatten().find(|(key, value)| **value != expected[key.as_str()]);
-        match differs {
+        match difference("config", &found, &expected) {
             None => Ok(()),
-            Some((key, found)) => {
-                let expected = format!("{}, as in checkpoint/checkpoint.json", expected[key.as_str()]);
-                Err(RunError::file(path, format!("config.{key}"), found, expected))
+            Some((place, found, expected)) => {
+                Err(RunError::file(path, place, found, format!("{expected}, as in checkpoint/checkpoint.json")))
             }
         }
     }
+}
+
+/// The first place where two documents differ, and what is there.
+fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<(String, &'v Value, &'v Value)> {
+    match (found, expected) {
+        (Value::Object(keys), Value::Object(_)) => {
+            keys.iter().find_map(|(key, found)| difference(&format!("{place}.{key}"), found, &expected[key.as_str()]))
+        }
+        (Value::Array(list), Value::Array(others)) if list.len() == others.len() => {
+            let pairs = list.iter().zip(others).enumerate();
+            pairs.into_iter().find_map(|(i, (found, expected))| difference(&format!("{place}[{i}]"), found, expected))
+        }
+        _ => (found != expected).then(|| (place.to_string(), found, expected)),
+    }
+}
+
+/// Makes a description of version 1 into one of version 2.
+fn upgrade(_: u64, mut run: Value) -> Result<Value, (String, String)> {
+    let config = TrainConfig::upgrade(run["config"].take());
+    run["config"] = config.map_err(|e| (format!("config.{}", e.path()), e.inner().to_string()))?;
+    run["version"] = VERSION.into();
+    Ok(run)
 }
 
 /// The folder of a run, locked against a second writer while this value lives.

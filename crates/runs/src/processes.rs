@@ -7,7 +7,7 @@
 
 use crate::error::RunError;
 use marathon_envs::registry;
-use marathon_learn::{Algorithm, Control, Deliver, Player, Players, PpoConfig};
+use marathon_learn::{Algorithm, Control, Deliver, Player, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 #[derive(Serialize, Deserialize)]
 struct Part {
     agent: String,
-    config: PpoConfig,
+    config: TrainConfig,
     slice: usize,
     slices: usize,
 }
@@ -47,7 +47,7 @@ impl Processes {
     ///
     /// # Errors
     /// If the algorithm is SAC.
-    pub fn check(config: &PpoConfig, count: usize) -> Result<(), RunError> {
+    pub fn check(config: &TrainConfig, count: usize) -> Result<(), RunError> {
         match config.algorithm {
             Algorithm::Sac(_) if count > 0 => Err(RunError::option(
                 "processes",
@@ -63,9 +63,9 @@ impl Processes {
     ///
     /// # Errors
     /// If one cannot be started.
-    pub fn start(program: &Path, agent: &str, config: &PpoConfig, count: usize) -> Result<Self, RunError> {
+    pub fn start(program: &Path, agent: &str, config: &TrainConfig, count: usize) -> Result<Self, RunError> {
         Self::check(config, count)?;
-        let slices = count.clamp(1, config.blocks());
+        let slices = count.clamp(1, config.run.blocks());
         let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));
         // those that have been started leave with it
         let mut all = Processes { workers: Vec::new(), error: None };

@@ -84,19 +84,19 @@ impl Session {
             (None, None, Some(name)) => default_of(name),
             (None, None, None) => default_for(&agent),
         };
-        let ppo = &mut loaded.ppo;
+        let run = &mut loaded.config.run;
         if let Some(agents) = options.agents {
-            ppo.agents = agents;
+            run.agents = agents;
             if let Some(buffer) = loaded.buffer {
-                ppo.horizon = (buffer as usize).div_ceil(agents.max(1));
+                run.horizon = (buffer as usize).div_ceil(agents.max(1));
             }
         }
-        ppo.total_steps = learn.steps.unwrap_or(ppo.total_steps);
-        ppo.seed = learn.seed.unwrap_or(ppo.seed);
-        ppo.threads = learn.threads.unwrap_or(ppo.threads);
-        ppo.validate()?;
-        Processes::check(ppo, options.processes)?;
-        let factory = task.factory(ppo.agents)?;
+        run.total_steps = learn.steps.unwrap_or(run.total_steps);
+        run.seed = learn.seed.unwrap_or(run.seed);
+        run.threads = learn.threads.unwrap_or(run.threads);
+        loaded.config.validate()?;
+        Processes::check(&loaded.config, options.processes)?;
+        let factory = task.factory(loaded.config.run.agents)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let run = RunFile::new(&agent, &loaded);
@@ -132,14 +132,14 @@ impl Session {
                 let problem = format!("is {}, but {} steps are done", thousands(steps), thousands(done));
                 return Err(RunError::option("steps", problem));
             }
-            run.config.total_steps = steps;
+            run.config.run.total_steps = steps;
         }
         run.config.validate()?;
-        if done >= run.config.total_steps && is_finished(&folder, done)? {
+        if done >= run.config.run.total_steps && is_finished(&folder, done)? {
             return Err(RunError::Complete { folder: path.into(), steps: done });
         }
-        run.config.threads = learn.threads.unwrap_or(run.config.threads);
-        let factory = task.factory(run.config.agents)?;
+        run.config.run.threads = learn.threads.unwrap_or(run.config.run.threads);
+        let factory = task.factory(run.config.run.agents)?;
         folder.write_run(&run)?;
         Ok(Session { folder: Some(folder), run, factory, checkpoint })
     }
@@ -202,8 +202,8 @@ impl Session {
 
         let steps = checkpoint.steps();
         let mut evaluation = None;
-        if steps >= run.config.total_steps {
-            let options = EvalOptions { episodes: EPISODES, threads: run.config.threads, ..Default::default() };
+        if steps >= run.config.run.total_steps {
+            let options = EvalOptions { episodes: EPISODES, threads: run.config.run.threads, ..Default::default() };
             let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
             policy.set_evaluation(eval);
             evaluation = Some(eval);

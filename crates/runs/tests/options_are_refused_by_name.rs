@@ -82,7 +82,7 @@ fn a_run_without_files_or_command_line_begins_from_plain_options() {
     let (session, notes) = open(Some(Task::named("hopper").unwrap()), &options).unwrap();
     let config = &session.run.config;
     assert_eq!((session.run.agent.as_str(), notes.len(), session.folder.is_none()), ("Hopper-v0", 0, true));
-    assert_eq!((config.total_steps, config.seed, config.threads, config.agents), (20_000, 3, 1, 16));
+    assert_eq!((config.run.total_steps, config.run.seed, config.run.threads, config.run.agents), (20_000, 3, 1, 16));
     let text = |result: Result<(Session, Vec<String>), RunError>| result.err().expect("a refusal").to_string();
     assert_eq!(text(open(None, &options)), "task is missing, expected a task or a run to resume");
     let resume = RunOptions { resume: Some("no/such/run".into()), ..Default::default() };

@@ -6,7 +6,7 @@ use crate::console::{note, print_json, say};
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_envs::registry;
-use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, PpoConfig, Snapshot, evaluate, train};
+use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, Snapshot, evaluate, train};
 use marathon_physics::lanes::Isa;
 use marathon_runs::configuration;
 use marathon_runs::text::{broken, short};
@@ -132,7 +132,10 @@ fn one(args: &GaitArgs, threads: usize, id: &str, seed: u64) -> Result<Run, CliE
         Some(path) => configuration::load(path, id)?,
         None => config::default_for(id),
     };
-    let config = PpoConfig { seed, threads, ..loaded.ppo };
+    let config = loaded.config.with(|c| {
+        c.run.seed = seed;
+        c.run.threads = threads;
+    });
     let options = EvalOptions { episodes: EPISODES, ..Default::default() };
     let mut next = args.every;
     let mut failed = None;

@@ -6,7 +6,7 @@ use crate::error::CliError;
 use crate::program;
 use marathon_config as config;
 use marathon_envs::registry;
-use marathon_learn::{Control, IterationStats, Players, PpoConfig, Snapshot, train_with};
+use marathon_learn::{Control, IterationStats, Players, Snapshot, train_with};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::text::short;
@@ -81,17 +81,21 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
 
 fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<Train>, CliError> {
     let factory = registry::factory(id, isa)?;
-    let mut base = config::default_for(id).ppo;
+    let mut base = config::default_for(id).config;
     if let Some(width) = args.hidden.map(|width| width as usize) {
-        (base.actor_hidden, base.critic_hidden) = (vec![width; 2], vec![width; 2]);
+        (base.network.actor_hidden, base.network.critic_hidden) = (vec![width; 2], vec![width; 2]);
     }
-    base.agents = args.agents.unwrap_or(base.agents);
+    base.run.agents = args.agents.unwrap_or(base.run.agents);
     let mut samples = Vec::new();
     let (mut shares, mut weight, mut diverged) = ([0.0; 2], 0.0, 0);
     for seed in 0..REPETITIONS as u64 {
         // it ends by the clock; agents fall at first and run later, so the cost of a step moves with learning
-        let config = PpoConfig { seed, threads, total_steps: u64::MAX >> 16, ..base.clone() };
-        let each = args.seconds * config.worker_count() as f64 / REPETITIONS as f64;
+        let config = base.clone().with(|c| {
+            c.run.seed = seed;
+            c.run.threads = threads;
+            c.run.total_steps = u64::MAX >> 16;
+        });
+        let each = args.seconds * config.run.worker_count() as f64 / REPETITIONS as f64;
         let mut first: Option<IterationStats> = None;
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
             diverged += stats.diverged;
@@ -126,7 +130,7 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
     }
     let [env_share, update_share] = shares.map(|share| share / weight);
     let figures = Train { env_share, update_share, physics_steps_per_wall_second: 0.0, diverged };
-    let mut row = Row::new(id, isa, (threads, base.agents), &samples, figures);
+    let mut row = Row::new(id, isa, (threads, base.run.agents), &samples, figures);
     row.figures.physics_steps_per_wall_second = row.steps_per_wall_second * factory.spec().frame_skip as f64;
     Ok(row)
 }

@@ -21,7 +21,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let (session, notes) = Session::open(task, &args.run, None, false)?;
     notes.iter().for_each(|note| console::note(format!("note: {note}")));
     let spec = session.factory.spec().clone();
-    let (total_steps, agent) = (session.run.config.total_steps, session.run.agent.clone());
+    let (total_steps, agent) = (session.run.config.run.total_steps, session.run.agent.clone());
     interrupt::install("finishing this iteration and writing the results")?;
     announce(&session);
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
@@ -82,12 +82,12 @@ fn announce(session: &Session) {
     console::note(format!(
         "{verb} {}{from} to {}: {} agents, {} thread{}, {}, seed {}; results in {}",
         run.agent,
-        text::thousands(config.total_steps),
-        config.agents,
-        config.worker_count(),
-        if config.worker_count() == 1 { "" } else { "s" },
+        text::thousands(config.run.total_steps),
+        config.run.agents,
+        config.run.worker_count(),
+        if config.run.worker_count() == 1 { "" } else { "s" },
         Isa::best().name(),
-        config.seed,
+        config.run.seed,
         folder
     ));
 }

@@ -25,14 +25,14 @@ const AGENTS: usize = 16;
 pub fn run(options: &Options) -> Result<Record, CliError> {
     let (mut rows, mut versions, mut lines) = (Vec::new(), Vec::new(), Vec::new());
     for (name, file) in FILES {
-        let mut config = config::parse(Path::new(&format!("{name}.yaml")), file, AGENT)?.ppo;
+        let mut config = config::parse(Path::new(&format!("{name}.yaml")), file, AGENT)?.config;
         // the buffer is that of all agents
-        config.horizon = (config.rollout_steps() as usize).div_ceil(AGENTS);
-        (config.agents, config.total_steps, config.threads) = (AGENTS, options.steps, options.threads);
+        config.run.horizon = (config.run.rollout_steps() as usize).div_ceil(AGENTS);
+        (config.run.agents, config.run.total_steps, config.run.threads) = (AGENTS, options.steps, options.threads);
         let keep = options.keep_for(name);
         let (mut theirs, mut ours) = (Vec::new(), Vec::new());
         for seed in 1..=options.seeds {
-            config.seed = seed;
+            config.run.seed = seed;
             let (run, version) = peers::mlagents(AGENT, &config, TIME_HORIZON, keep.as_deref())?;
             versions = vec![version];
             theirs.push(run);

@@ -4,7 +4,7 @@ use super::Options;
 use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_one};
 use crate::error::CliError;
 use marathon_config as config;
-use marathon_learn::PpoConfig;
+use marathon_learn::Algorithm;
 use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
@@ -21,20 +21,21 @@ const MINIBATCH: usize = 1024;
 /// # Errors
 /// If that fails.
 pub fn run(options: &Options) -> Result<Record, CliError> {
-    let base = config::default_for(AGENT).ppo;
+    let base = config::default_for(AGENT).config;
     let (mut rows, mut lines) = (Vec::new(), Vec::new());
     for agents in AGENTS {
         let horizon = (ROLLOUT / agents).max(SHORTEST);
-        let mut config = PpoConfig {
-            agents,
-            horizon,
-            minibatches: agents * horizon / MINIBATCH,
-            total_steps: options.steps,
-            threads: options.threads,
-            ..base.clone()
-        };
+        let mut config = base.clone().with(|c| {
+            c.run.agents = agents;
+            c.run.horizon = horizon;
+            if let Algorithm::Ppo(ppo) = &mut c.algorithm {
+                ppo.minibatches = agents * horizon / MINIBATCH;
+            }
+            c.run.total_steps = options.steps;
+            c.run.threads = options.threads;
+        });
         let runs = each_seed(options.seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             train_one(AGENT, &config)
         })?;
         rows.push(vec![

@@ -6,7 +6,7 @@ use crate::bench::env;
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_envs::registry;
-use marathon_learn::PpoConfig;
+use marathon_learn::Algorithm;
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
@@ -40,7 +40,10 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         }
     }
 
-    let base = PpoConfig { total_steps: options.steps, threads: options.threads, ..config::default_for(AGENT).ppo };
+    let base = config::default_for(AGENT).config.with(|c| {
+        c.run.total_steps = options.steps;
+        c.run.threads = options.threads;
+    });
     let own = registry::factory(AGENT, isa)?.spec().frame_skip;
     let longer = |x: f64| x.powf(1.0 / own as f64);
     let cases = [
@@ -49,20 +52,21 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         (
             "as much simulated time; discounts, rollouts and minibatches for the same time",
             1,
-            PpoConfig {
-                total_steps: base.total_steps * own as u64,
-                horizon: base.horizon * own,
-                minibatches: base.minibatches * own,
-                gamma: longer(base.gamma),
-                gae_lambda: longer(base.gae_lambda),
-                ..base
-            },
+            base.with(|config| {
+                config.run.total_steps *= own as u64;
+                config.run.horizon *= own;
+                config.rewards[0].gamma = longer(config.rewards[0].gamma);
+                if let Algorithm::Ppo(ppo) = &mut config.algorithm {
+                    ppo.minibatches *= own;
+                    ppo.gae_lambda = longer(ppo.gae_lambda);
+                }
+            }),
         ),
     ];
     for (name, frame_skip, mut config) in cases {
         let factory = registry::factory_every(AGENT, frame_skip, isa)?;
         let runs = each_seed(options.seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             train_on(&*factory, &config, None)
         })?;
         let decisions = spread(runs.iter().map(|r| r.steps as f64 / r.cpu)).0;
@@ -79,7 +83,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         ]);
         // in units of the own period's decisions, or periods could not be compared
         let part = frame_skip as f64 / own as f64;
-        let line = mean_curve(&runs, config.total_steps).into_iter().map(|(x, y)| (x * part, y * part)).collect();
+        let line = mean_curve(&runs, config.run.total_steps).into_iter().map(|(x, y)| (x * part, y * part)).collect();
         lines.push((format!("every {frame_skip}: {name}"), line));
     }
     Ok(Record {

@@ -6,7 +6,7 @@ use crate::error::CliError;
 use crate::program;
 use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
-use marathon_learn::{BLOCK, Players, PpoConfig};
+use marathon_learn::{BLOCK, Players};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::chart::Chart;
@@ -40,14 +40,13 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
 
     let factory = registry::factory(AGENT, Isa::best())?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let base = PpoConfig { total_steps: options.steps, ..config::default_for(AGENT).ppo };
+    let base = config::default_for(AGENT).config.with(|c| c.run.total_steps = options.steps);
     // the same rollouts of one agent, and as long a time
-    let solo = PpoConfig {
-        agents: 1,
-        horizon: base.agents * base.horizon,
-        total_steps: options.steps / BLOCK as u64,
-        ..base.clone()
-    };
+    let solo = base.clone().with(|c| {
+        c.run.agents = 1;
+        c.run.horizon *= base.run.agents;
+        c.run.total_steps = options.steps / BLOCK as u64;
+    });
     let ways = [
         ("solo".to_string(), &solo, 1, 0),
         ("one world, one thread".to_string(), &base, 1, 0),
@@ -57,7 +56,10 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     ];
     for (way, base, threads, processes) in ways {
         let runs = each_seed(options.seeds, |seed| {
-            let config = PpoConfig { seed, threads, ..base.clone() };
+            let config = base.clone().with(|c| {
+                c.run.seed = seed;
+                c.run.threads = threads;
+            });
             match processes {
                 0 => train_on(&*factory, &config, None),
                 n => {
@@ -69,7 +71,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         })?;
         let speed = |r: &Run| r.rate;
         let eval = plus_minus(spread(runs.iter().map(|r| r.eval.return_mean)), 1);
-        add(&way, base.agents, "yes", spread(runs.iter().map(speed)), eval);
+        add(&way, base.run.agents, "yes", spread(runs.iter().map(speed)), eval);
     }
     Ok(Record {
         name: "multi-env",

@@ -4,7 +4,7 @@ use super::record::{EPISODES, Run};
 use crate::error::CliError;
 use crate::python::{self, VARIABLE};
 use marathon_envs::registry;
-use marathon_learn::{EvalOptions, Evaluation, PpoConfig, Schedule, evaluate, write_atomic};
+use marathon_learn::{Algorithm, EvalOptions, Evaluation, Schedule, TrainConfig, evaluate, write_atomic};
 use marathon_physics::lanes::Isa;
 use marathon_runs::{policy_file, text};
 use serde::{Deserialize, Serialize};
@@ -140,19 +140,20 @@ pub fn sb3(
 /// If ML-Agents or the player is missing, or training fails.
 pub fn mlagents(
     agent: &str,
-    config: &PpoConfig,
+    config: &TrainConfig,
     time_horizon: u64,
     keep: Option<&Path>,
 ) -> Result<(Run, String), CliError> {
     let factory = registry::factory(agent, Isa::best())?;
     let id = &factory.spec().id;
     let job = json!({
-        "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.agents,
-        "seed": config.seed, "threads": 1,
+        "trainer": "mlagents", "agent": id, "config": file(id, config, time_horizon), "agents": config.run.agents,
+        "seed": config.run.seed, "threads": 1,
     });
-    once(keep, ("mlagents", config.seed), &job, || {
+    once(keep, ("mlagents", config.run.seed), &job, || {
         let mut job = job.clone();
-        let folder = std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.seed));
+        let folder =
+            std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.run.seed));
         std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
         (job["player"], job["folder"]) = (json!(player()?), json!(folder));
         let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
@@ -164,7 +165,7 @@ pub fn mlagents(
         let options = EvalOptions { episodes: EPISODES, threads: 1, ..Default::default() };
         let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
         let _ = std::fs::remove_dir_all(&folder);
-        Ok((finish(&answer, eval, ("ML-Agents' PPO", config.seed)), answer.versions))
+        Ok((finish(&answer, eval, ("ML-Agents' PPO", config.run.seed)), answer.versions))
     })
 }
 
@@ -185,30 +186,31 @@ fn finish(answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
 }
 
 /// The settings as ML-Agents reads them (JSON is YAML).
-fn file(behavior: &str, config: &PpoConfig, time_horizon: u64) -> Value {
-    let schedule = if config.schedule == Schedule::Linear { "linear" } else { "constant" };
-    let rollout = config.rollout_steps();
+fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
+    let Algorithm::Ppo(ppo) = &config.algorithm else { unreachable!("the comparison is of PPO") };
+    let schedule = if ppo.schedule == Schedule::Linear { "linear" } else { "constant" };
+    let rollout = config.run.rollout_steps();
     json!({ "behaviors": { behavior: {
         "trainer_type": "ppo",
         "hyperparameters": {
-            "batch_size": rollout / config.minibatches as u64,
+            "batch_size": rollout / ppo.minibatches as u64,
             "buffer_size": rollout,
-            "learning_rate": config.lr,
+            "learning_rate": ppo.lr,
             "learning_rate_schedule": schedule,
-            "beta": config.entropy_coef,
-            "epsilon": config.clip,
-            "lambd": config.gae_lambda,
-            "num_epoch": config.epochs,
+            "beta": ppo.entropy_coef.first,
+            "epsilon": ppo.clip.first,
+            "lambd": ppo.gae_lambda,
+            "num_epoch": ppo.epochs,
         },
         "network_settings": {
-            "normalize": config.normalize_observations,
-            "hidden_units": config.actor_hidden.first(),
-            "num_layers": config.actor_hidden.len(),
+            "normalize": config.statistics.normalize_observations,
+            "hidden_units": config.network.actor_hidden.first(),
+            "num_layers": config.network.actor_hidden.len(),
         },
-        "reward_signals": { "extrinsic": { "gamma": config.gamma, "strength": 1.0 } },
-        "max_steps": config.total_steps,
+        "reward_signals": { "extrinsic": { "gamma": config.task_reward().gamma, "strength": 1.0 } },
+        "max_steps": config.run.total_steps,
         "time_horizon": time_horizon,
-        "summary_freq": (config.total_steps / 60).max(1000),
+        "summary_freq": (config.run.total_steps / 60).max(1000),
     }}})
 }
 
@@ -263,11 +265,11 @@ mod tests {
     #[test]
     fn a_configuration_survives_the_way_to_mlagents_and_back() {
         let text = include_bytes!("../../../../assets/configs/hopper-mlagents.yaml");
-        let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().ppo;
+        let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().config;
         let written = file("Hopper-v0", &ppo, 128).to_string();
-        let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().ppo;
-        ppo.agents = read.agents;
-        ppo.horizon = read.horizon;
+        let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().config;
+        ppo.run.agents = read.run.agents;
+        ppo.run.horizon = read.run.horizon;
         assert_eq!(read, ppo);
     }
     #[test]

@@ -6,7 +6,8 @@ use crate::error::CliError;
 use marathon_envs::ShardFactory;
 use marathon_envs::registry;
 use marathon_learn::{
-    Control, EvalOptions, Evaluation, IterationStats, Players, PpoConfig, Snapshot, evaluate, train_with, write_atomic,
+    Control, EvalOptions, Evaluation, IterationStats, Players, Snapshot, TrainConfig, evaluate, train_with,
+    write_atomic,
 };
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
@@ -76,7 +77,7 @@ impl Run {
 ///
 /// # Errors
 /// If it cannot be trained.
-pub fn train_one(agent: &str, config: &PpoConfig) -> Result<Run, CliError> {
+pub fn train_one(agent: &str, config: &TrainConfig) -> Result<Run, CliError> {
     train_on(&*registry::factory(agent, Isa::best())?, config, None)
 }
 
@@ -86,7 +87,7 @@ pub fn train_one(agent: &str, config: &PpoConfig) -> Result<Run, CliError> {
 /// If that fails.
 pub fn train_on(
     factory: &dyn ShardFactory,
-    config: &PpoConfig,
+    config: &TrainConfig,
     players: Option<&mut dyn Players>,
 ) -> Result<Run, CliError> {
     let isa = Isa::best();
@@ -97,11 +98,11 @@ pub fn train_on(
         Control::Continue
     };
     let output = train_with(players, factory, isa, config, None, &mut observer)?;
-    let options = EvalOptions { episodes: EPISODES, threads: config.threads, ..Default::default() };
+    let options = EvalOptions { episodes: EPISODES, threads: config.run.threads, ..Default::default() };
     let eval = evaluate(factory, isa, &output.policy, &options)?;
     let (steps, wall, cpu) = clocks;
     let run = Run { curve, steps, wall, cpu, rate: steps as f64 / wall, eval };
-    run.note(&format!("{} {} seed {}", factory.spec().id, config.algorithm.name(), config.seed));
+    run.note(&format!("{} {} seed {}", factory.spec().id, config.algorithm.name(), config.run.seed));
     Ok(run)
 }
 

@@ -27,23 +27,23 @@ const HUMANOID: u64 = 20;
 pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
     let (mut rows, mut bars, mut versions) = (Vec::new(), Vec::new(), Vec::new());
     for (agent, paper) in AGENTS {
-        let mut config = config::parse(Path::new("paper-appendix-b.yaml"), PAPER, agent)?.ppo;
-        let least = 2 * config.rollout_steps();
+        let mut config = config::parse(Path::new("paper-appendix-b.yaml"), PAPER, agent)?.config;
+        let least = 2 * config.run.rollout_steps();
         let steps = if agent.starts_with("Humanoid") { options.steps / HUMANOID } else { options.steps };
-        config.total_steps = steps.max(least);
-        config.threads = options.threads;
+        config.run.total_steps = steps.max(least);
+        config.run.threads = options.threads;
         let runs = each_seed(options.seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             train_one(agent, &config)
         })?;
         let cpu = spread(runs.iter().map(|r| r.steps as f64 / r.cpu));
         let wall = spread(runs.iter().map(|r| r.steps as f64 / r.wall));
-        let steps = config.total_steps;
+        let steps = config.run.total_steps;
         // the same settings, trained by ML-Agents, right after
-        config.total_steps = (PEER_UPDATES * config.rollout_steps()).max(PEER_STEPS);
+        config.run.total_steps = (PEER_UPDATES * config.run.rollout_steps()).max(PEER_STEPS);
         let mut of_peers = Vec::new();
         for seed in 1..=peers.peer_seeds {
-            config.seed = seed;
+            config.run.seed = seed;
             let (run, version) = peers::mlagents(agent, &config, TIME_HORIZON, options.keep.as_deref())?;
             of_peers.push(run.rate);
             versions = vec![version];
@@ -51,7 +51,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         let of_peers = spread(of_peers.iter().copied());
         let mut row = vec![
             agent.to_string(),
-            format!("{:?}", config.actor_hidden),
+            format!("{:?}", config.network.actor_hidden),
             thousands(steps),
             plus_minus(cpu, 0),
             plus_minus(wall, 0),

@@ -5,7 +5,7 @@ use super::peers::{self, Sb3};
 use super::record::{Record, Run, each_seed, plus_minus, spread, train_one};
 use super::table3::ppo2;
 use crate::error::CliError;
-use marathon_learn::PpoConfig;
+use marathon_learn::TrainConfig;
 use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
@@ -22,10 +22,10 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     let wall = |runs: &[Run]| spread(runs.iter().map(|r| r.wall));
     let cpu = |runs: &[Run]| plus_minus(spread(runs.iter().map(|r| r.cpu)), 1);
     for (algorithm, on_cpu, on_gpu) in ALGORITHMS {
-        let mut config = if algorithm == Sb3::Ppo { ppo2() } else { PpoConfig::a2c() };
-        (config.total_steps, config.threads) = (options.steps, options.threads);
+        let mut config = if algorithm == Sb3::Ppo { ppo2() } else { TrainConfig::a2c() };
+        (config.run.total_steps, config.run.threads) = (options.steps, options.threads);
         let ours = each_seed(options.seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             train_one(AGENT, &config)
         })?;
         let mut theirs = |device| {

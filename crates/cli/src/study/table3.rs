@@ -5,7 +5,7 @@ use super::record::{Record, Run, each_seed, mean_curve, plus_minus, spread, trai
 use super::{Options, Peers};
 use crate::error::CliError;
 use marathon_config as config;
-use marathon_learn::{PpoConfig, Schedule};
+use marathon_learn::{A2c, Algorithm, Deviations, Moving, Ppo, Schedule, TrainConfig};
 use marathon_runs::report::chart::Chart;
 use std::path::Path;
 
@@ -17,18 +17,16 @@ const PAPER: &[u8] = include_bytes!("../../../../assets/configs/paper-appendix-c
 const TIME_HORIZON: u64 = 128;
 
 /// What is compared: a name, what the paper reports (seconds, score), and the settings.
-type Case = (&'static str, &'static str, PpoConfig);
+type Case = (&'static str, &'static str, TrainConfig);
 
 /// The settings of the paper's ML-Agents side.
-fn supplement_c() -> Result<PpoConfig, CliError> {
-    Ok(config::parse(Path::new("paper-appendix-c.yaml"), PAPER, AGENT)?.ppo)
+fn supplement_c() -> Result<TrainConfig, CliError> {
+    Ok(config::parse(Path::new("paper-appendix-c.yaml"), PAPER, AGENT)?.config)
 }
 
 /// OpenAI Baselines' PPO2 with the hyper-parameters of the authors' repository.
-pub fn ppo2() -> PpoConfig {
-    PpoConfig {
-        agents: 16,
-        horizon: 128,
+pub fn ppo2() -> TrainConfig {
+    let ppo = Ppo {
         minibatches: 32,
         epochs: 10,
         lr: 3e-4,
@@ -36,28 +34,42 @@ pub fn ppo2() -> PpoConfig {
         schedule: Schedule::Linear,
         max_grad_norm: 0.5,
         value_clip: Some(0.2),
-        entropy_coef: 0.0,
-        init_log_std: 0.0,
-        min_std: 1e-3,
-        max_std: 1e3,
-        ..PpoConfig::default()
-    }
+        entropy_coef: Moving::still(0.0),
+        deviations: Deviations::FREE,
+        ..Default::default()
+    };
+    TrainConfig::default().with(|config| {
+        (config.run.agents, config.run.horizon) = (16, 128);
+        config.algorithm = Algorithm::Ppo(ppo);
+    })
 }
 
 fn cases() -> Result<Vec<Case>, CliError> {
     // the same start for all, where a third of the actions is not clipped
-    let quieter = |config: PpoConfig| PpoConfig { init_log_std: -0.7, ..config };
+    let faster = Algorithm::A2c(A2c { lr: 2e-3, ..Default::default() });
+    let faster = TrainConfig::a2c().with(|config| config.algorithm = faster);
+    let quieter = |config: TrainConfig| {
+        config.with(|config| {
+            if let Some(deviations) = config.algorithm.deviations_mut() {
+                deviations.init_log_std = -0.7;
+            }
+        })
+    };
     Ok(vec![
         ("PPO, settings of ML-Agents (supplement C)", "418 s, 455", supplement_c()?),
         ("PPO, settings of Baselines' PPO2", "475 s, 700", ppo2()),
-        ("A2C, settings of Baselines", "291 s, none", PpoConfig::a2c()),
-        ("ACKTR, settings of Baselines", "281 s, none", PpoConfig::acktr()),
+        ("A2C, settings of Baselines", "291 s, none", TrainConfig::a2c()),
+        ("ACKTR, settings of Baselines", "281 s, none", TrainConfig::acktr()),
         ("PPO2, deviation 0.5", "", quieter(ppo2())),
-        ("PPO2, deviation 0.5, following the statistics", "", PpoConfig { follow_statistics: true, ..quieter(ppo2()) }),
-        ("A2C, deviation 0.5", "", quieter(PpoConfig::a2c())),
-        ("ACKTR, deviation 0.5", "", quieter(PpoConfig::acktr())),
-        ("A2C, deviation 0.5, rate 2e-3", "", PpoConfig { lr: 2e-3, value_lr: 2e-3, ..quieter(PpoConfig::a2c()) }),
-        ("PPO, Marathon's own settings", "", config::default_for(AGENT).ppo),
+        (
+            "PPO2, deviation 0.5, following the statistics",
+            "",
+            quieter(ppo2()).with(|c| c.statistics.follow_statistics = true),
+        ),
+        ("A2C, deviation 0.5", "", quieter(TrainConfig::a2c())),
+        ("ACKTR, deviation 0.5", "", quieter(TrainConfig::acktr())),
+        ("A2C, deviation 0.5, rate 2e-3", "", quieter(faster)),
+        ("PPO, Marathon's own settings", "", config::default_for(AGENT).config),
     ])
 }
 
@@ -82,9 +94,9 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         lines.push((name.to_string(), mean_curve(runs, options.steps)));
     };
     for (name, paper, mut config) in cases()? {
-        (config.total_steps, config.threads) = (options.steps, options.threads);
+        (config.run.total_steps, config.run.threads) = (options.steps, options.threads);
         let runs = each_seed(options.seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             train_one(AGENT, &config)
         })?;
         add(name, paper, &runs);
@@ -97,10 +109,10 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
             run
         };
         let mut config = supplement_c()?;
-        config.total_steps = options.steps;
+        config.run.total_steps = options.steps;
         let keep = options.keep_for("paper-appendix-c");
         let runs = each_seed(peers.peer_seeds, |seed| {
-            config.seed = seed;
+            config.run.seed = seed;
             Ok(note(peers::mlagents(AGENT, &config, TIME_HORIZON, keep.as_deref())?))
         })?;
         add("ML-Agents' own PPO (supplement C)", "418 s, 455", &runs);

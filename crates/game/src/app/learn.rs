@@ -7,7 +7,7 @@ use crate::app::show::{Script, Show, Source, file_stem, free_name};
 use crate::asset::PolicyAsset;
 use crate::ground::Ground;
 use bevy::prelude::*;
-use marathon_learn::{Control, IterationStats, Policy, PpoConfig, Snapshot, train};
+use marathon_learn::{Control, IterationStats, Policy, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Task};
 use std::path::PathBuf;
@@ -76,7 +76,7 @@ pub struct Lesson {
 ///
 /// # Errors
 /// If the options make no sense, or the file is no configuration for the agent.
-pub fn settings(agent: &str, teaching: &Teaching) -> Result<PpoConfig, RunError> {
+pub fn settings(agent: &str, teaching: &Teaching) -> Result<TrainConfig, RunError> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = teaching.learn.threads.unwrap_or(cores.saturating_sub(1).max(1));
     let learn = LearnOptions { seed: Some(teaching.seed), threads: Some(threads), ..teaching.learn.clone() };

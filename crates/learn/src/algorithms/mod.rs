@@ -26,6 +26,7 @@ use crate::rollout::collect::Collecting;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::{Statistics, StatisticsConfig};
 use crate::rollout::sums::Totals;
+use actor_critic::Deviations;
 use loss::LossSums;
 use marathon_envs::Spec;
 use marathon_physics::lanes::Isa;
@@ -158,6 +159,36 @@ impl Algorithm {
         }
     }
 
+    /// Its learning rates, for messages.
+    pub fn rates(&self) -> String {
+        match self {
+            Algorithm::Ppo(ppo::Ppo { lr, value_lr, .. }) | Algorithm::Sac(sac::Sac { lr, value_lr, .. }) => {
+                format!("lr is {lr:e}, value_lr {value_lr:e}")
+            }
+            Algorithm::A2c(a2c::A2c { lr, .. }) | Algorithm::Acktr(acktr::Acktr { lr, .. }) => format!("lr is {lr:e}"),
+        }
+    }
+
+    /// How the learning rate moves.
+    pub fn schedule(&self) -> schedule::Schedule {
+        match self {
+            Algorithm::Ppo(settings) => settings.schedule,
+            Algorithm::A2c(settings) => settings.schedule,
+            Algorithm::Acktr(settings) => settings.schedule,
+            Algorithm::Sac(settings) => settings.schedule,
+        }
+    }
+
+    /// Standard deviations of the actions, where they do not depend on the state.
+    pub fn deviations_mut(&mut self) -> Option<&mut Deviations> {
+        match self {
+            Algorithm::Ppo(settings) => Some(&mut settings.deviations),
+            Algorithm::A2c(settings) => Some(&mut settings.deviations),
+            Algorithm::Acktr(settings) => Some(&mut settings.deviations),
+            Algorithm::Sac(_) => None,
+        }
+    }
+
     /// Whether rollouts may be played elsewhere: not if they are kept, with the agents.
     pub fn travels(&self) -> bool {
         !matches!(self, Algorithm::Sac(_))
@@ -239,6 +270,9 @@ impl Partial {
     }
 }
 
+/// Sees a piece of the gradient: its network, its place among the parameters, and the numbers.
+pub type ShowPiece<'s> = &'s mut dyn FnMut(usize, Range<usize>, &[f32]);
+
 /// All workers of a run, from the view of one of them. What one calls, all call, in the same order.
 pub trait Workers {
     /// Shares a list of so many items out in groups: `work` fills a group's part, for the items of a range. Then the
@@ -247,7 +281,7 @@ pub trait Workers {
     /// Sums of the squares of that gradient, for each network of [`Places`].
     fn squares(&self) -> Vec<f64>;
     /// Shows every piece of that gradient with its network and its place among the parameters; no piece is in two networks.
-    fn pieces(&self, show: &mut dyn FnMut(usize, Range<usize>, &[f32]));
+    fn pieces(&self, show: ShowPiece<'_>);
     /// Shares `parts` parts of another piece of work out, with what the groups of the last gradient contributed, in order;
     /// returns when all are done.
     fn divide(&mut self, parts: usize, work: &mut dyn FnMut(usize, &[&Partial]));

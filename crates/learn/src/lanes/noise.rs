@@ -28,10 +28,10 @@ impl SplitMix {
     pub fn new(seed: u64, stream: u64) -> Self {
         // not the first word of anyone else's generator with the same seed
         let mut mix = SplitMix(seed ^ 0x6c65_6172_6e65_7221);
-        SplitMix(mix.next() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
+        SplitMix(mix.word() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
     }
     /// The next word.
-    pub fn next(&mut self) -> u64 {
+    pub fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = self.0;
         let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -40,7 +40,7 @@ impl SplitMix {
     }
     /// A number below `n`, by multiplication and shift (bias below n / 2^64).
     pub fn below(&mut self, n: usize) -> usize {
-        ((self.next() as u128 * n as u128) >> 64) as usize
+        ((self.word() as u128 * n as u128) >> 64) as usize
     }
     /// Shuffles a list (Fisher and Yates).
     pub fn shuffle<T>(&mut self, list: &mut [T]) {
@@ -66,7 +66,7 @@ impl Noise {
         for lane in 0..BLOCK {
             let mut mix = SplitMix::new(seed, ACTIONS | (block * BLOCK + lane) as u64);
             for word in &mut state {
-                word[lane] = mix.next() as u32;
+                word[lane] = mix.word() as u32;
             }
             // the state must not be zero
             state[0][lane] |= 1;
@@ -82,7 +82,7 @@ impl Noise {
 
     /// Streams for a block of an update's batch.
     pub fn of(seed: u64, update: u64, block: u64) -> Self {
-        Self::new(SplitMix::new(seed, update | SAMPLES).next(), block as usize)
+        Self::new(SplitMix::new(seed, update | SAMPLES).word(), block as usize)
     }
 
     /// The state as numbers.

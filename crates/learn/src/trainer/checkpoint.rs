@@ -4,13 +4,13 @@
 //! written first and the description last, each under a temporary name, so an interruption at any moment leaves the old
 //! or the new checkpoint, never half of one. Both have checksums.
 
-use super::config::MAX_STEPS;
-use super::flat::{PpoConfig, Signal};
+use super::config::{MAX_STEPS, TrainConfig};
 use super::{Clocks, Trainer, states};
 use crate::algorithms::{Numbers, Saved};
 use crate::error::Error;
 use crate::files::{self, Dtype, TensorReader, TensorWriter, read_versions, write_atomic, write_description};
 use crate::nets::normalize::Moments;
+use crate::rewards::RewardConfig;
 use crate::rollout::states::AgentStates;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ struct About {
     agent: String,
     obs: usize,
     act: usize,
-    config: PpoConfig,
+    config: TrainConfig,
     iteration: u64,
     steps: u64,
     /// Single numbers of the learner.
@@ -60,7 +60,7 @@ struct About {
 impl About {
     /// Refuses values that no run has: files of earlier versions have no checksum.
     fn check(&self, path: &Path) -> Result<(), Error> {
-        self.config.validate().map_err(|e| e.in_file(path, "config"))?;
+        self.config.validate_in(path, "config")?;
         let others = [
             ("observation_count", self.observation_count),
             ("return_count", self.return_count),
@@ -77,7 +77,7 @@ impl About {
             return Err(Error::file(path, key, x, "a number between 0 and 1"));
         }
         // rollouts may have had another horizon before
-        let agents = self.config.agents as u64;
+        let agents = self.config.run.agents as u64;
         let least = self.iteration.checked_mul(agents).filter(|least| *least <= self.steps);
         let none = (self.iteration == 0) != (self.steps == 0);
         if least.is_none() || none || self.steps > MAX_STEPS || !self.steps.is_multiple_of(agents) {
@@ -102,28 +102,33 @@ struct StateFile {
     checksum: String,
 }
 
-/// The signals of a configuration, as far as a run cannot change them on its way.
-fn signals(config: &PpoConfig) -> String {
-    let of = |s: &Signal| format!("{} {:?}", s.kind.name(), s.hidden);
-    config.signals.iter().map(of).collect::<Vec<_>>().join(", ")
+/// The rewards of a configuration, as far as a run cannot change them on its way.
+fn rewards(config: &TrainConfig) -> String {
+    let of = |reward: &RewardConfig| match reward.kind.networks() {
+        Some(networks) => format!("{} {:?}", reward.kind.name(), networks.hidden),
+        None => reward.kind.name().into(),
+    };
+    config.rewards.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// Makes a description of version 1 into one of version 2.
-fn upgrade(_: u64, mut about: Value) -> Value {
+fn upgrade(_: u64, mut about: Value) -> Result<Value, (String, String)> {
+    let Some(keys) = about.as_object_mut() else { return Ok(about) };
+    let config = keys.remove("config").unwrap_or_default();
+    let config = TrainConfig::upgrade(config).map_err(|e| (format!("config.{}", e.path()), e.inner().to_string()))?;
     let mut learner = serde_json::Map::new();
-    let Some(keys) = about.as_object_mut() else { return about };
     let powers = keys.remove("adam_powers").unwrap_or_default();
-    let algorithm = keys["config"]["algorithm"].clone();
-    if algorithm == "ppo" || !algorithm["sac"].is_null() {
+    if !config["algorithm"]["ppo"].is_null() || !config["algorithm"]["sac"].is_null() {
         learner.insert("adam_power_1".into(), powers[0].clone());
         learner.insert("adam_power_2".into(), powers[1].clone());
     }
     for (old, new) in [("lr", "lr"), ("skipped_minibatches", "skipped")] {
         learner.insert(new.into(), keys.remove(old).unwrap_or_default());
     }
+    keys.insert("config".into(), config);
     keys.insert("learner".into(), learner.into());
     keys.insert("version".into(), json!(VERSION));
-    about
+    Ok(about)
 }
 
 /// The name today of a learner's list in a file of version 1, which had Adam's for every algorithm.
@@ -138,7 +143,7 @@ fn renamed<'n>(name: &'n str, algorithm: &str) -> Option<&'n str> {
 
 impl Checkpoint {
     pub(super) fn of(trainer: &Trainer) -> Self {
-        let Trainer { flat, shared, replica, clocks, .. } = trainer;
+        let Trainer { shared, replica, clocks, .. } = trainer;
         let (progress, statistics) = (&replica.progress, &replica.statistics);
         let Saved { scalars, lists } = replica.learner.save();
         let about = About {
@@ -147,7 +152,7 @@ impl Checkpoint {
             agent: shared.spec.id.clone(),
             obs: shared.spec.obs,
             act: shared.spec.act,
-            config: flat.clone(),
+            config: shared.config.clone(),
             iteration: progress.iteration,
             steps: progress.steps,
             learner: scalars.into_iter().collect(),
@@ -165,7 +170,7 @@ impl Checkpoint {
             lists,
             obs_mean: statistics.observations.mean.clone(),
             obs_var: statistics.observations.var.clone(),
-            agents: AgentStates::of(collectors, 0..flat.blocks()),
+            agents: AgentStates::of(collectors, 0..shared.config.run.blocks()),
         }
     }
 
@@ -174,7 +179,7 @@ impl Checkpoint {
         &self.about.agent
     }
     /// Configuration of the run.
-    pub fn config(&self) -> &PpoConfig {
+    pub fn config(&self) -> &TrainConfig {
         &self.about.config
     }
     /// Rollouts done.
@@ -192,18 +197,19 @@ impl Checkpoint {
 
     /// Puts a fresh run into the state of the checkpoint.
     pub(super) fn restore(self, trainer: &mut Trainer) -> Result<(), Error> {
-        let (about, old, new, spec) = (&self.about, &self.about.config, &trainer.flat, &trainer.shared.spec);
+        let (about, old, new, spec) = (&self.about, &self.about.config, &trainer.shared.config, &trainer.shared.spec);
+        let (before, after) = (&old.network, &new.network);
         let pairs = [
             ("agent", about.agent.clone(), spec.id.clone()),
             ("observation length", about.obs.to_string(), spec.obs.to_string()),
             ("action length", about.act.to_string(), spec.act.to_string()),
             ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
-            ("agents", old.agents.to_string(), new.agents.to_string()),
-            ("seed", old.seed.to_string(), new.seed.to_string()),
-            ("actor_hidden", format!("{:?}", old.actor_hidden), format!("{:?}", new.actor_hidden)),
-            ("critic_hidden", format!("{:?}", old.critic_hidden), format!("{:?}", new.critic_hidden)),
-            ("signals", signals(old), signals(new)),
-            ("activation", old.activation.name().into(), new.activation.name().into()),
+            ("agents", old.run.agents.to_string(), new.run.agents.to_string()),
+            ("seed", old.run.seed.to_string(), new.run.seed.to_string()),
+            ("actor_hidden", format!("{:?}", before.actor_hidden), format!("{:?}", after.actor_hidden)),
+            ("critic_hidden", format!("{:?}", before.critic_hidden), format!("{:?}", after.critic_hidden)),
+            ("rewards", rewards(old), rewards(new)),
+            ("activation", before.activation.name().into(), after.activation.name().into()),
         ];
         let mismatch = |what: &str, found: String, expected: String| {
             Err(Error::Mismatch { what: format!("checkpoint: {what}"), found, expected })
@@ -218,7 +224,7 @@ impl Checkpoint {
                 return mismatch(what, format!("{found} numbers"), format!("{}", spec.obs));
             }
         }
-        let blocks = new.blocks();
+        let blocks = new.run.blocks();
         self.agents.check("checkpoint", blocks, spec.obs)?;
         let replica = &mut trainer.replica;
         let about = self.about;

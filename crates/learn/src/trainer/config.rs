@@ -1,14 +1,21 @@
 //! The trainer's configuration.
 
+use super::flat::{self, FlatConfig};
+use crate::algorithms::a2c::A2c;
+use crate::algorithms::acktr::Acktr;
+use crate::algorithms::sac::Sac;
 use crate::algorithms::{Algorithm, Common, Setup};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::nets::NetworkConfig;
+use crate::nets::activation::Activation;
 use crate::rewards::{RewardConfig, RewardKind};
 use crate::rollout::statistics::StatisticsConfig;
 use marathon_envs::Spec;
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::Path;
 
 /// Most steps of a run: as many as double precision can count.
 pub(crate) const MAX_STEPS: u64 = 1 << 53;
@@ -63,6 +70,83 @@ pub struct RunConfig {
 impl Default for RunConfig {
     fn default() -> Self {
         Self { agents: 256, horizon: 64, rollouts: 1, total_steps: 10_000_000, seed: 1, threads: 0 }
+    }
+}
+
+impl TrainConfig {
+    /// A2C with the settings of the paper's comparison: OpenAI Baselines' with the rate that its authors chose, sixteen
+    /// agents, two networks of 64 and 64 units.
+    pub fn a2c() -> Self {
+        let run = RunConfig { agents: 16, horizon: 5, rollouts: 50, total_steps: 1_000_000, ..Default::default() };
+        Self { run, algorithm: Algorithm::A2c(A2c::default()), ..Default::default() }
+    }
+
+    /// ACKTR with the settings of OpenAI Baselines, sixteen agents, two networks of 64 and 64 units.
+    pub fn acktr() -> Self {
+        let run = RunConfig { agents: 16, horizon: 20, rollouts: 10, total_steps: 1_000_000, ..Default::default() };
+        Self { run, algorithm: Algorithm::Acktr(Acktr::default()), ..Default::default() }
+    }
+
+    /// SAC for many agents: sixty-four, and an update with 256 samples for every eighth of their steps.
+    pub fn sac() -> Self {
+        Self {
+            run: RunConfig { agents: 64, horizon: 4, rollouts: 16, total_steps: 1_000_000, ..Default::default() },
+            network: NetworkConfig { activation: Activation::Relu, ..Default::default() },
+            statistics: StatisticsConfig { scale_rewards: false, ..Default::default() },
+            algorithm: Algorithm::Sac(Sac::default()),
+            ..Default::default()
+        }
+    }
+
+    /// The settings that an algorithm starts from, by its name.
+    pub fn of(algorithm: &str) -> Option<Self> {
+        match algorithm {
+            "ppo" => Some(Self::default()),
+            "a2c" => Some(Self::a2c()),
+            "acktr" => Some(Self::acktr()),
+            "sac" => Some(Self::sac()),
+            _ => None,
+        }
+    }
+
+    /// The same with a change.
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
+    /// The configuration in a file of version 1, as the document that files have today. Settings that mean nothing to the
+    /// algorithm, which that version accepted, are left out.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn upgrade(version_1: Value) -> Result<Value, serde_path_to_error::Error<serde_json::Error>> {
+        let flat: FlatConfig = serde_path_to_error::deserialize(version_1)?;
+        Ok(serde_json::to_value(TrainConfig::from(&flat)).expect("a configuration is plain data"))
+    }
+
+    /// A configuration from settings by name without their sections, such as `total_steps`, `gamma` or `actor_hidden`;
+    /// `final_min_std` and its like are the ends of settings that move. The rest has PPO's defaults.
+    ///
+    /// # Errors
+    /// If there is no such setting, its value is of the wrong kind, or it means nothing to the algorithm.
+    pub fn from_settings(settings: Value) -> Result<Self, Error> {
+        let names: Vec<String> = settings.as_object().map(|keys| keys.keys().cloned().collect()).unwrap_or_default();
+        let flat: FlatConfig = serde_path_to_error::deserialize(settings)
+            .map_err(|e| Error::Settings { place: e.path().to_string(), why: e.into_inner().to_string() })?;
+        let config = TrainConfig::from(&flat);
+        match names.iter().find(|name| flat::is_foreign(name, &config.algorithm)) {
+            Some(name) => Err(Error::Settings {
+                place: name.clone(),
+                why: format!("{} has no such setting", config.algorithm.name()),
+            }),
+            None => Ok(config),
+        }
+    }
+
+    /// Properties of the task's own reward.
+    pub fn task_reward(&self) -> &RewardConfig {
+        &self.rewards[0]
     }
 }
 
@@ -154,5 +238,21 @@ impl TrainConfig {
             return Err(Error::config("rewards", found, "the task's own in the first place"));
         }
         self.algorithm.validate(&self.common())
+    }
+
+    /// The same for a configuration in a file, under `key`.
+    ///
+    /// # Errors
+    /// Names the file, the setting's place in it, its value and the values that are valid.
+    pub fn validate_in(&self, path: &Path, key: &str) -> Result<(), Error> {
+        self.validate().map_err(|error| {
+            let Error::Config { field, .. } = &error else { return error };
+            let document = serde_json::to_value(self).unwrap_or_default();
+            let algorithm = format!("algorithm/{}", self.algorithm.name());
+            let sections = ["run", "network", "statistics", &algorithm];
+            let has = |section: &&&str| document.pointer(&format!("/{section}/{field}")).is_some();
+            let section = sections.iter().find(has).map_or(String::new(), |s| format!(".{}", s.replace('/', ".")));
+            error.in_file(path, &format!("{key}{section}"))
+        })
     }
 }

@@ -16,7 +16,7 @@ pub mod checkpoint;
 mod clock;
 pub mod config;
 pub mod evaluate;
-pub mod flat;
+mod flat;
 mod memory;
 pub mod observer;
 pub mod remote;
@@ -34,8 +34,7 @@ use crate::rollout::data::{Experience, Rollout};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 use checkpoint::Checkpoint;
-use config::TrainConfig;
-use flat::PpoConfig;
+use config::{RunConfig, TrainConfig};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 use observer::{Control, Observer, Snapshot};
@@ -71,7 +70,7 @@ pub struct TrainOutput {
 pub fn train(
     factory: &dyn ShardFactory,
     isa: Isa,
-    config: &PpoConfig,
+    config: &TrainConfig,
     resume: Option<Checkpoint>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutput, Error> {
@@ -89,7 +88,7 @@ pub fn train_with(
     mut players: Option<&mut dyn Players>,
     factory: &dyn ShardFactory,
     isa: Isa,
-    config: &PpoConfig,
+    config: &TrainConfig,
     resume: Option<Checkpoint>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutput, Error> {
@@ -121,7 +120,6 @@ pub fn train_with(
 
 /// A run that is made an iteration at a time.
 pub struct Trainer {
-    flat: PpoConfig,
     shared: Arc<Shared>,
     /// The first worker's.
     replica: Replica,
@@ -196,7 +194,7 @@ impl Trainer {
     ///
     /// # Errors
     /// If the configuration is invalid, or the run needs more memory than there is.
-    pub fn new(factory: &dyn ShardFactory, isa: Isa, config: &PpoConfig) -> Result<Self, Error> {
+    pub fn new(factory: &dyn ShardFactory, isa: Isa, config: &TrainConfig) -> Result<Self, Error> {
         Self::make(factory, isa, config, None)
     }
 
@@ -207,21 +205,25 @@ impl Trainer {
     pub fn resume(
         factory: &dyn ShardFactory,
         isa: Isa,
-        config: &PpoConfig,
+        config: &TrainConfig,
         checkpoint: Checkpoint,
     ) -> Result<Self, Error> {
         Self::make(factory, isa, config, Some(checkpoint))
     }
 
-    fn make(factory: &dyn ShardFactory, isa: Isa, flat: &PpoConfig, resume: Option<Checkpoint>) -> Result<Self, Error> {
-        flat.validate()?;
-        let config = TrainConfig::from(flat);
+    fn make(
+        factory: &dyn ShardFactory,
+        isa: Isa,
+        config: &TrainConfig,
+        resume: Option<Checkpoint>,
+    ) -> Result<Self, Error> {
+        config.validate()?;
         if isa == Isa::F64 || !isa.supported() {
             return Err(Error::Isa(isa.name(), Isa::best().name()));
         }
         let spec = factory.spec().clone();
         let setup = config.setup(&spec, isa);
-        memory::check(&setup, &config)?;
+        memory::check(&setup, config)?;
         let (workers, blocks) = (config.run.worker_count(), config.run.blocks());
         let shares: Vec<_> = (0..workers).map(|id| share(blocks, workers, id)).collect();
         let of_workers: Vec<usize> = shares.iter().map(|share| share.len()).collect();
@@ -246,15 +248,9 @@ impl Trainer {
             quit: AtomicBool::new(false),
             crew,
             spec,
-            config,
+            config: config.clone(),
         };
-        let mut trainer = Self {
-            flat: flat.clone(),
-            shared: Arc::new(shared),
-            replica,
-            threads: Vec::new(),
-            clocks: Clocks::default(),
-        };
+        let mut trainer = Self { shared: Arc::new(shared), replica, threads: Vec::new(), clocks: Clocks::default() };
         if let Some(checkpoint) = resume {
             checkpoint.restore(&mut trainer)?;
         }
@@ -279,6 +275,10 @@ impl Trainer {
     pub fn is_done(&self) -> bool {
         self.replica.progress.steps >= self.shared.config.run.total_steps
     }
+    /// The configuration.
+    pub fn config(&self) -> &TrainConfig {
+        &self.shared.config
+    }
     /// The task.
     pub fn spec(&self) -> &Spec {
         &self.shared.spec
@@ -302,7 +302,7 @@ impl Trainer {
     /// # Errors
     /// The same, and if what the players deliver does not fit.
     pub fn iterate_with(&mut self, players: &mut dyn Players) -> Result<Option<IterationStats>, Error> {
-        check_algorithm(&self.flat)?;
+        check_algorithm(&self.shared.config)?;
         let mut remote = Remote::new(players, &self.shared.config.run);
         let made = self.work(Some(&mut remote));
         if let Some(error) = remote.error {
@@ -329,7 +329,8 @@ impl Trainer {
         let mut meta =
             PolicyMeta::of(&self.shared.spec, config.network.actor_hidden.clone(), config.network.activation);
         meta.observation_clip = config.statistics.observation_clip as f32;
-        let config = PpoConfig { threads: 0, ..self.flat.clone() };
+        let run = RunConfig { threads: 0, ..config.run.clone() };
+        let config = TrainConfig { run, ..config.clone() };
         meta.training = Some(Training {
             config: serde_json::to_value(config).expect("a configuration is plain data"),
             steps: progress.steps,
@@ -359,16 +360,16 @@ impl Trainer {
         let parameters = learner.params();
         let count = parameters.iter().filter(|x| !x.is_finite()).count();
         if count > 0 {
-            let PpoConfig { lr, value_lr, .. } = self.flat;
-            let parameters = parameters.len();
-            return Err(Error::Diverged { count, parameters, steps: progress.steps, lr, value_lr });
+            let (parameters, rates) = (parameters.len(), shared.config.algorithm.rates());
+            return Err(Error::Diverged { count, parameters, steps: progress.steps, rates });
         }
 
         let Sums { totals, updates } = sums;
         let sums = &totals.sums;
         let per_episode = |x: f64| (sums.episodes > 0.0).then(|| x / sums.episodes);
         let per_sample = |x: f64| if updates.samples > 0.0 { x / updates.samples } else { 0.0 };
-        let signals = self.flat.signals.iter().zip(&sums.rewards);
+        let names = shared.config.rewards.iter().skip(1).map(|reward| reward.kind.name().to_string());
+        let of_rewards = names.zip(&sums.rewards).map(|(name, x)| (name, x / totals.samples));
         let about = learner.describe(totals, updates);
         let worked = (seconds.collect + seconds.update).max(1e-12);
         Ok(IterationStats {
@@ -394,7 +395,7 @@ impl Trainer {
             std_mean: about.std_mean,
             lr: about.lr,
             skipped_minibatches: about.skipped,
-            signal_rewards: signals.map(|(signal, x)| (signal.kind, x / totals.samples)).collect(),
+            signal_rewards: of_rewards.collect(),
         })
     }
 }

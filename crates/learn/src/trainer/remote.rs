@@ -9,7 +9,6 @@
 //! All messages are safetensors; nothing in them is code.
 
 use super::config::{RunConfig, TrainConfig};
-use super::flat::{Algorithm, PpoConfig};
 use super::observer::Control;
 use super::{Replica, Shared, clock, states};
 use crate::algorithms::schedule::Progress;
@@ -93,13 +92,13 @@ impl Player {
     pub fn new(
         factory: &dyn ShardFactory,
         isa: Isa,
-        config: &PpoConfig,
+        config: &TrainConfig,
         (slice, slices): (usize, usize),
     ) -> Result<Self, Error> {
         config.validate()?;
         check_algorithm(config)?;
-        if slice >= slices || slices > config.blocks() {
-            let expected = format!("a slice below their number, and at most {} of them", config.blocks());
+        if slice >= slices || slices > config.run.blocks() {
+            let expected = format!("a slice below their number, and at most {} of them", config.run.blocks());
             return Err(Error::Mismatch {
                 what: "player".into(),
                 found: format!("slice {slice} of {slices}"),
@@ -107,7 +106,6 @@ impl Player {
             });
         }
         let spec = factory.spec().clone();
-        let config = TrainConfig::from(config);
         let blocks = share(config.run.blocks(), slices, slice);
         let replica = Replica {
             learner: config.algorithm.learner(&config.setup(&spec, isa), &[blocks.len()]),
@@ -156,8 +154,8 @@ impl Player {
 ///
 /// # Errors
 /// If the algorithm is SAC, whose replay stays with the agents.
-pub fn check_algorithm(config: &PpoConfig) -> Result<(), Error> {
-    if matches!(config.algorithm, Algorithm::Sac(_)) {
+pub fn check_algorithm(config: &TrainConfig) -> Result<(), Error> {
+    if !config.algorithm.travels() {
         return Err(Error::Mismatch {
             what: "rollouts played elsewhere".into(),
             found: "the trainer sac".into(),

@@ -1,6 +1,5 @@
 //! What reports say of an iteration.
 
-use super::flat::SignalKind;
 use serde::{Deserialize, Serialize};
 
 /// Numbers of one iteration.
@@ -52,7 +51,7 @@ pub struct IterationStats {
     pub lr: f64,
     /// Minibatches left out in the whole run because their gradient was not finite.
     pub skipped_minibatches: u64,
-    /// Mean reward of each signal per decision, in the order of the configuration.
+    /// Mean of each reward per decision but the task's, by name, in the order of the configuration.
     #[serde(default)]
-    pub signal_rewards: Vec<(SignalKind, f64)>,
+    pub signal_rewards: Vec<(String, f64)>,
 }

@@ -6,7 +6,7 @@
 
 use super::barrier::Barrier;
 use crate::algorithms::loss::LossSums;
-use crate::algorithms::{Learner, MAX_GROUPS, Partial, Workers, group_count, share};
+use crate::algorithms::{Learner, MAX_GROUPS, Partial, ShowPiece, Workers, group_count, share};
 use crate::optim::sum;
 use crate::rollout::collect::Collector;
 use crate::rollout::data::Rollout;
@@ -149,7 +149,7 @@ impl Workers for Worker<'_> {
         squares
     }
 
-    fn pieces(&self, show: &mut dyn FnMut(usize, Range<usize>, &[f32])) {
+    fn pieces(&self, show: ShowPiece<'_>) {
         let mut pieces = self.crew.pieces.iter();
         for slice in &self.crew.slices {
             let slice = slice.read().expect("no worker has panicked");

@@ -5,7 +5,7 @@
 pub mod numbers;
 
 use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
-use marathon_learn::{Algorithm, Sac};
+use marathon_learn::{Algorithm, Ppo, Sac, TrainConfig};
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
 #[derive(Clone, Copy, Default)]
@@ -167,25 +167,32 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], EnvError> {
     Ok(*head)
 }
 
-/// A small setting for tests of equality.
-pub fn small_config() -> marathon_learn::PpoConfig {
-    marathon_learn::PpoConfig {
-        agents: 80,
-        horizon: 24,
-        minibatches: 3,
-        epochs: 2,
-        total_steps: 4 * 80 * 24,
-        actor_hidden: vec![13, 8],
-        critic_hidden: vec![16],
-        threads: 1,
-        ..Default::default()
+/// PPO's settings in a configuration of PPO.
+pub fn ppo(config: &mut TrainConfig) -> &mut Ppo {
+    match &mut config.algorithm {
+        Algorithm::Ppo(ppo) => ppo,
+        other => panic!("a configuration of {}", other.name()),
     }
 }
 
+/// A small setting for tests of equality.
+pub fn small_config() -> TrainConfig {
+    TrainConfig::default().with(|c| {
+        c.run.agents = 80;
+        c.run.horizon = 24;
+        ppo(c).minibatches = 3;
+        ppo(c).epochs = 2;
+        c.run.total_steps = 4 * 80 * 24;
+        c.network.actor_hidden = vec![13, 8];
+        c.network.critic_hidden = vec![16];
+        c.run.threads = 1;
+    })
+}
+
 /// The same with another algorithm, by its name.
-pub fn small_of(algorithm: &str) -> marathon_learn::PpoConfig {
+pub fn small_of(algorithm: &str) -> TrainConfig {
     let small = small_config();
-    let config = marathon_learn::PpoConfig::of(algorithm).expect("the name of an algorithm");
+    let config = TrainConfig::of(algorithm).expect("the name of an algorithm");
     // of SAC, an update from the third rollout on, and a replay that is soon full
     let algorithm = match config.algorithm {
         Algorithm::Sac(sac) => {
@@ -193,17 +200,16 @@ pub fn small_of(algorithm: &str) -> marathon_learn::PpoConfig {
         }
         other => other,
     };
-    marathon_learn::PpoConfig {
-        algorithm,
-        agents: small.agents,
-        horizon: 6,
-        rollouts: 4,
-        total_steps: small.total_steps,
-        actor_hidden: small.actor_hidden,
-        critic_hidden: small.critic_hidden,
-        threads: 1,
-        ..config
-    }
+    config.with(|c| {
+        c.algorithm = algorithm;
+        c.run.agents = small.run.agents;
+        c.run.horizon = 6;
+        c.run.rollouts = 4;
+        c.run.total_steps = small.run.total_steps;
+        c.network.actor_hidden = small.network.actor_hidden;
+        c.network.critic_hidden = small.network.critic_hidden;
+        c.run.threads = 1;
+    })
 }
 
 /// An observer that never stops.
@@ -212,15 +218,14 @@ pub fn silent(_: &marathon_learn::IterationStats, _: &marathon_learn::Snapshot<'
 }
 
 /// A configuration with which the puck is learned within seconds.
-pub fn learning_config() -> marathon_learn::PpoConfig {
-    marathon_learn::PpoConfig {
-        agents: 128,
-        horizon: 32,
-        minibatches: 4,
-        total_steps: 400_000,
-        actor_hidden: vec![32, 32],
-        critic_hidden: vec![32, 32],
-        threads: 1,
-        ..Default::default()
-    }
+pub fn learning_config() -> TrainConfig {
+    TrainConfig::default().with(|c| {
+        c.run.agents = 128;
+        c.run.horizon = 32;
+        ppo(c).minibatches = 4;
+        c.run.total_steps = 400_000;
+        c.network.actor_hidden = vec![32, 32];
+        c.network.critic_hidden = vec![32, 32];
+        c.run.threads = 1;
+    })
 }

@@ -44,7 +44,7 @@ pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     ]
     .map(|(name, x)| (name.to_string(), x))
     .into();
-    row.extend(stats.signal_rewards.iter().map(|(kind, x)| (format!("{}_reward", kind.name()), Some(*x))));
+    row.extend(stats.signal_rewards.iter().map(|(reward, x)| (format!("{reward}_reward"), Some(*x))));
     row.extend(terms.iter().zip(&stats.reward_terms).map(|(term, x)| (format!("reward/{term}"), Some(*x))));
     row
 }

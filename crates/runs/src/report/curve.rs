@@ -54,8 +54,8 @@ fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
             duration(wall),
             duration(cpu),
             short(rate),
-            run.config.agents,
-            run.config.seed
+            run.config.run.agents,
+            run.config.run.seed
         );
         root.draw_text(&facts, &style(14, FAINT, FontStyle::Normal), at(24, 48))?;
 

@@ -60,7 +60,7 @@ impl<'a> Reporter<'a> {
             folder,
             run,
             terms: terms.to_vec(),
-            progress: show.then(|| Progress::new(run.config.total_steps, steps, run.summary_freq)),
+            progress: show.then(|| Progress::new(run.config.run.total_steps, steps, run.summary_freq)),
             watch,
             csv,
             events,

@@ -46,7 +46,7 @@ impl Summary {
         Self {
             agent: checkpoint.agent().into(),
             folder,
-            seed: checkpoint.config().seed,
+            seed: checkpoint.config().run.seed,
             steps,
             wall_seconds,
             cpu_seconds,

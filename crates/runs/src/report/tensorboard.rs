@@ -13,7 +13,7 @@
 use crate::error::RunError;
 use crate::folder::{EVENTS, RunFolder};
 use crc::{CRC_32_ISCSI, Crc, Table};
-use marathon_learn::{IterationStats, SignalKind, write_atomic};
+use marathon_learn::{IterationStats, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -51,11 +51,11 @@ pub fn scalars(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     ];
     let fixed = fixed.into_iter().filter_map(|(tag, x)| Some((tag.to_string(), x?)));
     let terms = terms.iter().zip(&stats.reward_terms).map(|(term, x)| (format!("Reward/{term}"), *x));
-    let name = |kind: SignalKind| match kind {
-        SignalKind::Curiosity => "Policy/Curiosity Reward".to_string(),
-        SignalKind::Rnd => "Policy/Rnd Reward".to_string(),
+    let name = |reward: &str| {
+        let (first, rest) = reward.split_at(1);
+        format!("Policy/{}{rest} Reward", first.to_uppercase())
     };
-    let signals = stats.signal_rewards.iter().map(|(kind, x)| (name(*kind), *x));
+    let signals = stats.signal_rewards.iter().map(|(reward, x)| (name(reward), *x));
     fixed.chain(signals).chain(terms).collect()
 }
 
