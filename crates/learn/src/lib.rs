@@ -4,9 +4,10 @@
 //! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
 //! transposed or copied to a device.
 //!
-//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory); [`TrainConfig`] says how,
-//!   its [`Algorithm`] by what, an [`Observer`] follows it and may stop it.
-//! * [`train_with`] does the same with rollouts that others play, such as [`Player`]s on other machines.
+//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory). [`TrainConfig`] says how, its
+//!   [`Algorithm`] by what; an [`Observer`] follows the run and may stop it.
+//! * [`Trainer`] is the same run, made an iteration at a time by its caller.
+//! * [`train_with`] has the rollouts played by others, such as [`Player`]s on other machines.
 //! * [`Policy`] is the result: it acts, and it is a file. [`evaluate`] tells how good it is.
 //! * [`Checkpoint`] is an interrupted run. Resumed, it gives the bits of a run that was never interrupted.
 //!
@@ -23,19 +24,22 @@
 //!
 //! # Reading the code
 //!
-//! `ppo`, `a2c`, `acktr` and `sac` are the algorithms: what each does with a rollout, from top to bottom. `run` is around them:
-//! threads, iterations, reports. They stand on `rollout` (acting), `advantage` (returns), [`loss`] (the objective), [`mlp`]
-//! with `tiles` (networks), `adam` (the optimizer), [`kfac`] (the Fisher matrix), [`signal`] (rewards for novelty) and `normalize` (statistics); `learner`
-//! holds what learning changes.
+//! [`algorithms`] has `ppo`, `a2c`, `acktr` and `sac`: what each does with a rollout, from top to bottom. The folders below
+//! are what they stand on, each on those before it: [`lanes`] (memory and random numbers, sixteen agents side by side),
+//! [`nets`] (networks and distributions), [`optim`] (optimizers), [`policy`] (the result), [`rewards`], and [`rollout`]
+//! (collecting, and what is kept). `trainer` is around the algorithms: threads, iterations, files, reports.
+//!
+//! To add an algorithm, implement [`Learner`](algorithms::Learner) and give it a place in [`Algorithm`]. To add a reward,
+//! implement [`Reward`](rewards::Reward).
 //!
 //! # Example
 //!
 //! ```no_run
-//! use marathon_learn::{Control, IterationStats, TrainConfig, Snapshot, evaluate, train};
+//! use marathon_learn::{Control, IterationStats, Snapshot, TrainConfig, evaluate, train};
 //! use marathon_physics::lanes::Isa;
 //!
 //! fn learn(factory: &dyn marathon_envs::ShardFactory) -> Result<(), marathon_learn::Error> {
-//!     let config = TrainConfig { total_steps: 4_000_000, seed: 7, ..Default::default() };
+//!     let config = TrainConfig::default().with(|config| (config.run.total_steps, config.run.seed) = (4_000_000, 7));
 //!     let mut progress = |stats: &IterationStats, _: &Snapshot<'_>| {
 //!         println!("{:9} steps, return {:.1?}", stats.steps, stats.return_mean);
 //!         Control::Continue
