@@ -2,10 +2,10 @@
 //!
 //! Nothing here reads a file or knows a command line, so that a browser can use it, too.
 //!
-//! The way of a file: [`document`] makes a tree of the YAML text, [`current`] or [`legacy`] finds the agent's sections in
-//! it ([`behavior`], [`names`]) and refuses what is misspelled or missing here ([`features`]), [`settings`] reads
-//! ML-Agents' keys with its defaults, [`convert`] turns them into the trainer's configuration and adds what the
-//! `marathon:` section says. [`section`] is what all of them read values with.
+//! The way of a file: `document` makes a tree of the YAML text, `current` or `legacy` finds the agent's sections in
+//! it (`behavior`, `names`) and refuses what is misspelled or missing here (`features`), `settings` reads
+//! ML-Agents' keys with its defaults, `convert` turns them into the trainer's configuration and adds what the
+//! `marathon:` section says. `section` is what all of them read values with.
 //!
 //! `docs/configs.md` has the tables.
 

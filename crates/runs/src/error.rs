@@ -127,11 +127,10 @@ impl RunError {
 
     /// Whether the options are at fault, not the files or the machine.
     pub fn is_usage(&self) -> bool {
-        match self {
-            RunError::Option { .. } | RunError::NewRunOnly { .. } | RunError::HoldsRun(_) => true,
-            RunError::Complete { .. } => true,
-            _ => false,
-        }
+        matches!(
+            self,
+            RunError::Option { .. } | RunError::NewRunOnly { .. } | RunError::HoldsRun(_) | RunError::Complete { .. }
+        )
     }
 
     /// The text with options and advice as a front end spells them.
