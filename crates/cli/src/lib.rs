@@ -4,8 +4,7 @@
 //! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C. What
 //! stdout does not take is a failure, but for a reader that has left.
 //!
-//! The modules from bottom to top: `program` (its name), `error`, `console`, `interrupt`, `python`, `bench`, `study`,
-//! `args`, `commands`. What makes a run is in `marathon-runs`.
+//! What makes a run is in `marathon-runs`, which the game and the Python package use, too.
 
 mod args;
 mod bench;

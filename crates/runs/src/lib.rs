@@ -4,9 +4,6 @@
 //! The command, the game and the Python package are front ends of this crate. [`RunOptions`], [`PolicySource`] and
 //! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
 //! names of options; each front end spells them in its own way ([`Spelling`]).
-//!
-//! The modules from bottom to top: [`text`], [`error`], [`configuration`], [`folder`], [`policy_file`], [`task`], [`options`],
-//! [`play`], [`report`], [`processes`], [`session`].
 
 pub mod configuration;
 pub mod error;

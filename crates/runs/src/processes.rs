@@ -1,8 +1,8 @@
 //! Rollouts played by processes of this program, a slice of the agents each: `marathon train --processes N`.
 //!
-//! A process is the program with the word `rollout-worker` ([`serve`]). It reads a line of JSON, which says what it plays, then for every rollout two
-//! messages of the learner ([`Players::play`]), and answers with one; before each stands its length, 8 bytes, little-endian. It
-//! leaves when its input ends. The policy has the same bits as without processes. A process that is lost ends the run, which
+//! A process is the program with the word `rollout-worker` ([`serve`]). It reads a line of JSON, which says what it plays. Then,
+//! for every rollout, it reads two messages of the learner ([`Players::play`]) and answers with one; before each stands its
+//! length, 8 bytes, little-endian. It leaves when its input ends. The policy has the same bits as without processes. A process that is lost ends the run, which
 //! can be gone on with.
 
 use crate::error::RunError;
