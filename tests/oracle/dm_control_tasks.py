@@ -128,8 +128,10 @@ def random_return(env, rng):
 def run(job):
     env, twin = make(job), make(job)
     action = env.action_spec()
+    observation = env.reset().observation
     spec = {
-        "obs": len(flat(env.reset().observation)),
+        "obs": len(flat(observation)),
+        "observations": [[name, int(np.size(x))] for name, x in observation.items()],
         "low": action.minimum.tolist(),
         "high": action.maximum.tolist(),
         "dt": env.control_timestep(),

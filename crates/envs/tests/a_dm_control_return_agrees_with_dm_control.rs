@@ -307,6 +307,8 @@ fn spaces_and_time_limits_are_dm_controls() {
         let (spec, theirs) = (case.make(1, None, false).spec().clone(), &theirs["spec"]);
         let single = |key: &str| -> Vec<f32> { numbers(&theirs[key]).iter().map(|x| *x as f32).collect() };
         assert_eq!(spec.obs as u64, theirs["obs"].as_u64().unwrap(), "{}", case.name());
+        let parts: Vec<Json> = spec.observations.iter().map(|part| json!([part.name, part.range.len()])).collect();
+        assert_eq!(Json::Array(parts), theirs["observations"], "{}", case.name());
         assert_eq!(spec.max_episode_steps as u64, theirs["max_episode_steps"].as_u64().unwrap(), "{}", case.name());
         assert_eq!((&spec.action_low, &spec.action_high), (&single("low"), &single("high")), "{}", case.name());
         assert!((spec.dt - theirs["dt"].as_f64().unwrap()).abs() < 1e-12, "{}", case.name());

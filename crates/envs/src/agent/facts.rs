@@ -29,7 +29,7 @@ pub struct Facts {
     pub controls: Controls,
     /// Names of the reward's terms in the order in which `step_reward` adds them.
     pub reward_terms: Vec<String>,
-    /// Names of the numbers that [`Agent::info`] reports.
+    /// Names of the numbers that [`Agent::info`](crate::Agent::info) reports.
     pub info: Vec<String>,
     /// Numbers that tell, decision by decision, how well the task is done: names out of `info`, and `forward`, the distance
     /// moved along +x in the decision, m. Reports of a training may show their means.
@@ -42,11 +42,11 @@ pub struct Facts {
     pub feet: Vec<String>,
     /// Geoms with a touch sensor, in the order of the observation.
     pub touch: Vec<String>,
-    /// Sites with a touch sensor, see [`Senses::touch_force`].
+    /// Sites with a touch sensor, see [`Senses::touch_force`](crate::Senses::touch_force).
     pub touch_sites: Vec<String>,
-    /// What the agent can be told to do: the numbers of its command, see [`Agent::command`].
+    /// What the agent can be told to do: the numbers of its command, see [`Agent::command`](crate::Agent::command).
     pub command: Vec<CommandRange>,
-    /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`].
+    /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
     /// What it sees of the physics.
     pub view: View,

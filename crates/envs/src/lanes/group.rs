@@ -138,7 +138,8 @@ impl<T: Real> LaneGroup<T> {
             }
         };
         let given = match body {
-            Body::Whole(Whole { physics, memory: saved, given }) => {
+            Body::Whole(whole) => {
+                let Whole { physics, memory: saved, given } = &**whole;
                 p.load(&task.sim, lane, physics);
                 put(memory, saved);
                 given.as_ref()
@@ -163,7 +164,7 @@ impl<T: Real> LaneGroup<T> {
     pub fn begin(&mut self, task: &Task<T>, work: &mut Work<T>, lanes: u32) {
         task.sim.measure_start(work, &self.physics, &task.bindings.measure);
         task.agent.perceive(task, self, work, Occasion::Start(lanes));
-        T::enter(Settle { group: self, termination_reward: None, ended: Ended::default() });
+        T::enter(SumReward { group: self, termination_reward: None, ended: Ended::default() });
     }
 
     /// Writes the observations of `lanes` (a bit each) into a block's `obs`.
@@ -180,20 +181,20 @@ impl<T: Real> LaneGroup<T> {
     pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
         let along_x = &task.bindings.along_x;
         let clip = task.facts.controls == Controls::Nominal;
-        let unsound = T::enter(Act { group: self, along_x, action, first, clip });
+        let unsound = T::enter(TakeActions { group: self, along_x, action, first, clip });
         task.agent.control(task, self);
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
         task.sim.measure(work, &self.physics, &task.bindings.measure);
-        T::enter(Move { group: self, along_x });
+        T::enter(CompleteForward { group: self, along_x });
         let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
         self.commands.advance();
         let ended = Ended { terminated: perceived.failed, diverged: unsound };
-        T::enter(Settle { group: self, termination_reward: task.facts.termination_reward, ended })
+        T::enter(SumReward { group: self, termination_reward: task.facts.termination_reward, ended })
     }
 
     /// Writes the results of a decision into a block's arrays.
     pub fn report(&self, first: usize, obs: &mut [f32], out: &mut BlockStep) {
-        T::enter(Report { group: self, first, obs, out });
+        T::enter(StoreResults { group: self, first, obs, out });
     }
 
     /// Lets an agent do everything once.
@@ -253,7 +254,7 @@ fn sane<T: Real>(values: &[T]) -> T::Mask {
 }
 
 /// Takes in the actions; remembers where the agents were. Returns the lanes whose action is not finite.
-struct Act<'a, T: Real> {
+struct TakeActions<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     along_x: &'a [(usize, T::Scalar)],
     action: &'a [f32],
@@ -262,11 +263,11 @@ struct Act<'a, T: Real> {
     clip: bool,
 }
 
-impl<T: Real> Kernel<T> for Act<'_, T> {
+impl<T: Real> Kernel<T> for TakeActions<'_, T> {
     type Output = u32;
     #[inline(always)]
     fn run(self) -> u32 {
-        let Act { group, along_x, action, first, clip } = self;
+        let TakeActions { group, along_x, action, first, clip } = self;
         let one = T::lit(1.0);
         let mut ok = T::not(T::none());
         for (i, own) in group.action.iter_mut().enumerate() {
@@ -283,13 +284,13 @@ impl<T: Real> Kernel<T> for Act<'_, T> {
     }
 }
 
-/// Completes the distance that [`Act`] began.
-struct Move<'a, T: Real> {
+/// Completes the distance that [`TakeActions`] began.
+struct CompleteForward<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     along_x: &'a [(usize, T::Scalar)],
 }
 
-impl<T: Real> Kernel<T> for Move<'_, T> {
+impl<T: Real> Kernel<T> for CompleteForward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
@@ -301,18 +302,18 @@ impl<T: Real> Kernel<T> for Move<'_, T> {
 }
 
 /// Quarantine, termination and the sum of the reward. Nothing that is not a sane number leaves its lane.
-struct Settle<'a, T: Real> {
+struct SumReward<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     termination_reward: Option<f64>,
     /// Failed lanes, and lanes known to be unsound.
     ended: Ended,
 }
 
-impl<T: Real> Kernel<T> for Settle<'_, T> {
+impl<T: Real> Kernel<T> for SumReward<'_, T> {
     type Output = Ended;
     #[inline(always)]
     fn run(self) -> Ended {
-        let Settle { group, termination_reward, ended } = self;
+        let SumReward { group, termination_reward, ended } = self;
         let LaneGroup { physics, obs, terms, info, reward, forward, .. } = group;
         let failed = T::from_bits(ended.terminated);
         let mut ok = T::not(T::from_bits(ended.diverged));
@@ -341,18 +342,18 @@ impl<T: Real> Kernel<T> for Settle<'_, T> {
 }
 
 /// Stores results in single precision.
-struct Report<'a, T: Real> {
+struct StoreResults<'a, T: Real> {
     group: &'a LaneGroup<T>,
     first: usize,
     obs: &'a mut [f32],
     out: &'a mut BlockStep,
 }
 
-impl<T: Real> Kernel<T> for Report<'_, T> {
+impl<T: Real> Kernel<T> for StoreResults<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Report { group, first, obs, out } = self;
+        let StoreResults { group, first, obs, out } = self;
         for (row, value) in obs.chunks_exact_mut(BLOCK).zip(&group.obs) {
             store(*value, &mut row[first..]);
         }

@@ -27,7 +27,7 @@ pub(crate) struct Saved {
 /// What an agent is besides its life.
 pub(crate) enum Body {
     /// Everything.
-    Whole(Whole),
+    Whole(Box<Whole>),
     /// `qpos`, `qvel`, warm start and memory, from a block without a mark.
     Unmarked(Vec<f64>),
 }
@@ -106,7 +106,7 @@ fn agent(model: &Model, spec: &Spec, memory: usize, format: Format, bytes: &mut 
         Format::Present => Some((numbers(bytes, spec.act)?, SavedCommand::read_from(spec.command.len(), bytes)?)),
         Format::WithoutCommands | Format::Unmarked => None,
     };
-    Some(Saved { life, body: Body::Whole(Whole { physics, memory, given }) })
+    Some(Saved { life, body: Body::Whole(Box::new(Whole { physics, memory, given })) })
 }
 
 fn life(bytes: &mut &[u8]) -> Option<[u64; 4]> {

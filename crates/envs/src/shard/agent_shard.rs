@@ -18,7 +18,7 @@ pub struct AgentState {
 pub trait AgentShard: Shard {
     /// State of an agent, numbered within this shard.
     fn state(&self, agent: usize) -> AgentState;
-    /// Writes the positions of the agents' roots along x, m, which [`BlockStep::forward`] is a difference of; as many as
+    /// Writes the positions of the agents' roots along x, m, which [`BlockStep::forward`](crate::BlockStep::forward) is a difference of; as many as
     /// fit. Returns whether roots can move along x.
     fn x_positions(&self, out: &mut [f64]) -> bool;
     /// Puts an agent into a state, as if an episode had begun there.
@@ -28,10 +28,10 @@ pub trait AgentShard: Shard {
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
     /// What an agent, numbered within this shard, is given from outside: commands, pushes, constants and ground of its own.
     fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_>;
-    /// Feet ([`Facts::feet`]) of an agent that touched the ground during its last decision: a bit each, of the first 32.
+    /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision: a bit each, of the first 32.
     fn feet(&self, agent: usize) -> u32;
     /// Writes what the agents in `mask` report about their present states into `info` (`[info][16]`, see
-    /// [`Facts::info`]; lanes outside the mask are left alone).
+    /// [`Facts::info`](crate::Facts::info); lanes outside the mask are left alone).
     fn info(&self, block: usize, mask: u16, info: &mut [f32]);
     /// Starts all random streams anew from a seed; the next reset begins every agent's first episode under it.
     fn reseed(&mut self, seed: u64);

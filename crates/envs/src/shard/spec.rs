@@ -31,9 +31,9 @@ pub struct Spec {
     pub frame_skip: usize,
     /// Decisions after which an episode is truncated.
     pub max_episode_steps: usize,
-    /// Names of the reward's terms, in the order of [`BlockStep::terms`].
+    /// Names of the reward's terms, in the order of [`BlockStep::terms`](crate::BlockStep::terms).
     pub reward_terms: Vec<String>,
-    /// Names of further numbers for logs, in the order of [`BlockStep::info`].
+    /// Names of further numbers for logs, in the order of [`BlockStep::info`](crate::BlockStep::info).
     pub info: Vec<String>,
     /// Names of the observation's parts, in their order, and where they lie; together they are all of it.
     pub observations: Vec<ObsGroup>,

@@ -54,7 +54,7 @@ crate::options! {
 }
 
 /// What a humanoid is told to observe beside its joints.
-pub(super) struct Sight {
+pub(super) struct HumanoidObs {
     pub position: bool,
     pub cinert: bool,
     pub cvel: bool,
@@ -62,7 +62,7 @@ pub(super) struct Sight {
     pub cfrc_ext: bool,
 }
 
-impl Sight {
+impl HumanoidObs {
     /// What the physics has to prepare.
     pub fn view() -> View {
         View { of_last_step: true, bodies: true, actuators: true, ..View::default() }
@@ -127,8 +127,8 @@ impl Humanoid {
     }
 
     #[inline(always)]
-    fn senses(&self) -> Sight {
-        Sight {
+    fn parts(&self) -> HumanoidObs {
+        HumanoidObs {
             position: !self.exclude_current_positions_from_observation,
             cinert: self.include_cinert_in_observation,
             cvel: self.include_cvel_in_observation,
@@ -151,7 +151,7 @@ impl Agent for Humanoid {
             reward_terms: names(["reward_survive", "reward_forward", "reward_ctrl", "reward_contact"]),
             info: names(["x_position", "y_position", "distance_from_origin", "x_velocity", "y_velocity"]),
             memory: Travel::SLOTS,
-            view: Sight::view(),
+            view: HumanoidObs::view(),
             ..super::facts("Humanoid-v5", "Gymnasium's humanoid", &self.xml_file, self.frame_skip)
         }
     }
@@ -184,12 +184,12 @@ impl Agent for Humanoid {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        self.senses().observe(s, out);
+        self.parts().observe(s, out);
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        let contact = T::lit(self.contact_cost_weight) * Sight::contact_squares(s);
+        let contact = T::lit(self.contact_cost_weight) * HumanoidObs::contact_squares(s);
         let [low, high] = self.contact_cost_range;
         terms.add("reward_survive", self.healthy_reward, T::masked(self.healthy(s), T::lit(1.0)));
         terms.add("reward_forward", self.forward_reward_weight, s.memory(Travel::X_VELOCITY));

@@ -7,7 +7,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::Noise;
-use super::humanoid::Sight;
+use super::humanoid::HumanoidObs;
 use crate::agent::senses::clamp;
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
@@ -49,7 +49,7 @@ impl Agent for HumanoidStandup {
             reward_terms: names(["reward_linup", "reward_quadctrl", "reward_impact", "reward_alive"]),
             info: names(["x_position", "y_position", "z_distance_from_origin"]),
             metrics: names(["z_distance_from_origin"]),
-            view: Sight::view(),
+            view: HumanoidObs::view(),
             ..super::facts(id, "Gymnasium's humanoid that is to stand up", &self.xml_file, self.frame_skip)
         }
     }
@@ -72,19 +72,19 @@ impl Agent for HumanoidStandup {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        let sight = Sight {
+        let parts = HumanoidObs {
             position: !self.exclude_current_positions_from_observation,
             cinert: self.include_cinert_in_observation,
             cvel: self.include_cvel_in_observation,
             qfrc_actuator: self.include_qfrc_actuator_in_observation,
             cfrc_ext: self.include_cfrc_ext_in_observation,
         };
-        sight.observe(s, out);
+        parts.observe(s, out);
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        let impact = T::lit(self.impact_cost_weight) * Sight::contact_squares(s);
+        let impact = T::lit(self.impact_cost_weight) * HumanoidObs::contact_squares(s);
         let [low, high] = self.impact_cost_range;
         let timestep = T::lit(s.readings().sim.model().opt.timestep);
         terms.add("reward_linup", 1.0, s.readings().qpos(2).div(timestep));
