@@ -49,8 +49,11 @@ pub enum Command {
     RecordDemo(RecordDemoArgs),
     /// Open the game: watch, push and teach characters in a window.
     Play(PlayArgs),
-    /// List the agents.
-    List,
+    /// List the agents, or tell all about one.
+    List {
+        /// Agent to tell about: the parts of its observation, its rewards, commands and options.
+        agent: Option<String>,
+    },
     /// Measure the speed of the physics, the environments or the training.
     Bench(BenchArgs),
     /// Make the paper's experiments again: a table, a picture and a page each.

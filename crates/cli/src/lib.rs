@@ -71,7 +71,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Import(import) => commands::convert::import(import, args.json),
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::Play(play) => commands::play::run(play),
-        Command::List => commands::list::run(args.json),
+        Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Study(study) => study::run(study, args.json),

@@ -238,6 +238,13 @@ fn help_is_worth_reading() {
     for id in ["Hopper-v0", "Walker2d-v1", "Humanoid-v0", "Ant-v1"] {
         assert!(text.contains(id), "{text}");
     }
+    let text = succeed(temp.path(), &["list", "humanoid-run"]);
+    for line in ["0..21  joint_angles", "22..34  extremities", "-1..1  abdomen_y", "forward, speed"] {
+        assert!(text.lines().any(|found| found.trim() == line), "'{line}' in {text}");
+    }
+    let agents = json(&succeed(temp.path(), &["list", "hopper", "--json"]))["agents"].clone();
+    assert_eq!((agents.as_array().map(Vec::len), &agents[0]["id"]), (Some(1), &"Hopper-v0".into()));
+    assert_eq!(agents[0]["observations"][3], serde_json::json!({ "name": "touch", "range": [9, 10] }));
     let agents = json(&succeed(temp.path(), &["list", "--json"]))["agents"].clone();
     assert_eq!(agents[0]["id"], "Hopper-v0");
     assert_eq!(agents[0]["observation"], 31);

@@ -1,8 +1,8 @@
-//! `marathon list`: the agents.
+//! `marathon list`: the agents, or one of them.
 
 use crate::console::{print_json, say};
 use crate::error::CliError;
-use marathon_envs::{OptionInfo, registry};
+use marathon_envs::{CommandRange, ObsGroup, OptionInfo, registry};
 use marathon_physics::lanes::Isa;
 use serde::Serialize;
 
@@ -12,16 +12,38 @@ struct Entry {
     id: String,
     summary: String,
     observation: usize,
+    /// Parts of the observation, with the places where each begins and ends.
+    observations: Vec<Part>,
     action: usize,
+    action_names: Vec<String>,
     /// Seconds between decisions.
     dt: f64,
     frame_skip: usize,
     max_episode_steps: usize,
     reward_terms: Vec<String>,
     info: Vec<String>,
+    /// Numbers that tell how well the task is done.
+    metrics: Vec<String>,
+    /// What it can be told to do.
+    command: Vec<Order>,
     /// Lowest and highest action per actuator; null for one without bounds.
     action_range: Vec<[Option<f32>; 2]>,
     options: Vec<Argument>,
+}
+
+/// A part of an observation.
+#[derive(Serialize)]
+struct Part {
+    name: String,
+    range: [usize; 2],
+}
+
+/// A number that an agent can be told.
+#[derive(Serialize)]
+struct Order {
+    name: String,
+    range: [f64; 2],
+    unit: String,
 }
 
 /// A named argument that an agent takes.
@@ -33,51 +55,92 @@ struct Argument {
     about: &'static str,
 }
 
-/// Lists the agents.
+/// Lists the agents, or tells all about one.
 ///
 /// # Errors
-/// If an agent cannot be simulated.
-pub fn run(json: bool) -> Result<(), CliError> {
-    let mut entries = Vec::new();
-    for id in registry::ids() {
-        let agent = registry::agent(&id)?;
-        let facts = agent.facts();
-        let factory = registry::factory(&id, Isa::F32)?;
-        let spec = factory.spec();
-        entries.push(Entry {
-            summary: facts.summary,
-            observation: spec.obs,
-            action: spec.act,
-            dt: spec.dt,
-            frame_skip: spec.frame_skip,
-            max_episode_steps: spec.max_episode_steps,
-            reward_terms: spec.reward_terms.clone(),
-            info: spec.info.clone(),
-            action_range: spec
-                .action_low
-                .iter()
-                .zip(&spec.action_high)
-                .map(|(a, b)| [finite(*a), finite(*b)])
-                .collect(),
-            options: agent.options().into_iter().map(argument).collect(),
-            id,
-        });
+/// If there is no such agent, or one cannot be simulated.
+pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
+    let ids = match agent {
+        Some(name) => vec![registry::agent(name)?.facts().id],
+        None => registry::ids(),
+    };
+    let entries = ids.iter().map(|id| entry(id)).collect::<Result<Vec<_>, _>>()?;
+    match (&entries[..], agent) {
+        _ if json => print_json(&serde_json::json!({ "agents": entries })),
+        ([entry], Some(_)) => tell(entry),
+        _ => table(&entries),
     }
-    if json {
-        print_json(&serde_json::json!({ "agents": entries }));
-        return Ok(());
-    }
+    Ok(())
+}
+
+/// What is told of an agent.
+fn entry(id: &str) -> Result<Entry, CliError> {
+    let agent = registry::agent(id)?;
+    let factory = registry::factory(id, Isa::F32)?;
+    let spec = factory.spec();
+    let range = |(low, high): (&f32, &f32)| [finite(*low), finite(*high)];
+    let part = |group: &ObsGroup| Part { name: group.name.clone(), range: [group.range.start, group.range.end] };
+    let order = |c: &CommandRange| Order { name: c.name.clone(), range: [c.low, c.high], unit: c.unit.clone() };
+    Ok(Entry {
+        id: id.into(),
+        summary: agent.facts().summary,
+        observation: spec.obs,
+        observations: spec.observations.iter().map(part).collect(),
+        action: spec.act,
+        action_names: spec.action_names.clone(),
+        dt: spec.dt,
+        frame_skip: spec.frame_skip,
+        max_episode_steps: spec.max_episode_steps,
+        reward_terms: spec.reward_terms.clone(),
+        info: spec.info.clone(),
+        metrics: spec.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        command: spec.command.iter().map(order).collect(),
+        action_range: spec.action_low.iter().zip(&spec.action_high).map(range).collect(),
+        options: agent.options().into_iter().map(argument).collect(),
+    })
+}
+
+/// A line per agent.
+fn table(entries: &[Entry]) {
     let width = entries.iter().map(|e| e.id.len()).max().unwrap_or(0);
     say(format!("{:width$}  observation  action  decisions/s  episode", "agent"));
-    for e in &entries {
+    for e in entries {
         let (rate, seconds) = (1.0 / e.dt, e.dt * e.max_episode_steps as f64);
         say(format!(
             "{:width$}  {:>11}  {:>6}  {rate:>11.0}  {seconds:>5.0} s   {}",
             e.id, e.observation, e.action, e.summary
         ));
     }
-    say("\nNames work in any case; without a version they mean the lowest.");
-    Ok(())
+    say("\nNames work in any case; without a version they mean the lowest. `marathon list AGENT` tells all about one.");
+}
+
+/// All about an agent.
+fn tell(e: &Entry) {
+    say(format!("{}: {}", e.id, e.summary));
+    let (rate, seconds) = (1.0 / e.dt, e.dt * e.max_episode_steps as f64);
+    say(format!("{rate:.0} decisions/s, episodes of {seconds:.0} s\n\nobservation"));
+    for Part { name, range: [start, end] } in &e.observations {
+        say(format!("  {:>9}  {name}", format!("{start}..{end}")));
+    }
+    say("action");
+    for (name, [low, high]) in e.action_names.iter().zip(&e.action_range) {
+        let end = |x: &Option<f32>| x.map_or("any".to_string(), |x| x.to_string());
+        say(format!("  {:>9}  {name}", format!("{}..{}", end(low), end(high))));
+    }
+    for Order { name, range: [low, high], unit } in &e.command {
+        say(format!("command\n  {:>9}  {name} {unit}", format!("{low}..{high}")));
+    }
+    for (what, names) in [("reward", &e.reward_terms), ("info", &e.info), ("metrics", &e.metrics)] {
+        if !names.is_empty() {
+            say(format!("{what}\n  {}", names.join(", ")));
+        }
+    }
+    if !e.options.is_empty() {
+        say("options");
+    }
+    for Argument { name, default, about, .. } in &e.options {
+        say(format!("  {name} = {default}\n      {about}"));
+    }
 }
 
 fn argument(info: OptionInfo) -> Argument {
