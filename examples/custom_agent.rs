@@ -53,11 +53,17 @@ impl Agent for Inchworm {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.group("velocity");
         out.vector(s.linear_velocity(MIDDLE));
+        out.group("forward");
         out.vector(s.forward(MIDDLE));
+        out.group("touch");
         out.touch_sensors(s);
+        out.group("joint_rotations");
         out.joint_rotations(s);
+        out.group("joint_velocities");
         out.joint_velocities(s);
+        out.group("head_height");
         out.scalar(s.height(HEAD));
     }
 

@@ -25,14 +25,14 @@ class Inchworm(MarathonAgent):
     feet = touch = ("head", "tail", "middle")  # a worm lies on the ground
 
     def observations(self):
-        return [
-            self.linear_velocity("middle"),
-            self.forward("middle"),
-            self.touch_sensors(),
-            self.joint_rotations(),
-            self.joint_velocities(),
-            self.height("head"),
-        ]
+        return {
+            "velocity": self.linear_velocity("middle"),
+            "forward": self.forward("middle"),
+            "touch": self.touch_sensors(),
+            "joint_rotations": self.joint_rotations(),
+            "joint_velocities": self.joint_velocities(),
+            "head_height": self.height("head"),
+        }
 
     def step_reward(self):
         return {"velocity": 4 * self.velocity("middle"), "effort": -0.05 * self.effort()}

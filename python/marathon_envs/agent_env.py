@@ -173,8 +173,13 @@ class AgentVecEnv:
         """Observations, `(N, obs_size)`."""
         said = self.agent.observations()
         n = self.num_envs
-        named = said if isinstance(said, Mapping) else {}
-        parts = [said] if isinstance(said, np.ndarray) else list(named.values() or said)
+        names, parts = ["observation"], list[FloatArray]()
+        if isinstance(said, np.ndarray):
+            parts = [said]
+        elif isinstance(said, Mapping):
+            names, parts = list(said), list(said.values())
+        else:
+            parts = list(said)
         for part in parts:
             if np.ndim(part) not in (1, 2) or len(part) != n:
                 found = np.shape(part)
@@ -183,10 +188,10 @@ class AgentVecEnv:
         if self._obs_size and obs.shape[1] != self._obs_size:
             raise ValueError(f"{self._id}: it observes {obs.shape[1]} numbers, but {self._obs_size} at first")
         if not self._obs_size:
-            widths = [np.size(part) // n for part in parts] if named else [obs.shape[1]]
+            widths = [np.size(part) // n for part in parts] if isinstance(said, Mapping) else [obs.shape[1]]
             ends = np.cumsum([0, *widths]).tolist()
-            names = list(named) or ["observation"]
-            self._parts = {name: slice(*ends[i : i + 2], 1) for i, name in enumerate(names) if ends[i] < ends[i + 1]}
+            places = zip(names, ends, ends[1:], strict=False)
+            self._parts = {name: slice(start, end, 1) for name, start, end in places if start < end}
         return obs
 
     def _numbers(self, what: str, said: Mapping[str, FloatArray], names: list[str]) -> FloatArray:

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 
 /// One number of what an agent can be told to do: its name, range and unit.
-#[pyclass(frozen, eq, get_all, module = "marathon_envs", skip_from_py_object)]
+#[pyclass(frozen, eq, get_all, module = "marathon_envs")]
 #[derive(Clone, PartialEq)]
 pub struct CommandRange {
     /// Name, such as `velocity`.

@@ -9,7 +9,7 @@ use crate::state::{AgentState, Group, SolverStats, Variation, Work};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// What [`Batch`](super::Batch) needs of a lane width.
+/// What [`Batch`] needs of a lane width.
 pub(super) trait Lanes: Send {
     fn set_ctrl(&mut self, agent: usize, ctrl: &[f64]);
     fn step(&mut self, substeps: usize);
