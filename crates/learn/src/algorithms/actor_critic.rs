@@ -134,7 +134,7 @@ impl Layout {
 
     /// What a run needs, whose longest list of samples has so many items.
     pub fn needs(&self, items: usize, moments: usize) -> Needs {
-        Needs { parameters: self.places.len(), moments, items, shape: self.shape, replay: 0 }
+        Needs { parameters: self.places.total(), moments, items, shape: self.shape, replay: 0 }
     }
 
     /// Rates of all networks: the policy's, the value function's, those of the rewards.
@@ -161,7 +161,7 @@ impl ActorCritic {
     /// At the start of a run.
     pub fn new(setup: &Setup<'_>, ratio: Ratio, deviations: Deviations, lambda: f64) -> Self {
         let layout = Layout::new(setup, ratio);
-        let mut params = vec![0.0; layout.places.len()];
+        let mut params = vec![0.0; layout.places.total()];
         let mut random = SplitMix::new(setup.common.seed, PARAMETERS);
         let init = setup.common.network.initialization;
         init.policy(&layout.actor, &mut params, &mut random);
@@ -357,7 +357,7 @@ impl Space {
             actor: layout.actor.tape(),
             critic: layout.critic.tape(),
             judges: networks.map(|networks| networks.reward.judge()).collect(),
-            gradient: vec![0.0; layout.places.len()],
+            gradient: vec![0.0; layout.places.total()],
             moments: vec![0.0; moments],
             rows: vec![[0.0; BLOCK]; layout.shape.act],
         }

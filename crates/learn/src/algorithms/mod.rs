@@ -7,9 +7,9 @@
 
 pub mod a2c;
 pub mod acktr;
-pub(crate) mod actor_critic;
+pub mod actor_critic;
 pub mod loss;
-pub(crate) mod parameters;
+pub mod parameters;
 pub mod ppo;
 pub mod sac;
 pub(crate) mod saved;

@@ -22,7 +22,7 @@ impl Places {
         start..start + count
     }
     /// Length of the array.
-    pub fn len(&self) -> usize {
+    pub fn total(&self) -> usize {
         self.len
     }
     /// Number of networks.

@@ -74,7 +74,7 @@ impl Noise {
         Self { state }
     }
 
-    /// The first streams in place of the others, see [`mirror`](crate::lanes::mirror).
+    /// The first streams in place of the others, where a block has fewer agents than lanes.
     pub fn mirrored(mut self, agents: usize) -> Self {
         mirror::rows(self.state.as_flattened_mut(), agents);
         self

@@ -18,7 +18,7 @@ pub struct Shape {
     pub streams: usize,
     /// Whether what was observed next is kept.
     pub next_obs: bool,
-    /// Agents in a block: sixteen, or fewer, which the other lanes [mirror](crate::lanes::mirror).
+    /// Agents in a block: sixteen, or fewer, which the other lanes mirror.
     pub lanes: usize,
 }
 
@@ -35,7 +35,7 @@ impl Shape {
 pub struct Samples<'a, S> {
     /// Actions taken, `[action][16]`.
     pub action: &'a [S],
-    /// Their log-probabilities then (see [`Gaussian`] for the constant): of all actions, or with a ratio for each of each.
+    /// Their log-probabilities then (see [`Gaussian`](crate::nets::gaussian::Gaussian) for the constant): of all actions, or with a ratio for each of each.
     pub log_prob: &'a [S],
     /// Advantages, not normalized.
     pub advantage: &'a [S],

@@ -1,7 +1,7 @@
 //! What agents experience: collected, kept, and made into advantages.
 
 pub(crate) mod advantage;
-pub(crate) mod collect;
+pub mod collect;
 pub mod data;
 pub(crate) mod replay;
 pub(crate) mod states;

@@ -16,7 +16,7 @@ pub fn write(states: &AgentStates, file: &mut TensorWriter) {
     file.list("env_ends", &states.env_ends);
 }
 
-/// Reads what [`write`] wrote.
+/// The inverse of [`write()`].
 pub fn read(file: &TensorReader<'_>) -> Result<AgentStates, Error> {
     Ok(AgentStates {
         noise: file.list("noise")?,

@@ -57,7 +57,7 @@ impl Crew {
             let len = own.iter().map(|(_, range)| range.len()).sum();
             RwLock::new(Slice { gradient: vec![0.0; len], squares: vec![0.0; own.len()] })
         };
-        let partial = |_| RwLock::new(Partial::new(places.len(), moments));
+        let partial = |_| RwLock::new(Partial::new(places.total(), moments));
         Self {
             isa,
             partials: (0..group_count(items)).map(partial).collect(),

@@ -1,7 +1,7 @@
 //! Soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018): learns from everything that
 //! was experienced, not from the last rollout alone.
 //!
-//! Each rollout of all agents goes into a [`Replay`]. Then, `updates` times, a batch is drawn from it:
+//! Each rollout of all agents goes into a replay. Then, `updates` times, a batch is drawn from it:
 //!
 //! ```text
 //! a' ~ pi(s')     y = r + gamma^n (min(Q1', Q2')(s', a') - alpha ln pi(a'|s'))       r: n rewards; no value after a failure
@@ -133,7 +133,7 @@ impl Sac {
         let layout = Layout::new(setup);
         let (obs, act) = (setup.spec.obs as u64, setup.spec.act as u64);
         Needs {
-            parameters: layout.places.len(),
+            parameters: layout.places.total(),
             moments: 0,
             items: self.batch / BLOCK,
             shape: layout.shape(setup.common.lanes()),

@@ -70,7 +70,7 @@ impl Networks {
     /// At the start of a run.
     pub fn new(setup: &Setup<'_>, init_alpha: f64) -> Self {
         let layout = Layout::new(setup);
-        let mut params = vec![0.0; layout.places.len()];
+        let mut params = vec![0.0; layout.places.total()];
         let mut random = SplitMix::new(setup.common.seed, PARAMETERS);
         let init = setup.common.network.initialization;
         init.policy(&layout.actor, &mut params, &mut random);
@@ -112,7 +112,7 @@ impl Space {
             action: row(layout.act),
             log_prob: row(1),
             target: row(1),
-            gradient: vec![0.0; layout.places.len()],
+            gradient: vec![0.0; layout.places.total()],
         }
     }
 }
