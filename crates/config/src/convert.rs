@@ -184,9 +184,6 @@ fn note_others(hyperparameters: &Section<'_>, marathon: &Section<'_>, algorithm:
     let all = [&ON_POLICY[..], &PPO, &A2C, &ACKTR, &SAC].concat();
     let others: BTreeSet<&str> = all.into_iter().filter(|key| !own.concat().contains(key)).collect();
     let name = algorithm.name();
-    for entry in others.into_iter().filter_map(|key| marathon.get(key)) {
-        notes.ignored(&entry, &format!("{name} has no such setting"));
-    }
     if let Algorithm::A2c(_) | Algorithm::Acktr(_) = algorithm {
         for (keys, why) in [
             (["epsilon", "epsilon_schedule"], "bounds no ratio"),
@@ -196,6 +193,9 @@ fn note_others(hyperparameters: &Section<'_>, marathon: &Section<'_>, algorithm:
                 notes.ignored(&entry, &format!("{name} {why}"));
             }
         }
+    }
+    for entry in others.into_iter().filter_map(|key| marathon.get(key)) {
+        notes.ignored(&entry, &format!("{name} has no such setting"));
     }
 }
 

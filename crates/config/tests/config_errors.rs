@@ -150,8 +150,8 @@ fn values_that_do_not_go_together_are_refused() {
         "a/test.yaml: behaviors.Hopper: configuration: max_std is 2, expected a number not below the smallest deviation, 3",
     );
     refuse(
-        "behaviors: {Hopper: {trainer_type: a2c, hyperparameters: {num_epoch: 3}}}",
-        "a/test.yaml: behaviors.Hopper: configuration: epochs is 3, expected 1: a2c makes one step on each rollout",
+        "behaviors: {Hopper: {trainer_type: a2c, marathon: {schedule: adaptive}}}",
+        "a/test.yaml: behaviors.Hopper: configuration: schedule is adaptive, expected constant or linear with a2c",
     );
     let error = error("behaviors: {Hopper: {marathon: {agents: 16, horizon: 2, minibatches: 5}}}").to_string();
     assert!(error.contains("minibatches is 5, expected at most 2"), "{error}");
@@ -237,7 +237,7 @@ fn features_that_are_not_here_are_refused() {
     );
     refuse_with(
         "behaviors: {Hopper: {trainer_type: acktr, reward_signals: {extrinsic: {}, rnd: {}}}}",
-        "signals is rnd, expected none with acktr; ppo and a2c take them",
+        "rewards is rnd, expected the task's alone with acktr; ppo and a2c take others",
     );
 }
 

@@ -200,9 +200,9 @@ fn schedules_follow_that_of_the_learning_rate_unless_they_have_their_own() {
     assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Constant, None, None));
     let ppo = flat(&current("    hyperparameters: {epsilon_schedule: constant, beta_schedule: constant}\n"));
     assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Linear, None, None));
-    // a decay never raises
+    // a decay never raises: both stay
     let ppo = flat(&current("    hyperparameters: {epsilon: 0.05, beta: 0}\n"));
-    assert_eq!((ppo.final_clip, ppo.final_entropy_coef), (Some(0.05), Some(0.0)));
+    assert_eq!((ppo.clip, ppo.final_clip, ppo.entropy_coef, ppo.final_entropy_coef), (0.05, None, 0.0, None));
 }
 
 #[test]
