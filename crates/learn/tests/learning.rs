@@ -158,3 +158,25 @@ fn settings_that_mean_nothing_to_an_algorithm_are_refused() {
         assert!(error.contains(&format!("unknown field `{name}`")), "{error}");
     }
 }
+
+/// Settings by name, as Python's `MarathonAgent.learn` takes them, find their sections.
+#[test]
+fn settings_by_name_are_those_of_the_algorithm() {
+    let of = |json| TrainConfig::from_settings(serde_json::from_str(json).unwrap());
+    let config = of(r#"{"total_steps": 512, "gamma": 0.9, "actor_hidden": [8], "epochs": 1, "final_min_std": 0.01}"#);
+    let want = TrainConfig::default().with(|c| {
+        (c.run.total_steps, c.rewards[0].gamma, c.network.actor_hidden) = (512, 0.9, vec![8]);
+        ppo(c).epochs = 1;
+        ppo(c).deviations.min_std.last = 0.01;
+    });
+    assert_eq!(config.unwrap(), want);
+    for (json, text) in [
+        (r#"{"epoch": 1}"#, "configuration: epoch: unknown field `epoch`"),
+        (r#"{"epochs": "x"}"#, "configuration: epochs: invalid type: string"),
+        (r#"{"algorithm": {"a2c": {}}, "target_kl": 0.1}"#, "configuration: target_kl: a2c has no such setting"),
+        (r#"{"algorithm": {"sac": {}}, "gae_lambda": 0.9}"#, "configuration: gae_lambda: sac has no such setting"),
+    ] {
+        let error = of(json).unwrap_err().to_string();
+        assert!(error.starts_with(text), "{error}");
+    }
+}
