@@ -21,7 +21,7 @@ pub enum SimError {
     },
 }
 
-/// Choices a user makes when building a [`Sim`].
+/// Choices a user makes when building a [`Sim`](crate::Sim).
 #[derive(Clone, Debug, Default)]
 pub struct SimOptions {
     /// Simulate contacts with the static world alone even if the model's moving geoms could collide with each other (by
