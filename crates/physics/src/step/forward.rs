@@ -9,30 +9,45 @@ use crate::sim::Sim;
 use crate::solver::solve;
 use crate::state::{Group, Work};
 
+/// Frames, axes, inertias.
+#[inline(always)]
+fn fwd_position<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    kinematics(sim, group, work);
+}
+
+/// Velocities, and the bias forces that they and gravity need.
+#[inline(always)]
+fn fwd_velocity<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    velocities(sim, group, work);
+}
+
+/// Springs and dampers of joints and tendons, which MuJoCo counts to `fwd_velocity`.
+#[inline(always)]
+fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    measure_tendons(sim, group, work);
+    joint_passive(sim, group, work);
+    tendon_passive(sim, work);
+}
+
+/// Forces of the actuators.
+#[inline(always)]
+fn fwd_actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    actuation(sim, group, work);
+}
+
+// stages that always follow each other share a kernel, which small models feel
 kernel_fn! {
-    /// Frames, axes, inertias.
-    fn fwd_position<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        kinematics(sim, group, work);
+    /// Positions and velocities of bodies.
+    fn motion<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        fwd_position(sim, group, work);
+        fwd_velocity(sim, group, work);
     }
 }
 kernel_fn! {
-    /// Velocities, and the bias forces that they and gravity need.
-    fn fwd_velocity<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        velocities(sim, group, work);
-    }
-}
-kernel_fn! {
-    /// Springs and dampers of joints and tendons, which MuJoCo counts to `fwd_velocity`.
-    fn passive<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        measure_tendons(sim, group, work);
-        joint_passive(sim, group, work);
-        tendon_passive(sim, work);
-    }
-}
-kernel_fn! {
-    /// Forces of the actuators.
-    fn fwd_actuation<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
-        actuation(sim, group, work);
+    /// Forces of joints, tendons and actuators.
+    fn joint_forces<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        passive(sim, group, work);
+        fwd_actuation(sim, group, work);
     }
 }
 kernel_fn! {
@@ -101,10 +116,8 @@ impl<T: Real> Sim<T> {
     }
 
     fn smooth(&self, work: &mut Work<T>, group: &Group<T>) {
-        fwd_position(self, group, work);
-        fwd_velocity(self, group, work);
-        passive(self, group, work);
-        fwd_actuation(self, group, work);
+        motion(self, group, work);
+        joint_forces(self, group, work);
         work.forces.link_applied.clear();
         if !self.gravcomp.is_empty() || !self.drags.is_empty() || !group.xfrc_applied.is_empty() {
             link_forces(self, group, work);
@@ -134,14 +147,12 @@ impl<T: Real> Sim<T> {
 
     /// Recomputes positions and velocities of bodies at the present state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
-        fwd_position(self, group, work);
-        fwd_velocity(self, group, work);
+        motion(self, group, work);
     }
 
     /// The same, and the forces of the actuators there.
     pub(crate) fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
-        passive(self, group, work);
-        fwd_actuation(self, group, work);
+        joint_forces(self, group, work);
     }
 }
