@@ -23,6 +23,8 @@ struct Rule {
 enum Inside {
     /// The elements of this list.
     Rules(&'static [Rule]),
+    /// What the world contains, see [`BODY`].
+    Bodies,
     /// Anything: the element is of no consequence.
     Anything,
     /// The element itself is refused.
@@ -49,6 +51,10 @@ const fn refused(name: &'static str, reason: &'static str) -> Rule {
 
 const fn containing(rule: Rule, rules: &'static [Rule]) -> Rule {
     Rule { inside: Inside::Rules(rules), ..rule }
+}
+
+const fn world_like(rule: Rule) -> Rule {
+    Rule { inside: Inside::Bodies, ..rule }
 }
 
 const NO_PLUGIN: Rule = refused("plugin", "plugins are not supported");
@@ -172,8 +178,18 @@ const ASSET: &[Rule] = &[
 ];
 
 const BODY: &[Rule] = &[
-    rule("body", "name childclass mocap gravcomp simple pos quat axisangle euler xyaxes zaxis", "user fuse sleep", ""),
-    rule("frame", "name childclass pos quat axisangle euler xyaxes zaxis", "scaling", "scale=1 massscale=1"),
+    world_like(rule(
+        "body",
+        "name childclass mocap gravcomp simple pos quat axisangle euler xyaxes zaxis",
+        "user fuse sleep",
+        "",
+    )),
+    world_like(rule(
+        "frame",
+        "name childclass pos quat axisangle euler xyaxes zaxis",
+        "scaling",
+        "scale=1 massscale=1",
+    )),
     rule("inertial", "pos mass diaginertia fullinertia quat axisangle euler xyaxes zaxis", "", ""),
     rule(
         "joint",
@@ -384,8 +400,7 @@ fn element(element: &Element, parent: &Element, rules: &'static [Rule]) -> Resul
     };
     checked(element, rule, "")?;
     match &rule.inside {
-        // bodies and frames contain what the world does
-        _ if matches!(rule.name, "body" | "frame") && std::ptr::eq(rules, BODY) => descend(element, BODY),
+        Inside::Bodies => descend(element, BODY),
         _ if rule.name == "default" => element.children.iter().try_for_each(|child| default(child, element)),
         Inside::Rules(inner) => descend(element, inner),
         _ => Ok(()),
@@ -443,7 +458,7 @@ fn checked(element: &Element, rule: &Rule, except: &str) -> Result<(), MjcfError
     match rule.inside {
         Inside::Refused(reason) => Err(element.unsupported(None, reason)),
         Inside::Anything => Ok(()),
-        Inside::Rules(_) => attributes(element, rule, except),
+        Inside::Rules(_) | Inside::Bodies => attributes(element, rule, except),
     }
 }
 
