@@ -12,18 +12,13 @@
 
 use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
 use super::loss::{LossSums, Objective};
-use super::parameters::Places;
+use super::on_policy::{Course, OnPolicy};
 use super::schedule::{Moving, Progress, Schedule};
-use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check};
+use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
-use crate::nets::normalize::Normalizer;
 use crate::optim::rmsprop::RmsProp;
-use crate::policy::{Policy, PolicyMeta};
-use crate::rollout::collect::Collecting;
-use crate::rollout::data::{Experience, Shape};
-use crate::rollout::statistics::Statistics;
-use crate::rollout::sums::Totals;
+use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 
 /// Far outside of what the ratio of a policy to itself can reach by rounding.
@@ -110,8 +105,7 @@ pub struct A2cLearner {
     settings: A2c,
     nets: ActorCritic,
     rms: RmsProp,
-    lr: f64,
-    skipped: u64,
+    course: Course,
     space: Option<Box<Space>>,
 }
 
@@ -120,34 +114,17 @@ impl A2cLearner {
     pub fn new(settings: A2c, setup: &Setup<'_>) -> Self {
         let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
         let rms = RmsProp::new(nets.params.len(), settings.rms_decay, settings.rms_epsilon);
-        Self { settings, nets, rms, lr: settings.lr, skipped: 0, space: None }
-    }
-
-    /// One step on one rollout.
-    fn learn(
-        &mut self,
-        workers: &mut dyn Workers,
-        experience: &Experience<'_>,
-        progress: &Progress,
-        all: &mut LossSums,
-    ) {
-        let items: Vec<u32> = (0..experience.items() as u32).collect();
-        let objective = objective(progress.at(self.settings.entropy_coef));
-        let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
-        let sums = self.nets.gradient(workers, experience, &items, objective, None, space);
-        *all += sums;
-        self.lr = self.settings.lr * progress.rate(self.settings.schedule);
-        self.step(workers, progress, &sums);
+        Self { settings, nets, rms, course: Course { lr: settings.lr, skipped: 0 }, space: None }
     }
 
     fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let Self { settings, nets, rms, lr, .. } = self;
+        let Self { settings, nets, rms, course: Course { lr, .. }, .. } = self;
         // the gradient at hand is that of (V - R)^2 / 2
         let weight = [1.0, 2.0 * settings.value_coef];
         let squares = workers.squares();
         let norm = (squares[0] + weight[1] * weight[1] * squares[1]).sqrt() / sums.samples;
         if !norm.is_finite() {
-            self.skipped += 1;
+            self.course.skipped += 1;
             return;
         }
         let bound = (settings.max_grad_norm / norm).min(1.0) / sums.samples;
@@ -161,55 +138,45 @@ impl A2cLearner {
     }
 }
 
-impl Learner for A2cLearner {
-    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
-        // the first rollout only fills the statistics
-        if now.progress.iteration > 0 {
-            self.learn(workers, experience, now.progress, sums);
-        }
+impl OnPolicy for A2cLearner {
+    fn nets(&self) -> &ActorCritic {
+        &self.nets
     }
-    fn replica(&self) -> Box<dyn Learner> {
-        let Self { settings, nets, rms, lr, skipped, .. } = self;
+    fn nets_mut(&mut self) -> &mut ActorCritic {
+        &mut self.nets
+    }
+    fn course(&self) -> Course {
+        self.course
+    }
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
+    }
+    fn copy(&self) -> Self {
+        let Self { settings, nets, rms, course, .. } = self;
         let (nets, rms) = (nets.clone(), rms.clone());
-        Box::new(Self { settings: *settings, nets, rms, lr: *lr, skipped: *skipped, space: None })
+        Self { settings: *settings, nets, rms, course: *course, space: None }
     }
-    fn places(&self) -> &Places {
-        &self.nets.layout.places
+
+    fn learn(
+        &mut self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+        all: &mut LossSums,
+    ) {
+        let items: Vec<u32> = (0..experience.items() as u32).collect();
+        let objective = objective(progress.at(self.settings.entropy_coef));
+        let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
+        let sums = self.nets.gradient(workers, experience, &items, objective, None, space);
+        *all += sums;
+        self.course.lr = self.settings.lr * progress.rate(self.settings.schedule);
+        self.step(workers, progress, &sums);
     }
-    fn params(&self) -> &[f32] {
-        &self.nets.params
-    }
-    fn params_mut(&mut self) -> &mut Vec<f32> {
-        &mut self.nets.params
-    }
-    fn shape(&self) -> Shape {
-        self.nets.shape()
-    }
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
-        self.nets.collecting(statistics)
-    }
-    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
-        self.nets.follow(before, after);
-    }
-    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
-        self.nets.describe(totals, self.lr, self.skipped)
-    }
-    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
-        self.nets.policy(meta, normalizer)
-    }
-    fn save(&self) -> Saved {
-        let mut saved = Saved::default();
-        saved.list("params", &self.nets.params);
+
+    fn save_optimizer(&self, saved: &mut Saved) {
         saved.list("mean_square", &self.rms.mean_square);
-        saved.scalar("lr", self.lr);
-        saved.scalar("skipped", self.skipped as f64);
-        saved
     }
-    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
-        saved.copy("params", &mut self.nets.params)?;
-        saved.copy("mean_square", &mut self.rms.mean_square)?;
-        self.lr = saved.number("lr")?;
-        self.skipped = saved.number("skipped")? as u64;
-        Ok(())
+    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
+        saved.copy("mean_square", &mut self.rms.mean_square)
     }
 }

@@ -19,18 +19,13 @@
 use super::a2c;
 use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
 use super::loss::LossSums;
-use super::parameters::Places;
+use super::on_policy::{Course, OnPolicy};
 use super::schedule::{Moving, Progress, Schedule};
-use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check};
+use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
-use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
-use crate::policy::{Policy, PolicyMeta};
-use crate::rollout::collect::Collecting;
-use crate::rollout::data::{Experience, Shape};
-use crate::rollout::statistics::Statistics;
-use crate::rollout::sums::Totals;
+use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -119,8 +114,7 @@ pub struct AcktrLearner {
     /// The factors, which all workers share.
     kfac: Arc<Kfac>,
     momentum: Vec<f32>,
-    lr: f64,
-    skipped: u64,
+    course: Course,
     space: Option<Box<Space>>,
 }
 
@@ -131,10 +125,65 @@ impl AcktrLearner {
         let Layout { actor, critic, critic_start, .. } = &nets.layout;
         let kfac = Arc::new(Kfac::new(actor, critic, *critic_start));
         let momentum = vec![0.0; nets.params.len()];
-        Self { settings, nets, kfac, momentum, lr: settings.lr, skipped: 0, space: None }
+        Self { settings, nets, kfac, momentum, course: Course { lr: settings.lr, skipped: 0 }, space: None }
     }
 
-    /// One step on one rollout.
+    /// The step on the worker's replica.
+    fn step(&mut self, progress: &Progress, scale: [f64; 2], sums: &LossSums, all: &mut LossSums) {
+        let Self { settings, nets, kfac, momentum, course: Course { lr, .. }, space: Some(space), .. } = self else {
+            return;
+        };
+        let gradient = &space.gradient;
+        let log_std = nets.layout.log_std.clone();
+        let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
+        let mut products = [0.0; 2];
+        products[0] = log_std.clone().map(|i| of_std(i) * gradient[i] as f64 * scale[0]).sum();
+        (0..kfac.count()).map(|l| kfac.layer(l)).for_each(|layer| products[layer.network] += layer.product);
+        if !products.iter().all(|p| p.is_finite() && *p >= 0.0) {
+            self.course.skipped += 1;
+            return;
+        }
+        // a product of zero asks for no step: any length will do
+        let length = products.map(|p| lr.min((2.0 * settings.kl_clip / p.max(1e-300)).sqrt()));
+        let mut step = |i: usize, d: f64, length: f64| {
+            let m = &mut momentum[i];
+            *m = (settings.momentum * *m as f64 + (1.0 - settings.momentum) * length * d) as f32;
+            nets.params[i] -= *m;
+        };
+        log_std.for_each(|i| step(i, of_std(i), length[0]));
+        for l in 0..kfac.count() {
+            let layer = kfac.layer(l);
+            let places = layer.weights.start..layer.biases.end;
+            for (i, d) in places.zip(&layer.step) {
+                step(i, *d as f64, length[layer.network]);
+            }
+        }
+        nets.bound_std(progress);
+        // the divergence is known without looking at samples
+        let kl = 0.5 * length[0] * length[0] * products[0];
+        all.kl += (kl * sums.samples) - sums.kl;
+    }
+}
+
+impl OnPolicy for AcktrLearner {
+    fn nets(&self) -> &ActorCritic {
+        &self.nets
+    }
+    fn nets_mut(&mut self) -> &mut ActorCritic {
+        &mut self.nets
+    }
+    fn course(&self) -> Course {
+        self.course
+    }
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
+    }
+    fn copy(&self) -> Self {
+        let Self { settings, nets, kfac, momentum, course, .. } = self;
+        let (nets, kfac, momentum) = (nets.clone(), kfac.clone(), momentum.clone());
+        Self { settings: *settings, nets, kfac, momentum, course: *course, space: None }
+    }
+
     fn learn(
         &mut self,
         workers: &mut dyn Workers,
@@ -170,95 +219,18 @@ impl AcktrLearner {
             let scale = scale[layer.network];
             layer.natural(nets.isa, gradient, scale);
         });
-        self.lr = settings.lr * progress.rate(settings.schedule);
+        self.course.lr = settings.lr * progress.rate(settings.schedule);
         self.step(progress, scale, &sums, all);
         workers.wait();
     }
 
-    /// The step on the worker's replica.
-    fn step(&mut self, progress: &Progress, scale: [f64; 2], sums: &LossSums, all: &mut LossSums) {
-        let Self { settings, nets, kfac, momentum, lr, space: Some(space), .. } = self else { return };
-        let gradient = &space.gradient;
-        let log_std = nets.layout.log_std.clone();
-        let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
-        let mut products = [0.0; 2];
-        products[0] = log_std.clone().map(|i| of_std(i) * gradient[i] as f64 * scale[0]).sum();
-        (0..kfac.count()).map(|l| kfac.layer(l)).for_each(|layer| products[layer.network] += layer.product);
-        if !products.iter().all(|p| p.is_finite() && *p >= 0.0) {
-            self.skipped += 1;
-            return;
-        }
-        // a product of zero asks for no step: any length will do
-        let length = products.map(|p| lr.min((2.0 * settings.kl_clip / p.max(1e-300)).sqrt()));
-        let mut step = |i: usize, d: f64, length: f64| {
-            let m = &mut momentum[i];
-            *m = (settings.momentum * *m as f64 + (1.0 - settings.momentum) * length * d) as f32;
-            nets.params[i] -= *m;
-        };
-        log_std.for_each(|i| step(i, of_std(i), length[0]));
-        for l in 0..kfac.count() {
-            let layer = kfac.layer(l);
-            let places = layer.weights.start..layer.biases.end;
-            for (i, d) in places.zip(&layer.step) {
-                step(i, *d as f64, length[layer.network]);
-            }
-        }
-        nets.bound_std(progress);
-        // the divergence is known without looking at samples
-        let kl = 0.5 * length[0] * length[0] * products[0];
-        all.kl += (kl * sums.samples) - sums.kl;
-    }
-}
-
-impl Learner for AcktrLearner {
-    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
-        // the first rollout only fills the statistics
-        if now.progress.iteration > 0 {
-            self.learn(workers, experience, now.progress, sums);
-        }
-    }
-    fn replica(&self) -> Box<dyn Learner> {
-        let Self { settings, nets, kfac, momentum, lr, skipped, .. } = self;
-        let (nets, kfac, momentum) = (nets.clone(), kfac.clone(), momentum.clone());
-        Box::new(Self { settings: *settings, nets, kfac, momentum, lr: *lr, skipped: *skipped, space: None })
-    }
-    fn places(&self) -> &Places {
-        &self.nets.layout.places
-    }
-    fn params(&self) -> &[f32] {
-        &self.nets.params
-    }
-    fn params_mut(&mut self) -> &mut Vec<f32> {
-        &mut self.nets.params
-    }
-    fn shape(&self) -> Shape {
-        self.nets.shape()
-    }
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
-        self.nets.collecting(statistics)
-    }
-    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
-        self.nets.follow(before, after);
-    }
-    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
-        self.nets.describe(totals, self.lr, self.skipped)
-    }
-    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
-        self.nets.policy(meta, normalizer)
-    }
-    fn save(&self) -> Saved {
-        let mut saved = Saved::default();
-        saved.list("params", &self.nets.params);
+    fn save_optimizer(&self, saved: &mut Saved) {
         saved.list("momentum", &self.momentum);
         let (factors, inverses) = self.kfac.save();
         saved.list("kfac", &factors);
         saved.list("kfac_inverse", &inverses);
-        saved.scalar("lr", self.lr);
-        saved.scalar("skipped", self.skipped as f64);
-        saved
     }
-    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
-        saved.copy("params", &mut self.nets.params)?;
+    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
         saved.copy("momentum", &mut self.momentum)?;
         let factors: &[f64] = saved.get("kfac")?;
         if !self.kfac.load(factors, saved.get("kfac_inverse")?) {
@@ -268,8 +240,6 @@ impl Learner for AcktrLearner {
                 expected: "those of the networks".into(),
             });
         }
-        self.lr = saved.number("lr")?;
-        self.skipped = saved.number("skipped")? as u64;
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ pub mod a2c;
 pub mod acktr;
 pub mod actor_critic;
 pub mod loss;
+mod on_policy;
 pub mod parameters;
 pub mod ppo;
 pub mod sac;

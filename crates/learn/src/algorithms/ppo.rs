@@ -5,19 +5,14 @@
 
 use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space};
 use super::loss::{LossSums, Objective};
-use super::parameters::Places;
+use super::on_policy::{Course, OnPolicy};
 use super::schedule::{Moving, Progress, Schedule};
-use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check, load_adam, save_adam, share};
+use super::{Common, Needs, Saved, Setup, Workers, check, load_adam, save_adam, share};
 use crate::error::Error;
 use crate::lanes::noise::{SHUFFLES, SplitMix};
 use crate::nets::gaussian::Ratio;
-use crate::nets::normalize::Normalizer;
 use crate::optim::adam::Adam;
-use crate::policy::{Policy, PolicyMeta};
-use crate::rollout::collect::Collecting;
-use crate::rollout::data::{Experience, Shape};
-use crate::rollout::statistics::Statistics;
-use crate::rollout::sums::Totals;
+use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 
 /// Settings of PPO; the defaults solve the small tasks.
@@ -128,8 +123,7 @@ pub struct PpoLearner {
     seed: u64,
     nets: ActorCritic,
     adam: Adam,
-    lr: f64,
-    skipped: u64,
+    course: Course,
     space: Option<Box<Space>>,
 }
 
@@ -138,33 +132,13 @@ impl PpoLearner {
     pub fn new(settings: Ppo, setup: &Setup<'_>) -> Self {
         let nets = ActorCritic::new(setup, settings.ratio, settings.deviations, settings.gae_lambda);
         let adam = Adam::new(nets.params.len(), settings.adam_epsilon);
-        Self { settings, seed: setup.common.seed, nets, adam, lr: settings.lr, skipped: 0, space: None }
-    }
-
-    /// All epochs over one rollout.
-    fn epochs(
-        &mut self,
-        workers: &mut dyn Workers,
-        experience: &Experience<'_>,
-        progress: &Progress,
-        all: &mut LossSums,
-    ) {
-        let Ppo { epochs, minibatches, .. } = self.settings;
-        let objective = self.objective(experience, progress);
-        let mut items: Vec<u32> = (0..experience.items() as u32).collect();
-        if self.settings.schedule == Schedule::Linear {
-            self.lr = self.settings.lr * progress.rate(Schedule::Linear);
-        }
-        for epoch in 0..epochs {
-            let draw = progress.iteration * epochs as u64 + epoch as u64;
-            SplitMix::new(self.seed, draw | SHUFFLES).shuffle(&mut items);
-            for m in 0..minibatches {
-                let batch = &items[share(items.len(), minibatches, m)];
-                let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
-                let sums = self.nets.gradient(workers, experience, batch, objective, None, space);
-                *all += sums;
-                self.step(workers, progress, &sums);
-            }
+        Self {
+            settings,
+            seed: setup.common.seed,
+            nets,
+            adam,
+            course: Course { lr: settings.lr, skipped: 0 },
+            space: None,
         }
     }
 
@@ -185,10 +159,10 @@ impl PpoLearner {
 
     /// One step of Adam on the worker's replica, each network's gradient bounded by itself.
     fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let Self { settings, nets, adam, lr, .. } = self;
+        let Self { settings, nets, adam, course: Course { lr, .. }, .. } = self;
         let squares = workers.squares();
         if !squares.iter().all(|s| s.is_finite()) {
-            self.skipped += 1;
+            self.course.skipped += 1;
             return;
         }
         let mean = 1.0 / sums.samples;
@@ -215,55 +189,55 @@ impl PpoLearner {
     }
 }
 
-impl Learner for PpoLearner {
-    fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
-        // the first rollout only fills the statistics
-        if now.progress.iteration > 0 {
-            self.epochs(workers, experience, now.progress, sums);
+impl OnPolicy for PpoLearner {
+    fn nets(&self) -> &ActorCritic {
+        &self.nets
+    }
+    fn nets_mut(&mut self) -> &mut ActorCritic {
+        &mut self.nets
+    }
+    fn course(&self) -> Course {
+        self.course
+    }
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
+    }
+    fn copy(&self) -> Self {
+        let Self { settings, seed, nets, adam, course, .. } = self;
+        let (nets, adam) = (nets.clone(), adam.clone());
+        Self { settings: *settings, seed: *seed, nets, adam, course: *course, space: None }
+    }
+
+    fn learn(
+        &mut self,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+        all: &mut LossSums,
+    ) {
+        let Ppo { epochs, minibatches, .. } = self.settings;
+        let objective = self.objective(experience, progress);
+        let mut items: Vec<u32> = (0..experience.items() as u32).collect();
+        if self.settings.schedule == Schedule::Linear {
+            self.course.lr = self.settings.lr * progress.rate(Schedule::Linear);
+        }
+        for epoch in 0..epochs {
+            let draw = progress.iteration * epochs as u64 + epoch as u64;
+            SplitMix::new(self.seed, draw | SHUFFLES).shuffle(&mut items);
+            for m in 0..minibatches {
+                let batch = &items[share(items.len(), minibatches, m)];
+                let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
+                let sums = self.nets.gradient(workers, experience, batch, objective, None, space);
+                *all += sums;
+                self.step(workers, progress, &sums);
+            }
         }
     }
-    fn replica(&self) -> Box<dyn Learner> {
-        let Self { settings, seed, nets, adam, lr, skipped, .. } = self;
-        let (nets, adam) = (nets.clone(), adam.clone());
-        Box::new(Self { settings: *settings, seed: *seed, nets, adam, lr: *lr, skipped: *skipped, space: None })
+
+    fn save_optimizer(&self, saved: &mut Saved) {
+        save_adam(&self.adam, saved);
     }
-    fn places(&self) -> &Places {
-        &self.nets.layout.places
-    }
-    fn params(&self) -> &[f32] {
-        &self.nets.params
-    }
-    fn params_mut(&mut self) -> &mut Vec<f32> {
-        &mut self.nets.params
-    }
-    fn shape(&self) -> Shape {
-        self.nets.shape()
-    }
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
-        self.nets.collecting(statistics)
-    }
-    fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
-        self.nets.follow(before, after);
-    }
-    fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
-        self.nets.describe(totals, self.lr, self.skipped)
-    }
-    fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
-        self.nets.policy(meta, normalizer)
-    }
-    fn save(&self) -> Saved {
-        let mut saved = Saved::default();
-        saved.list("params", &self.nets.params);
-        save_adam(&self.adam, &mut saved);
-        saved.scalar("lr", self.lr);
-        saved.scalar("skipped", self.skipped as f64);
-        saved
-    }
-    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
-        saved.copy("params", &mut self.nets.params)?;
-        load_adam(&mut self.adam, saved)?;
-        self.lr = saved.number("lr")?;
-        self.skipped = saved.number("skipped")? as u64;
-        Ok(())
+    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
+        load_adam(&mut self.adam, saved)
     }
 }
