@@ -54,9 +54,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!(
                 "{:9} steps  return {:7.1}  {speed:5.2} m/s  falls {:3.0}%  std {:.2}",
                 stats.steps,
-                stats.return_mean.unwrap_or(f64::NAN),
+                stats.learned.return_mean.unwrap_or(f64::NAN),
                 falls * 100.0,
-                stats.std_mean
+                stats.learned.std_mean
             );
         }
         if speed > GOOD_ENOUGH.0 && falls < GOOD_ENOUGH.1 { Control::Stop } else { Control::Continue }

@@ -129,6 +129,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         },
         rewards: [task].into_iter().chain(signals).collect(),
         algorithm,
+        roles: Default::default(),
     };
     config.validate().map_err(|source| ConfigError::Combination {
         path: path.into(),

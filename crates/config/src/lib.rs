@@ -17,10 +17,12 @@ mod error;
 mod features;
 mod legacy;
 mod names;
+mod roles;
 mod section;
 mod settings;
 
 pub use error::ConfigError;
+pub use roles::parse_roles;
 
 use marathon_learn::TrainConfig;
 use std::path::Path;

@@ -69,7 +69,7 @@ struct Flat {
 }
 
 fn flat(loaded: &Loaded) -> Flat {
-    let TrainConfig { run, network, statistics, rewards, algorithm } = loaded.config.clone();
+    let TrainConfig { run, network, statistics, rewards, algorithm, .. } = loaded.config.clone();
     let Algorithm::Ppo(ppo) = algorithm else { panic!("a configuration of {}", algorithm.name()) };
     let last = |moving: Moving| (moving.last != moving.first).then_some(moving.last);
     assert_eq!((rewards.len(), &rewards[0].kind), (1, &RewardKind::Task));

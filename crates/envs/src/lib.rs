@@ -37,7 +37,7 @@ mod vec;
 
 pub use agent::{
     Agent, Body, CommandRange, Controls, Ctrl, Facts, ModelSource, Motors, Obs, OptionInfo, Options, Part, ResetNoise,
-    Senses, Sigmoid, Start, Terms, Tolerance, Value, View, memory, names, options, senses, tolerance,
+    RoleFacts, Senses, Sigmoid, Start, Terms, Tolerance, Value, View, memory, names, options, senses, tolerance,
 };
 pub use any_agent::{AnyAgent, Elsewhere};
 pub use episode_rng::EpisodeRng;
@@ -46,7 +46,7 @@ pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
 pub use shard::{
-    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Metric, MetricSource, ObsGroup, Shard,
+    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Metric, MetricSource, ObsGroup, Role, Shard,
     ShardFactory, Spec,
 };
 pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

@@ -41,7 +41,7 @@
 //! fn learn(factory: &dyn marathon_envs::ShardFactory) -> Result<(), marathon_learn::Error> {
 //!     let config = TrainConfig::default().with(|config| (config.run.total_steps, config.run.seed) = (4_000_000, 7));
 //!     let mut progress = |stats: &IterationStats, _: &Snapshot<'_>| {
-//!         println!("{:9} steps, return {:.1?}", stats.steps, stats.return_mean);
+//!         println!("{:9} steps, return {:.1?}", stats.steps, stats.learned.return_mean);
 //!         Control::Continue
 //!     };
 //!     let output = train(factory, Isa::best(), &config, None, &mut progress)?;
@@ -77,13 +77,13 @@ pub use nets::gaussian::Ratio;
 pub use nets::init::Init;
 pub use nets::normalize::Normalizer;
 pub use policy::evaluation::Evaluation;
-pub use policy::{BlockPolicy, Policy, PolicyMeta, Training};
+pub use policy::{BlockPolicy, Cast, Policy, PolicyMeta, Training};
 pub use rewards::{Novelty, RewardConfig, RewardKind};
 pub use rollout::statistics::StatisticsConfig;
 pub use trainer::checkpoint::Checkpoint;
-pub use trainer::config::{RunConfig, TrainConfig};
-pub use trainer::evaluate::{EvalOptions, evaluate};
+pub use trainer::config::{RoleConfig, RunConfig, TrainConfig};
+pub use trainer::evaluate::{EvalOptions, evaluate, evaluate_roles};
 pub use trainer::observer::{Control, Observer, Snapshot};
 pub use trainer::remote::{Deliver, Player, Players};
-pub use trainer::stats::IterationStats;
+pub use trainer::stats::{IterationStats, Learned};
 pub use trainer::{TrainOutput, Trainer, train, train_with};

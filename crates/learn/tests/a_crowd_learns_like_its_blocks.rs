@@ -62,8 +62,11 @@ fn the_same_bits_for_any_number_of_threads() {
         let got = train(&lockstep(crowd()), Isa::best(), &config(threads), None, &mut silent).unwrap();
         assert_eq!(bits(&want), bits(&got), "{threads} threads");
         let (a, b) = (want.last.as_ref().unwrap(), got.last.as_ref().unwrap());
-        assert_eq!((a.episodes, a.return_mean, a.speed_mean), (b.episodes, b.return_mean, b.speed_mean));
-        assert_eq!((&a.reward_terms, a.fall_fraction), (&b.reward_terms, b.fall_fraction));
+        assert_eq!(
+            (a.episodes, a.learned.return_mean, a.speed_mean),
+            (b.episodes, b.learned.return_mean, b.speed_mean)
+        );
+        assert_eq!((&a.learned.reward_terms, a.fall_fraction), (&b.learned.reward_terms, b.fall_fraction));
     }
 }
 

@@ -65,7 +65,7 @@ fn what_is_reported_is_theirs_alone() {
         });
         let mut seen = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
-            seen.push((stats.steps, stats.episodes, stats.return_mean, stats.reward_terms[0]));
+            seen.push((stats.steps, stats.episodes, stats.learned.return_mean, stats.learned.reward_terms[0]));
             Control::Continue
         };
         let output = train(&Numbered(PuckTask::with_limit(LIMIT)), Isa::best(), &config, None, &mut observer).unwrap();

@@ -91,7 +91,14 @@ impl Case {
         let samples: Vec<Samples<'_, f64>> = self
             .data
             .iter()
-            .map(|[action, log_prob, advantage, value, target]| Samples { action, log_prob, advantage, value, target })
+            .map(|[action, log_prob, advantage, value, target]| Samples {
+                decided: !0,
+                action,
+                log_prob,
+                advantage,
+                value,
+                target,
+            })
             .collect();
         let mut gradient = vec![0.0; params.len()];
         let sums = f64::enter(Loss::<f64> {

@@ -14,8 +14,8 @@ fn learned(config: &TrainConfig) -> f64 {
     let task = PuckTask::new();
     let mut returns = Vec::new();
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
-        returns.extend(stats.return_mean);
-        assert!(stats.kl.is_finite() && stats.value_loss.is_finite() && stats.std_mean > 0.0);
+        returns.extend(stats.learned.return_mean);
+        assert!(stats.learned.kl.is_finite() && stats.learned.value_loss.is_finite() && stats.learned.std_mean > 0.0);
         Control::Continue
     };
     let output = train(&task, Isa::best(), config, None, &mut observer).unwrap();
@@ -23,7 +23,7 @@ fn learned(config: &TrainConfig) -> f64 {
     println!("first {:?}, last {:?}, {result:?}, {:?}", returns.first(), returns.last(), output.last);
     assert!(returns[0] < 0.0, "the untrained policy is bad: {}", returns[0]);
     assert_eq!(result.episodes, 64);
-    assert!(result.falls == 0 && output.last.unwrap().explained_variance > 0.5);
+    assert!(result.falls == 0 && output.last.unwrap().learned.explained_variance > 0.5);
     result.return_mean
 }
 
@@ -107,7 +107,7 @@ fn observer_can_stop_and_looks_at_every_iteration() {
     let output = train(&PuckTask::new(), Isa::best(), &learning_config(), None, &mut observer).unwrap();
     let last = output.last.unwrap();
     assert_eq!((seen, last.iteration), (vec![4096, 8192, 12288], 3));
-    assert!(last.cpu_seconds > 0.0 && last.reward_terms.len() == 2);
+    assert!(last.cpu_seconds > 0.0 && last.learned.reward_terms.len() == 2);
 }
 
 /// A number that is not finite in one observation of every episode of one agent does not keep the others from learning.

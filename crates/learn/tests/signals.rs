@@ -122,8 +122,8 @@ fn novelty_fades_and_the_task_is_solved() {
         let config = learning_config().with(|c| c.rewards.push(reward));
         let mut rewards = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
-            assert_eq!(stats.signal_rewards[0].0, kind.name());
-            rewards.push(stats.signal_rewards[0].1);
+            assert_eq!(stats.learned.signal_rewards[0].0, kind.name());
+            rewards.push(stats.learned.signal_rewards[0].1);
             Control::Continue
         };
         let output = train(&PuckTask::new(), Isa::best(), &config, None, &mut observer).unwrap();

@@ -119,7 +119,14 @@ impl Case {
         let samples: Vec<Samples<'_, f32>> = self
             .data
             .iter()
-            .map(|[action, log_prob, advantage, value, target]| Samples { action, log_prob, advantage, value, target })
+            .map(|[action, log_prob, advantage, value, target]| Samples {
+                decided: !0,
+                action,
+                log_prob,
+                advantage,
+                value,
+                target,
+            })
             .collect();
         let gaussian = Gaussian::new(&self.log_std);
         let mut d_log_std = vec![0.0; ACT];

@@ -94,6 +94,7 @@ pub fn spec(env: &Bound<'_, PyAny>) -> PyResult<Spec> {
         observations: parts(&spec.getattr("observations")?)?,
         metrics: metrics(&spec.getattr("metrics")?, &spec.getattr("info")?)?,
         command: commands(&spec.getattr("command")?)?,
+        roles: Vec::new(),
     })
 }
 

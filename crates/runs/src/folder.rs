@@ -221,6 +221,10 @@ impl RunFolder {
     pub fn policy(&self) -> PathBuf {
         self.path.join("policy.safetensors")
     }
+    /// The policy of a role but the first.
+    pub fn policy_of(&self, role: &str) -> PathBuf {
+        self.path.join(format!("policy-{role}.safetensors"))
+    }
     /// The folder of the checkpoint.
     pub fn checkpoint(&self) -> PathBuf {
         self.path.join("checkpoint")

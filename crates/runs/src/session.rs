@@ -7,14 +7,14 @@ use crate::options::RunOptions;
 use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
-use crate::report::{Reporter, Watch, curve, save};
+use crate::report::{Reporter, Watch, curve, save, save_policies};
 use crate::task::Task;
 use crate::text::thousands;
 use marathon_config::{Loaded, default_for, default_of};
 use marathon_envs::ShardFactory;
 use marathon_learn::{
-    Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput, evaluate,
-    train_with,
+    Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput,
+    evaluate_roles, train_with,
 };
 use marathon_physics::lanes::Isa;
 use std::path::Path;
@@ -34,8 +34,10 @@ pub struct Session {
 
 /// What a run has led to.
 pub struct Outcome {
-    /// The policy, which knows its evaluation.
+    /// The policy, which knows its evaluation: of a task with several roles, the first one's.
     pub policy: Policy,
+    /// The other roles' policies, by the roles' names.
+    pub others: Vec<(String, Policy)>,
     /// Agent-steps done.
     pub steps: u64,
     /// How its best actions do; none if the run was stopped before its last step.
@@ -97,6 +99,10 @@ impl Session {
         loaded.config.validate()?;
         Processes::check(&loaded.config, options.processes)?;
         let factory = task.factory(loaded.config.run.agents)?;
+        if let (Some(path), [_, others @ ..]) = (&learn.config, &factory.spec().roles[..]) {
+            let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
+            loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
+        }
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let run = RunFile::new(&agent, &loaded);
@@ -176,7 +182,7 @@ impl Session {
         watch: &mut Watch,
     ) -> Result<Outcome, RunError> {
         let resume = self.checkpoint.take();
-        let TrainOutput { mut policy, checkpoint, .. } = match self.learn(players, resume, show, watch) {
+        let TrainOutput { mut policy, mut others, checkpoint, .. } = match self.learn(players, resume, show, watch) {
             Ok(output) => output,
             // it says how to go on
             Err(error @ RunError::Stopped { .. }) => return Err(error),
@@ -204,18 +210,20 @@ impl Session {
         let mut evaluation = None;
         if steps >= run.config.run.total_steps {
             let options = EvalOptions { episodes: EPISODES, threads: run.config.run.threads, ..Default::default() };
-            let eval = evaluate(&*factory, Isa::best(), &policy, &options)?;
-            policy.set_evaluation(eval);
-            evaluation = Some(eval);
+            let all: Vec<&Policy> = [&policy].into_iter().chain(others.iter().map(|(_, policy)| policy)).collect();
+            let evaluations = evaluate_roles(&*factory, Isa::best(), &all, &options)?;
+            let policies = [&mut policy].into_iter().chain(others.iter_mut().map(|(_, policy)| policy));
+            policies.zip(&evaluations).for_each(|(policy, evaluation)| policy.set_evaluation(*evaluation));
+            evaluation = Some(evaluations[0]);
         }
         let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
         let summary = Summary::new(path, &checkpoint, &history, evaluation);
         if let Some(folder) = &folder {
-            policy.save(&folder.policy())?;
+            save_policies(folder, &policy, &others)?;
             write_json(&folder.summary(), &summary)?;
         }
         drawn?;
-        Ok(Outcome { policy, steps, evaluation, summary, folder })
+        Ok(Outcome { policy, others, steps, evaluation, summary, folder })
     }
 
     /// Trains and saves what was learned.
@@ -242,7 +250,7 @@ impl Session {
         let output = result?;
         let steps = output.checkpoint.steps();
         // what was learned is safe before anything else happens; an iteration that is not told of is to come again
-        let saved = if told { save(folder, &output.policy, &output.checkpoint).map(|()| true) } else { Ok(false) };
+        let saved = if told { save(folder, &output).map(|()| true) } else { Ok(false) };
         match (error, saved) {
             (Some(cause), saved) => Err(stopped(folder, cause, saved.unwrap_or(false), steps)),
             (None, Err(cause)) => Err(stopped(folder, cause, false, steps)),

@@ -94,7 +94,7 @@ pub fn train_on(
     let (mut curve, mut clocks) = (Vec::new(), (0, 0.0, 0.0));
     let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
         clocks = (stats.steps, stats.wall_seconds, stats.cpu_seconds);
-        curve.extend(stats.return_mean.map(|mean| (stats.steps as f64, mean)));
+        curve.extend(stats.learned.return_mean.map(|mean| (stats.steps as f64, mean)));
         Control::Continue
     };
     let output = train_with(players, factory, isa, config, None, &mut observer)?;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use super::CommandRange;
+use super::{CommandRange, RoleFacts};
 
 /// Name of the metric that is the distance along +x.
 pub(crate) const FORWARD: &str = "forward";
@@ -46,6 +46,8 @@ pub struct Facts {
     pub touch_sites: Vec<String>,
     /// What the agent can be told to do: the numbers of its command, see [`Agent::command`](crate::Agent::command).
     pub command: Vec<CommandRange>,
+    /// Who decides in the task, if more than one does; empty: one who has it all.
+    pub roles: Vec<RoleFacts>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
     /// What it sees of the physics.
@@ -74,6 +76,7 @@ impl Default for Facts {
             touch: Vec::new(),
             touch_sites: Vec::new(),
             command: Vec::new(),
+            roles: Vec::new(),
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),

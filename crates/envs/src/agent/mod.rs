@@ -11,6 +11,7 @@ mod facts;
 pub mod memory;
 pub mod options;
 mod outputs;
+mod role;
 pub mod senses;
 mod start;
 pub mod tolerance;
@@ -25,6 +26,7 @@ pub(crate) use facts::FORWARD;
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
 pub use outputs::{Obs, Terms};
+pub use role::RoleFacts;
 pub use senses::Senses;
 pub use start::Start;
 pub use tolerance::{Sigmoid, Tolerance};
@@ -68,6 +70,15 @@ pub trait Agent: Send + Sync + 'static {
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         c.ctrl.copy_from_slice(c.action);
+    }
+
+    /// Lanes in which a role, numbered as in [`Facts::roles`], decides next. It is asked once per decision, with the state that
+    /// the decision led to. A role that does not decide goes on with its last action, and what it earns meanwhile counts for
+    /// its last decision. All roles decide at the start of an episode.
+    #[inline(always)]
+    fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
+        let _ = (s, role);
+        T::not(T::none())
     }
 
     /// Reports numbers that are neither observed nor rewarded, as many as [`Facts::info`] names: for a user's logs.

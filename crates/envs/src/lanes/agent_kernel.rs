@@ -111,7 +111,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             Occasion::Start(lanes) => (Some(lanes), None, None),
             Occasion::Rehearsal(Named { terms, groups }) => (Some(!0), Some(terms), Some(groups)),
         };
-        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, .. } = group;
+        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, decides, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             bindings: &task.bindings,
@@ -147,6 +147,9 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         for (lanes, geom) in feet.iter_mut().zip(&task.bindings.feet) {
             let touched = T::bits(s.readings.touched(*geom));
             *lanes = fresh.map_or(touched, |begun| *lanes & !begun);
+        }
+        for (role, lanes) in decides.iter_mut().enumerate() {
+            *lanes = T::bits(agent.decides(&s, role));
         }
         Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(agent.terminated(&s)) }
     }

@@ -29,6 +29,8 @@ pub(crate) struct LaneGroup<T: Real> {
     pub info: Vec<T>,
     /// Per foot, the lanes in which it touched the ground during the last decision.
     pub feet: Vec<u32>,
+    /// Per role, the lanes in which it decides next.
+    pub decides: Vec<u32>,
     reward: T,
     forward: T,
 }
@@ -62,6 +64,7 @@ impl<T: Real> LaneGroup<T> {
             terms: vec![T::zero(); task.spec.reward_terms.len()],
             info: vec![T::zero(); task.spec.info.len()],
             feet: vec![0; task.bindings.feet.len()],
+            decides: vec![0; task.facts.roles.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -164,7 +167,8 @@ impl<T: Real> LaneGroup<T> {
     pub fn begin(&mut self, task: &Task<T>, work: &mut Work<T>, lanes: u32) {
         task.sim.measure_start(work, &self.physics, &task.bindings.measure);
         task.agent.perceive(task, self, work, Occasion::Start(lanes));
-        T::enter(SumReward { group: self, termination_reward: None, ended: Ended::default() });
+        let of_first = task.terms_of_first();
+        T::enter(SumReward { group: self, termination_reward: None, of_first, ended: Ended::default() });
     }
 
     /// Writes the observations of `lanes` (a bit each) into a block's `obs`.
@@ -189,7 +193,8 @@ impl<T: Real> LaneGroup<T> {
         let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
         self.commands.advance();
         let ended = Ended { terminated: perceived.failed, diverged: unsound };
-        T::enter(SumReward { group: self, termination_reward: task.facts.termination_reward, ended })
+        let (termination_reward, of_first) = (task.facts.termination_reward, task.terms_of_first());
+        T::enter(SumReward { group: self, termination_reward, of_first, ended })
     }
 
     /// Writes the results of a decision into a block's arrays.
@@ -305,6 +310,8 @@ impl<T: Real> Kernel<T> for CompleteForward<'_, T> {
 struct SumReward<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     termination_reward: Option<f64>,
+    /// Terms of the first role, which add up to the reward.
+    of_first: usize,
     /// Failed lanes, and lanes known to be unsound.
     ended: Ended,
 }
@@ -313,7 +320,7 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
     type Output = Ended;
     #[inline(always)]
     fn run(self) -> Ended {
-        let SumReward { group, termination_reward, ended } = self;
+        let SumReward { group, termination_reward, of_first, ended } = self;
         let LaneGroup { physics, obs, terms, info, reward, forward, .. } = group;
         let failed = T::from_bits(ended.terminated);
         let mut ok = T::not(T::from_bits(ended.diverged));
@@ -335,6 +342,8 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
         *reward = T::zero();
         for term in terms.iter_mut() {
             *term = T::masked(ok, *term);
+        }
+        for term in &terms[..of_first] {
             *reward += *term;
         }
         Ended { terminated: T::bits(T::or(failed, T::not(ok))), diverged: T::bits(T::not(ok)) }

@@ -3,6 +3,7 @@
 mod agent_kernel;
 mod context;
 mod group;
+mod roles;
 mod saved;
 mod shard;
 mod start_cache;

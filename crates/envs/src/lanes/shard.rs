@@ -140,6 +140,8 @@ impl<T: Real> Shard for LaneShard<T> {
         out.terms.resize(BLOCK * task.spec.reward_terms.len(), 0.0);
         out.info.resize(BLOCK * task.spec.info.len(), 0.0);
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
+        out.decides.clear();
+        out.decides.resize(task.spec.roles.len(), 0);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
             for (lane, life) in lives[first..].iter().take(T::LANES).enumerate() {
@@ -149,6 +151,9 @@ impl<T: Real> Shard for LaneShard<T> {
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
             out.diverged |= (ended.diverged << first) as u16;
+            for (all, lanes) in out.decides.iter_mut().zip(&group.decides) {
+                *all |= (lanes << first) as u16;
+            }
             // a broken state is put away at once: it must not slow its group down until the caller resets it
             for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
                 group.put(&task.sim, lane, &task.blueprint.spawn, &vec![0.0; task.blueprint.model.nv]);

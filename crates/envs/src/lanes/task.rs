@@ -8,6 +8,7 @@ use marathon_physics::{Model, Sim, Work};
 
 use super::agent_kernel::AgentKernel;
 use super::group::{LaneGroup, Rehearsal};
+use super::roles;
 use crate::agent::bindings::{Bindings, Blueprint, sim_options};
 use crate::agent::{CommandRange, Controls, FORWARD, Facts, Options, Start};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
@@ -62,6 +63,7 @@ impl<T: Real> AgentFactory<T> {
             info: facts.info.clone(),
             command: facts.command.clone(),
             observations: Vec::new(),
+            roles: Vec::new(),
             metrics: metrics(&facts, !bindings.along_x.is_empty())
                 .map_err(|problem| EnvError::Agent { id: id(), problem })?,
             nq: blueprint.model.nq,
@@ -71,6 +73,8 @@ impl<T: Real> AgentFactory<T> {
         let mut task = Task { agent, facts, spec, blueprint, bindings, sim };
         task.spec.observations = task.rehearse()?;
         task.spec.obs = task.spec.observations.last().map_or(0, |group| group.range.end);
+        task.spec.roles = roles::of(&task.facts, &task.spec)
+            .map_err(|problem| EnvError::Agent { id: task.facts.id.clone(), problem })?;
         Ok(AgentFactory { task: Arc::new(task) })
     }
 }
@@ -174,6 +178,11 @@ impl<T: Real> Task<T> {
             return wrong(format!("it adds the reward terms {terms:?}, but its facts say {:?}", facts.reward_terms));
         }
         parts(&named.groups, observed).or_else(wrong)
+    }
+
+    /// How many terms the first role earns.
+    pub fn terms_of_first(&self) -> usize {
+        self.spec.roles.first().map_or(self.spec.reward_terms.len(), |role| role.terms.end)
     }
 
     /// Lets the agent draw the start of an episode into `out`.

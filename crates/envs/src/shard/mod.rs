@@ -8,10 +8,12 @@
 
 mod agent_shard;
 mod context;
+mod role;
 mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
+pub use role::Role;
 pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
 use crate::error::EnvError;
@@ -22,7 +24,7 @@ pub const BLOCK: usize = 16;
 /// What one decision of a block led to.
 #[derive(Clone, Debug, Default)]
 pub struct BlockStep {
-    /// Reward per agent.
+    /// Reward per agent: of a task with several roles, the first role's.
     pub reward: [f32; BLOCK],
     /// Bit per agent: the episode ended in a terminal state (do not bootstrap).
     pub terminated: u16,
@@ -33,10 +35,12 @@ pub struct BlockStep {
     /// Bit per agent: its state was not finite; it was quarantined, counts as terminated with reward 0, and its
     /// observation was replaced by zeros. It is made whole by the `reset` that follows, like any other ended episode.
     pub diverged: u16,
-    /// Terms of the reward, `[term][16]`, length `16 * reward_terms.len()`; they add up to the reward.
+    /// Terms of the reward, `[term][16]`, length `16 * reward_terms.len()`; those of a role add up to its reward.
     pub terms: Vec<f32>,
     /// Further numbers about the state reached, `[info][16]`.
     pub info: Vec<f32>,
+    /// Per role of [`Spec::roles`], a bit per agent whose role decides next.
+    pub decides: Vec<u16>,
 }
 
 impl BlockStep {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::Role;
 use crate::agent::{CommandRange, Options};
 
 /// Constant facts of a task.
@@ -41,6 +42,8 @@ pub struct Spec {
     pub metrics: Vec<Metric>,
     /// What the agent can be told to do: names, ranges and units of its command.
     pub command: Vec<CommandRange>,
+    /// Who decides in the task, if more than one does, each with a policy of its own, see [`Spec::deciders`].
+    pub roles: Vec<Role>,
     /// Arguments that the agent takes, with the values that it has.
     pub options: Options,
     /// Length of a configuration, `qpos`.

@@ -148,7 +148,7 @@ fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &
     let mut board = board(shared);
     board.newest = Some(policy);
     board.progress.state = "from random weights".into();
-    if let Some(total) = stats.return_mean {
+    if let Some(total) = stats.learned.return_mean {
         board.progress.curve.push(Point { seconds: stats.wall_seconds, steps: stats.steps, total });
     }
     // what is spent here does not count as learning

@@ -119,6 +119,10 @@ impl A2cLearner {
 
     fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
         let Self { settings, nets, rms, course: Course { lr, .. }, .. } = self;
+        // nobody has decided anything
+        if sums.samples == 0.0 {
+            return;
+        }
         // the gradient at hand is that of (V - R)^2 / 2
         let weight = [1.0, 2.0 * settings.value_coef];
         let squares = workers.squares();

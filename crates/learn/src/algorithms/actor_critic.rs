@@ -245,7 +245,8 @@ impl ActorCritic {
         let (actor, critic) = (self.actor_params(), self.critic_params());
         partial.sums = LossSums::default();
         for (i, chunk) in chunks.enumerate() {
-            let mut samples = [Samples { action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
+            let mut samples =
+                [Samples { decided: 0, action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
             let (mut n, mut steps) = (0, Vec::new());
             for (rollout, item) in chunk {
                 space.input.block_mut(n).copy_from_slice(rollout.obs(item));

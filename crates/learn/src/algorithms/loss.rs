@@ -114,14 +114,15 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
             for part in 0..BLOCK / T::LANES {
                 let lane = part * T::LANES;
                 let lp = log_prob::<T>(gaussian, s.action, mean, d_mean, lane);
+                let on = T::from_bits(s.decided as u32 >> lane);
                 let advantage = (T::load(&s.advantage[lane..]) - shift) * scale;
                 let mut d_lp = zero;
                 if objective.ratio == Ratio::Joint {
                     let surrogate = Surrogate::new(lp - T::load(&s.log_prob[lane..]), advantage, (low, high));
-                    policy_sum[part] -= surrogate.gain;
-                    kl_sum[part] += surrogate.kl;
-                    clipped_sum[part] += T::masked(surrogate.clipped, one);
-                    d_lp = surrogate.d_log_prob;
+                    policy_sum[part] -= T::masked(on, surrogate.gain);
+                    kl_sum[part] += T::masked(on, surrogate.kl);
+                    clipped_sum[part] += T::masked(T::and(on, surrogate.clipped), one);
+                    d_lp = T::masked(on, surrogate.d_log_prob);
                 }
 
                 // d lp / d mean = z / std, d lp / d log std = z^2 - 1, d H / d log std = 1
@@ -131,14 +132,14 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
                     if objective.ratio == Ratio::PerAction {
                         let lp = (z * T::lit(0.5)).neg_mul_add(z, -T::splat(gaussian.log_std[k]));
                         let surrogate = Surrogate::new(lp - T::load(&s.log_prob[at..]), advantage, (low, high));
-                        policy_sum[part] = surrogate.gain.neg_mul_add(weight, policy_sum[part]);
-                        kl_sum[part] += surrogate.kl;
-                        clipped_sum[part] += T::masked(surrogate.clipped, weight);
-                        d_lp = surrogate.d_log_prob * weight;
+                        policy_sum[part] = T::masked(on, surrogate.gain).neg_mul_add(weight, policy_sum[part]);
+                        kl_sum[part] += T::masked(on, surrogate.kl);
+                        clipped_sum[part] += T::masked(T::and(on, surrogate.clipped), weight);
+                        d_lp = T::masked(on, surrogate.d_log_prob * weight);
                     }
                     (d_lp * z * T::splat(*inv_std)).store(&mut d_mean[at..]);
                     let row = &mut rows[k][lane..];
-                    (d_lp.mul_add(z.mul_add(z, -one), T::load(row)) - entropy_coef).store(row);
+                    (d_lp.mul_add(z.mul_add(z, -one), T::load(row)) - T::masked(on, entropy_coef)).store(row);
                 }
 
                 // values of all streams
@@ -156,6 +157,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
                         d = T::select(worse, T::masked(moved.abs().lt(range), held_error), error);
                         error = T::select(worse, held_error, error);
                     }
+                    (error, d) = (T::masked(on, error), T::masked(on, d));
                     value_sum[part] = (error * T::lit(0.5)).mul_add(error, value_sum[part]);
                     d.store(&mut d_value[at..]);
                 }
@@ -170,7 +172,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
             value: T::widen(sum16(&value_sum[..parts])),
             kl: T::widen(sum16(&kl_sum[..parts])),
             clipped: T::widen(sum16(&clipped_sum[..parts])),
-            samples: (samples.len() * BLOCK) as f64,
+            samples: samples.iter().map(|s| s.decided.count_ones() as f64).sum(),
             ..LossSums::default()
         }
     }

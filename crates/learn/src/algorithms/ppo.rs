@@ -160,6 +160,10 @@ impl PpoLearner {
     /// One step of Adam on the worker's replica, each network's gradient bounded by itself.
     fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
         let Self { settings, nets, adam, course: Course { lr, .. }, .. } = self;
+        // nobody has decided anything
+        if sums.samples == 0.0 {
+            return;
+        }
         let squares = workers.squares();
         if !squares.iter().all(|s| s.is_finite()) {
             self.course.skipped += 1;

@@ -27,7 +27,8 @@ pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
     for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms] {
         rows(row, agents);
     }
-    for mask in [&mut out.terminated, &mut out.truncated, &mut out.diverged] {
+    let BlockStep { terminated, truncated, diverged, decides, .. } = out;
+    for mask in [terminated, truncated, diverged].into_iter().chain(decides) {
         *mask = repeat(*mask, agents);
     }
 }

@@ -19,6 +19,14 @@ pub const SAMPLES: u64 = 1 << 61;
 /// Initial parameters of reward signals; two streams for each.
 pub const SIGNALS: u64 = PARAMETERS + 1;
 
+/// Seeds of roles but the first.
+const ROLES: u64 = 5 << 60;
+
+/// Seed of everything random about role number `i` of a run: that of the run for the first.
+pub fn seed_of_role(seed: u64, i: usize) -> u64 {
+    if i == 0 { seed } else { SplitMix::new(seed, ROLES | i as u64).word() }
+}
+
 /// SplitMix64: a stream of well-mixed words from any seed.
 #[derive(Clone, Debug)]
 pub struct SplitMix(u64);

@@ -13,11 +13,13 @@
 //! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
 
 mod block;
+mod cast;
 pub mod evaluation;
 mod file;
 mod onnx;
 
 pub use block::BlockPolicy;
+pub use cast::Cast;
 
 use crate::error::Error;
 use crate::nets::activation::Activation;

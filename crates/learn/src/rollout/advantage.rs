@@ -11,11 +11,17 @@ use std::marker::PhantomData;
 /// where an episode ends, the value targets `A + V`, and their sums. With several streams of rewards, each has its own
 /// values, and the advantages of all are added up.
 ///
+/// Agents that did not decide at an item go on with their last decision: what they earn there is added to what it earned,
+/// undiscounted, as in ML-Agents. What was earned before the first decision of a rollout is left out, since the last value of
+/// the rollout before has foreseen it.
+///
 /// `gamma` has the discount per decision of each stream, `lambda` is the decay of the estimator.
 pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
     let mut rows = rollout.rewards();
+    let intermittent = rows.decided.iter().any(|decided| *decided != !0);
     f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> {
         rows: &mut rows,
+        intermittent,
         gamma,
         lambda,
         lanes: PhantomData,
@@ -26,7 +32,11 @@ pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
         for item in (b..rows.done.len()).step_by(blocks) {
             let row = item * rows.streams * BLOCK..(item * rows.streams + 1) * BLOCK;
             let of_task = rows.target[row.clone()].iter().zip(&rows.value[row]);
-            for (advantage, (target, value)) in rows.advantage[item * BLOCK..(item + 1) * BLOCK].iter().zip(of_task) {
+            let advantages = &rows.advantage[item * BLOCK..(item + 1) * BLOCK];
+            for (i, (advantage, (target, value))) in advantages.iter().zip(of_task).enumerate() {
+                if rows.decided[item] >> i & 1 == 0 {
+                    continue;
+                }
                 let (advantage, target) = (*advantage as f64, *target as f64);
                 a += advantage;
                 aa += advantage * advantage;
@@ -46,6 +56,8 @@ pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
 
 struct Estimate<'a, 'b, T> {
     rows: &'a mut Rewards<'b>,
+    /// Whether agents do not decide every time.
+    intermittent: bool,
     gamma: &'a [f64],
     lambda: f64,
     lanes: PhantomData<T>,
@@ -56,7 +68,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
 
     #[inline(always)]
     fn run(self) {
-        let rows = self.rows;
+        let (rows, intermittent) = (self.rows, self.intermittent);
         let (blocks, streams) = (rows.sums.len(), rows.streams);
         for (b, stream) in (0..blocks).flat_map(|b| (0..streams).map(move |stream| (b, stream))) {
             let gamma = self.gamma[stream];
@@ -64,13 +76,27 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
             for lane in (0..BLOCK).step_by(T::LANES) {
                 let mut next = T::load(&rows.last_value[(b * streams + stream) * BLOCK + lane..]);
                 let mut advantage = T::zero();
+                // earned since the last decision
+                let mut earned = T::zero();
                 for item in (b..rows.done.len()).step_by(blocks).rev() {
                     let at = (item * streams + stream) * BLOCK + lane;
                     // bits above the lanes of this vector are ignored
                     let goes_on = T::not(T::from_bits(rows.done[item] as u32 >> lane));
                     let value = T::load(&rows.value[at..]);
-                    let delta = T::masked(goes_on, next).mul_add(gamma, T::load(&rows.reward[at..]) - value);
-                    advantage = T::masked(goes_on, advantage).mul_add(decay, delta);
+                    let mut reward = T::load(&rows.reward[at..]);
+                    let (then, later) = (T::masked(goes_on, next), T::masked(goes_on, advantage));
+                    if intermittent {
+                        reward += T::masked(goes_on, earned);
+                    }
+                    let delta = then.mul_add(gamma, reward - value);
+                    advantage = later.mul_add(decay, delta);
+                    next = value;
+                    if intermittent {
+                        let decided = T::from_bits(rows.decided[item] as u32 >> lane);
+                        advantage = T::select(decided, advantage, later);
+                        next = T::select(decided, value, then);
+                        earned = T::masked(T::not(decided), reward);
+                    }
                     let total = &mut rows.advantage[item * BLOCK + lane..];
                     if stream == 0 {
                         advantage.store(total)
@@ -78,7 +104,6 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
                         (T::load(total) + advantage).store(total)
                     }
                     (advantage + value).store(&mut rows.target[at..]);
-                    next = value;
                 }
             }
         }
@@ -124,6 +149,7 @@ mod tests {
         let value: Vec<f32> = (0..items * BLOCK).map(|i| noise(i + 5000)).collect();
         let last_value: Vec<f32> = (0..blocks * BLOCK).map(|i| noise(i + 9000)).collect();
         let done: Vec<u16> = (0..items).map(|i| if i % 7 == 3 { (i * 40503 % 65536) as u16 } else { 0 }).collect();
+        let decided = vec![!0; items];
         let mut before: Option<Vec<f32>> = None;
         for isa in [Isa::F32, Isa::X4, Isa::X8, Isa::X16].into_iter().filter(|isa| isa.supported()) {
             let (mut advantage, mut target) = (vec![0.0; items * BLOCK], vec![0.0; items * BLOCK]);
@@ -132,13 +158,14 @@ mod tests {
                 reward: &reward,
                 value: &value,
                 last_value: &last_value,
+                decided: &decided,
                 done: &done,
                 advantage: &mut advantage,
                 target: &mut target,
                 sums: &mut vec![BlockSums::default(); blocks],
             };
             f32_lanes!(isa, T => <T as Real>::enter(Estimate::<T> {
-                rows: &mut rows, gamma: &[gamma], lambda, lanes: PhantomData,
+                rows: &mut rows, intermittent: false, gamma: &[gamma], lambda, lanes: PhantomData,
             }));
             for (b, lane) in [(0, 0), (1, 5), (2, 15)] {
                 let pick =

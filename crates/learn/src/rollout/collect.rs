@@ -3,19 +3,18 @@
 //! A worker owns a run of consecutive blocks and goes through the whole rollout without waiting for anyone. Everything
 //! it adds up is kept per block, so that the totals, taken in the order of the blocks, do not depend on how blocks are
 //! spread over workers.
+//!
+//! Each role of the task has a [`Seat`], with a rollout of its own; most tasks have one.
 
-use super::advantage;
 use super::data::Rollout;
-use super::sums::BlockSums;
+use super::seat::{Seat, SeatPlan};
 use crate::lanes::BLOCK;
-use crate::lanes::buffer::{Aligned, Blocks};
 use crate::lanes::mirror;
-use crate::lanes::noise::Noise;
-use crate::nets::acting::{Acting, ActingSpace};
-use crate::nets::mlp::{CHUNK, Mlp, Tape};
-use crate::rewards::{Judge, Step, Stream};
+use crate::nets::acting::Acting;
+use crate::nets::mlp::{CHUNK, Mlp};
+use crate::rewards::Stream;
 use marathon_envs::{BlockStep, Shard, ShardFactory};
-use marathon_physics::lanes::{Isa, Real};
+use std::ops::DerefMut;
 
 /// What a horizon is played with; the same for all workers.
 pub struct Collecting<'a> {
@@ -47,52 +46,42 @@ pub struct Values<'a> {
 pub struct Collector {
     shard: Box<dyn Shard>,
     first_block: usize,
-    noise: Vec<Noise>,
-    /// Current raw observations, `[block][obs][16]`.
-    obs: Aligned<f32>,
-    /// Per agent, `[block][16]`: discounted return, and return, length and distance of the episode so far.
-    pub(crate) tallies: [Vec<[f32; BLOCK]>; 4],
-    /// Work space.
-    obs_sums: [Aligned<f32>; 2],
-    space: ActingSpace,
-    tape: Option<Tape<f32>>,
-    judges: Vec<Option<Box<dyn Judge>>>,
+    blocks: usize,
+    /// Agents of a block.
+    lanes: usize,
+    seats: Vec<Seat>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
+    /// Observation of a block, `[obs][16]`, where several roles see parts of it.
+    whole: Vec<f32>,
     out: BlockStep,
 }
 
 impl Collector {
-    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode; `lanes` of a block count. They
-    /// will play with networks like those.
+    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode, for all roles of the task.
     pub fn new(
         factory: &dyn ShardFactory,
         (first_block, blocks): (usize, usize),
         seed: u64,
-        lanes: usize,
-        with: &Collecting<'_>,
+        plans: Vec<SeatPlan<'_>>,
     ) -> Self {
-        let n = factory.spec().obs * BLOCK;
-        let mut shard = factory.shard(first_block, blocks, seed);
-        let mut obs = Aligned::new(blocks * n);
-        for b in 0..blocks {
-            shard.reset(b, !0, &mut obs[b * n..(b + 1) * n]);
-        }
-        mirror::rows(&mut obs, lanes);
-        let noise = |b| Noise::new(seed, first_block + b).mirrored(lanes);
-        Self {
-            shard,
+        let spec = factory.spec();
+        let lanes = plans[0].lanes;
+        let seat = |(number, plan)| Seat::new(number, plan, (first_block, blocks));
+        let mut collector = Self {
+            shard: factory.shard(first_block, blocks, seed),
             first_block,
-            noise: (0..blocks).map(noise).collect(),
-            obs,
-            tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
-            obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
-            space: with.acting.space(factory.spec().act),
-            tape: with.values.as_ref().map(|values| values.net.inference_tape()),
-            judges: with.streams.iter().map(|s| s.networks.as_ref().map(|nets| nets.reward.judge())).collect(),
-            action: vec![0.0; blocks * factory.spec().act * BLOCK],
+            blocks,
+            lanes,
+            seats: plans.into_iter().enumerate().map(seat).collect(),
+            action: vec![0.0; blocks * spec.act * BLOCK],
+            whole: vec![0.0; spec.obs * BLOCK],
             out: BlockStep::default(),
+        };
+        for b in 0..blocks {
+            collector.reset(b, !0);
         }
+        collector
     }
 
     /// First block of the whole environment that this worker owns.
@@ -101,7 +90,7 @@ impl Collector {
     }
     /// Number of blocks.
     pub fn blocks(&self) -> usize {
-        self.noise.len()
+        self.blocks
     }
     /// The environments.
     pub fn shard(&self) -> &dyn Shard {
@@ -111,238 +100,125 @@ impl Collector {
     pub fn shard_mut(&mut self) -> &mut dyn Shard {
         &mut *self.shard
     }
-    /// Current observations of a block, `[obs][16]`.
-    pub fn obs(&self, block: usize) -> &[f32] {
-        let n = self.obs.len() / self.noise.len();
-        &self.obs[block * n..(block + 1) * n]
+    /// The roles' seats.
+    pub fn seats(&self) -> &[Seat] {
+        &self.seats
     }
-    /// Current observations of a block, `[obs][16]`.
-    pub fn obs_mut(&mut self, block: usize) -> &mut [f32] {
-        let n = self.obs.len() / self.noise.len();
-        &mut self.obs[block * n..(block + 1) * n]
+    /// The roles' seats.
+    pub fn seats_mut(&mut self) -> &mut [Seat] {
+        &mut self.seats
     }
-    /// Random streams, one per block.
-    pub fn noise(&self) -> &[Noise] {
-        &self.noise
+    /// The actions that a block is carrying out, in the environment's units, `[act][16]`.
+    pub fn action(&self, block: usize) -> &[f32] {
+        let row = self.action.len() / self.blocks;
+        &self.action[block * row..(block + 1) * row]
     }
-    /// Random streams, one per block.
-    pub fn noise_mut(&mut self) -> &mut [Noise] {
-        &mut self.noise
+    /// The actions that a block is carrying out.
+    pub fn action_mut(&mut self, block: usize) -> &mut [f32] {
+        let row = self.action.len() / self.blocks;
+        &mut self.action[block * row..(block + 1) * row]
     }
 
-    /// Plays one horizon and fills `rollout`, advantages included. Returns the seconds spent in the environments, by the
-    /// clock `now`.
-    pub fn collect(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, now: fn() -> f64) -> f64 {
-        let blocks = self.blocks();
-        let terms = self.shard.spec().reward_terms.len();
-        let rewards = vec![0.0; with.streams.len() - 1];
-        rollout.sums = vec![BlockSums { terms: vec![0.0; terms], rewards, ..Default::default() }; blocks];
-        rollout.cut.clear();
-        rollout.cut_obs.clear();
-        self.obs_sums.iter_mut().for_each(|s| s.fill(0.0));
+    /// Plays one horizon and fills the rollouts of all roles, advantages included. Returns the seconds spent in the
+    /// environments, by the clock `now`.
+    pub fn collect<R: DerefMut<Target = Rollout>>(
+        &mut self,
+        with: &[Collecting<'_>],
+        rollouts: &mut [R],
+        now: fn() -> f64,
+    ) -> f64 {
+        let blocks = self.blocks;
+        for ((seat, with), rollout) in self.seats.iter_mut().zip(with).zip(rollouts.iter_mut()) {
+            seat.begin(with, rollout);
+        }
         let mut env_seconds = 0.0;
-        for t in 0..rollout.items() / blocks {
-            for first in (0..blocks).step_by(CHUNK) {
-                self.act(with, rollout, t * blocks, first, CHUNK.min(blocks - first));
+        for t in 0..rollouts[0].items() / blocks {
+            for ((seat, with), rollout) in self.seats.iter_mut().zip(with).zip(rollouts.iter_mut()) {
+                for first in (0..blocks).step_by(CHUNK) {
+                    seat.act(with, rollout, t * blocks, first, CHUNK.min(blocks - first));
+                }
             }
             let start = now();
-            let row = blocks * rollout.act_len * BLOCK;
-            self.announce(&rollout.action[t * row..(t + 1) * row], with.acting.action_scale);
+            self.announce(with, rollouts, t);
             for b in 0..blocks {
-                self.step(with, rollout, t * blocks + b, b);
+                self.step(with, rollouts, t * blocks + b, b);
             }
             env_seconds += now() - start;
         }
-        self.add_up_observations(rollout);
-        let Some(values) = &with.values else { return env_seconds };
-        self.judge(with, rollout);
-        self.evaluate(with, values, rollout);
-        let gamma: Vec<f64> = with.streams.iter().map(|stream| stream.gamma).collect();
-        advantage::estimate(with.acting.isa, &gamma, values.lambda, rollout);
-        // exact, since the number of agents is a power of two
-        let part = rollout.lanes as f64 / BLOCK as f64;
-        rollout.sums.iter_mut().for_each(|sums| sums.scale(part));
+        for ((seat, with), rollout) in self.seats.iter_mut().zip(with).zip(rollouts) {
+            seat.end(with, rollout);
+        }
         env_seconds
     }
 
-    /// Normalizes the observations of `n` blocks, and draws and stores their actions.
-    fn act(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
-        let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
-        let log_prob_row = rollout.log_prob.len() / rollout.items();
-        let of = |row: usize| first * row..(first + n) * row;
-        let at = |row: usize| (item + first) * row..(item + first + n) * row;
-        let [sum, square] = &mut self.obs_sums;
-        let (raw, kept) = (&self.obs[of(obs_row)], &mut rollout.obs[at(obs_row)]);
-        let copy = match with.values {
-            Some(_) => Some(kept),
-            None => {
-                kept.copy_from_slice(raw);
-                None
-            }
-        };
-        let sums = (&mut sum[of(obs_row)], &mut square[of(obs_row)]);
-        with.acting.normalize(raw, &mut self.space.input, copy, Some(sums));
-        let action = &mut rollout.action[at(act_row)];
-        let log_prob = &mut rollout.log_prob[at(log_prob_row)];
-        with.acting.draw(&mut self.noise[first..first + n], &mut self.space, action, log_prob);
-    }
-
     /// Tells the environments the actions of all blocks, in their own units.
-    fn announce(&mut self, drawn: &[f32], scale: f32) {
-        let spec = self.shard.spec();
-        for (i, (action, drawn)) in self.action.iter_mut().zip(drawn).enumerate() {
-            *action = spec.action_of(i / BLOCK % spec.act, *drawn * scale);
+    fn announce<R: DerefMut<Target = Rollout>>(&mut self, with: &[Collecting<'_>], rollouts: &[R], t: usize) {
+        let Self { shard, seats, action, blocks, .. } = self;
+        let spec = shard.spec();
+        for ((seat, with), rollout) in seats.iter().zip(with).zip(rollouts) {
+            let (act, scale) = (&seat.role.act, with.acting.action_scale);
+            let row = act.len() * BLOCK;
+            let drawn = &rollout.action[t * *blocks * row..(t + 1) * *blocks * row];
+            for ((action, drawn), decides) in
+                action.chunks_exact_mut(spec.act * BLOCK).zip(drawn.chunks_exact(row)).zip(&seat.decides)
+            {
+                let own = &mut action[act.start * BLOCK..act.end * BLOCK];
+                for (i, (own, drawn)) in own.iter_mut().zip(drawn).enumerate() {
+                    // the others go on with their last action
+                    if *decides == !0 || decides >> (i % BLOCK) & 1 == 1 {
+                        *own = spec.action_of(act.start + i / BLOCK, drawn * scale);
+                    }
+                }
+            }
         }
-        self.shard.announce(&self.action);
+        shard.announce(action);
     }
 
     /// One decision of one block, with all bookkeeping.
-    fn step(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, b: usize) {
-        let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
-        let out = &mut self.out;
-        let obs = &mut self.obs[b * obs_row..(b + 1) * obs_row];
-        self.shard.step(b, &self.action[b * act_row..(b + 1) * act_row], obs, out);
-        let ended = out.terminated | out.truncated | out.diverged;
-        if rollout.lanes < BLOCK {
-            mirror::step(out, obs, rollout.lanes);
-        }
-
-        // running sums of the agents
-        let sums = &mut rollout.sums[b];
-        let [discounted, returns, lengths, distances] = &mut self.tallies;
-        let (discounted, returns) = (&mut discounted[b], &mut returns[b]);
-        let (lengths, distances) = (&mut lengths[b], &mut distances[b]);
-        let (gamma, center) = (with.streams[0].gamma as f32, with.return_center);
-        let scale = with.reward_scale as f32;
-        let reward = &mut rollout.reward[item * rollout.streams * BLOCK..][..BLOCK];
-        let (mut first, mut second) = (0.0, 0.0);
-        for i in 0..BLOCK {
-            discounted[i] = discounted[i] * gamma + out.reward[i];
-            returns[i] += out.reward[i];
-            lengths[i] += 1.0;
-            distances[i] += out.forward[i];
-            reward[i] = out.reward[i] * scale;
-            let d = (discounted[i] - center) as f64;
-            first += d;
-            second += d * d;
-        }
-        sums.discounted.0 += first;
-        sums.discounted.1 += second;
-        for (sum, term) in sums.terms.iter_mut().zip(out.terms.chunks_exact(BLOCK)) {
-            *sum += term.iter().map(|x| *x as f64).sum::<f64>();
-        }
-
-        if !rollout.next_obs.is_empty() {
-            let next = &mut rollout.next_obs[item * obs_row..(item + 1) * obs_row];
-            match with.values {
-                Some(_) => with.acting.normalize(obs, &mut self.space.input, Some(next), None),
-                None => next.copy_from_slice(obs),
-            }
-        }
-
-        // ended episodes
-        let done = out.terminated | out.truncated | out.diverged;
-        (rollout.done[item], rollout.failed[item]) = (done, out.terminated | out.diverged);
-        if done | ended == 0 {
-            return;
-        }
-        let cut = out.truncated & !(out.terminated | out.diverged);
-        let goes_on = with.streams.iter().any(|stream| stream.ignores_done);
-        let whole = if goes_on { done & !out.diverged } else { cut };
-        if whole != 0 {
-            rollout.cut.push((item, [cut, whole]));
-            rollout.cut_obs.extend_from_slice(obs);
-        }
-        for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
-            sums.episodes += 1.0;
-            sums.returns += returns[i] as f64;
-            sums.lengths += lengths[i] as f64;
-            sums.speeds += distances[i] as f64 / lengths[i] as f64;
-            sums.falls += (out.terminated >> i & 1) as f64;
-            sums.diverged += (out.diverged >> i & 1) as f64;
-            (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
-        }
+    fn step<R: DerefMut<Target = Rollout>>(
+        &mut self,
+        with: &[Collecting<'_>],
+        rollouts: &mut [R],
+        item: usize,
+        b: usize,
+    ) {
+        let Self { shard, seats, action, whole, out, lanes, .. } = self;
+        let row = shard.spec().act * BLOCK;
+        let obs = observation(seats, b, whole);
+        shard.step(b, &action[b * row..(b + 1) * row], obs, out);
         // lanes without an agent live on too
-        self.shard.reset(b, done | ended, obs);
-        mirror::rows(obs, rollout.lanes);
-    }
-
-    /// Sums of the observations per block.
-    fn add_up_observations(&self, rollout: &mut Rollout) {
-        let [sum, square] = &self.obs_sums;
-        let total = |row: &[f32]| row.iter().map(|x| *x as f64).sum::<f64>();
-        let rows = sum.chunks_exact(BLOCK).zip(square.chunks_exact(BLOCK));
-        let all: Vec<(f64, f64)> = rows.map(|(s, q)| (total(s), total(q))).collect();
-        for (b, sums) in rollout.sums.iter_mut().enumerate() {
-            sums.observations = all[b * rollout.obs_len..(b + 1) * rollout.obs_len].to_vec();
+        let ended = out.terminated | out.truncated | out.diverged;
+        if *lanes < BLOCK {
+            mirror::step(out, obs, *lanes);
+        }
+        if let [_, _, ..] = &seats[..] {
+            seats.iter_mut().for_each(|seat| seat.see(b, whole));
+        }
+        for ((seat, with), rollout) in seats.iter_mut().zip(with).zip(rollouts) {
+            seat.take(with, rollout, item, b, out);
+        }
+        let ended = ended | out.terminated | out.truncated | out.diverged;
+        if ended != 0 {
+            self.reset(b, ended);
         }
     }
 
-    /// Rewards that networks give.
-    fn judge(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
-        let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
-        let mut rows = vec![0.0; CHUNK * BLOCK];
-        for (s, (stream, judge)) in with.streams.iter().zip(&mut self.judges).enumerate() {
-            let (Some(networks), Some(judge)) = (&stream.networks, judge) else { continue };
-            let params = &with.params[networks.place.clone()];
-            let (strength, most) = (stream.strength as f32, (networks.reward.bound() / stream.strength) as f32);
-            for first in (0..items).step_by(CHUNK) {
-                let n = CHUNK.min(items - first);
-                let steps: Vec<Step<'_, f32>> = (first..first + n).map(|item| rollout.step(item)).collect();
-                judge.reward(with.acting.isa, params, &steps, &mut rows);
-                for (item, row) in (first..first + n).zip(rows.chunks_exact(BLOCK)) {
-                    let out = &mut rollout.reward[(item * streams + s) * BLOCK..][..BLOCK];
-                    for (out, x) in out.iter_mut().zip(row) {
-                        *out = strength * Real::min(*x, most);
-                    }
-                    rollout.sums[item % blocks].rewards[s - 1] += out.iter().map(|x| *x as f64).sum::<f64>();
-                }
-            }
-        }
-    }
-
-    /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
-    /// episodes, and in the streams that go on beyond an episode's end to those of all.
-    fn evaluate(&mut self, with: &Collecting<'_>, values: &Values<'_>, rollout: &mut Rollout) {
-        let Self { space: ActingSpace { input, .. }, tape: Some(tape), .. } = self else { return };
-        let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, streams, .. } = rollout;
-        let (row, streams) = (*obs_len * BLOCK, *streams);
-        let isa = with.acting.isa;
-        // values of normalized observations
-        for (obs, value) in obs.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
-            for (b, obs) in obs.chunks_exact(row).enumerate() {
-                input.block_mut(b).copy_from_slice(obs);
-            }
-            values.of(isa, input, tape, value);
-        }
-        // values of raw ones
-        let mut cut_value = vec![0.0; cut.len() * streams * BLOCK];
-        for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
-            for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {
-                with.acting.normalize(raw, input, None, None);
-                values.of(isa, input, tape, value);
-            }
-        }
-        for ((item, [truncated, whole]), values) in cut.iter().zip(cut_value.chunks_exact(streams * BLOCK)) {
-            let rewards = reward[item * streams * BLOCK..].chunks_exact_mut(BLOCK);
-            for ((stream, reward), value) in with.streams.iter().zip(rewards).zip(values.chunks_exact(BLOCK)) {
-                let (gamma, agents) = (stream.gamma as f32, if stream.ignores_done { whole } else { truncated });
-                for i in (0..BLOCK).filter(|i| agents >> i & 1 == 1) {
-                    reward[i] += gamma * value[i];
-                }
-            }
+    /// Starts new episodes of agents of a block.
+    fn reset(&mut self, b: usize, mask: u16) {
+        let Self { shard, seats, whole, lanes, .. } = self;
+        let obs = observation(seats, b, whole);
+        shard.reset(b, mask, obs);
+        mirror::rows(obs, *lanes);
+        if let [_, _, ..] = &seats[..] {
+            seats.iter_mut().for_each(|seat| seat.see(b, whole));
         }
     }
 }
 
-impl Values<'_> {
-    /// Values of the first blocks of `input`, as many as `out` has rows for.
-    fn of(&self, isa: Isa, input: &Blocks<f32>, tape: &mut Tape<f32>, out: &mut [f32]) {
-        let sizes = self.net.sizes();
-        let row = sizes[sizes.len() - 1] * BLOCK;
-        self.net.forward(isa, self.params, input, tape, out.len() / row);
-        for (b, out) in out.chunks_exact_mut(row).enumerate() {
-            out.copy_from_slice(tape.output().block(b));
-        }
+/// Where the environments write the observations of a block: to the one who sees them all, or to a place for the whole.
+fn observation<'a>(seats: &'a mut [Seat], b: usize, whole: &'a mut [f32]) -> &'a mut [f32] {
+    match seats {
+        [seat] => seat.obs_mut(b),
+        _ => whole,
     }
 }

@@ -33,6 +33,8 @@ impl Shape {
 /// What the rollout knows about a block of samples; rows of sixteen.
 #[derive(Clone, Copy)]
 pub struct Samples<'a, S> {
+    /// Agents who decided, a bit each; the others' rows mean nothing.
+    pub decided: u16,
     /// Actions taken, `[action][16]`.
     pub action: &'a [S],
     /// Their log-probabilities then (see [`Gaussian`](crate::nets::gaussian::Gaussian) for the constant): of all actions, or with a ratio for each of each.
@@ -68,6 +70,8 @@ pub struct Rollout {
     pub(super) streams: usize,
     /// Agents in a block, which the other lanes mirror.
     pub lanes: usize,
+    /// Agents who decided at the item; what the others earn counts for their last decision.
+    pub(super) decided: Vec<u16>,
     /// Agents whose episode ended with the item, and whose episode failed.
     pub(super) done: Vec<u16>,
     pub(super) failed: Vec<u16>,
@@ -102,6 +106,7 @@ impl Rollout {
             target: stream_rows(),
             streams,
             lanes: shape.lanes,
+            decided: vec![!0; items],
             done: vec![0; items],
             failed: vec![0; items],
             cut: Vec::new(),
@@ -165,6 +170,7 @@ impl Rollout {
         let log_prob = self.log_prob.len() / self.items();
         let rows = item * self.streams * BLOCK..(item + 1) * self.streams * BLOCK;
         Samples {
+            decided: self.decided[item],
             action: &self.action[item * self.act_len * BLOCK..][..self.act_len * BLOCK],
             log_prob: &self.log_prob[item * log_prob..(item + 1) * log_prob],
             advantage: &self.advantage[row],
@@ -196,6 +202,7 @@ pub(super) struct Rewards<'a> {
     pub reward: &'a [f32],
     pub value: &'a [f32],
     pub last_value: &'a [f32],
+    pub decided: &'a [u16],
     pub done: &'a [u16],
     pub advantage: &'a mut [f32],
     pub target: &'a mut [f32],
@@ -210,6 +217,7 @@ impl Rollout {
             reward: &self.reward,
             value: &self.value,
             last_value: &self.last_value,
+            decided: &self.decided,
             done: &self.done,
             advantage: &mut self.advantage,
             target: &mut self.target,

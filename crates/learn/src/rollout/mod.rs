@@ -4,6 +4,7 @@ pub(crate) mod advantage;
 pub mod collect;
 pub mod data;
 pub(crate) mod replay;
+pub mod seat;
 pub(crate) mod states;
 pub mod statistics;
 pub mod sums;

@@ -9,45 +9,89 @@ use std::ops::{Deref, Range};
 /// States of the agents of consecutive blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AgentStates {
+    /// What each role has of them.
+    pub seats: Vec<SeatStates>,
+    /// The actions that they are carrying out, in the environment's units, `[block][act][16]`; nothing where one role decides
+    /// about them all, every time.
+    pub action: Vec<f32>,
+    /// What the environments saved, block after block, and where each block's part ends.
+    pub env: Vec<u8>,
+    pub env_ends: Vec<u64>,
+}
+
+/// What a role has of the agents.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SeatStates {
     /// Words of the random streams, `[block][64]`.
     pub noise: Vec<u32>,
     /// Raw observations, `[block][obs][16]`.
     pub obs: Vec<f32>,
     /// Running sums of the agents, `[tally][block][16]`.
     pub tallies: Vec<f32>,
-    /// What the environments saved, block after block, and where each block's part ends.
-    pub env: Vec<u8>,
-    pub env_ends: Vec<u64>,
+    /// Agents whose next action it chooses, a bit each, per block; nothing where it chooses all.
+    pub decides: Vec<u32>,
+}
+
+/// How long the lists of some agents' states are.
+#[derive(Clone, Copy)]
+pub struct StatesShape<'a> {
+    /// Blocks.
+    pub blocks: usize,
+    /// Length of the observation of each role.
+    pub obs: &'a [usize],
+    /// Length of the action.
+    pub act: usize,
 }
 
 impl AgentStates {
     /// Of those blocks in a range that collectors have; the collectors come in the order of their blocks.
     pub fn of<A: Deref<Target = Collector>>(collectors: impl IntoIterator<Item = A>, blocks: Range<usize>) -> Self {
         let mut states = Self::default();
-        let mut tallies = [(); 4].map(|()| Vec::new());
+        let mut tallies: Vec<[Vec<f32>; 4]> = Vec::new();
         for collector in collectors {
+            let several = collector.seats().len() > 1;
+            states.seats.resize_with(collector.seats().len(), SeatStates::default);
+            tallies.resize_with(collector.seats().len(), Default::default);
             for b in (0..collector.blocks()).filter(|b| blocks.contains(&(collector.first_block() + b))) {
-                states.noise.extend(collector.noise()[b].words());
-                states.obs.extend_from_slice(collector.obs(b));
-                for (all, tally) in tallies.iter_mut().zip(&collector.tallies) {
-                    all.extend_from_slice(&tally[b]);
+                for ((seat, states), tallies) in collector.seats().iter().zip(&mut states.seats).zip(&mut tallies) {
+                    states.noise.extend(seat.noise[b].words());
+                    states.obs.extend_from_slice(seat.obs(b));
+                    for (all, tally) in tallies.iter_mut().zip(&seat.tallies) {
+                        all.extend_from_slice(&tally[b]);
+                    }
+                    states.decides.extend(several.then_some(seat.decides[b] as u32));
+                }
+                if several {
+                    states.action.extend_from_slice(collector.action(b));
                 }
                 collector.shard().save(b, &mut states.env);
                 states.env_ends.push(states.env.len() as u64);
             }
         }
-        states.tallies = tallies.concat();
+        for (seat, tallies) in states.seats.iter_mut().zip(tallies) {
+            seat.tallies = tallies.concat();
+        }
         states
     }
 
-    /// Refuses states that are not of a number of blocks with observations of a length; `what` has them.
-    pub fn check(&self, what: &str, blocks: usize, obs: usize) -> Result<(), Error> {
-        let lengths = [
-            ("noise", self.noise.len(), blocks * Noise::WORDS),
-            ("obs", self.obs.len(), blocks * obs * BLOCK),
-            ("tallies", self.tallies.len(), 4 * blocks * BLOCK),
+    /// Refuses states that do not have a shape; `what` has them.
+    pub fn check(&self, what: &str, shape: StatesShape<'_>) -> Result<(), Error> {
+        let StatesShape { blocks, obs, act } = shape;
+        let several = obs.len() > 1;
+        let held = |n: usize| if several { blocks * n } else { 0 };
+        let mut lengths = vec![
+            ("roles", self.seats.len(), obs.len()),
+            ("action", self.action.len(), held(act * BLOCK)),
             ("env_ends", self.env_ends.len(), blocks),
         ];
+        for (seat, obs) in self.seats.iter().zip(obs) {
+            lengths.extend([
+                ("noise", seat.noise.len(), blocks * Noise::WORDS),
+                ("obs", seat.obs.len(), blocks * obs * BLOCK),
+                ("tallies", seat.tallies.len(), 4 * blocks * BLOCK),
+                ("decides", seat.decides.len(), held(1)),
+            ]);
+        }
         match lengths.into_iter().find(|(_, found, expected)| found != expected) {
             None => Ok(()),
             Some((name, found, expected)) => Err(Error::Mismatch {
@@ -68,12 +112,21 @@ impl AgentStates {
                 continue;
             }
             let i = block - blocks.start;
-            let words = self.noise[i * Noise::WORDS..].first_chunk().expect("the length was checked");
-            collector.noise_mut()[b] = Noise::from_words(words);
-            let row = collector.obs(b).len();
-            collector.obs_mut(b).copy_from_slice(&self.obs[i * row..(i + 1) * row]);
-            for (k, all) in collector.tallies.iter_mut().enumerate() {
-                all[b].copy_from_slice(&self.tallies[k * tally + i * BLOCK..][..BLOCK]);
+            for (seat, states) in collector.seats_mut().iter_mut().zip(&self.seats) {
+                let words = states.noise[i * Noise::WORDS..].first_chunk().expect("the length was checked");
+                seat.noise[b] = Noise::from_words(words);
+                let row = seat.obs(b).len();
+                seat.obs_mut(b).copy_from_slice(&states.obs[i * row..(i + 1) * row]);
+                for (k, all) in seat.tallies.iter_mut().enumerate() {
+                    all[b].copy_from_slice(&states.tallies[k * tally + i * BLOCK..][..BLOCK]);
+                }
+                if let Some(decides) = states.decides.get(i) {
+                    seat.decides[b] = *decides as u16;
+                }
+            }
+            if !self.action.is_empty() {
+                let row = collector.action(b).len();
+                collector.action_mut(b).copy_from_slice(&self.action[i * row..(i + 1) * row]);
             }
             let start = if i == 0 { 0 } else { self.env_ends[i - 1] };
             let bytes = self.env.get(start as usize..self.env_ends[i] as usize);

@@ -18,6 +18,8 @@ pub struct BlockSums {
     pub falls: f64,
     /// Agents whose state stopped being finite.
     pub diverged: f64,
+    /// Decisions made.
+    pub decisions: f64,
     /// Sum of each reward term over the rollout.
     pub terms: Vec<f64>,
     /// Discounted returns: deviations from the center and their squares.
@@ -47,6 +49,7 @@ impl BlockSums {
         self.speeds += other.speeds;
         self.falls += other.falls;
         self.diverged += other.diverged;
+        self.decisions += other.decisions;
         self.terms.resize(other.terms.len(), 0.0);
         self.terms.iter_mut().zip(&other.terms).for_each(|(a, b)| *a += b);
         self.observations.resize(other.observations.len(), (0.0, 0.0));
@@ -61,9 +64,9 @@ impl BlockSums {
 
     /// Multiplies all by a factor.
     pub fn scale(&mut self, factor: f64) {
-        let Self { episodes, returns, lengths, speeds, falls, diverged, terms, .. } = self;
+        let Self { episodes, returns, lengths, speeds, falls, diverged, decisions, terms, .. } = self;
         let Self { discounted, observations, advantages, targets, errors, rewards, .. } = self;
-        let scalars = [episodes, returns, lengths, speeds, falls, diverged].into_iter();
+        let scalars = [episodes, returns, lengths, speeds, falls, diverged, decisions].into_iter();
         let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
         let all = scalars.chain(terms).chain(rewards).chain(pairs.flat_map(|(a, b)| [a, b]));
         all.for_each(|x| *x *= factor);
@@ -103,7 +106,8 @@ impl Totals {
         1.0 - self.moments(self.sums.errors).1 / self.moments(self.sums.targets).1.max(1e-12)
     }
     fn moments(&self, (sum, square): (f64, f64)) -> (f64, f64) {
-        let mean = sum / self.samples;
-        (mean, (square / self.samples - mean * mean).max(0.0))
+        let decisions = self.sums.decisions.max(1.0);
+        let mean = sum / decisions;
+        (mean, (square / decisions - mean * mean).max(0.0))
     }
 }

@@ -5,13 +5,14 @@
 //! or the new checkpoint, never half of one. Both have checksums.
 
 use super::config::{MAX_STEPS, TrainConfig};
+use super::roles::RoleReplica;
 use super::{Clocks, Trainer, states};
 use crate::algorithms::{Numbers, Saved};
 use crate::error::Error;
 use crate::files::{self, Dtype, TensorReader, TensorWriter, read_versions, write_atomic, write_description};
 use crate::nets::normalize::Moments;
 use crate::rewards::RewardConfig;
-use crate::rollout::states::AgentStates;
+use crate::rollout::states::{AgentStates, StatesShape};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -21,18 +22,24 @@ const FORMAT: &str = "marathon-checkpoint";
 /// Since version 2, each algorithm keeps its own state by its own names.
 const VERSION: u32 = 2;
 const DESCRIPTION: &str = "checkpoint.json";
-/// Lists beside those of the learner and of the agents.
+/// Lists of a role beside those of its learner.
 const OBSERVATIONS: [&str; 2] = ["obs_mean", "obs_var"];
 
 /// Everything a run needs to go on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     about: About,
-    /// Lists of the learner.
-    lists: Vec<(String, Numbers)>,
+    roles: Vec<RoleLists>,
+    agents: AgentStates,
+}
+
+/// Lists of a role.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct RoleLists {
+    /// Of the learner.
+    learner: Vec<(String, Numbers)>,
     obs_mean: Vec<f64>,
     obs_var: Vec<f64>,
-    agents: AgentStates,
 }
 
 /// The description.
@@ -46,34 +53,52 @@ struct About {
     config: TrainConfig,
     iteration: u64,
     steps: u64,
+    /// Of the first role.
+    #[serde(flatten)]
+    first: AboutRole,
+    /// Of the others, with their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    others: Vec<(String, AboutRole)>,
+    wall_seconds: f64,
+    cpu_seconds: f64,
+    state: StateFile,
+}
+
+/// What the description says of a role.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct AboutRole {
     /// Single numbers of the learner.
     learner: BTreeMap<String, f64>,
     observation_count: f64,
     return_count: f64,
     return_mean: f64,
     return_var: f64,
-    wall_seconds: f64,
-    cpu_seconds: f64,
-    state: StateFile,
+}
+
+impl AboutRole {
+    /// Its numbers that are not below 0, by their keys.
+    fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
+        let others = [
+            ("observation_count", self.observation_count),
+            ("return_count", self.return_count),
+            ("return_var", self.return_var),
+        ];
+        self.learner.iter().map(|(key, x)| (key.as_str(), *x)).chain(others)
+    }
 }
 
 impl About {
     /// Refuses values that no run has: files of earlier versions have no checksum.
     fn check(&self, path: &Path) -> Result<(), Error> {
         self.config.validate_in(path, "config")?;
-        let others = [
-            ("observation_count", self.observation_count),
-            ("return_count", self.return_count),
-            ("return_var", self.return_var),
-            ("wall_seconds", self.wall_seconds),
-            ("cpu_seconds", self.cpu_seconds),
-        ];
-        let learner = self.learner.iter().map(|(key, x)| (key.as_str(), *x));
-        let mut numbers = learner.clone().chain(others);
+        let roles = || [&self.first].into_iter().chain(self.others.iter().map(|(_, role)| role));
+        let clocks = [("wall_seconds", self.wall_seconds), ("cpu_seconds", self.cpu_seconds)];
+        let mut numbers = roles().flat_map(AboutRole::numbers).chain(clocks);
         if let Some((key, x)) = numbers.find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
             return Err(Error::file(path, key, x, "a number not below 0"));
         }
-        if let Some((key, x)) = learner.clone().find(|(key, x)| key.starts_with("adam_power") && *x > 1.0) {
+        let is_power = |(key, x): &(&str, f64)| key.starts_with("adam_power") && *x > 1.0;
+        if let Some((key, x)) = roles().flat_map(AboutRole::numbers).find(is_power) {
             return Err(Error::file(path, key, x, "a number between 0 and 1"));
         }
         // rollouts may have had another horizon before
@@ -144,8 +169,21 @@ fn renamed<'n>(name: &'n str, algorithm: &str) -> Option<&'n str> {
 impl Checkpoint {
     pub(super) fn of(trainer: &Trainer) -> Self {
         let Trainer { shared, replica, clocks, .. } = trainer;
-        let (progress, statistics) = (&replica.progress, &replica.statistics);
-        let Saved { scalars, lists } = replica.learner.save();
+        let (mut roles, mut about_roles) = (Vec::new(), Vec::new());
+        for (role, RoleReplica { learner, statistics }) in shared.roles.iter().zip(&replica.roles) {
+            let Saved { scalars, lists } = learner.save();
+            let about = AboutRole {
+                learner: scalars.into_iter().collect(),
+                observation_count: statistics.observations.count,
+                return_count: statistics.returns.count,
+                return_mean: statistics.returns.mean[0],
+                return_var: statistics.returns.var[0],
+            };
+            about_roles.push((role.role.name.clone(), about));
+            let (obs_mean, obs_var) = (statistics.observations.mean.clone(), statistics.observations.var.clone());
+            roles.push(RoleLists { learner: lists, obs_mean, obs_var });
+        }
+        let (_, first) = about_roles.remove(0);
         let about = About {
             format: FORMAT.into(),
             version: VERSION,
@@ -153,25 +191,22 @@ impl Checkpoint {
             obs: shared.spec.obs,
             act: shared.spec.act,
             config: shared.config.clone(),
-            iteration: progress.iteration,
-            steps: progress.steps,
-            learner: scalars.into_iter().collect(),
-            observation_count: statistics.observations.count,
-            return_count: statistics.returns.count,
-            return_mean: statistics.returns.mean[0],
-            return_var: statistics.returns.var[0],
+            iteration: replica.progress.iteration,
+            steps: replica.progress.steps,
+            first,
+            others: about_roles,
             wall_seconds: clocks.wall,
             cpu_seconds: clocks.cpu,
             state: StateFile::default(),
         };
-        let collectors = shared.crew.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
-        Self {
-            about,
-            lists,
-            obs_mean: statistics.observations.mean.clone(),
-            obs_var: statistics.observations.var.clone(),
-            agents: AgentStates::of(collectors, 0..shared.config.run.blocks()),
-        }
+        let collectors = shared.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
+        Self { about, roles, agents: AgentStates::of(collectors, 0..shared.config.run.blocks()) }
+    }
+
+    /// What comes before the names of each role's lists.
+    fn prefixes(about: &About) -> Vec<String> {
+        let others = about.others.iter().enumerate().map(|(i, (name, _))| states::prefix(i + 1, name));
+        [states::prefix(0, "")].into_iter().chain(others).collect()
     }
 
     /// Name of the agent and its task.
@@ -198,19 +233,30 @@ impl Checkpoint {
     /// Puts a fresh run into the state of the checkpoint.
     pub(super) fn restore(self, trainer: &mut Trainer) -> Result<(), Error> {
         let (about, old, new, spec) = (&self.about, &self.about.config, &trainer.shared.config, &trainer.shared.spec);
-        let (before, after) = (&old.network, &new.network);
-        let pairs = [
+        let names = |roles: &mut dyn Iterator<Item = &String>| roles.map(String::as_str).collect::<Vec<_>>().join(", ");
+        let mut pairs = vec![
             ("agent", about.agent.clone(), spec.id.clone()),
             ("observation length", about.obs.to_string(), spec.obs.to_string()),
             ("action length", about.act.to_string(), spec.act.to_string()),
-            ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
+            (
+                "roles but the first",
+                names(&mut about.others.iter().map(|(name, _)| name)),
+                names(&mut spec.roles.iter().skip(1).map(|role| &role.name)),
+            ),
             ("agents", old.run.agents.to_string(), new.run.agents.to_string()),
             ("seed", old.run.seed.to_string(), new.run.seed.to_string()),
-            ("actor_hidden", format!("{:?}", before.actor_hidden), format!("{:?}", after.actor_hidden)),
-            ("critic_hidden", format!("{:?}", before.critic_hidden), format!("{:?}", after.critic_hidden)),
-            ("rewards", rewards(old), rewards(new)),
-            ("activation", before.activation.name().into(), after.activation.name().into()),
         ];
+        for role in &trainer.shared.roles {
+            let (old, new) = (old.of_role(&role.role.name), &role.config);
+            let (before, after) = (&old.network, &new.network);
+            pairs.extend([
+                ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
+                ("actor_hidden", format!("{:?}", before.actor_hidden), format!("{:?}", after.actor_hidden)),
+                ("critic_hidden", format!("{:?}", before.critic_hidden), format!("{:?}", after.critic_hidden)),
+                ("rewards", rewards(&old), rewards(new)),
+                ("activation", before.activation.name().into(), after.activation.name().into()),
+            ]);
+        }
         let mismatch = |what: &str, found: String, expected: String| {
             Err(Error::Mismatch { what: format!("checkpoint: {what}"), found, expected })
         };
@@ -219,23 +265,29 @@ impl Checkpoint {
                 return mismatch(what, found, expected);
             }
         }
-        for (what, found) in OBSERVATIONS.into_iter().zip([self.obs_mean.len(), self.obs_var.len()]) {
-            if found != spec.obs {
-                return mismatch(what, format!("{found} numbers"), format!("{}", spec.obs));
+        let lengths: Vec<usize> = trainer.shared.roles.iter().map(|role| role.spec.obs).collect();
+        for (lists, expected) in self.roles.iter().zip(&lengths) {
+            for (what, found) in OBSERVATIONS.into_iter().zip([lists.obs_mean.len(), lists.obs_var.len()]) {
+                if found != *expected {
+                    return mismatch(what, format!("{found} numbers"), expected.to_string());
+                }
             }
         }
         let blocks = new.run.blocks();
-        self.agents.check("checkpoint", blocks, spec.obs)?;
+        self.agents.check("checkpoint", StatesShape { blocks, obs: &lengths, act: spec.act })?;
         let replica = &mut trainer.replica;
         let about = self.about;
-        replica.learner.load(&Saved { scalars: about.learner.into_iter().collect(), lists: self.lists })?;
-        replica.statistics.observations =
-            Moments { count: about.observation_count, mean: self.obs_mean, var: self.obs_var };
-        replica.statistics.returns =
-            Moments { count: about.return_count, mean: vec![about.return_mean], var: vec![about.return_var] };
+        let about_roles = [about.first].into_iter().chain(about.others.into_iter().map(|(_, role)| role));
+        for ((role, about), lists) in replica.roles.iter_mut().zip(about_roles).zip(self.roles) {
+            let RoleLists { learner, obs_mean, obs_var } = lists;
+            role.learner.load(&Saved { scalars: about.learner.into_iter().collect(), lists: learner })?;
+            role.statistics.observations = Moments { count: about.observation_count, mean: obs_mean, var: obs_var };
+            role.statistics.returns =
+                Moments { count: about.return_count, mean: vec![about.return_mean], var: vec![about.return_var] };
+        }
         (replica.progress.iteration, replica.progress.steps) = (about.iteration, about.steps);
         trainer.clocks = Clocks { wall: about.wall_seconds, cpu: about.cpu_seconds };
-        for collector in &trainer.shared.crew.collectors {
+        for collector in &trainer.shared.collectors {
             let collector = &mut *collector.lock().expect("no worker has panicked");
             self.agents.put("checkpoint", 0..blocks, collector)?;
         }
@@ -249,18 +301,22 @@ impl Checkpoint {
     pub fn save(&self, folder: &Path) -> Result<(), Error> {
         std::fs::create_dir_all(folder).map_err(Error::io(folder, "create folder"))?;
         let mut file = TensorWriter::default();
-        for (name, numbers) in &self.lists {
-            match numbers {
-                Numbers::F32(list) => file.list(name, list),
-                Numbers::F64(list) => file.list(name, list),
-                Numbers::U32(list) => file.list(name, list),
-                Numbers::U64(list) => file.list(name, list),
+        let prefixes = Self::prefixes(&self.about);
+        for (role, prefix) in self.roles.iter().zip(&prefixes) {
+            for (name, numbers) in &role.learner {
+                let name = format!("{prefix}{name}");
+                match numbers {
+                    Numbers::F32(list) => file.list(&name, list),
+                    Numbers::F64(list) => file.list(&name, list),
+                    Numbers::U32(list) => file.list(&name, list),
+                    Numbers::U64(list) => file.list(&name, list),
+                }
+            }
+            for (name, list) in OBSERVATIONS.into_iter().zip([&role.obs_mean, &role.obs_var]) {
+                file.list(&format!("{prefix}{name}"), list);
             }
         }
-        for (name, list) in OBSERVATIONS.into_iter().zip([&self.obs_mean, &self.obs_var]) {
-            file.list(name, list);
-        }
-        states::write(&self.agents, &mut file);
+        states::write(&self.agents, &prefixes, &mut file);
         let bytes = file.bytes(&serde_json::json!({ "format": FORMAT, "version": VERSION }));
         let checksum = files::checksum(&bytes);
         // a name of its own for every state: the old description must keep naming the old state
@@ -299,32 +355,41 @@ impl Checkpoint {
             return Err(Error::file(&path, "checksum", checksum, &about.state.checksum));
         }
         let file = TensorReader::new(&path, &bytes)?;
-        let others = states::NAMES.into_iter().chain(OBSERVATIONS);
-        let mut lists = Vec::new();
-        for (name, kind) in file.names() {
-            if others.clone().any(|other| other == name) {
-                continue;
-            }
-            // observations of a task may be anything
-            let finite = !name.starts_with("replay_");
-            let numbers = match kind {
-                Dtype::F32 if finite => Numbers::F32(file.finite_list(name)?),
-                Dtype::F32 => Numbers::F32(file.list(name)?),
-                Dtype::F64 => Numbers::F64(file.list(name)?),
-                Dtype::U32 => Numbers::U32(file.list(name)?),
-                _ => Numbers::U64(file.list(name)?),
+        let prefixes = Self::prefixes(&about);
+        let mut roles = Vec::new();
+        for (i, prefix) in prefixes.iter().enumerate() {
+            let [obs_mean, obs_var] = OBSERVATIONS.map(|name| format!("{prefix}{name}"));
+            let (obs_mean, obs_var) = (file.list(&obs_mean)?, file.list(&obs_var)?);
+            let algorithm = match i {
+                0 => about.config.algorithm.name(),
+                _ => about.config.of_role(&about.others[i - 1].0).algorithm.name(),
             };
-            if let Some(name) = renamed(name, about.config.algorithm.name()) {
-                lists.push((name.to_string(), numbers));
-            }
+            roles.push(RoleLists { learner: learner_lists(&file, prefix, algorithm)?, obs_mean, obs_var });
         }
-        let [obs_mean, obs_var] = OBSERVATIONS;
-        Ok(Self {
-            lists,
-            obs_mean: file.list(obs_mean)?,
-            obs_var: file.list(obs_var)?,
-            agents: states::read(&file)?,
-            about,
-        })
+        Ok(Self { roles, agents: states::read(&file, &prefixes)?, about })
     }
+}
+
+/// The lists of a role's learner, by their names today.
+fn learner_lists(file: &TensorReader<'_>, prefix: &str, algorithm: &str) -> Result<Vec<(String, Numbers)>, Error> {
+    let mut lists = Vec::new();
+    for (full, kind) in file.names() {
+        let Some(name) = full.strip_prefix(prefix).filter(|name| !name.contains('/')) else { continue };
+        if states::has(name) || OBSERVATIONS.contains(&name) {
+            continue;
+        }
+        // observations of a task may be anything
+        let finite = !name.starts_with("replay_");
+        let numbers = match kind {
+            Dtype::F32 if finite => Numbers::F32(file.finite_list(full)?),
+            Dtype::F32 => Numbers::F32(file.list(full)?),
+            Dtype::F64 => Numbers::F64(file.list(full)?),
+            Dtype::U32 => Numbers::U32(file.list(full)?),
+            _ => Numbers::U64(file.list(full)?),
+        };
+        if let Some(name) = renamed(name, algorithm) {
+            lists.push((name.to_string(), numbers));
+        }
+    }
+    Ok(lists)
 }

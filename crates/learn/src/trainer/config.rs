@@ -15,6 +15,7 @@ use marathon_envs::Spec;
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Most steps of a run: as many as double precision can count.
@@ -34,6 +35,37 @@ pub struct TrainConfig {
     pub rewards: Vec<RewardConfig>,
     /// What learns from the rollouts.
     pub algorithm: Algorithm,
+    /// What differs for roles of the task, by their names; the others have the settings above.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub roles: BTreeMap<String, RoleConfig>,
+}
+
+/// Settings of a role of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RoleConfig {
+    /// Networks of policy and values.
+    pub network: NetworkConfig,
+    /// How observations and rewards are normalized.
+    pub statistics: StatisticsConfig,
+    /// The rewards, the task's own first; the others' kinds differ.
+    pub rewards: Vec<RewardConfig>,
+    /// What learns from the rollouts.
+    pub algorithm: Algorithm,
+}
+
+impl Default for RoleConfig {
+    fn default() -> Self {
+        Self::from(TrainConfig::default())
+    }
+}
+
+impl From<TrainConfig> for RoleConfig {
+    /// Without what is the run's.
+    fn from(config: TrainConfig) -> Self {
+        let TrainConfig { network, statistics, rewards, algorithm, .. } = config;
+        Self { network, statistics, rewards, algorithm }
+    }
 }
 
 impl Default for TrainConfig {
@@ -45,6 +77,7 @@ impl Default for TrainConfig {
             statistics: StatisticsConfig::default(),
             rewards: vec![RewardConfig::new(RewardKind::Task)],
             algorithm: Algorithm::default(),
+            roles: BTreeMap::new(),
         }
     }
 }
@@ -144,6 +177,16 @@ impl TrainConfig {
         }
     }
 
+    /// The settings of a role.
+    pub fn of_role(&self, name: &str) -> Self {
+        match self.roles.get(name).cloned() {
+            Some(RoleConfig { network, statistics, rewards, algorithm }) => {
+                Self { run: self.run.clone(), network, statistics, rewards, algorithm, roles: BTreeMap::new() }
+            }
+            None => Self { roles: BTreeMap::new(), ..self.clone() },
+        }
+    }
+
     /// Properties of the task's own reward.
     pub fn task_reward(&self) -> &RewardConfig {
         &self.rewards[0]
@@ -237,7 +280,14 @@ impl TrainConfig {
             let found = first.map_or("nothing", RewardKind::name);
             return Err(Error::config("rewards", found, "the task's own in the first place"));
         }
-        self.algorithm.validate(&self.common())
+        self.algorithm.validate(&self.common())?;
+        self.roles.keys().try_for_each(|name| match self.of_role(name).validate() {
+            Err(Error::Config { field, found, expected }) => {
+                let why = format!("is {found}, expected {expected}");
+                Err(Error::Settings { place: format!("roles.{name}.{field}"), why })
+            }
+            other => other,
+        })
     }
 
     /// The same for a configuration in a file, under `key`.

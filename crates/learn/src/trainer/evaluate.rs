@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::policy::evaluation::Evaluation;
-use crate::policy::{BlockPolicy, Policy};
-use marathon_envs::{BlockStep, ShardFactory};
+use crate::policy::{Cast, Policy};
+use marathon_envs::{BlockStep, Role, ShardFactory};
 use marathon_physics::lanes::Isa;
 
 /// Most agents that play side by side.
@@ -49,7 +49,20 @@ pub fn evaluate(
     policy: &Policy,
     options: &EvalOptions,
 ) -> Result<Evaluation, Error> {
-    policy.check(factory.spec())?;
+    Ok(evaluate_roles(factory, isa, &[policy], options)?.swap_remove(0))
+}
+
+/// The same with a policy for each role of the task; returns how each did.
+///
+/// # Errors
+/// The same, and if there is not one policy for each role.
+pub fn evaluate_roles(
+    factory: &dyn ShardFactory,
+    isa: Isa,
+    policies: &[&Policy],
+    options: &EvalOptions,
+) -> Result<Vec<Evaluation>, Error> {
+    Cast::new(factory.spec(), policies, isa, 0)?;
     if isa == Isa::F64 || !isa.supported() {
         return Err(Error::Isa(isa.name(), Isa::best().name()));
     }
@@ -72,73 +85,80 @@ pub fn evaluate(
     let part = |id: usize| {
         let (first, end) = (blocks * id / threads, blocks * (id + 1) / threads);
         let quotas: Vec<usize> = (first * BLOCK..end * BLOCK).map(quota).collect();
-        play(factory, isa, policy, options.seed, first, &quotas)
+        play(factory, isa, policies, options.seed, first, &quotas)
     };
-    let episodes: Vec<Episode> = std::thread::scope(|scope| {
+    let episodes: Vec<Vec<Episode>> = std::thread::scope(|scope| {
         let others: Vec<_> = (1..threads).map(|id| scope.spawn(move || part(id))).collect();
         let mut all = part(0);
         for other in others {
-            all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            let theirs = other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            all.iter_mut().zip(theirs).for_each(|(all, theirs)| all.extend(theirs));
         }
         all
     });
-    Ok(summarize(&episodes, factory.spec().dt))
+    Ok(episodes.iter().map(|episodes| summarize(episodes, factory.spec().dt)).collect())
 }
 
-/// Plays the episodes of consecutive blocks; returns them in the order of the agents.
+/// Plays the episodes of consecutive blocks; returns them for each role, in the order of the agents.
 fn play(
     factory: &dyn ShardFactory,
     isa: Isa,
-    policy: &Policy,
+    policies: &[&Policy],
     seed: u64,
     first_block: usize,
     quotas: &[usize],
-) -> Vec<Episode> {
+) -> Vec<Vec<Episode>> {
     let (blocks, spec) = (quotas.len() / BLOCK, factory.spec());
     let (obs_row, act_row) = (spec.obs * BLOCK, spec.act * BLOCK);
     let mut shard = factory.shard(first_block, blocks, seed);
-    let mut pilot = BlockPolicy::new(policy, isa);
+    let mut cast = Cast::new(spec, policies, isa, blocks).expect("the policies have been checked");
+    let roles: Vec<Role> = cast.roles().cloned().collect();
     let (mut obs, mut action) = (vec![0.0; blocks * obs_row], vec![0.0; blocks * act_row]);
     for (b, obs) in obs.chunks_exact_mut(obs_row).enumerate() {
         shard.reset(b, !0, obs);
     }
-    let mut current = vec![Episode::default(); quotas.len()];
-    let mut done: Vec<Vec<Episode>> = quotas.iter().map(|q| Vec::with_capacity(*q)).collect();
+    let mut current = vec![vec![Episode::default(); quotas.len()]; roles.len()];
+    let room = || quotas.iter().map(|q| Vec::with_capacity(*q)).collect();
+    let mut done: Vec<Vec<Vec<Episode>>> = roles.iter().map(|_| room()).collect();
     let mut out = BlockStep::default();
     let busy = |done: &[Vec<Episode>], b: usize| {
         let agents = b * BLOCK..(b + 1) * BLOCK;
         agents.clone().any(|i| done[i].len() < quotas[i])
     };
-    let mut playing: Vec<usize> = (0..blocks).filter(|b| busy(&done, *b)).collect();
+    let mut playing: Vec<usize> = (0..blocks).filter(|b| busy(&done[0], *b)).collect();
     while !playing.is_empty() {
-        pilot.act(&obs, &mut action);
+        cast.act(&obs, &mut action);
         shard.announce(&action);
         for b in &playing {
             let obs = &mut obs[b * obs_row..(b + 1) * obs_row];
             shard.step(*b, &action[b * act_row..(b + 1) * act_row], obs, &mut out);
+            cast.follow(*b, &out);
             let ended = out.terminated | out.truncated | out.diverged;
-            for lane in 0..BLOCK {
-                let agent = b * BLOCK + lane;
-                let episode = &mut current[agent];
-                episode.total += out.reward[lane] as f64;
-                episode.length += 1.0;
-                episode.distance += out.forward[lane] as f64;
-                if ended >> lane & 1 == 1 {
-                    episode.diverged = out.diverged >> lane & 1 == 1;
-                    episode.fell = episode.diverged || out.terminated >> lane & 1 == 1;
-                    if done[agent].len() < quotas[agent] {
-                        done[agent].push(*episode);
+            for (r, role) in roles.iter().enumerate() {
+                let reward = out.reward_of(r, role);
+                for lane in 0..BLOCK {
+                    let agent = b * BLOCK + lane;
+                    let (episode, done) = (&mut current[r][agent], &mut done[r][agent]);
+                    episode.total += reward[lane] as f64;
+                    episode.length += 1.0;
+                    episode.distance += out.forward[lane] as f64;
+                    if ended >> lane & 1 == 1 {
+                        episode.diverged = out.diverged >> lane & 1 == 1;
+                        episode.fell = episode.diverged || out.terminated >> lane & 1 == 1;
+                        if done.len() < quotas[agent] {
+                            done.push(*episode);
+                        }
+                        *episode = Episode::default();
                     }
-                    *episode = Episode::default();
                 }
             }
             if ended != 0 {
                 shard.reset(*b, ended, obs);
             }
         }
-        playing.retain(|b| busy(&done, *b));
+        playing.retain(|b| busy(&done[0], *b));
     }
-    done.into_iter().flatten().collect()
+    done.into_iter().map(|done| done.into_iter().flatten().collect()).collect()
 }
 
 fn summarize(episodes: &[Episode], dt: f64) -> Evaluation {

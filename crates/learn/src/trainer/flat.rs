@@ -295,6 +295,7 @@ impl From<&FlatConfig> for TrainConfig {
             },
             rewards: [task].into_iter().chain(novelty).collect(),
             algorithm,
+            roles: Default::default(),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! What a run needs of memory, looked at before it begins: an allocation that fails later ends the whole program.
 
 use super::config::TrainConfig;
+use super::roles::RoleParts;
 use crate::algorithms::{Algorithm, Needs, Setup, group_count};
 use crate::error::Error;
 use crate::lanes::BLOCK;
+use marathon_physics::lanes::Isa;
 use std::hint::black_box;
 
 /// What environments, checkpoints being written and the rest take for every byte of the large arrays, at the most seen.
@@ -13,8 +15,8 @@ const REST: f64 = 0.3;
 ///
 /// # Errors
 /// Names what the run needs, and what would need less.
-pub fn check(setup: &Setup<'_>, config: &TrainConfig) -> Result<(), Error> {
-    let bytes = bytes(setup, config);
+pub fn check(roles: &[RoleParts], isa: Isa, config: &TrainConfig) -> Result<(), Error> {
+    let bytes = roles.iter().map(|role| bytes(&role.setup(isa), &role.config)).fold(0, u64::saturating_add);
     let mut probe: Vec<u8> = Vec::new();
     let fits = usize::try_from(bytes).is_ok_and(|bytes| probe.try_reserve_exact(bytes).is_ok());
     // without this the compiler sees that nobody needs it, and takes it as given
@@ -42,7 +44,7 @@ fn less(config: &TrainConfig) -> String {
     )
 }
 
-/// Bytes that a run needs. Its large arrays are those of [`Crew`](super::workers::Crew), of each worker's
+/// Bytes that a role of a run needs. Its large arrays are those of [`Crew`](super::workers::Crew), of each worker's
 /// [`Learner`](crate::algorithms::Learner), of [`Rollout`](crate::rollout::data::Rollout), and what the algorithm keeps.
 fn bytes(setup: &Setup<'_>, config: &TrainConfig) -> u64 {
     let Needs { parameters, moments, items, shape, replay } = config.algorithm.needs(setup);

@@ -7,6 +7,8 @@
 //!    same steps to their replicas.
 //! 3. *Report*: the numbers of the iteration. With `rollouts` above 1, steps 1 and 2 are done so many times first.
 //!
+//! A task with several [roles](marathon_envs::Role) has a learner for each: step 2 is done for one after the other.
+//!
 //! The first worker is the caller's thread; with one worker there is no other. The first rollout has no update: it fills the
 //! statistics that normalize observations and rewards, without which the first updates would see inputs and losses of
 //! arbitrary size.
@@ -20,26 +22,29 @@ mod flat;
 mod memory;
 pub mod observer;
 pub mod remote;
+mod roles;
 mod states;
 pub mod stats;
 mod workers;
 
 use crate::algorithms::loss::LossSums;
 use crate::algorithms::schedule::Progress;
-use crate::algorithms::{Learner, Needs, Now, share};
+use crate::algorithms::{Needs, Now, share};
 use crate::error::Error;
-use crate::policy::{Policy, PolicyMeta, Training};
-use crate::rollout::collect::Collector;
+use crate::policy::Policy;
+use crate::rollout::collect::{Collecting, Collector};
 use crate::rollout::data::{Experience, Rollout};
-use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
+use barrier::Barrier;
 use checkpoint::Checkpoint;
-use config::{RunConfig, TrainConfig};
+use config::TrainConfig;
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 use observer::{Control, Observer, Snapshot};
-use remote::{Players, Remote, Spent, check_algorithm};
+use remote::{Players, Remote, Spent, check_travels};
+use roles::{RoleParts, RoleReplica};
 use stats::IterationStats;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -48,8 +53,10 @@ use workers::{Crew, Worker};
 /// What a finished run returns.
 #[derive(Debug)]
 pub struct TrainOutput {
-    /// The trained policy.
+    /// The trained policy: of a task with several roles, the first one's.
     pub policy: Policy,
+    /// The other roles' policies, by the roles' names.
+    pub others: Vec<(String, Policy)>,
     /// Everything needed to go on.
     pub checkpoint: Checkpoint,
     /// Statistics of the last iteration of this call, if there was one.
@@ -94,7 +101,7 @@ pub fn train_with(
 ) -> Result<TrainOutput, Error> {
     if players.is_some() {
         config.validate()?;
-        check_algorithm(config)?;
+        check_travels(config, factory.spec())?;
     }
     let mut trainer = match resume {
         None => Trainer::new(factory, isa, config)?,
@@ -115,7 +122,7 @@ pub fn train_with(
             break;
         }
     }
-    Ok(TrainOutput { policy: trainer.policy(), checkpoint: trainer.checkpoint(), last })
+    Ok(trainer.output(last))
 }
 
 /// A run that is made an iteration at a time.
@@ -141,7 +148,14 @@ struct Clocks {
 struct Shared {
     config: TrainConfig,
     spec: Spec,
-    crew: Crew,
+    /// Each worker's agents.
+    collectors: Vec<Mutex<Collector>>,
+    /// What the workers share to teach each role.
+    crews: Vec<Crew>,
+    /// The roles, with their settings.
+    roles: Vec<RoleParts>,
+    /// Where all workers wait for each other.
+    barrier: Arc<Barrier>,
     seconds: Vec<Mutex<Seconds>>,
     /// Those who play elsewhere have given up.
     stop: AtomicBool,
@@ -153,23 +167,19 @@ struct Shared {
 
 /// What learning changes; every worker has the same.
 struct Replica {
-    learner: Box<dyn Learner>,
-    statistics: Statistics,
+    /// Of each role.
+    roles: Vec<RoleReplica>,
     progress: Progress,
 }
 
 impl Replica {
     fn copy(&self) -> Self {
-        Self { learner: self.learner.replica(), statistics: self.statistics.clone(), progress: self.progress }
+        Self { roles: self.roles.iter().map(RoleReplica::copy).collect(), progress: self.progress }
     }
 
-    /// Takes in the statistics of a rollout.
-    fn absorb(&mut self, totals: &Totals) {
-        if let Some([before, after]) = self.statistics.absorb(totals, self.progress.iteration == 0) {
-            self.learner.follow(&before, &after);
-        }
-        self.progress.iteration += 1;
-        self.progress.steps += totals.samples as u64;
+    /// What a horizon is played with, by each role.
+    fn collecting(&self) -> Vec<Collecting<'_>> {
+        self.roles.iter().map(|role| role.learner.collecting(&role.statistics)).collect()
     }
 }
 
@@ -182,8 +192,8 @@ struct Seconds {
     update: f64,
 }
 
-/// Sums over an iteration.
-#[derive(Default)]
+/// Sums over an iteration, of a role.
+#[derive(Clone, Default)]
 struct Sums {
     totals: Totals,
     updates: LossSums,
@@ -222,31 +232,37 @@ impl Trainer {
             return Err(Error::Isa(isa.name(), Isa::best().name()));
         }
         let spec = factory.spec().clone();
-        let setup = config.setup(&spec, isa);
-        memory::check(&setup, config)?;
+        let roles = RoleParts::all(config, &spec)?;
+        memory::check(&roles, isa, config)?;
         let (workers, blocks) = (config.run.worker_count(), config.run.blocks());
         let shares: Vec<_> = (0..workers).map(|id| share(blocks, workers, id)).collect();
         let of_workers: Vec<usize> = shares.iter().map(|share| share.len()).collect();
         let replica = Replica {
-            learner: config.algorithm.learner(&setup, &of_workers),
-            statistics: Statistics::new(spec.obs, config.statistics),
+            roles: roles.iter().map(|role| RoleReplica::new(role, isa, &of_workers)).collect(),
             progress: Progress { iteration: 0, steps: 0, total_steps: config.run.total_steps },
         };
-        let (with, shape) = (replica.learner.collecting(&replica.statistics), replica.learner.shape());
-        let collector = |share: &std::ops::Range<usize>| {
-            let place = (share.start, share.len());
-            Collector::new(factory, place, config.run.seed, shape.lanes, &with)
+        let collector = |share: &Range<usize>| {
+            let plans = replica.roles.iter().zip(&roles).map(|(replica, role)| replica.seat(role)).collect();
+            Mutex::new(Collector::new(factory, (share.start, share.len()), config.run.seed, plans))
         };
         let collectors = shares.iter().map(collector).collect();
-        let rollouts = shares.iter().map(|share| Rollout::new(share.len(), config.run.horizon, &shape)).collect();
-        let Needs { items, moments, .. } = config.algorithm.needs(&setup);
-        let crew = Crew::new(isa, &*replica.learner, (items, moments), collectors, rollouts);
+        let barrier = Arc::new(Barrier::new(workers));
+        let crew = |(role, RoleReplica { learner, .. }): (&RoleParts, &RoleReplica)| {
+            let shape = learner.shape();
+            let rollouts = shares.iter().map(|share| Rollout::new(share.len(), config.run.horizon, &shape)).collect();
+            let Needs { items, moments, .. } = role.config.algorithm.needs(&role.setup(isa));
+            Crew::new(isa, &**learner, (items, moments), rollouts, barrier.clone())
+        };
+        let crews = roles.iter().zip(&replica.roles).map(crew).collect();
         let shared = Shared {
             seconds: (0..workers).map(|_| Mutex::default()).collect(),
             stop: AtomicBool::new(false),
             elsewhere: AtomicBool::new(false),
             quit: AtomicBool::new(false),
-            crew,
+            collectors,
+            crews,
+            barrier,
+            roles,
             spec,
             config: config.clone(),
         };
@@ -257,9 +273,9 @@ impl Trainer {
         for id in 1..workers {
             let (shared, mut replica) = (trainer.shared.clone(), trainer.replica.copy());
             let work = move || {
-                let _guard = shared.crew.barrier.guard();
+                let _guard = shared.barrier.guard();
                 loop {
-                    shared.crew.barrier.wait();
+                    shared.barrier.wait();
                     if shared.quit.load(Ordering::Acquire) {
                         return;
                     }
@@ -302,7 +318,7 @@ impl Trainer {
     /// # Errors
     /// The same, and if what the players deliver does not fit.
     pub fn iterate_with(&mut self, players: &mut dyn Players) -> Result<Option<IterationStats>, Error> {
-        check_algorithm(&self.shared.config)?;
+        check_travels(&self.shared.config, &self.shared.spec)?;
         let mut remote = Remote::new(players, &self.shared.config.run);
         let made = self.work(Some(&mut remote));
         if let Some(error) = remote.error {
@@ -312,31 +328,31 @@ impl Trainer {
     }
 
     /// Has all workers make an iteration; returns its sums and its seconds, unless the players have ended the run before it.
-    fn work(&mut self, remote: Option<&mut Remote<'_>>) -> Option<(Sums, f64)> {
+    fn work(&mut self, remote: Option<&mut Remote<'_>>) -> Option<(Vec<Sums>, f64)> {
         let start = clock::wall();
         let shared = &self.shared;
-        let _guard = shared.crew.barrier.guard();
+        let _guard = shared.barrier.guard();
         shared.stop.store(false, Ordering::Release);
         shared.elsewhere.store(remote.is_some(), Ordering::Release);
-        shared.crew.barrier.wait();
+        shared.barrier.wait();
         let sums = shared.iterate(0, &mut self.replica, remote)?;
         Some((sums, clock::wall() - start))
     }
 
-    /// The policy as it is now.
+    /// The policy as it is now: of a task with several roles, the first one's.
     pub fn policy(&self) -> Policy {
-        let (config, Replica { learner, statistics, progress }) = (&self.shared.config, &self.replica);
-        let mut meta =
-            PolicyMeta::of(&self.shared.spec, config.network.actor_hidden.clone(), config.network.activation);
-        meta.observation_clip = config.statistics.observation_clip as f32;
-        let run = RunConfig { threads: 0, ..config.run.clone() };
-        let config = TrainConfig { run, ..config.clone() };
-        meta.training = Some(Training {
-            config: serde_json::to_value(config).expect("a configuration is plain data"),
-            steps: progress.steps,
-            iterations: progress.iteration,
-        });
-        learner.policy(meta, statistics.normalizer())
+        self.policy_of(0)
+    }
+    /// The policies of all roles, and everything needed to go on from here.
+    pub fn output(&self, last: Option<IterationStats>) -> TrainOutput {
+        let named = |(i, role): (usize, &RoleParts)| (role.role.name.clone(), self.policy_of(i));
+        let others = self.shared.roles.iter().enumerate().skip(1).map(named).collect();
+        TrainOutput { policy: self.policy(), others, checkpoint: self.checkpoint(), last }
+    }
+
+    fn policy_of(&self, i: usize) -> Policy {
+        let Replica { roles, progress } = &self.replica;
+        self.shared.roles[i].policy(&roles[i], progress, &self.shared.config)
     }
 
     /// Everything needed to go on from here.
@@ -345,8 +361,8 @@ impl Trainer {
     }
 
     /// The numbers of an iteration.
-    fn report(&mut self, sums: &Sums, wall: f64) -> Result<IterationStats, Error> {
-        let (shared, Replica { learner, progress, .. }) = (&self.shared, &self.replica);
+    fn report(&mut self, sums: &[Sums], wall: f64) -> Result<IterationStats, Error> {
+        let (shared, Replica { roles, progress }) = (&self.shared, &self.replica);
         let mut seconds = Seconds::default();
         for of_worker in &shared.seconds {
             let s = of_worker.lock().expect("no worker has panicked");
@@ -357,20 +373,21 @@ impl Trainer {
         }
         self.clocks.wall += wall;
         self.clocks.cpu += seconds.cpu;
-        let parameters = learner.params();
-        let count = parameters.iter().filter(|x| !x.is_finite()).count();
-        if count > 0 {
-            let (parameters, rates) = (parameters.len(), shared.config.algorithm.rates());
-            return Err(Error::Diverged { count, parameters, steps: progress.steps, rates });
+        for (role, RoleReplica { learner, .. }) in shared.roles.iter().zip(roles) {
+            let parameters = learner.params();
+            let count = parameters.iter().filter(|x| !x.is_finite()).count();
+            if count > 0 {
+                let (parameters, rates) = (parameters.len(), role.config.algorithm.rates());
+                return Err(Error::Diverged { count, parameters, steps: progress.steps, rates });
+            }
         }
 
-        let Sums { totals, updates } = sums;
-        let sums = &totals.sums;
-        let per_episode = |x: f64| (sums.episodes > 0.0).then(|| x / sums.episodes);
-        let per_sample = |x: f64| if updates.samples > 0.0 { x / updates.samples } else { 0.0 };
-        let names = shared.config.rewards.iter().skip(1).map(|reward| reward.kind.name().to_string());
-        let of_rewards = names.zip(&sums.rewards).map(|(name, x)| (name, x / totals.samples));
-        let about = learner.describe(totals, updates);
+        let learned = |i: usize| {
+            let Sums { totals, updates } = &sums[i];
+            shared.roles[i].learned(&*roles[i].learner, totals, updates)
+        };
+        let played = &sums[0].totals.sums;
+        let per_episode = |x: f64| (played.episodes > 0.0).then(|| x / played.episodes);
         let worked = (seconds.collect + seconds.update).max(1e-12);
         Ok(IterationStats {
             iteration: progress.iteration,
@@ -379,23 +396,13 @@ impl Trainer {
             cpu_seconds: self.clocks.cpu,
             env_share: seconds.env / worked,
             update_share: seconds.update / worked,
-            episodes: sums.episodes as u64,
-            return_mean: per_episode(sums.returns),
-            length_mean: per_episode(sums.lengths),
-            speed_mean: per_episode(sums.speeds / shared.spec.dt),
-            fall_fraction: per_episode(sums.falls),
-            diverged: sums.diverged as u64,
-            reward_terms: sums.terms.iter().map(|x| x / totals.samples).collect(),
-            kl: per_sample(updates.kl),
-            clip_fraction: per_sample(updates.clipped),
-            policy_loss: per_sample(updates.policy),
-            value_loss: per_sample(updates.value),
-            explained_variance: about.explained_variance,
-            entropy: about.entropy,
-            std_mean: about.std_mean,
-            lr: about.lr,
-            skipped_minibatches: about.skipped,
-            signal_rewards: of_rewards.collect(),
+            episodes: played.episodes as u64,
+            length_mean: per_episode(played.lengths),
+            speed_mean: per_episode(played.speeds / shared.spec.dt),
+            fall_fraction: per_episode(played.falls),
+            diverged: played.diverged as u64,
+            learned: learned(0),
+            others: (1..roles.len()).map(|i| (shared.roles[i].role.name.clone(), learned(i))).collect(),
         })
     }
 }
@@ -404,7 +411,7 @@ impl Drop for Trainer {
     /// Ends the other workers.
     fn drop(&mut self) {
         self.shared.quit.store(true, Ordering::Release);
-        self.shared.crew.barrier.leave();
+        self.shared.barrier.leave();
         for thread in self.threads.drain(..) {
             // one that has panicked has said so, and the first worker has panicked with it
             let _ = thread.join();
@@ -414,9 +421,9 @@ impl Drop for Trainer {
 
 impl Shared {
     /// Worker `id`'s part in an iteration. None if the players have ended the run before it.
-    fn iterate(&self, id: usize, replica: &mut Replica, mut remote: Option<&mut Remote<'_>>) -> Option<Sums> {
+    fn iterate(&self, id: usize, replica: &mut Replica, mut remote: Option<&mut Remote<'_>>) -> Option<Vec<Sums>> {
         let (cpu, mut cpu_elsewhere) = (clock::thread_cpu(), 0.0);
-        let (mut seconds, mut sums) = (Seconds::default(), Sums::default());
+        let (mut seconds, mut sums) = (Seconds::default(), vec![Sums::default(); self.roles.len()]);
         // a run that was given up halfway goes on there
         let rollouts = self.config.run.rollouts as u64;
         let first = replica.progress.iteration % rollouts;
@@ -426,7 +433,7 @@ impl Shared {
             seconds.env += spent.env;
             cpu_elsewhere += spent.cpu_elsewhere;
             seconds.collect += clock::wall() - begin;
-            self.crew.barrier.wait();
+            self.barrier.wait();
             if self.stop.load(Ordering::Acquire) {
                 if n == first {
                     return None;
@@ -435,24 +442,31 @@ impl Shared {
             }
 
             let begin = clock::wall();
-            sums.totals.add(&self.learn(id, replica, &mut sums.updates));
+            self.learn(id, replica, &mut sums);
             seconds.update += clock::wall() - begin;
             seconds.cpu = clock::thread_cpu() - cpu + cpu_elsewhere;
             *self.seconds[id].lock().expect("no worker has panicked") = seconds;
-            self.crew.barrier.wait();
+            self.barrier.wait();
         }
         Some(sums)
     }
 
-    /// Learns from the rollout of all workers.
-    fn learn(&self, id: usize, replica: &mut Replica, sums: &mut LossSums) -> Totals {
-        let rollouts: Vec<_> = self.crew.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
-        let totals = Totals::new(&rollouts, self.config.run.horizon);
-        let experience = Experience::new(rollouts.iter().map(|r| &**r).collect(), &totals, id);
-        let now = Now { progress: &replica.progress, statistics: &replica.statistics };
-        replica.learner.update(&mut Worker::new(&self.crew, id), &experience, now, sums);
-        replica.absorb(&totals);
-        totals
+    /// Learns from the rollouts of all workers, one role after the other, and adds up what they were.
+    fn learn(&self, id: usize, replica: &mut Replica, sums: &mut [Sums]) {
+        let Replica { roles, progress } = replica;
+        let mut samples = 0;
+        for ((crew, role), Sums { totals: all, updates }) in self.crews.iter().zip(roles).zip(sums) {
+            let rollouts: Vec<_> = crew.rollouts.iter().map(|r| r.read().expect("no worker has panicked")).collect();
+            let totals = Totals::new(&rollouts, self.config.run.horizon);
+            let experience = Experience::new(rollouts.iter().map(|r| &**r).collect(), &totals, id);
+            let now = Now { progress, statistics: &role.statistics };
+            role.learner.update(&mut Worker::new(crew, id), &experience, now, updates);
+            role.absorb(&totals, progress);
+            samples = totals.samples as u64;
+            all.add(&totals);
+        }
+        progress.iteration += 1;
+        progress.steps += samples;
     }
 
     /// Plays a horizon with the worker's agents. If others play, the first worker has them play all agents.
@@ -464,10 +478,11 @@ impl Shared {
                 Spent::default()
             });
         }
-        let mut collector = self.crew.collectors[id].lock().expect("no worker has panicked");
-        let mut rollout = self.crew.rollouts[id].write().expect("no worker has panicked");
-        let with = replica.learner.collecting(&replica.statistics);
-        let env = collector.collect(&with, &mut rollout, clock::wall);
+        let mut collector = self.collectors[id].lock().expect("no worker has panicked");
+        let crews = self.crews.iter();
+        let mut rollouts: Vec<_> =
+            crews.map(|crew| crew.rollouts[id].write().expect("no worker has panicked")).collect();
+        let env = collector.collect(&replica.collecting(), &mut rollouts, clock::wall);
         Spent { env, cpu_elsewhere: 0.0 }
     }
 }

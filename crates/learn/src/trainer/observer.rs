@@ -1,8 +1,8 @@
 //! What a caller sees of a run, and how it takes part.
 
-use super::Trainer;
 use super::checkpoint::Checkpoint;
 use super::stats::IterationStats;
+use super::{TrainOutput, Trainer};
 use crate::policy::Policy;
 
 /// What an observer wants.
@@ -31,12 +31,16 @@ impl<F: FnMut(&IterationStats, &Snapshot<'_>) -> Control> Observer for F {
 pub struct Snapshot<'a>(pub(super) &'a Trainer);
 
 impl Snapshot<'_> {
-    /// The policy as it is now.
+    /// The policy as it is now: of a task with several roles, the first one's.
     pub fn policy(&self) -> Policy {
         self.0.policy()
     }
     /// Everything needed to go on from here.
     pub fn checkpoint(&self) -> Checkpoint {
         self.0.checkpoint()
+    }
+    /// What the run would return if it ended now, without the statistics.
+    pub fn output(&self) -> TrainOutput {
+        self.0.output(None)
     }
 }

@@ -10,15 +10,14 @@
 
 use super::config::{RunConfig, TrainConfig};
 use super::observer::Control;
+use super::roles::{RoleParts, RoleReplica};
 use super::{Replica, Shared, clock, states};
-use crate::algorithms::schedule::Progress;
 use crate::algorithms::share;
 use crate::error::Error;
 use crate::files::{TensorReader, TensorWriter};
 use crate::rollout::collect::Collector;
 use crate::rollout::data::Rollout;
-use crate::rollout::states::AgentStates;
-use crate::rollout::statistics::Statistics;
+use crate::rollout::states::{AgentStates, StatesShape};
 use crate::rollout::sums::BlockSums;
 use marathon_envs::{ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
@@ -26,7 +25,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::Path;
 
-const VERSION: u32 = 1;
+/// Since version 2, sums have the number of decisions.
+const VERSION: u32 = 2;
 
 /// What a message says of itself.
 #[derive(Serialize, Deserialize)]
@@ -78,7 +78,7 @@ pub trait Players {
 /// Plays the agents of one slice of a run.
 pub struct Player {
     spec: Spec,
-    replica: Replica,
+    replica: RoleReplica,
     blocks: Range<usize>,
     collector: Collector,
     rollout: Rollout,
@@ -96,7 +96,7 @@ impl Player {
         (slice, slices): (usize, usize),
     ) -> Result<Self, Error> {
         config.validate()?;
-        check_algorithm(config)?;
+        check_travels(config, factory.spec())?;
         if slice >= slices || slices > config.run.blocks() {
             let expected = format!("a slice below their number, and at most {} of them", config.run.blocks());
             return Err(Error::Mismatch {
@@ -107,16 +107,11 @@ impl Player {
         }
         let spec = factory.spec().clone();
         let blocks = share(config.run.blocks(), slices, slice);
-        let replica = Replica {
-            learner: config.algorithm.learner(&config.setup(&spec, isa), &[blocks.len()]),
-            statistics: Statistics::new(spec.obs, config.statistics),
-            progress: Progress { iteration: 0, steps: 0, total_steps: config.run.total_steps },
-        };
+        let role = RoleParts::all(config, &spec)?.swap_remove(0);
+        let replica = RoleReplica::new(&role, isa, &[blocks.len()]);
         let (shape, place) = (replica.learner.shape(), (blocks.start, blocks.len()));
-        let with = replica.learner.collecting(&replica.statistics);
-        let collector = Collector::new(factory, place, config.run.seed, shape.lanes, &with);
+        let collector = Collector::new(factory, place, config.run.seed, vec![replica.seat(&role)]);
         let rollout = Rollout::new(blocks.len(), config.run.horizon, &shape);
-        drop(with);
         Ok(Self { replica, collector, rollout, spec, blocks })
     }
 
@@ -127,7 +122,7 @@ impl Player {
     /// If the messages are damaged or belong to another task, network or slice.
     pub fn play(&mut self, orders: &[u8], state: &[u8]) -> Result<Vec<u8>, Error> {
         let cpu = clock::thread_cpu();
-        let Replica { learner, statistics, .. } = &mut self.replica;
+        let RoleReplica { learner, statistics } = &mut self.replica;
         let orders = Message::Orders.open(orders)?;
         *learner.params_mut() = orders.finite("params", &[learner.params().len()])?;
         statistics.observations.mean = orders.get("obs_mean", &[self.spec.obs])?;
@@ -136,33 +131,43 @@ impl Player {
         (statistics.returns.mean[0], statistics.returns.var[0]) = (returns[0], returns[1]);
 
         let what = Message::Agents.format();
-        let agents = states::read(&Message::Agents.open(state)?)?;
-        agents.check(what, self.blocks.len(), self.spec.obs)?;
+        let agents = states::read(&Message::Agents.open(state)?, &ONE_ROLE)?;
+        agents.check(what, shape(&self.spec, self.blocks.len()))?;
         agents.put(what, self.blocks.clone(), &mut self.collector)?;
 
-        let env = self.collector.collect(&learner.collecting(statistics), &mut self.rollout, clock::wall);
+        let env = self.collector.collect(&[learner.collecting(statistics)], &mut [&mut self.rollout], clock::wall);
 
         let mut file = TensorWriter::default();
         write_rollout(&self.rollout, &mut file);
-        states::write(&AgentStates::of([&self.collector], self.blocks.clone()), &mut file);
+        states::write(&AgentStates::of([&self.collector], self.blocks.clone()), &ONE_ROLE, &mut file);
         file.list("seconds", &[env, clock::thread_cpu() - cpu]);
         Ok(Message::Rollout.close(&file))
     }
 }
 
-/// Refuses algorithms that learn from more than the last rollout.
+/// Prefixes of the lists of a task with one role.
+const ONE_ROLE: [String; 1] = [String::new()];
+
+/// What a slice's states of a task with one role are like.
+fn shape(spec: &Spec, blocks: usize) -> StatesShape<'_> {
+    StatesShape { blocks, obs: std::slice::from_ref(&spec.obs), act: spec.act }
+}
+
+/// Refuses algorithms that learn from more than the last rollout, and tasks with several roles.
 ///
 /// # Errors
-/// If the algorithm is SAC, whose replay stays with the agents.
-pub fn check_algorithm(config: &TrainConfig) -> Result<(), Error> {
+/// If the algorithm is SAC, whose replay stays with the agents, or the task has several roles.
+pub fn check_travels(config: &TrainConfig, spec: &Spec) -> Result<(), Error> {
+    let refuse = |found: String, expected: &str| {
+        Err(Error::Mismatch { what: "rollouts played elsewhere".into(), found, expected: expected.into() })
+    };
     if !config.algorithm.travels() {
-        return Err(Error::Mismatch {
-            what: "rollouts played elsewhere".into(),
-            found: "the trainer sac".into(),
-            expected: "ppo, a2c or acktr".into(),
-        });
+        return refuse("the trainer sac".into(), "ppo, a2c or acktr");
     }
-    Ok(())
+    match spec.roles.len() {
+        0 | 1 => Ok(()),
+        n => refuse(format!("{} with its {n} roles", spec.id), "a task with one role"),
+    }
 }
 
 /// Seconds spent on a rollout.
@@ -193,8 +198,8 @@ impl<'a> Remote<'a> {
     /// Has one horizon played; fills the rollouts and brings the collectors into the states in which their agents are then.
     /// `None` if the run is to end: nothing has changed then, except after an error.
     pub(super) fn collect(&mut self, run: &Shared, replica: &Replica) -> Option<Spent> {
-        let Replica { learner, statistics, .. } = replica;
-        let locked = || run.crew.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
+        let RoleReplica { learner, statistics } = &replica.roles[0];
+        let locked = || run.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
         let mut orders = TensorWriter::default();
         orders.list("params", learner.params());
         orders.list("obs_mean", &statistics.observations.mean);
@@ -203,7 +208,7 @@ impl<'a> Remote<'a> {
         let orders = Message::Orders.close(&orders);
         let states = self.slices.iter().map(|slice| {
             let mut file = TensorWriter::default();
-            states::write(&AgentStates::of(locked(), slice.clone()), &mut file);
+            states::write(&AgentStates::of(locked(), slice.clone()), &ONE_ROLE, &mut file);
             Message::Agents.close(&file)
         });
         let states: Vec<Vec<u8>> = states.collect();
@@ -243,7 +248,7 @@ impl<'a> Remote<'a> {
             spent.cpu_elsewhere += answer.seconds[1];
         }
         let mut all = answers.iter().flatten().flat_map(|a| (0..a.rollout.blocks()).map(|b| (&a.rollout, b)));
-        for rollout in &run.crew.rollouts {
+        for rollout in &run.crews[0].rollouts {
             let mut rollout = rollout.write().expect("no worker has panicked");
             rollout.sums.clear();
             for b in 0..rollout.blocks() {
@@ -266,16 +271,16 @@ impl Answer {
     fn read(bytes: &[u8], run: &Shared, replica: &Replica, blocks: usize) -> Result<Self, Error> {
         let spec = &run.spec;
         let file = Message::Rollout.open(bytes)?;
-        let mut rollout = Rollout::new(blocks, run.config.run.horizon, &replica.learner.shape());
+        let mut rollout = Rollout::new(blocks, run.config.run.horizon, &replica.roles[0].learner.shape());
         read_rollout(&mut rollout, &file, spec, run.config.rewards.len() - 1)?;
-        let agents = states::read(&file)?;
-        agents.check(Message::Rollout.format(), blocks, spec.obs)?;
+        let agents = states::read(&file, &ONE_ROLE)?;
+        agents.check(Message::Rollout.format(), shape(spec, blocks))?;
         Ok(Self { rollout, agents, seconds: file.get("seconds", &[2])? })
     }
 }
 
 /// Numbers of a block's sums, except for its observations, reward terms and rewards.
-const SUMS: usize = 14;
+const SUMS: usize = 15;
 
 /// What a learner needs of a rollout.
 fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
@@ -283,7 +288,7 @@ fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
         file.list(name, rows);
     }
     let sums = rollout.sums.iter().flat_map(|s| {
-        let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged];
+        let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged, s.decisions];
         let pairs = [s.discounted, s.advantages, s.targets, s.errors].into_iter().chain(s.observations.iter().copied());
         let rest = s.terms.iter().chain(&s.rewards).copied();
         scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(rest).collect::<Vec<_>>()
@@ -308,10 +313,11 @@ fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, rew
             speeds: scalars[3],
             falls: scalars[4],
             diverged: scalars[5],
-            discounted: pair(6),
-            advantages: pair(8),
-            targets: pair(10),
-            errors: pair(12),
+            decisions: scalars[6],
+            discounted: pair(7),
+            advantages: pair(9),
+            targets: pair(11),
+            errors: pair(13),
             observations: (0..spec.obs).map(|i| pair(SUMS + 2 * i)).collect(),
             terms: terms.to_vec(),
             rewards: rewards.to_vec(),

@@ -20,9 +20,7 @@ pub struct IterationStats {
 
     /// Episodes that ended in this iteration.
     pub episodes: u64,
-    /// Their mean return; none if no episode ended.
-    pub return_mean: Option<f64>,
-    /// Their mean length, decisions.
+    /// Their mean length, decisions; none if no episode ended.
     pub length_mean: Option<f64>,
     /// Mean over them of distance along +x by time, m/s.
     pub speed_mean: Option<f64>,
@@ -30,7 +28,21 @@ pub struct IterationStats {
     pub fall_fraction: Option<f64>,
     /// Agents whose simulation stopped being finite in this iteration.
     pub diverged: u64,
-    /// Mean of each reward term per decision, in the order of the task's names.
+
+    /// What was learned: of a task with several roles, by the first.
+    #[serde(flatten)]
+    pub learned: Learned,
+    /// What the other roles learned, by their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<(String, Learned)>,
+}
+
+/// What a role earned and learned in an iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Learned {
+    /// Mean return of the episodes that ended; none if none did.
+    pub return_mean: Option<f64>,
+    /// Mean of each of its reward terms per decision, in the order of the task's names.
     pub reward_terms: Vec<f64>,
 
     /// Estimated divergence of the policy from the one that acted, mean over the updates, nats.

@@ -8,19 +8,16 @@ use super::barrier::Barrier;
 use crate::algorithms::loss::LossSums;
 use crate::algorithms::{Learner, MAX_GROUPS, Partial, ShowPiece, Workers, group_count, share};
 use crate::optim::sum;
-use crate::rollout::collect::Collector;
 use crate::rollout::data::Rollout;
 use marathon_physics::lanes::Isa;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, RwLock, RwLockReadGuard};
+use std::sync::{Arc, RwLock, RwLockReadGuard};
 
-/// What the workers of a run share.
+/// What the workers of a run share to teach one learner.
 pub struct Crew {
     isa: Isa,
-    /// Each worker's agents.
-    pub collectors: Vec<Mutex<Collector>>,
-    /// What they experienced.
+    /// What each worker's agents experienced.
     pub rollouts: Vec<RwLock<Rollout>>,
     /// Gradients of the groups of the current list of samples.
     partials: Vec<RwLock<Partial>>,
@@ -32,7 +29,7 @@ pub struct Crew {
     /// Next part of the current piece of work to be taken.
     ticket: AtomicUsize,
     /// Where they wait for each other.
-    pub barrier: Barrier,
+    barrier: Arc<Barrier>,
 }
 
 /// A worker's slice of the gradient.
@@ -42,15 +39,15 @@ struct Slice {
 }
 
 impl Crew {
-    /// For workers with those agents and rollouts, and lists of at most `items` items.
+    /// For workers with those rollouts who meet at a barrier, and lists of at most `items` items.
     pub fn new(
         isa: Isa,
         learner: &dyn Learner,
         (items, moments): (usize, usize),
-        collectors: Vec<Collector>,
         rollouts: Vec<Rollout>,
+        barrier: Arc<Barrier>,
     ) -> Self {
-        let (workers, places) = (collectors.len(), learner.places());
+        let (workers, places) = (rollouts.len(), learner.places());
         let pieces = places.pieces();
         let slice = |id| {
             let own = &pieces[share(pieces.len(), workers, id)];
@@ -64,10 +61,9 @@ impl Crew {
             slices: (0..workers).map(slice).collect(),
             pieces,
             networks: places.count(),
-            collectors: collectors.into_iter().map(Mutex::new).collect(),
             rollouts: rollouts.into_iter().map(RwLock::new).collect(),
             ticket: AtomicUsize::new(0),
-            barrier: Barrier::new(workers),
+            barrier,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `progress.csv`: one row of numbers per iteration.
 
 use crate::error::RunError;
-use marathon_learn::{IterationStats, write_atomic};
+use marathon_learn::{IterationStats, Learned, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 
@@ -16,37 +16,52 @@ pub struct CsvLog {
     before: Option<(String, String)>,
 }
 
-/// Columns and values of an iteration; a value that there is none of (no episode ended) is an empty cell.
+/// Columns and values of an iteration; a value that there is none of (no episode ended) is an empty cell. `terms` are the
+/// reward terms of all roles; columns of roles but the first begin with the role's name.
 pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) -> Vec<(String, Option<f64>)> {
-    let mut row: Vec<(String, Option<f64>)> = [
+    let IterationStats { learned, others, .. } = stats;
+    let about = [
         (ITERATION, Some(stats.iteration as f64)),
         ("steps", Some(stats.steps as f64)),
         ("wall_seconds", Some(stats.wall_seconds)),
         ("cpu_seconds", Some(stats.cpu_seconds)),
         ("steps_per_second", Some(steps_per_second)),
         ("episodes", Some(stats.episodes as f64)),
-        ("return_mean", stats.return_mean),
+        ("return_mean", learned.return_mean),
         ("length_mean", stats.length_mean),
         ("speed_mean", stats.speed_mean),
         ("fall_fraction", stats.fall_fraction),
         ("diverged", Some(stats.diverged as f64)),
-        ("kl", Some(stats.kl)),
-        ("clip_fraction", Some(stats.clip_fraction)),
-        ("policy_loss", Some(stats.policy_loss)),
-        ("value_loss", Some(stats.value_loss)),
-        ("explained_variance", Some(stats.explained_variance)),
-        ("entropy", Some(stats.entropy)),
-        ("std_mean", Some(stats.std_mean)),
-        ("lr", Some(stats.lr)),
-        ("env_share", Some(stats.env_share)),
-        ("update_share", Some(stats.update_share)),
-        ("skipped_minibatches", Some(stats.skipped_minibatches as f64)),
-    ]
-    .map(|(name, x)| (name.to_string(), x))
-    .into();
-    row.extend(stats.signal_rewards.iter().map(|(reward, x)| (format!("{reward}_reward"), Some(*x))));
-    row.extend(terms.iter().zip(&stats.reward_terms).map(|(term, x)| (format!("reward/{term}"), Some(*x))));
+    ];
+    let shares = [("env_share", Some(stats.env_share)), ("update_share", Some(stats.update_share))];
+    let skipped = ("skipped_minibatches", Some(learned.skipped_minibatches as f64));
+    let first = about.into_iter().chain(of_learning(learned)).chain(shares).chain([skipped]);
+    let mut row: Vec<(String, Option<f64>)> = first.map(|(name, x)| (name.to_string(), x)).collect();
+    row.extend(learned.signal_rewards.iter().map(|(reward, x)| (format!("{reward}_reward"), Some(*x))));
+    for (role, learned) in others {
+        let named = [("return_mean", learned.return_mean)].into_iter().chain(of_learning(learned));
+        row.extend(named.map(|(name, x)| (format!("{role}/{name}"), x)));
+        row.extend(learned.signal_rewards.iter().map(|(reward, x)| (format!("{role}/{reward}_reward"), Some(*x))));
+    }
+    let all = [learned].into_iter().chain(others.iter().map(|(_, learned)| learned));
+    let all = all.flat_map(|learned| &learned.reward_terms);
+    row.extend(terms.iter().zip(all).map(|(term, x)| (format!("reward/{term}"), Some(*x))));
     row
+}
+
+/// What learning tells of itself.
+fn of_learning(learned: &Learned) -> [(&'static str, Option<f64>); 8] {
+    [
+        ("kl", learned.kl),
+        ("clip_fraction", learned.clip_fraction),
+        ("policy_loss", learned.policy_loss),
+        ("value_loss", learned.value_loss),
+        ("explained_variance", learned.explained_variance),
+        ("entropy", learned.entropy),
+        ("std_mean", learned.std_mean),
+        ("lr", learned.lr),
+    ]
+    .map(|(name, x)| (name, Some(x)))
 }
 
 impl CsvLog {

@@ -11,7 +11,7 @@ pub mod tensorboard;
 use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder};
 use csv::CsvLog;
-use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot};
+use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot, TrainOutput};
 use progress::Progress;
 use std::path::PathBuf;
 use tensorboard::EventLog;
@@ -95,16 +95,16 @@ impl<'a> Reporter<'a> {
         self.told = true;
         if stats.steps >= self.due {
             self.plan(stats.steps);
-            let policy = snapshot.policy();
+            let output = snapshot.output();
             // a run that is killed in between comes by here again
-            self.keep(&policy)?;
-            save(self.folder, &policy, &snapshot.checkpoint())?;
+            self.keep(&output.policy)?;
+            save(self.folder, &output)?;
             self.prune(stats.steps);
         }
         Ok(())
     }
 
-    /// Keeps a policy in `policies/`.
+    /// Keeps a policy in `policies/`: that of the first role.
     fn keep(&self, policy: &Policy) -> Result<(), RunError> {
         if self.run.keep_checkpoints == 0 {
             return Ok(());
@@ -152,12 +152,23 @@ pub fn kept_policies(folder: &RunFolder) -> Vec<(u64, PathBuf)> {
     entries.filter_map(|entry| of(entry.path())).collect()
 }
 
-/// Writes the checkpoint, then the policy.
+/// Writes the checkpoint, then the policies.
 ///
 /// # Errors
 /// If one of them cannot be written; the old one is whole then.
-pub fn save(folder: &RunFolder, policy: &Policy, checkpoint: &Checkpoint) -> Result<(), RunError> {
-    checkpoint.save(&folder.checkpoint())?;
+pub fn save(folder: &RunFolder, output: &TrainOutput) -> Result<(), RunError> {
+    output.checkpoint.save(&folder.checkpoint())?;
+    save_policies(folder, &output.policy, &output.others)
+}
+
+/// Writes the policies of all roles.
+///
+/// # Errors
+/// If one of them cannot be written; the old one is whole then.
+pub fn save_policies(folder: &RunFolder, policy: &Policy, others: &[(String, Policy)]) -> Result<(), RunError> {
     policy.save(&folder.policy())?;
+    for (role, policy) in others {
+        policy.save(&folder.policy_of(role))?;
+    }
     Ok(())
 }

@@ -119,7 +119,7 @@ impl Progress {
 impl Episodes {
     fn add(&mut self, stats: &IterationStats) {
         let n = stats.episodes as f64;
-        if let (Some(r), Some(l), Some(v)) = (stats.return_mean, stats.length_mean, stats.speed_mean) {
+        if let (Some(r), Some(l), Some(v)) = (stats.learned.return_mean, stats.length_mean, stats.speed_mean) {
             self.count += n;
             self.returns += n * r;
             self.lengths += n * l;

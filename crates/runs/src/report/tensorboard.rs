@@ -13,7 +13,7 @@
 use crate::error::RunError;
 use crate::folder::{EVENTS, RunFolder};
 use crc::{CRC_32_ISCSI, Crc, Table};
-use marathon_learn::{IterationStats, write_atomic};
+use marathon_learn::{IterationStats, Learned, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -29,34 +29,48 @@ pub struct EventLog {
     file: File,
 }
 
-/// Tags and values of an iteration, named as ML-Agents names them where it has them.
+/// Tags and values of an iteration, named as ML-Agents names them where it has them. `terms` are the reward terms of all
+/// roles; tags of roles but the first begin with the role's name.
 pub fn scalars(stats: &IterationStats, steps_per_second: f64, terms: &[String]) -> Vec<(String, f64)> {
-    let fixed = [
-        ("Environment/Cumulative Reward", stats.return_mean),
+    let IterationStats { learned, others, .. } = stats;
+    let of_run = [
         ("Environment/Episode Length", stats.length_mean),
         ("Environment/Speed", stats.speed_mean),
         ("Environment/Falls", stats.fall_fraction),
         ("Environment/Diverged", Some(stats.diverged as f64)),
-        ("Losses/Policy Loss", Some(stats.policy_loss)),
-        ("Losses/Value Loss", Some(stats.value_loss)),
-        ("Policy/Entropy", Some(stats.entropy)),
-        ("Policy/Learning Rate", Some(stats.lr)),
-        ("Policy/KL Divergence", Some(stats.kl)),
-        ("Policy/Clip Fraction", Some(stats.clip_fraction)),
-        ("Policy/Standard Deviation", Some(stats.std_mean)),
-        ("Policy/Explained Variance", Some(stats.explained_variance)),
         ("Performance/Steps Per Second", Some(steps_per_second)),
         ("Performance/Wall Seconds", Some(stats.wall_seconds)),
         ("Performance/CPU Seconds", Some(stats.cpu_seconds)),
     ];
-    let fixed = fixed.into_iter().filter_map(|(tag, x)| Some((tag.to_string(), x?)));
-    let terms = terms.iter().zip(&stats.reward_terms).map(|(term, x)| (format!("Reward/{term}"), *x));
+    let of_run = of_run.into_iter().filter_map(|(tag, x)| Some((tag.to_string(), x?)));
+    let of_others = others
+        .iter()
+        .flat_map(|(role, learned)| of_learning(learned).into_iter().map(move |(tag, x)| (format!("{role}/{tag}"), x)));
+    let all = [learned].into_iter().chain(others.iter().map(|(_, learned)| learned));
+    let all = all.flat_map(|learned| &learned.reward_terms);
+    let terms = terms.iter().zip(all).map(|(term, x)| (format!("Reward/{term}"), *x));
+    of_learning(learned).into_iter().chain(of_run).chain(of_others).chain(terms).collect()
+}
+
+/// What a role earned and learned.
+fn of_learning(learned: &Learned) -> Vec<(String, f64)> {
+    let fixed = [
+        ("Environment/Cumulative Reward", learned.return_mean),
+        ("Losses/Policy Loss", Some(learned.policy_loss)),
+        ("Losses/Value Loss", Some(learned.value_loss)),
+        ("Policy/Entropy", Some(learned.entropy)),
+        ("Policy/Learning Rate", Some(learned.lr)),
+        ("Policy/KL Divergence", Some(learned.kl)),
+        ("Policy/Clip Fraction", Some(learned.clip_fraction)),
+        ("Policy/Standard Deviation", Some(learned.std_mean)),
+        ("Policy/Explained Variance", Some(learned.explained_variance)),
+    ];
     let name = |reward: &str| {
         let (first, rest) = reward.split_at(1);
         format!("Policy/{}{rest} Reward", first.to_uppercase())
     };
-    let signals = stats.signal_rewards.iter().map(|(reward, x)| (name(reward), *x));
-    fixed.chain(signals).chain(terms).collect()
+    let signals = learned.signal_rewards.iter().map(|(reward, x)| (name(reward), *x));
+    fixed.into_iter().filter_map(|(tag, x)| Some((tag.to_string(), x?))).chain(signals).collect()
 }
 
 impl EventLog {

@@ -1,0 +1,44 @@
+//! A task with several roles: the behavior with the task's name speaks of the run and of the first role, `task/role` of
+//! another. A role that the file does not speak of has the settings of the first; one that the task lacks is refused.
+
+use marathon_config::{parse, parse_roles};
+use std::path::Path;
+
+const FILE: &str = "
+default_settings:
+  trainer_type: ppo
+  hyperparameters: {learning_rate: 0.001}
+behaviors:
+  Tag-v0:
+    max_steps: 1000000
+  Tag-v0/opponent:
+    trainer_type: ppo
+    hyperparameters: {learning_rate: 0.0002}
+    network_settings: {hidden_units: 24, num_layers: 1}
+";
+
+fn path() -> &'static Path {
+    Path::new("tag.yaml")
+}
+
+#[test]
+fn a_role_has_the_settings_of_its_behavior() {
+    let run = parse(path(), FILE.as_bytes(), "Tag-v0").unwrap();
+    assert!(run.config.roles.is_empty());
+    let roles = parse_roles(path(), FILE.as_bytes(), "Tag-v0", &["opponent", "referee"]).unwrap();
+    assert_eq!(roles.keys().collect::<Vec<_>>(), ["opponent"]);
+    let config = run.config.with(|config| config.roles = roles);
+    config.validate().unwrap();
+    let [opponent, referee] = ["opponent", "referee"].map(|role| config.of_role(role));
+    assert_eq!(opponent.network.actor_hidden, [24]);
+    assert_eq!(opponent.run, config.run);
+    let lr = |config: &marathon_learn::TrainConfig| config.algorithm.rates();
+    assert!(lr(&opponent).starts_with("lr is 2e-4") && lr(&referee).starts_with("lr is 1e-3"));
+    assert_eq!((&referee.network, referee.algorithm), (&config.network, config.algorithm));
+}
+
+#[test]
+fn a_role_that_there_is_not_is_refused_by_name() {
+    let error = parse_roles(path(), FILE.as_bytes(), "Tag-v0", &["oponent"]).unwrap_err().to_string();
+    assert_eq!(error, "tag.yaml:8: behaviors.Tag-v0/opponent: unknown key; did you mean 'Tag-v0/oponent'?");
+}

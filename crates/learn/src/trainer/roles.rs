@@ -1,0 +1,131 @@
+//! The roles of a run: what each learns with.
+
+use super::config::{RunConfig, TrainConfig};
+use super::stats::Learned;
+use crate::algorithms::loss::LossSums;
+use crate::algorithms::schedule::Progress;
+use crate::algorithms::{Algorithm, Learner, Setup};
+use crate::error::Error;
+use crate::lanes::noise::seed_of_role;
+use crate::policy::{Policy, PolicyMeta, Training};
+use crate::rollout::seat::SeatPlan;
+use crate::rollout::statistics::Statistics;
+use crate::rollout::sums::Totals;
+use marathon_envs::{Role, Spec};
+use marathon_physics::lanes::Isa;
+
+/// A role with its settings.
+pub struct RoleParts {
+    /// The role.
+    pub role: Role,
+    /// The task as the role knows it.
+    pub spec: Spec,
+    /// Its settings, with a seed of its own.
+    pub config: TrainConfig,
+}
+
+impl RoleParts {
+    /// All roles of a task.
+    ///
+    /// # Errors
+    /// If the configuration speaks of another role, or does not suit a role's way of deciding.
+    pub fn all(config: &TrainConfig, spec: &Spec) -> Result<Vec<Self>, Error> {
+        let roles = spec.deciders();
+        if let Some(name) = config.roles.keys().find(|name| !spec.roles.iter().any(|role| role.name == **name)) {
+            let names: Vec<&str> = spec.roles.iter().map(|role| role.name.as_str()).collect();
+            let expected = if names.is_empty() { "none: the task has one role".into() } else { names.join(", ") };
+            return Err(Error::config("roles", name, expected));
+        }
+        let parts = |(i, role): (usize, Role)| {
+            let config = config.of_role(&role.name).with(|own| own.run.seed = seed_of_role(config.run.seed, i));
+            let suits = matches!(config.algorithm, Algorithm::Ppo(_) | Algorithm::A2c(_)) && config.rewards.len() == 1;
+            if role.intermittent && !suits {
+                let found =
+                    format!("{} with {} rewards for {}", config.algorithm.name(), config.rewards.len(), role.name);
+                let expected = "ppo or a2c with the task's reward alone: the role does not decide every time";
+                return Err(Error::config("algorithm", found, expected));
+            }
+            Ok(Self { spec: spec.of_role(&role), config, role })
+        };
+        roles.into_iter().enumerate().map(parts).collect()
+    }
+
+    /// What its algorithm is to learn.
+    pub fn setup(&self, isa: Isa) -> Setup<'_> {
+        self.config.setup(&self.spec, isa)
+    }
+
+    /// Its policy in a run that has this configuration.
+    pub fn policy(&self, replica: &RoleReplica, progress: &Progress, config: &TrainConfig) -> Policy {
+        let network = &self.config.network;
+        let mut meta = PolicyMeta::of(&self.spec, network.actor_hidden.clone(), network.activation);
+        meta.observation_clip = self.config.statistics.observation_clip as f32;
+        let run = RunConfig { threads: 0, ..config.run.clone() };
+        let config = TrainConfig { run, ..config.clone() };
+        meta.training = Some(Training {
+            config: serde_json::to_value(config).expect("a configuration is plain data"),
+            steps: progress.steps,
+            iterations: progress.iteration,
+        });
+        replica.learner.policy(meta, replica.statistics.normalizer())
+    }
+
+    /// What reports say of its learning in an iteration.
+    pub fn learned(&self, learner: &dyn Learner, totals: &Totals, updates: &LossSums) -> Learned {
+        let sums = &totals.sums;
+        let per_sample = |x: f64| if updates.samples > 0.0 { x / updates.samples } else { 0.0 };
+        let names = self.config.rewards.iter().skip(1).map(|reward| reward.kind.name().to_string());
+        let of_rewards = names.zip(&sums.rewards).map(|(name, x)| (name, x / totals.samples));
+        let about = learner.describe(totals, updates);
+        Learned {
+            return_mean: (sums.episodes > 0.0).then(|| sums.returns / sums.episodes),
+            reward_terms: sums.terms.iter().map(|x| x / totals.samples).collect(),
+            kl: per_sample(updates.kl),
+            clip_fraction: per_sample(updates.clipped),
+            policy_loss: per_sample(updates.policy),
+            value_loss: per_sample(updates.value),
+            explained_variance: about.explained_variance,
+            entropy: about.entropy,
+            std_mean: about.std_mean,
+            lr: about.lr,
+            skipped_minibatches: about.skipped,
+            signal_rewards: of_rewards.collect(),
+        }
+    }
+}
+
+/// What learning changes of a role; every worker has the same.
+pub struct RoleReplica {
+    /// What learns.
+    pub learner: Box<dyn Learner>,
+    /// What it has seen.
+    pub statistics: Statistics,
+}
+
+impl RoleReplica {
+    /// At the start of a run, for workers that have so many blocks each.
+    pub fn new(role: &RoleParts, isa: Isa, blocks: &[usize]) -> Self {
+        Self {
+            learner: role.config.algorithm.learner(&role.setup(isa), blocks),
+            statistics: Statistics::new(role.spec.obs, role.config.statistics),
+        }
+    }
+
+    /// Another worker's.
+    pub fn copy(&self) -> Self {
+        Self { learner: self.learner.replica(), statistics: self.statistics.clone() }
+    }
+
+    /// What it plays with.
+    pub fn seat(&self, role: &RoleParts) -> SeatPlan<'_> {
+        let (seed, lanes) = (role.config.run.seed, self.learner.shape().lanes);
+        SeatPlan { role: role.role.clone(), seed, lanes, with: self.learner.collecting(&self.statistics) }
+    }
+
+    /// Takes in the statistics of a rollout.
+    pub fn absorb(&mut self, totals: &Totals, progress: &Progress) {
+        if let Some([before, after]) = self.statistics.absorb(totals, progress.iteration == 0) {
+            self.learner.follow(&before, &after);
+        }
+    }
+}
