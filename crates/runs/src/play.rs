@@ -9,7 +9,7 @@ use marathon_physics::lanes::Isa;
 /// actions, [`Play::step`] carries them out.
 pub struct Play<'a> {
     env: VecEnv,
-    pilot: BlockPolicy<'a>,
+    pilot: BlockPolicy<&'a Policy>,
     actions: Vec<f32>,
     step: Step,
 }

@@ -10,9 +10,9 @@
 //! The rollout was drawn from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of
 //! `A log pi`: the gradient comes from the same code as PPO's. The bound of its norm is for both networks together.
 
-use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
+use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
 use super::loss::{LossSums, Objective};
-use super::on_policy::{Course, OnPolicy};
+use super::on_policy::{OnPolicy, Rule, Student};
 use super::schedule::{Moving, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
@@ -100,25 +100,23 @@ pub fn objective(entropy_coef: f64) -> Objective {
     }
 }
 
-/// What A2C learns with.
-pub struct A2cLearner {
+/// A2C at work.
+#[derive(Clone)]
+pub struct A2cRule {
     settings: A2c,
-    nets: ActorCritic,
     rms: RmsProp,
-    course: Course,
-    space: Option<Box<Space>>,
 }
 
-impl A2cLearner {
-    /// At the start of a run.
-    pub fn new(settings: A2c, setup: &Setup<'_>) -> Self {
+impl A2cRule {
+    /// A learner at the start of a run.
+    pub fn learner(settings: A2c, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
         let rms = RmsProp::new(nets.params.len(), settings.rms_decay, settings.rms_epsilon);
-        Self { settings, nets, rms, course: Course { lr: settings.lr, skipped: 0 }, space: None }
+        OnPolicy::new(nets, settings.lr, 0, Self { settings, rms })
     }
 
-    fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let Self { settings, nets, rms, course: Course { lr, .. }, .. } = self;
+    fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let (Self { settings, rms }, Student { nets, lr, skipped, .. }) = (self, student);
         // nobody has decided anything
         if sums.samples == 0.0 {
             return;
@@ -128,7 +126,7 @@ impl A2cLearner {
         let squares = workers.squares();
         let norm = (squares[0] + weight[1] * weight[1] * squares[1]).sqrt() / sums.samples;
         if !norm.is_finite() {
-            self.course.skipped += 1;
+            *skipped += 1;
             return;
         }
         let bound = (settings.max_grad_norm / norm).min(1.0) / sums.samples;
@@ -142,45 +140,26 @@ impl A2cLearner {
     }
 }
 
-impl OnPolicy for A2cLearner {
-    fn nets(&self) -> &ActorCritic {
-        &self.nets
-    }
-    fn nets_mut(&mut self) -> &mut ActorCritic {
-        &mut self.nets
-    }
-    fn course(&self) -> Course {
-        self.course
-    }
-    fn course_mut(&mut self) -> &mut Course {
-        &mut self.course
-    }
-    fn copy(&self) -> Self {
-        let Self { settings, nets, rms, course, .. } = self;
-        let (nets, rms) = (nets.clone(), rms.clone());
-        Self { settings: *settings, nets, rms, course: *course, space: None }
-    }
-
+impl Rule for A2cRule {
     fn learn(
         &mut self,
+        student: &mut Student,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
-        all: &mut LossSums,
-    ) {
+    ) -> LossSums {
         let items: Vec<u32> = (0..experience.items() as u32).collect();
         let objective = objective(progress.at(self.settings.entropy_coef));
-        let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
-        let sums = self.nets.gradient(workers, experience, &items, objective, None, space);
-        *all += sums;
-        self.course.lr = self.settings.lr * progress.rate(self.settings.schedule);
-        self.step(workers, progress, &sums);
+        let sums = student.gradient(workers, experience, &items, objective, None);
+        student.lr = self.settings.lr * progress.rate(self.settings.schedule);
+        self.step(student, workers, progress, &sums);
+        sums
     }
 
-    fn save_optimizer(&self, saved: &mut Saved) {
+    fn save(&self, saved: &mut Saved) {
         saved.list("mean_square", &self.rms.mean_square);
     }
-    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
         saved.copy("mean_square", &mut self.rms.mean_square)
     }
 }

@@ -17,9 +17,9 @@
 //! first rollouts alike instead), and the damping is split between the factors (Martens and Grosse, 2015, section 6.3).
 
 use super::a2c;
-use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space, refuse_adaptive};
+use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
 use super::loss::LossSums;
-use super::on_policy::{Course, OnPolicy};
+use super::on_policy::{OnPolicy, Rule, Student};
 use super::schedule::{Moving, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
@@ -107,32 +107,29 @@ impl Acktr {
     }
 }
 
-/// What ACKTR learns with.
-pub struct AcktrLearner {
+/// ACKTR at work.
+#[derive(Clone)]
+pub struct AcktrRule {
     settings: Acktr,
-    nets: ActorCritic,
     /// The factors, which all workers share.
     kfac: Arc<Kfac>,
     momentum: Vec<f32>,
-    course: Course,
-    space: Option<Box<Space>>,
 }
 
-impl AcktrLearner {
-    /// At the start of a run.
-    pub fn new(settings: Acktr, setup: &Setup<'_>) -> Self {
+impl AcktrRule {
+    /// A learner at the start of a run.
+    pub fn learner(settings: Acktr, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
         let Layout { actor, critic, critic_start, .. } = &nets.layout;
         let kfac = Arc::new(Kfac::new(actor, critic, *critic_start));
-        let momentum = vec![0.0; nets.params.len()];
-        Self { settings, nets, kfac, momentum, course: Course { lr: settings.lr, skipped: 0 }, space: None }
+        let (moments, momentum) = (Kfac::moments_len(actor, critic), vec![0.0; nets.params.len()]);
+        OnPolicy::new(nets, settings.lr, moments, Self { settings, kfac, momentum })
     }
 
     /// The step on the worker's replica.
-    fn step(&mut self, progress: &Progress, scale: [f64; 2], sums: &LossSums, all: &mut LossSums) {
-        let Self { settings, nets, kfac, momentum, course: Course { lr, .. }, space: Some(space), .. } = self else {
-            return;
-        };
+    fn step(&mut self, student: &mut Student, progress: &Progress, scale: [f64; 2], sums: &mut LossSums) {
+        let Self { settings, kfac, momentum } = self;
+        let Student { nets, lr, skipped, space: Some(space), .. } = student else { return };
         let gradient = &space.gradient;
         let log_std = nets.layout.log_std.clone();
         let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
@@ -140,7 +137,7 @@ impl AcktrLearner {
         products[0] = log_std.clone().map(|i| of_std(i) * gradient[i] as f64 * scale[0]).sum();
         (0..kfac.count()).map(|l| kfac.layer(l)).for_each(|layer| products[layer.network] += layer.product);
         if !products.iter().all(|p| p.is_finite() && *p >= 0.0) {
-            self.course.skipped += 1;
+            *skipped += 1;
             return;
         }
         // a product of zero asks for no step: any length will do
@@ -161,49 +158,28 @@ impl AcktrLearner {
         nets.bound_std(progress);
         // the divergence is known without looking at samples
         let kl = 0.5 * length[0] * length[0] * products[0];
-        all.kl += (kl * sums.samples) - sums.kl;
+        sums.kl = kl * sums.samples;
     }
 }
 
-impl OnPolicy for AcktrLearner {
-    fn nets(&self) -> &ActorCritic {
-        &self.nets
-    }
-    fn nets_mut(&mut self) -> &mut ActorCritic {
-        &mut self.nets
-    }
-    fn course(&self) -> Course {
-        self.course
-    }
-    fn course_mut(&mut self) -> &mut Course {
-        &mut self.course
-    }
-    fn copy(&self) -> Self {
-        let Self { settings, nets, kfac, momentum, course, .. } = self;
-        let (nets, kfac, momentum) = (nets.clone(), kfac.clone(), momentum.clone());
-        Self { settings: *settings, nets, kfac, momentum, course: *course, space: None }
-    }
-
+impl Rule for AcktrRule {
     fn learn(
         &mut self,
+        student: &mut Student,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
-        all: &mut LossSums,
-    ) {
-        let Self { settings, nets, kfac, space, .. } = self;
+    ) -> LossSums {
+        let Self { settings, kfac, .. } = self;
         let items: Vec<u32> = (0..experience.items() as u32).collect();
         let objective = a2c::objective(progress.at(settings.entropy_coef));
-        let layout = &nets.layout;
-        let space =
-            space.get_or_insert_with(|| Box::new(Space::new(layout, Kfac::moments_len(&layout.actor, &layout.critic))));
-        let sums = nets.gradient(workers, experience, &items, objective, Some(kfac), space);
-        *all += sums;
-        let gradient = &mut space.gradient;
-        workers.pieces(&mut |_, range, piece| gradient[range].copy_from_slice(piece));
+        let mut sums = student.gradient(workers, experience, &items, objective, Some(kfac));
         let mean = 1.0 / sums.samples;
         // the gradient at hand is that of (V - R)^2 / 2
         let scale = [mean, mean * 2.0 * settings.value_coef];
+        let Student { nets, space: Some(space), .. } = &mut *student else { return sums };
+        let gradient = &mut space.gradient;
+        workers.pieces(&mut |_, range, piece| gradient[range].copy_from_slice(piece));
 
         // factors, inverses and natural gradients, a layer at a time, shared out among the workers
         let count = progress.iteration;
@@ -219,18 +195,19 @@ impl OnPolicy for AcktrLearner {
             let scale = scale[layer.network];
             layer.natural(nets.isa, gradient, scale);
         });
-        self.course.lr = settings.lr * progress.rate(settings.schedule);
-        self.step(progress, scale, &sums, all);
+        student.lr = settings.lr * progress.rate(settings.schedule);
+        self.step(student, progress, scale, &mut sums);
         workers.wait();
+        sums
     }
 
-    fn save_optimizer(&self, saved: &mut Saved) {
+    fn save(&self, saved: &mut Saved) {
         saved.list("momentum", &self.momentum);
         let (factors, inverses) = self.kfac.save();
         saved.list("kfac", &factors);
         saved.list("kfac_inverse", &inverses);
     }
-    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
         saved.copy("momentum", &mut self.momentum)?;
         let factors: &[f64] = saved.get("kfac")?;
         if !self.kfac.load(factors, saved.get("kfac_inverse")?) {

@@ -132,9 +132,9 @@ impl Algorithm {
     /// A learner at the start of a run, for workers that have so many blocks each.
     pub fn learner(&self, setup: &Setup<'_>, blocks: &[usize]) -> Box<dyn Learner> {
         match self {
-            Algorithm::Ppo(settings) => Box::new(ppo::PpoLearner::new(*settings, setup)),
-            Algorithm::A2c(settings) => Box::new(a2c::A2cLearner::new(*settings, setup)),
-            Algorithm::Acktr(settings) => Box::new(acktr::AcktrLearner::new(*settings, setup)),
+            Algorithm::Ppo(settings) => Box::new(ppo::PpoRule::learner(*settings, setup)),
+            Algorithm::A2c(settings) => Box::new(a2c::A2cRule::learner(*settings, setup)),
+            Algorithm::Acktr(settings) => Box::new(acktr::AcktrRule::learner(*settings, setup)),
             Algorithm::Sac(settings) => Box::new(sac::SacLearner::new(*settings, setup, blocks)),
         }
     }

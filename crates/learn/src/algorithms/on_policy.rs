@@ -1,100 +1,127 @@
-//! What every learner from its own rollouts does alike, whatever its optimizer.
+//! What every learner from its own rollouts does alike, whatever moves its networks.
 
-use super::actor_critic::ActorCritic;
-use super::loss::LossSums;
+use super::actor_critic::{ActorCritic, Space};
+use super::loss::{LossSums, Objective};
 use super::parameters::Places;
 use super::schedule::Progress;
 use super::{Description, Learner, Now, Saved, Workers};
 use crate::error::Error;
 use crate::nets::normalize::Normalizer;
+use crate::optim::kfac::Kfac;
 use crate::policy::{Policy, PolicyMeta};
 use crate::rollout::collect::Collecting;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 
-/// How far the optimizer's settings have come.
-#[derive(Clone, Copy)]
-pub struct Course {
+/// Networks, and how far they have come.
+pub struct Student {
+    /// The networks.
+    pub nets: ActorCritic,
     /// Learning rate of the policy.
     pub lr: f64,
     /// Steps left out because their gradient was not finite.
     pub skipped: u64,
+    /// Numbers beside the gradient that a group of samples contributes.
+    moments: usize,
+    /// Where gradients are computed, once there are any.
+    pub space: Option<Box<Space>>,
 }
 
-/// An algorithm that learns from its own rollouts; it is a [`Learner`].
-pub trait OnPolicy: Send + Sized + 'static {
-    /// Its networks.
-    fn nets(&self) -> &ActorCritic;
-    /// Its networks.
-    fn nets_mut(&mut self) -> &mut ActorCritic;
-    /// How far it has come.
-    fn course(&self) -> Course;
-    /// How far it has come.
-    fn course_mut(&mut self) -> &mut Course;
-    /// Another worker's.
-    fn copy(&self) -> Self;
-    /// Learns from a rollout together with all other workers.
-    fn learn(
+impl Student {
+    /// Leaves the gradient of an objective on a list of items with the workers, see [`ActorCritic::gradient`].
+    pub fn gradient(
         &mut self,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
-        progress: &Progress,
-        all: &mut LossSums,
-    );
-    /// Adds what its optimizer remembers.
-    fn save_optimizer(&self, saved: &mut Saved);
-    /// Takes that back.
-    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error>;
+        items: &[u32],
+        objective: Objective,
+        kfac: Option<&Kfac>,
+    ) -> LossSums {
+        let Self { nets, moments, space, .. } = self;
+        let space = space.get_or_insert_with(|| Box::new(Space::new(&nets.layout, *moments)));
+        nets.gradient(workers, experience, items, objective, kfac, space)
+    }
 }
 
-impl<A: OnPolicy> Learner for A {
+/// What moves the networks: an algorithm with its settings and the memory of its optimizer.
+pub trait Rule: Clone + Send + 'static {
+    /// Learns from a rollout together with all other workers; returns what the objective was.
+    fn learn(
+        &mut self,
+        student: &mut Student,
+        workers: &mut dyn Workers,
+        experience: &Experience<'_>,
+        progress: &Progress,
+    ) -> LossSums;
+    /// Adds what its optimizer remembers.
+    fn save(&self, saved: &mut Saved);
+    /// Takes that back.
+    fn load(&mut self, saved: &Saved) -> Result<(), Error>;
+}
+
+/// A [`Learner`] from its own rollouts.
+pub struct OnPolicy<R> {
+    student: Student,
+    rule: R,
+}
+
+impl<R: Rule> OnPolicy<R> {
+    /// At the start of a run; each group of samples contributes so many `moments` beside its gradient.
+    pub fn new(nets: ActorCritic, lr: f64, moments: usize, rule: R) -> Self {
+        Self { student: Student { nets, lr, skipped: 0, moments, space: None }, rule }
+    }
+}
+
+impl<R: Rule> Learner for OnPolicy<R> {
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
         // the first rollout only fills the statistics
         if now.progress.iteration > 0 {
-            self.learn(workers, experience, now.progress, sums);
+            *sums += self.rule.learn(&mut self.student, workers, experience, now.progress);
         }
     }
     fn replica(&self) -> Box<dyn Learner> {
-        Box::new(self.copy())
+        let Student { nets, lr, skipped, moments, .. } = &self.student;
+        let student = Student { nets: nets.clone(), lr: *lr, skipped: *skipped, moments: *moments, space: None };
+        Box::new(Self { student, rule: self.rule.clone() })
     }
     fn places(&self) -> &Places {
-        &self.nets().layout.places
+        &self.student.nets.layout.places
     }
     fn params(&self) -> &[f32] {
-        &self.nets().params
+        &self.student.nets.params
     }
     fn params_mut(&mut self) -> &mut Vec<f32> {
-        &mut self.nets_mut().params
+        &mut self.student.nets.params
     }
     fn shape(&self) -> Shape {
-        self.nets().shape()
+        self.student.nets.shape()
     }
     fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
-        self.nets().collecting(statistics)
+        self.student.nets.collecting(statistics)
     }
     fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
-        self.nets_mut().follow(before, after);
+        self.student.nets.follow(before, after);
     }
     fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
-        let Course { lr, skipped } = self.course();
-        self.nets().describe(totals, lr, skipped)
+        let Student { nets, lr, skipped, .. } = &self.student;
+        nets.describe(totals, *lr, *skipped)
     }
     fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
-        self.nets().policy(meta, normalizer)
+        self.student.nets.policy(meta, normalizer)
     }
     fn save(&self) -> Saved {
-        let (mut saved, Course { lr, skipped }) = (Saved::default(), self.course());
-        saved.list("params", &self.nets().params);
-        self.save_optimizer(&mut saved);
-        saved.scalar("lr", lr);
-        saved.scalar("skipped", skipped as f64);
+        let (mut saved, Student { nets, lr, skipped, .. }) = (Saved::default(), &self.student);
+        saved.list("params", &nets.params);
+        self.rule.save(&mut saved);
+        saved.scalar("lr", *lr);
+        saved.scalar("skipped", *skipped as f64);
         saved
     }
     fn load(&mut self, saved: &Saved) -> Result<(), Error> {
-        saved.copy("params", &mut self.nets_mut().params)?;
-        self.load_optimizer(saved)?;
-        *self.course_mut() = Course { lr: saved.number("lr")?, skipped: saved.number("skipped")? as u64 };
+        saved.copy("params", &mut self.student.nets.params)?;
+        self.rule.load(saved)?;
+        (self.student.lr, self.student.skipped) = (saved.number("lr")?, saved.number("skipped")? as u64);
         Ok(())
     }
 }

@@ -3,9 +3,9 @@
 //! `epochs` times, the rollout of all workers is shuffled and split into minibatches; each gives one step of Adam on the
 //! clipped objective of [`loss`](super::loss).
 
-use super::actor_critic::{self, ActorCritic, Deviations, Layout, Space};
+use super::actor_critic::{self, ActorCritic, Deviations, Layout};
 use super::loss::{LossSums, Objective};
-use super::on_policy::{Course, OnPolicy};
+use super::on_policy::{OnPolicy, Rule, Student};
 use super::schedule::{Moving, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check, load_adam, save_adam, share};
 use crate::error::Error;
@@ -117,29 +117,20 @@ impl Ppo {
     }
 }
 
-/// What PPO learns with.
-pub struct PpoLearner {
+/// PPO at work.
+#[derive(Clone)]
+pub struct PpoRule {
     settings: Ppo,
     seed: u64,
-    nets: ActorCritic,
     adam: Adam,
-    course: Course,
-    space: Option<Box<Space>>,
 }
 
-impl PpoLearner {
-    /// At the start of a run.
-    pub fn new(settings: Ppo, setup: &Setup<'_>) -> Self {
+impl PpoRule {
+    /// A learner at the start of a run.
+    pub fn learner(settings: Ppo, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, settings.ratio, settings.deviations, settings.gae_lambda);
         let adam = Adam::new(nets.params.len(), settings.adam_epsilon);
-        Self {
-            settings,
-            seed: setup.common.seed,
-            nets,
-            adam,
-            course: Course { lr: settings.lr, skipped: 0 },
-            space: None,
-        }
+        OnPolicy::new(nets, settings.lr, 0, Self { settings, seed: setup.common.seed, adam })
     }
 
     /// The objective with the settings of this moment; advantages are normalized over the rollout.
@@ -158,15 +149,15 @@ impl PpoLearner {
     }
 
     /// One step of Adam on the worker's replica, each network's gradient bounded by itself.
-    fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let Self { settings, nets, adam, course: Course { lr, .. }, .. } = self;
+    fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let (Self { settings, adam, .. }, Student { nets, lr, skipped, .. }) = (self, student);
         // nobody has decided anything
         if sums.samples == 0.0 {
             return;
         }
         let squares = workers.squares();
         if !squares.iter().all(|s| s.is_finite()) {
-            self.course.skipped += 1;
+            *skipped += 1;
             return;
         }
         let mean = 1.0 / sums.samples;
@@ -193,55 +184,38 @@ impl PpoLearner {
     }
 }
 
-impl OnPolicy for PpoLearner {
-    fn nets(&self) -> &ActorCritic {
-        &self.nets
-    }
-    fn nets_mut(&mut self) -> &mut ActorCritic {
-        &mut self.nets
-    }
-    fn course(&self) -> Course {
-        self.course
-    }
-    fn course_mut(&mut self) -> &mut Course {
-        &mut self.course
-    }
-    fn copy(&self) -> Self {
-        let Self { settings, seed, nets, adam, course, .. } = self;
-        let (nets, adam) = (nets.clone(), adam.clone());
-        Self { settings: *settings, seed: *seed, nets, adam, course: *course, space: None }
-    }
-
+impl Rule for PpoRule {
     fn learn(
         &mut self,
+        student: &mut Student,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
-        all: &mut LossSums,
-    ) {
-        let Ppo { epochs, minibatches, .. } = self.settings;
+    ) -> LossSums {
+        let Ppo { epochs, minibatches, schedule, lr, .. } = self.settings;
         let objective = self.objective(experience, progress);
         let mut items: Vec<u32> = (0..experience.items() as u32).collect();
-        if self.settings.schedule == Schedule::Linear {
-            self.course.lr = self.settings.lr * progress.rate(Schedule::Linear);
+        if schedule == Schedule::Linear {
+            student.lr = lr * progress.rate(Schedule::Linear);
         }
+        let mut all = LossSums::default();
         for epoch in 0..epochs {
             let draw = progress.iteration * epochs as u64 + epoch as u64;
             SplitMix::new(self.seed, draw | SHUFFLES).shuffle(&mut items);
             for m in 0..minibatches {
                 let batch = &items[share(items.len(), minibatches, m)];
-                let space = self.space.get_or_insert_with(|| Box::new(Space::new(&self.nets.layout, 0)));
-                let sums = self.nets.gradient(workers, experience, batch, objective, None, space);
-                *all += sums;
-                self.step(workers, progress, &sums);
+                let sums = student.gradient(workers, experience, batch, objective, None);
+                all += sums;
+                self.step(student, workers, progress, &sums);
             }
         }
+        all
     }
 
-    fn save_optimizer(&self, saved: &mut Saved) {
+    fn save(&self, saved: &mut Saved) {
         save_adam(&self.adam, saved);
     }
-    fn load_optimizer(&mut self, saved: &Saved) -> Result<(), Error> {
+    fn load(&mut self, saved: &Saved) -> Result<(), Error> {
         load_adam(&mut self.adam, saved)
     }
 }

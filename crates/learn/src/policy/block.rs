@@ -9,22 +9,28 @@ use crate::nets::mlp::{CHUNK, Tape};
 use crate::nets::normalize::Normalize;
 use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
+use std::ops::Deref;
 
-/// A policy with work space to act for many blocks.
-pub struct BlockPolicy<'a> {
-    policy: &'a Policy,
+/// A policy with work space to act for many blocks; it is borrowed, or shared.
+pub struct BlockPolicy<P> {
+    policy: P,
     isa: Isa,
     input: Blocks<f32>,
     tape: Tape<f32>,
 }
 
-impl<'a> BlockPolicy<'a> {
+impl<P: Deref<Target = Policy>> BlockPolicy<P> {
     /// Work space for a policy.
     ///
     /// # Panics
     /// If this processor lacks the instruction set, at the first use.
-    pub fn new(policy: &'a Policy, isa: Isa) -> Self {
-        Self { policy, isa, input: policy.net.input(), tape: policy.net.inference_tape() }
+    pub fn new(policy: P, isa: Isa) -> Self {
+        Self { isa, input: policy.net.input(), tape: policy.net.inference_tape(), policy }
+    }
+
+    /// The policy.
+    pub fn policy(&self) -> &P {
+        &self.policy
     }
 
     /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`.
@@ -32,11 +38,11 @@ impl<'a> BlockPolicy<'a> {
     /// # Panics
     /// If the lengths do not fit each other.
     pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
-        let policy = self.policy;
+        let policy = &*self.policy;
         let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
         assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
         for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
-            self.forward(raw);
+            forward(policy, self.isa, raw, &mut self.input, &mut self.tape);
             for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
                 for (i, (out, x)) in out.iter_mut().zip(self.tape.output().block(b)).enumerate() {
                     *out = policy.action(i / BLOCK, *x);
@@ -51,7 +57,7 @@ impl<'a> BlockPolicy<'a> {
     /// # Panics
     /// If the lengths do not fit each other.
     pub fn act_rows(&mut self, obs: &[f32], noise: Option<&[f32]>, action: &mut [f32]) {
-        let policy = self.policy;
+        let policy = &*self.policy;
         let (n_obs, n_act) = (policy.meta.obs, policy.meta.act);
         assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "whole rows");
         assert!(noise.is_none_or(|noise| noise.len() == action.len()), "noise for every action");
@@ -65,7 +71,7 @@ impl<'a> BlockPolicy<'a> {
                     block[k * BLOCK + i % BLOCK] = *x;
                 }
             }
-            self.forward(&raw);
+            forward(policy, self.isa, &raw, &mut self.input, &mut self.tape);
             for (i, row) in action.chunks_exact_mut(n_act).enumerate() {
                 let mean = self.tape.output().block(i / BLOCK);
                 for (k, out) in row.iter_mut().enumerate() {
@@ -75,19 +81,18 @@ impl<'a> BlockPolicy<'a> {
             }
         }
     }
+}
 
-    /// Runs the network for at most [`CHUNK`] blocks of raw observations.
-    fn forward(&mut self, raw: &[f32]) {
-        let policy = self.policy;
-        f32_lanes!(self.isa, T => <T as Real>::enter(Normalize::<T> {
-            normalizer: &policy.normalizer,
-            raw,
-            input: &mut self.input,
-            copy: None,
-            sums: None,
-            lanes: PhantomData,
-        }));
-        let blocks = raw.len() / (policy.meta.obs * BLOCK);
-        policy.net.forward(self.isa, &policy.params, &self.input, &mut self.tape, blocks);
-    }
+/// Runs the network for at most [`CHUNK`] blocks of raw observations.
+fn forward(policy: &Policy, isa: Isa, raw: &[f32], input: &mut Blocks<f32>, tape: &mut Tape<f32>) {
+    f32_lanes!(isa, T => <T as Real>::enter(Normalize::<T> {
+        normalizer: &policy.normalizer,
+        raw,
+        input: &mut *input,
+        copy: None,
+        sums: None,
+        lanes: PhantomData,
+    }));
+    let blocks = raw.len() / (policy.meta.obs * BLOCK);
+    policy.net.forward(isa, &policy.params, input, tape, blocks);
 }

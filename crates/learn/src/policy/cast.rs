@@ -17,7 +17,7 @@ pub struct Cast<'a> {
 /// A role with its policy.
 struct Part<'a> {
     role: Role,
-    policy: BlockPolicy<'a>,
+    policy: BlockPolicy<&'a Policy>,
     /// Its part of the observations and actions, `[block][..][16]`, where it does not have them all.
     obs: Vec<f32>,
     action: Vec<f32>,
@@ -45,7 +45,7 @@ impl<'a> Cast<'a> {
             Ok(Part {
                 obs: room(role.obs.len()),
                 action: room(role.act.len()),
-                policy: BlockPolicy::new(policy, isa),
+                policy: BlockPolicy::new(*policy, isa),
                 decides: vec![!0; blocks],
                 role,
             })
