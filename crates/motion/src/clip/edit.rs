@@ -1,0 +1,275 @@
+//! Changes of a clip: trim, loop, resample, smooth, mirror, move.
+
+use super::{Clip, Cycle, quaternions};
+use crate::error::{MotionError, did_you_mean};
+use crate::layout::{JointKind, Layout};
+use crate::rotation::{about_z, cubic, exp, heading, hermite, log, quat, wxyz};
+use glam::{DQuat, DVec3};
+use marathon_physics::Model;
+use std::path::Path;
+
+impl Clip {
+    /// The part from one time to another, s, to the nearest frames. It does not loop.
+    ///
+    /// # Errors
+    /// If fewer than two frames would remain.
+    pub fn trim(&self, path: &Path, from: f64, to: f64) -> Result<Self, MotionError> {
+        let last = if self.cycle.is_some() { self.frames() } else { self.frames() - 1 };
+        let frame = |time: f64| libm::round(time / self.dt).clamp(0.0, last as f64) as i64;
+        let (from_frame, to_frame) = (frame(from), frame(to));
+        if from_frame >= to_frame {
+            let expected = format!("two or more frames between 0 and {:.3} s", self.duration());
+            return Err(MotionError::value(path, "trim", format!("{from} to {to} s"), expected));
+        }
+        let rows: Vec<Vec<f64>> = (from_frame..=to_frame).map(|frame| self.frame_at(frame)).collect();
+        Ok(self.rebuilt(self.dt, None, &rows))
+    }
+
+    /// A cycle from a clip whose last frame is its first again, farther on. What differs between the two beside the
+    /// travel is spread over the clip's last `blend` seconds.
+    pub fn looped(&self, blend: f64) -> Self {
+        let count = self.frames() - 1;
+        let mut rows = self.rows();
+        let cycle = Cycle::between(&self.layout, &rows[0], &rows[count]);
+        let mut target = rows[0].clone();
+        cycle.advance(&self.layout, &mut target, 1);
+        let end = rows[count].clone();
+        let window = (blend / self.dt).clamp(1.0, count as f64);
+        for (i, row) in rows.iter_mut().enumerate() {
+            let s = (1.0 - (count - i) as f64 / window).clamp(0.0, 1.0);
+            let share = s * s * (3.0 - 2.0 * s);
+            for k in 0..row.len() {
+                row[k] += share * (target[k] - end[k]);
+            }
+            for (_, k) in quaternions(&self.layout) {
+                let error = quat(&target[k..]) * quat(&end[k..]).conjugate();
+                let q = exp(share * log(error)) * quat(&self.frame(i)[k..]);
+                row[k..k + 4].copy_from_slice(&wxyz(q));
+            }
+        }
+        rows.pop();
+        self.rebuilt(self.dt, Some(cycle), &rows)
+    }
+
+    /// The same motion with another step between frames, by cubic interpolation. A looping clip keeps its length, so that
+    /// its step is the nearest that divides it.
+    ///
+    /// # Errors
+    /// If the step is not a positive number up to half of the clip.
+    pub fn resample(&self, path: &Path, dt: f64) -> Result<Self, MotionError> {
+        let duration = self.duration();
+        let steps = libm::round(duration / dt);
+        if !(dt >= 1e-4 && steps >= 2.0) {
+            let expected = format!("a step from 0.0001 to {:.4} s", duration / 2.0);
+            return Err(MotionError::value(path, "dt", dt, expected));
+        }
+        let dt = duration / steps;
+        let count = steps as usize + usize::from(self.cycle.is_none());
+        let rows: Vec<Vec<f64>> = (0..count).map(|i| self.cubic_at(i as f64 * dt)).collect();
+        Ok(self.rebuilt(dt, self.cycle, &rows))
+    }
+
+    /// `qpos` on the cubic through the frames, at a time within the clip.
+    fn cubic_at(&self, time: f64) -> Vec<f64> {
+        let last = self.frames() - usize::from(self.cycle.is_none());
+        // rounding must not ask for what is behind the last frame
+        let i = (libm::floor(time / self.dt + 1e-9) as usize).min(last - 1);
+        let s = (time / self.dt - i as f64).clamp(0.0, 1.0);
+        let (a, b) = (self.frame(i), self.frame_at(i as i64 + 1));
+        let mut end = self.velocity((i + 1) % self.frames()).to_vec();
+        self.turn(&mut end, i64::from(i + 1 == self.frames()));
+        let start = self.velocity(i);
+        let [wa, wb, wu, wv] = hermite(s);
+        let mut out = vec![0.0; a.len()];
+        for joint in &self.layout.joints {
+            let (k, v) = (joint.qpos, joint.qvel);
+            let linear = |k: usize, v: usize| wa * a[k] + wb * b[k] + self.dt * (wu * start[v] + wv * end[v]);
+            let angular = |k: usize, v: usize| {
+                let velocities = [DVec3::from_slice(&start[v..]), DVec3::from_slice(&end[v..])];
+                wxyz(cubic(quat(&a[k..]), quat(&b[k..]), velocities, self.dt, s))
+            };
+            match joint.kind {
+                JointKind::Free => {
+                    for i in 0..3 {
+                        out[k + i] = linear(k + i, v + i);
+                    }
+                    out[k + 3..k + 7].copy_from_slice(&angular(k + 3, v + 3));
+                }
+                JointKind::Ball => out[k..k + 4].copy_from_slice(&angular(k, v)),
+                JointKind::Slide | JointKind::Hinge => out[k] = linear(k, v),
+            }
+        }
+        out
+    }
+
+    /// The motion behind a Gaussian filter with this standard deviation, s. The ends of a clip that does not loop stay
+    /// where they are.
+    pub fn smooth(&self, seconds: f64) -> Self {
+        let sigma = seconds / self.dt;
+        if !(sigma > 1e-3) {
+            return self.clone();
+        }
+        let reach = libm::ceil(3.0 * sigma) as i64;
+        let count = self.frames() as i64;
+        let rows: Vec<Vec<f64>> = (0..count)
+            .map(|i| {
+                // at the ends of a clip the window narrows, which keeps it symmetric
+                let reach = if self.cycle.is_some() { reach } else { reach.min(i).min(count - 1 - i) };
+                let weights: Vec<f64> = (-reach..=reach).map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2))).collect();
+                let total: f64 = weights.iter().sum();
+                let middle = self.frame(i as usize);
+                let mut row = middle.to_vec();
+                for (weight, k) in weights.iter().zip(-reach..=reach) {
+                    let frame = self.frame_at(i + k);
+                    for (out, (there, here)) in row.iter_mut().zip(frame.iter().zip(middle)) {
+                        *out += weight / total * (there - here);
+                    }
+                }
+                for (_, at) in quaternions(&self.layout) {
+                    let here = quat(&middle[at..]);
+                    let mean: DVec3 = (weights.iter().zip(-reach..=reach))
+                        .map(|(w, k)| w / total * log(here.conjugate() * quat(&self.frame_at(i + k)[at..])))
+                        .sum();
+                    row[at..at + 4].copy_from_slice(&wxyz(here * exp(mean)));
+                }
+                row
+            })
+            .collect();
+        self.rebuilt(self.dt, self.cycle, &rows)
+    }
+
+    /// The motion as a mirror shows it that stands along the world's x and z axes: left and right change places.
+    ///
+    /// # Errors
+    /// If the clip is not the model's, or the model is not its own mirror image: a joint with "left" in its name needs a
+    /// partner with "right" whose axis is the mirror image, and any other joint an axis that is its own.
+    pub fn mirror(&self, path: &Path, model: &Model) -> Result<Self, MotionError> {
+        self.check_model(path, model)?;
+        let partners = partners(path, model)?;
+        let rows: Vec<Vec<f64>> = self
+            .rows()
+            .iter()
+            .map(|row| {
+                let mut out = row.clone();
+                for (joint, (partner, sign)) in self.layout.joints.iter().zip(&partners) {
+                    let (from, to) = (joint.qpos, self.layout.joints[*partner].qpos);
+                    let mirrored = |k: usize| [row[k], -row[k + 1], row[k + 2], -row[k + 3]];
+                    match joint.kind {
+                        JointKind::Free => {
+                            out[to..to + 3].copy_from_slice(&[row[from], -row[from + 1], row[from + 2]]);
+                            out[to + 3..to + 7].copy_from_slice(&mirrored(from + 3));
+                        }
+                        JointKind::Ball => out[to..to + 4].copy_from_slice(&mirrored(from)),
+                        JointKind::Slide | JointKind::Hinge => out[to] = sign * row[from],
+                    }
+                }
+                out
+            })
+            .collect();
+        let cycle = self.cycle.map(|Cycle { pos: [x, y], yaw }| Cycle { pos: [x, -y], yaw: -yaw });
+        Ok(self.rebuilt(self.dt, cycle, &rows))
+    }
+
+    /// The motion begun at the world's origin with the heading +x; heights stay.
+    ///
+    /// A first joint that slides begins at 0.
+    pub fn at_origin(&self) -> Self {
+        let first = self.frame(0);
+        let (turn, start) = match self.layout.joints.first().map(|joint| joint.kind) {
+            Some(JointKind::Free) => (-heading(quat(&first[3..])), DVec3::new(first[0], first[1], 0.0)),
+            Some(JointKind::Slide) => (0.0, DVec3::new(first[0], 0.0, 0.0)),
+            _ => return self.clone(),
+        };
+        let place = |row: &mut Vec<f64>| match self.layout.joints[0].kind {
+            JointKind::Free => {
+                let pos = about_z(turn) * (DVec3::from_slice(row) - start);
+                row[..3].copy_from_slice(&pos.to_array());
+                let turned = about_z(turn) * quat(&row[3..]);
+                row[3..7].copy_from_slice(&wxyz(turned));
+            }
+            _ => row[0] -= start.x,
+        };
+        let mut rows = self.rows();
+        rows.iter_mut().for_each(place);
+        let cycle = self.cycle.map(|_| {
+            let mut next = self.frame_at(self.frames() as i64);
+            place(&mut next);
+            Cycle::between(&self.layout, &rows[0], &next)
+        });
+        self.rebuilt(self.dt, cycle, &rows)
+    }
+
+    /// The clip with its numbers rounded to six decimals, as files should have them: a micrometer, a microradian.
+    pub fn rounded(&self) -> Self {
+        // adding zero makes -0 a 0
+        let round = |value: f64| libm::round(value * 1e6) / 1e6 + 0.0;
+        let rows: Vec<Vec<f64>> =
+            self.rows().into_iter().map(|row| row.into_iter().map(round).collect()).collect();
+        let cycle = self.cycle.map(|Cycle { pos, yaw }| Cycle { pos: pos.map(round), yaw: round(yaw) });
+        self.rebuilt(self.dt, cycle, &rows)
+    }
+}
+
+/// For each joint: its mirror image, and 1 or -1 for the angle's sign there.
+fn partners(path: &Path, model: &Model) -> Result<Vec<(usize, f64)>, MotionError> {
+    let layout = Layout::of(model);
+    let names: Vec<&str> = layout.joints().map(|(name, _)| name).collect();
+    let axes = rest_axes(model);
+    let wrong = |problem: String| Err(MotionError::model(path, &model.name, problem));
+    let mut partners = Vec::with_capacity(names.len());
+    for (i, name) in names.iter().enumerate() {
+        let other = swapped(name);
+        let Some(partner) = names.iter().position(|name| *name == other) else {
+            let hint = did_you_mean(&other, names.iter().copied());
+            return wrong(format!("joint {name:?} has no mirror image: there is no joint {other:?}{hint}"));
+        };
+        let kind = layout.joints[i].kind;
+        if layout.joints[partner].kind != kind {
+            return wrong(format!("joints {name:?} and {other:?} are of different kinds"));
+        }
+        let [x, y, z] = axes[i].to_array();
+        // a mirror turns an axis of rotation into the opposite of its image
+        let image = match kind {
+            JointKind::Hinge => DVec3::new(-x, y, -z),
+            _ => DVec3::new(x, -y, z),
+        };
+        let sign = match kind {
+            JointKind::Free | JointKind::Ball => 1.0,
+            JointKind::Hinge | JointKind::Slide => image.dot(axes[partner]),
+        };
+        if (sign.abs() - 1.0).abs() > 1e-3 {
+            return wrong(format!("the axis of joint {other:?} is not the mirror image of that of {name:?}"));
+        }
+        partners.push((partner, sign.signum()));
+    }
+    Ok(partners)
+}
+
+/// Axes of the joints in the world's axes, in the reference pose.
+fn rest_axes(model: &Model) -> Vec<DVec3> {
+    let mut turns = vec![DQuat::IDENTITY; model.bodies.len()];
+    for (i, body) in model.bodies.iter().enumerate().skip(1) {
+        turns[i] = turns[body.parent] * quat(&body.quat);
+    }
+    model.joints.iter().map(|joint| turns[joint.body] * DVec3::from_array(joint.axis)).collect()
+}
+
+/// A name with left and right exchanged.
+fn swapped(name: &str) -> String {
+    const SIDES: [(&str, &str); 6] =
+        [("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("_l_", "_r_"), ("_L_", "_R_"), (".L", ".R")];
+    for (a, b) in SIDES {
+        if name.contains(a) || name.contains(b) {
+            return name.replace(a, "\0").replace(b, a).replace('\0', b);
+        }
+    }
+    for (a, b) in [("_l", "_r"), ("_L", "_R")] {
+        if let Some(stem) = name.strip_suffix(a) {
+            return format!("{stem}{b}");
+        }
+        if let Some(stem) = name.strip_suffix(b) {
+            return format!("{stem}{a}");
+        }
+    }
+    name.into()
+}

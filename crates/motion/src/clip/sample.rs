@@ -1,0 +1,153 @@
+//! Positions and velocities at any time.
+
+use super::Clip;
+use crate::layout::JointKind;
+use crate::rotation::{log, quat, slerp, wxyz};
+use glam::DVec3;
+
+/// A time between two frames.
+struct Moment {
+    /// The frame before, within the clip.
+    frame: usize,
+    /// Share of the way to the next frame, 0 to 1.
+    share: f64,
+    /// Cycles before this one.
+    cycle: i64,
+}
+
+impl Clip {
+    /// Length of the clip, or of a cycle of it, s.
+    pub fn duration(&self) -> f64 {
+        (self.frames() - usize::from(self.cycle.is_none())) as f64 * self.dt
+    }
+
+    /// Share of the clip, or of its cycle, that is over at a time: 0 to 1.
+    pub fn phase(&self, time: f64) -> f64 {
+        let share = time / self.duration();
+        if self.cycle.is_some() { share - libm::floor(share) } else { share.clamp(0.0, 1.0) }
+    }
+
+    /// Whether a clip that does not loop is over.
+    pub fn is_over(&self, time: f64) -> bool {
+        self.cycle.is_none() && time > self.duration()
+    }
+
+    /// `qpos` at a time, s. A looping clip goes on into both directions; any other rests in its first and last frame.
+    ///
+    /// # Panics
+    /// If `out` is not `nq` numbers long.
+    pub fn qpos(&self, time: f64, out: &mut [f64]) {
+        assert_eq!(out.len(), self.layout.nq(), "qpos has the length nq");
+        let moment = self.moment(time);
+        let after = self.frame_at(moment.frame as i64 + 1);
+        self.blend(self.frame(moment.frame), &after, moment.share, out);
+        if let Some(cycle) = &self.cycle {
+            cycle.advance(&self.layout, out, moment.cycle);
+        }
+    }
+
+    /// `qvel` at a time: a free joint has its linear velocity in the world's axes, m/s, and its angular velocity in the
+    /// body's axes, rad/s. Before and after a clip that does not loop all is at rest.
+    ///
+    /// # Panics
+    /// If `out` is not `nv` numbers long.
+    pub fn qvel(&self, time: f64, out: &mut [f64]) {
+        assert_eq!(out.len(), self.layout.nv(), "qvel has the length nv");
+        if self.cycle.is_none() && !(0.0..=self.duration()).contains(&time) {
+            out.fill(0.0);
+            return;
+        }
+        let moment = self.moment(time);
+        let mut before = self.velocity(moment.frame).to_vec();
+        let mut after = self.velocity((moment.frame + 1) % self.frames()).to_vec();
+        self.turn(&mut before, moment.cycle);
+        self.turn(&mut after, moment.cycle + i64::from(moment.frame + 1 == self.frames()));
+        for ((out, a), b) in out.iter_mut().zip(before).zip(after) {
+            *out = a + moment.share * (b - a);
+        }
+    }
+
+    /// Turns the linear velocity of a traveling free joint as the cycles do; its angular velocity is in body axes.
+    fn turn(&self, qvel: &mut [f64], cycles: i64) {
+        if let (Some(cycle), Some(JointKind::Free)) = (self.cycle, self.layout.joints.first().map(|joint| joint.kind)) {
+            let turned = crate::rotation::about_z(cycle.yaw * cycles as f64) * DVec3::from_slice(qvel);
+            qvel[..3].copy_from_slice(&turned.to_array());
+        }
+    }
+
+    fn moment(&self, time: f64) -> Moment {
+        let count = self.frames() as i64;
+        let at = if time.is_finite() { time / self.dt } else { 0.0 };
+        match self.cycle {
+            Some(_) => {
+                let frame = libm::floor(at);
+                let (whole, share) = (frame as i64, at - frame);
+                Moment { frame: whole.rem_euclid(count) as usize, share, cycle: whole.div_euclid(count) }
+            }
+            None => {
+                let frame = (libm::floor(at) as i64).clamp(0, count - 2);
+                Moment { frame: frame as usize, share: (at - frame as f64).clamp(0.0, 1.0), cycle: 0 }
+            }
+        }
+    }
+
+    /// A frame of the endless motion: those of looping clips are moved by their cycles, others rest at the ends.
+    pub(super) fn frame_at(&self, frame: i64) -> Vec<f64> {
+        let count = self.frames() as i64;
+        match &self.cycle {
+            Some(cycle) => {
+                let mut qpos = self.frame(frame.rem_euclid(count) as usize).to_vec();
+                cycle.advance(&self.layout, &mut qpos, frame.div_euclid(count));
+                qpos
+            }
+            None => self.frame(frame.clamp(0, count - 1) as usize).to_vec(),
+        }
+    }
+
+    /// Between two poses.
+    fn blend(&self, a: &[f64], b: &[f64], share: f64, out: &mut [f64]) {
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = a[k] + share * (b[k] - a[k]);
+        }
+        for (_, k) in super::quaternions(&self.layout) {
+            out[k..k + 4].copy_from_slice(&wxyz(slerp(quat(&a[k..]), quat(&b[k..]), share)));
+        }
+    }
+
+    /// Velocities at the frames: central differences; one-sided ones at the ends of a clip that does not loop.
+    pub(super) fn differentiate(&mut self) {
+        let mut velocities = Vec::with_capacity(self.frames() * self.layout.nv());
+        for i in 0..self.frames() as i64 {
+            let (mut before, mut after) = (i - 1, i + 1);
+            if self.cycle.is_none() {
+                (before, after) = (before.max(0), after.min(self.frames() as i64 - 1));
+            }
+            let seconds = (after - before) as f64 * self.dt;
+            let (a, here, b) = (self.frame_at(before), self.frame_at(i), self.frame_at(after));
+            velocities.extend(self.difference(&a, &here, &b, seconds));
+        }
+        self.velocities = velocities;
+    }
+
+    /// The velocity that leads from `a` to `b`, with angular velocities in the body axes of `here`.
+    fn difference(&self, a: &[f64], here: &[f64], b: &[f64], seconds: f64) -> Vec<f64> {
+        let angular = |k: usize| {
+            let (from, middle, to) = (quat(&a[k..]), quat(&here[k..]), quat(&b[k..]));
+            let world = from * log(from.conjugate() * to) / seconds;
+            (middle.conjugate() * world).to_array()
+        };
+        let mut qvel = Vec::with_capacity(self.layout.nv());
+        for joint in &self.layout.joints {
+            let k = joint.qpos;
+            match joint.kind {
+                JointKind::Free => {
+                    qvel.extend((k..k + 3).map(|k| (b[k] - a[k]) / seconds));
+                    qvel.extend(angular(k + 3));
+                }
+                JointKind::Ball => qvel.extend(angular(k)),
+                JointKind::Slide | JointKind::Hinge => qvel.push((b[k] - a[k]) / seconds),
+            }
+        }
+        qvel
+    }
+}

@@ -1,0 +1,94 @@
+//! What can be wrong with a motion, a mapping, or the model that they are for.
+
+use std::path::{Path, PathBuf};
+
+/// Why a motion cannot be read or used. Every message names the file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The text does not follow its format.
+    #[error("{}:{line}:{column}: {problem}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// What was found, and what was expected.
+        problem: String,
+    },
+    /// An entry of the file has a value that makes no sense.
+    #[error("{}: {key}: found {found}, expected {expected}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Name of the entry.
+        key: String,
+        /// Its value.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
+    /// A frame is wrong.
+    #[error("{}: frame {frame}: {problem}", path.display())]
+    Frame {
+        /// The file.
+        path: PathBuf,
+        /// The frame, counted from 0.
+        frame: usize,
+        /// What was found, and what was expected.
+        problem: String,
+    },
+    /// The motion and the model do not belong together.
+    #[error("{}: not a motion of the model {model}: {problem}", path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// Name of the model.
+        model: String,
+        /// What differs.
+        problem: String,
+    },
+    /// The file has something that is not supported.
+    #[error("{}: {feature} is not supported; {instead}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        feature: String,
+        /// What makes the file usable.
+        instead: String,
+    },
+}
+
+impl MotionError {
+    pub(crate) fn value(path: &Path, key: &str, found: impl ToString, expected: impl ToString) -> Self {
+        Self::Value { path: path.into(), key: key.into(), found: found.to_string(), expected: expected.to_string() }
+    }
+
+    pub(crate) fn frame(path: &Path, frame: usize, problem: impl ToString) -> Self {
+        Self::Frame { path: path.into(), frame, problem: problem.to_string() }
+    }
+
+    pub(crate) fn model(path: &Path, model: &str, problem: impl ToString) -> Self {
+        Self::Model { path: path.into(), model: model.into(), problem: problem.to_string() }
+    }
+
+    /// A message of `serde_json`, which ends with the place that has fields of its own here.
+    pub(crate) fn json(path: &Path, error: &serde_json::Error) -> Self {
+        let text = error.to_string();
+        let problem = text.split(" at line ").next().unwrap_or(&text).to_string();
+        Self::Syntax { path: path.into(), line: error.line(), column: error.column(), problem }
+    }
+}
+
+/// "; did you mean X?" for the known name closest to a wrong one, or nothing if none is close.
+pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let lower = name.to_lowercase();
+    known
+        .into_iter()
+        .map(|known| (strsim::jaro_winkler(&lower, &known.to_lowercase()), known))
+        .filter(|(score, _)| *score > 0.8)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(String::new(), |(_, known)| format!("; did you mean {known}?"))
+}

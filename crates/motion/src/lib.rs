@@ -1,0 +1,34 @@
+//! Motion clips: from motion capture to the joint angles of a character, and their sampling.
+//!
+//! Nothing here reads a file, asks a clock or starts a thread: bytes go in, clips come out, also in a browser.
+//!
+//! A [`Clip`] is a motion of one MJCF model, in MuJoCo's `qpos`. Its file format is that of [`Clip::parse`] and
+//! [`Clip::to_bytes`].
+//!
+//! ```
+//! # fn main() -> Result<(), marathon_motion::MotionError> {
+//! let text = r#"{
+//!   "motion": 1, "name": "bow", "model": "pole", "source": "made up", "license": "CC0-1.0", "loop": "none", "dt": 0.5,
+//!   "joints": [["hip", "hinge"]],
+//!   "frames": [[0.0], [0.4], [0.6]]
+//! }"#;
+//! let clip = marathon_motion::Clip::parse("bow.motion".as_ref(), text.as_bytes())?;
+//! assert_eq!(clip.duration(), 1.0);
+//! let (mut qpos, mut qvel) = ([0.0], [0.0]);
+//! clip.qpos(0.75, &mut qpos);
+//! clip.qvel(0.5, &mut qvel);
+//! assert!((qpos[0] - 0.5).abs() < 1e-12 && (qvel[0] - 0.6).abs() < 1e-12);
+//! # Ok(())
+//! # }
+//! ```
+
+mod error;
+mod rotation;
+
+mod layout;
+
+mod clip;
+
+pub use clip::{About, Clip, Cycle};
+pub use error::MotionError;
+pub use layout::{JointKind, Layout};
