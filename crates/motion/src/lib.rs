@@ -29,6 +29,11 @@ mod layout;
 
 mod clip;
 
+mod skeleton;
+
+pub mod import;
+
 pub use clip::{About, Clip, Cycle};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
+pub use skeleton::{Animation, Bone, Keyframe, Skeleton};

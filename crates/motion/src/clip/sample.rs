@@ -68,7 +68,7 @@ impl Clip {
     }
 
     /// Turns the linear velocity of a traveling free joint as the cycles do; its angular velocity is in body axes.
-    fn turn(&self, qvel: &mut [f64], cycles: i64) {
+    pub(super) fn turn(&self, qvel: &mut [f64], cycles: i64) {
         if let (Some(cycle), Some(JointKind::Free)) = (self.cycle, self.layout.joints.first().map(|joint| joint.kind)) {
             let turned = crate::rotation::about_z(cycle.yaw * cycles as f64) * DVec3::from_slice(qvel);
             qvel[..3].copy_from_slice(&turned.to_array());
@@ -92,7 +92,7 @@ impl Clip {
     }
 
     /// A frame of the endless motion: those of looping clips are moved by their cycles, others rest at the ends.
-    pub(super) fn frame_at(&self, frame: i64) -> Vec<f64> {
+    pub(crate) fn frame_at(&self, frame: i64) -> Vec<f64> {
         let count = self.frames() as i64;
         match &self.cycle {
             Some(cycle) => {

@@ -1,0 +1,5 @@
+//! Readers of motion capture formats: bytes in, an [`Animation`](crate::Animation) out.
+
+mod deepmimic;
+
+pub use deepmimic::deepmimic;

@@ -1,0 +1,132 @@
+//! Recorded motions before they are a model's: a skeleton of joints, and how it moves.
+
+use crate::clip::{About, Clip, Cycle};
+use crate::error::MotionError;
+use crate::layout::{JointKind, Layout};
+use crate::rotation::quat;
+use glam::{DQuat, DVec3};
+use std::path::Path;
+
+/// A joint of a skeleton.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bone {
+    /// Name.
+    pub name: String,
+    /// Index of the joint that it hangs from; it is lower than its own. None for the root.
+    pub parent: Option<usize>,
+    /// Where it is in the frame of its parent, m.
+    pub offset: [f64; 3],
+    /// Its rotation in the frame of its parent while the skeleton rests, `[w, x, y, z]`.
+    pub rest: [f64; 4],
+}
+
+/// Joints from the root to the tips. Lengths are in meters, z points up, axes are right-handed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skeleton {
+    /// The joints; parents come before their children, and the first is the root.
+    pub bones: Vec<Bone>,
+}
+
+/// Where the joints of a skeleton are in the world.
+#[derive(Clone, Debug)]
+pub(crate) struct SkeletonPose {
+    pub pos: Vec<DVec3>,
+    pub quat: Vec<DQuat>,
+}
+
+/// A motion of a skeleton. The root's position and the joints' rotations are kept as a clip whose first joint is free and
+/// whose other joints are balls.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Animation {
+    skeleton: Skeleton,
+    clip: Clip,
+}
+
+/// One instant of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyframe {
+    /// Position of the root, m.
+    pub root: [f64; 3],
+    /// Rotation of each joint in the frame of its parent, `[w, x, y, z]`.
+    pub rotations: Vec<[f64; 4]>,
+}
+
+impl Skeleton {
+    /// The skeleton at rest, its root at the origin.
+    pub(crate) fn rest(&self) -> SkeletonPose {
+        let rotations: Vec<DQuat> = self.bones.iter().map(|bone| quat(&bone.rest)).collect();
+        self.pose(DVec3::ZERO, &rotations)
+    }
+
+    fn pose(&self, root: DVec3, rotations: &[DQuat]) -> SkeletonPose {
+        let mut pose = SkeletonPose { pos: Vec::new(), quat: Vec::new() };
+        for (bone, rotation) in self.bones.iter().zip(rotations) {
+            let (pos, turn) = match bone.parent {
+                Some(parent) => {
+                    let turn = pose.quat[parent];
+                    (pose.pos[parent] + turn * DVec3::from_array(bone.offset), turn * *rotation)
+                }
+                None => (root, *rotation),
+            };
+            pose.pos.push(pos);
+            pose.quat.push(turn);
+        }
+        pose
+    }
+}
+
+impl Animation {
+    /// An animation of these keyframes, `dt` seconds apart. One that loops has its first pose again as its last, farther
+    /// on. The path is for messages.
+    ///
+    /// # Errors
+    /// As [`Clip::new`].
+    pub fn new(
+        path: &Path,
+        about: About,
+        skeleton: Skeleton,
+        dt: f64,
+        looping: bool,
+        keyframes: &[Keyframe],
+    ) -> Result<Self, MotionError> {
+        let kinds = std::iter::once(JointKind::Free).chain(std::iter::repeat(JointKind::Ball));
+        let layout = Layout::new(skeleton.bones.iter().map(|bone| bone.name.clone()).zip(kinds));
+        let rows: Vec<Vec<f64>> = keyframes
+            .iter()
+            .map(|frame| frame.root.into_iter().chain(frame.rotations.iter().flatten().copied()).collect())
+            .collect();
+        let mut clip = Clip::new(path, about, layout, dt, None, &rows)?;
+        if looping {
+            // recordings never close exactly; what is left is spread over the whole cycle, where it shows least
+            clip = clip.looped(clip.duration());
+        }
+        Ok(Animation { skeleton, clip })
+    }
+
+    /// The joints.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+
+    /// Root position and rotations over time.
+    pub fn clip(&self) -> &Clip {
+        &self.clip
+    }
+
+    /// The same skeleton with its motion changed, by the edits of a [`Clip`].
+    pub fn with_clip(&self, clip: Clip) -> Self {
+        Animation { skeleton: self.skeleton.clone(), clip }
+    }
+
+    /// How far a cycle gets, if the motion loops.
+    pub fn cycle(&self) -> Option<Cycle> {
+        self.clip.cycle()
+    }
+
+    /// Where the joints are in a frame, which may be one of another cycle.
+    pub(crate) fn pose(&self, frame: i64) -> SkeletonPose {
+        let qpos = self.clip.frame_at(frame);
+        let rotations: Vec<DQuat> = (0..self.skeleton.bones.len()).map(|i| quat(&qpos[3 + 4 * i..])).collect();
+        self.skeleton.pose(DVec3::from_slice(&qpos), &rotations)
+    }
+}
