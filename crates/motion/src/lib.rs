@@ -33,7 +33,16 @@ mod skeleton;
 
 pub mod import;
 
+pub mod kinematics;
+
+mod ground;
+
+mod contact;
+
+mod retarget;
+
 pub use clip::{About, Clip, Cycle};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
+pub use retarget::{Mapping, retarget};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};

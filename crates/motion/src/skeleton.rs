@@ -3,7 +3,7 @@
 use crate::clip::{About, Clip, Cycle};
 use crate::error::MotionError;
 use crate::layout::{JointKind, Layout};
-use crate::rotation::quat;
+use crate::rotation::{quat, slerp, wxyz};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 
@@ -49,6 +49,15 @@ pub struct Keyframe {
     pub root: [f64; 3],
     /// Rotation of each joint in the frame of its parent, `[w, x, y, z]`.
     pub rotations: Vec<[f64; 4]>,
+}
+
+impl Keyframe {
+    /// An instant at this share of the way to another.
+    pub(crate) fn blended(&self, to: &Keyframe, share: f64) -> Keyframe {
+        let root = [0, 1, 2].map(|i| self.root[i] + share * (to.root[i] - self.root[i]));
+        let rotations = self.rotations.iter().zip(&to.rotations);
+        Keyframe { root, rotations: rotations.map(|(a, b)| wxyz(slerp(quat(a), quat(b), share))).collect() }
+    }
 }
 
 impl Skeleton {

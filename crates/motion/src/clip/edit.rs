@@ -26,18 +26,33 @@ impl Clip {
     }
 
     /// A cycle from a clip whose last frame is its first again, farther on. What differs between the two beside the
-    /// travel is spread over the clip's last `blend` seconds.
+    /// travel is spread over the clip's last `blend` seconds. So is a turn of less than 0.4 rad: people who record a walk
+    /// straight ahead do not end exactly as they began.
     pub fn looped(&self, blend: f64) -> Self {
+        let mut cycle = Cycle::between(&self.layout, self.frame(0), self.frame(self.frames() - 1));
+        if cycle.yaw.abs() < 0.4 && self.layout.joints[0].kind == JointKind::Free {
+            let (a, b) = (self.frame(0), self.frame(self.frames() - 1));
+            cycle = Cycle { pos: [b[0] - a[0], b[1] - a[1]], yaw: 0.0 };
+        }
+        self.joined(cycle, blend)
+    }
+
+    /// A cycle from a clip whose last frame is its first again after this cycle, but for rounding errors.
+    pub(crate) fn closed(&self, cycle: Cycle) -> Self {
+        self.joined(cycle, self.duration())
+    }
+
+    fn joined(&self, cycle: Cycle, blend: f64) -> Self {
         let count = self.frames() - 1;
         let mut rows = self.rows();
-        let cycle = Cycle::between(&self.layout, &rows[0], &rows[count]);
         let mut target = rows[0].clone();
         cycle.advance(&self.layout, &mut target, 1);
         let end = rows[count].clone();
         let window = (blend / self.dt).clamp(1.0, count as f64);
         for (i, row) in rows.iter_mut().enumerate() {
             let s = (1.0 - (count - i) as f64 / window).clamp(0.0, 1.0);
-            let share = s * s * (3.0 - 2.0 * s);
+            // over a whole cycle a steady drift shows least; over a part of it, one that begins and ends gently
+            let share = if blend < self.duration() { s * s * (3.0 - 2.0 * s) } else { s };
             for k in 0..row.len() {
                 row[k] += share * (target[k] - end[k]);
             }
@@ -195,6 +210,24 @@ impl Clip {
             let mut next = self.frame_at(self.frames() as i64);
             place(&mut next);
             Cycle::between(&self.layout, &rows[0], &next)
+        });
+        self.rebuilt(self.dt, cycle, &rows)
+    }
+
+    /// The motion elsewhere: the first joint moved by so much, if it can be.
+    pub(crate) fn moved(&self, by: DVec3) -> Self {
+        let mut rows = self.rows();
+        for row in &mut rows {
+            match self.layout.joints.first().map(|joint| joint.kind) {
+                Some(JointKind::Free) => (0..3).for_each(|i| row[i] += by[i]),
+                _ => return self.clone(),
+            }
+        }
+        // the turns of a cycle are about the world's origin
+        let cycle = self.cycle.map(|cycle| {
+            let flat = DVec3::new(by.x, by.y, 0.0);
+            let shift = flat - about_z(cycle.yaw) * flat;
+            Cycle { pos: [cycle.pos[0] + shift.x, cycle.pos[1] + shift.y], yaw: cycle.yaw }
         });
         self.rebuilt(self.dt, cycle, &rows)
     }

@@ -65,7 +65,7 @@ pub fn deepmimic(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     };
     let keyframes: Vec<Keyframe> =
         file.frames.iter().enumerate().map(|(i, frame)| keyframe(path, i, frame)).collect::<Result<_, _>>()?;
-    let dt = step(path, &file.frames)?;
+    let (dt, keyframes) = even(path, &file.frames, keyframes)?;
     let bones = JOINTS.map(|(name, parent, offset, _)| Bone {
         name: name.into(),
         parent,
@@ -105,22 +105,40 @@ fn keyframe(path: &Path, i: usize, frame: &[f64]) -> Result<Keyframe, MotionErro
             }
             Nothing => [1.0, 0.0, 0.0, 0.0],
         };
-        let [w, axis @ ..] = rotation;
+        // some of DeepMimic's own files have quaternions blended without normalizing them
+        let length = rotation.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if !((0.5..=1.5).contains(&length)) {
+            let problem = format!("the quaternion that ends at number {at} is {length:.3} long, expected unit length");
+            return Err(MotionError::frame(path, i, problem));
+        }
+        let [w, axis @ ..] = rotation.map(|x| x / length);
         let [x, y, z] = z_up(axis);
         rotations.push([w, x, y, z]);
     }
     Ok(Keyframe { root: z_up([frame[1], frame[2], frame[3]]), rotations })
 }
 
-/// Seconds between frames, which must be the same throughout. The last frame's are not counted: nothing follows it.
-fn step(path: &Path, frames: &[Vec<f64>]) -> Result<f64, MotionError> {
-    let dt = frames.first().map_or(0.0, |frame| frame[0]);
+/// The keyframes at equal steps, those of the first frame, and this step, s. The last frame's time is not counted: nothing
+/// follows it.
+fn even(path: &Path, frames: &[Vec<f64>], keyframes: Vec<Keyframe>) -> Result<(f64, Vec<Keyframe>), MotionError> {
     let between = &frames[..frames.len().saturating_sub(1)];
-    match between.iter().position(|frame| !((frame[0] - dt).abs() < 0.02 * dt)) {
-        Some(i) => {
-            let problem = format!("lasts {} s, expected {dt} s as the first", frames[i][0]);
-            Err(MotionError::frame(path, i, problem))
-        }
-        None => Ok(dt),
+    if let Some(i) = between.iter().position(|frame| !(1e-4..=10.0).contains(&frame[0])) {
+        let problem = format!("lasts {} s, expected 0.0001 to 10", frames[i][0]);
+        return Err(MotionError::frame(path, i, problem));
     }
+    let dt = frames.first().map_or(0.0, |frame| frame[0]);
+    if between.iter().all(|frame| (frame[0] - dt).abs() < 0.02 * dt) {
+        return Ok((dt, keyframes));
+    }
+    let (mut out, mut begin) = (Vec::new(), 0.0);
+    for (i, frame) in between.iter().enumerate() {
+        let end = begin + frame[0];
+        while out.len() as f64 * dt < end - 1e-6 {
+            let share = ((out.len() as f64 * dt - begin) / frame[0]).max(0.0);
+            out.push(keyframes[i].blended(&keyframes[i + 1], share));
+        }
+        begin = end;
+    }
+    out.extend(keyframes.last().cloned());
+    Ok((dt, out))
 }

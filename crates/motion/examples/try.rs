@@ -1,0 +1,23 @@
+//! Scratch.
+use marathon_motion::*;
+fn main() {
+    let a: Vec<String> = std::env::args().collect();
+    let (src, model, map, out) = (&a[1], &a[2], &a[3], &a[4]);
+    let model = marathon_physics::Model::from_xml_file(model).unwrap();
+    let p = std::path::Path::new(src);
+    let mut an = import::deepmimic(p, &std::fs::read(p).unwrap()).unwrap();
+    an = an.with_clip(an.clip().resample(p, 1.0 / 60.0).unwrap());
+    let mp = std::path::Path::new(map);
+    let m = Mapping::parse(mp, &std::fs::read(mp).unwrap(), an.skeleton(), &model).unwrap_or_else(|e| panic!("{e}"));
+    let t = std::time::Instant::now();
+    let clip = retarget(p, &an, &model, &m).unwrap();
+    let about = About {
+        source: "DeepMimic (Peng et al., 2018), from pybullet 3.2.7; retargeted by Marathon".into(),
+        license: "Zlib".into(),
+        name: std::path::Path::new(out).file_stem().unwrap().to_string_lossy().into(),
+        ..clip.about().clone()
+    };
+    let clip = clip.with_about(about);
+    eprintln!("{} frames in {:.2} s, cycle {:?}", clip.frames(), t.elapsed().as_secs_f64(), clip.cycle());
+    std::fs::write(out, clip.rounded().to_bytes()).unwrap();
+}

@@ -1,0 +1,66 @@
+//! What touches the ground, and when.
+
+use crate::clip::Clip;
+use crate::ground::Touch;
+use crate::kinematics::Pose;
+use glam::DVec3;
+use marathon_physics::Model;
+
+/// Highest point of a sole that still counts as standing, m.
+const HEIGHT: f64 = 0.03;
+/// Fastest speed along the ground of what still counts as standing, m/s.
+const SPEED: f64 = 0.6;
+/// Shortest contact, s.
+const SHORTEST: f64 = 0.05;
+
+/// Per frame and touch: whether a sole stands on the ground there.
+pub(crate) fn held(
+    model: &Model,
+    touches: &[Touch],
+    soles: &[usize],
+    frames: &[Vec<f64>],
+    dt: f64,
+) -> Vec<Vec<bool>> {
+    let poses: Vec<Pose> = frames.iter().map(|frame| Pose::of(model, frame)).collect();
+    let mut held = vec![vec![false; touches.len()]; frames.len()];
+    for (k, touch) in touches.iter().enumerate().filter(|(_, touch)| soles.contains(&touch.body)) {
+        let low = |i: usize| touch.lowest(&poses[i]);
+        for i in 0..frames.len() {
+            let (before, after) = (i.saturating_sub(1), (i + 1).min(frames.len() - 1));
+            let seconds = (after - before).max(1) as f64 * dt;
+            let speed = (slide(touch, &poses[before], &poses[i]) + slide(touch, &poses[i], &poses[after])) / seconds;
+            held[i][k] = low(i).z < HEIGHT && speed < SPEED;
+        }
+        let shortest = libm::ceil(SHORTEST / dt) as usize;
+        let mut begin = 0;
+        while begin < frames.len() {
+            let state = held[begin][k];
+            let end = (begin..frames.len()).find(|i| held[*i][k] != state).unwrap_or(frames.len());
+            if state && end - begin < shortest && begin > 0 && end < frames.len() {
+                (begin..end).for_each(|i| held[i][k] = false);
+            }
+            begin = end;
+        }
+    }
+    held
+}
+
+/// How far the lowest point of a touch slides along the ground until the next frame, m. Rolling is no slide.
+pub(crate) fn slide(touch: &Touch, now: &Pose, next: &Pose) -> f64 {
+    let lowest = touch.lowest(now);
+    let local = now.quat[touch.body].conjugate() * (lowest - now.pos[touch.body]);
+    (next.point(touch.body, local) - lowest).truncate().length()
+}
+
+/// The lowest point of a pose above the ground, m; negative below it.
+pub(crate) fn clearance(touches: &[Touch], pose: &Pose) -> f64 {
+    touches.iter().map(|touch| touch.lowest(pose).z).fold(f64::INFINITY, f64::min)
+}
+
+/// The clip lifted as a whole, so that nothing is below the ground.
+pub(crate) fn above_ground(model: &Model, touches: &[Touch], clip: &Clip) -> Clip {
+    let depth = (0..clip.frames())
+        .map(|i| -clearance(touches, &Pose::of(model, clip.frame(i))))
+        .fold(0.0, f64::max);
+    clip.moved(DVec3::Z * depth)
+}

@@ -1,0 +1,175 @@
+//! Mapping files: which joint of a skeleton moves which body of a model.
+//!
+//! | entry | meaning |
+//! |---|---|
+//! | `mapping` | version of the format, 1 |
+//! | `skeleton`, `model` | what is mapped to what; for people |
+//! | `hips` | the bodies of the left and the right thigh, in this order: they tell the figure's front and the length of its legs |
+//! | `soles` | bodies that stand: what they touch does not slide |
+//! | `parts` | by name of a body, geom or site of the model: the joint that it follows |
+//!
+//! A part has:
+//!
+//! | entry | meaning |
+//! |---|---|
+//! | `joint` | joint of the skeleton |
+//! | `toward`, `share` | a second joint, and how far from the first to it the part's orientation lies, 0 to 1 |
+//! | `rotation` | weight of its orientation, 1/rad; 1 if absent; geoms and sites have none |
+//! | `position` | weight of its position, 1/m; 0 if absent |
+//! | `rest` | `[w, x, y, z]`, a turn of the part's reference orientation, in the model's axes, that makes it fit the skeleton's rest pose. If absent, the part is turned so that the bone to the next part points as in the skeleton |
+
+use crate::error::{MotionError, did_you_mean};
+use crate::skeleton::Skeleton;
+use marathon_physics::Model;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    mapping: u64,
+    #[allow(dead_code)]
+    skeleton: String,
+    #[allow(dead_code)]
+    model: String,
+    hips: [String; 2],
+    #[serde(default)]
+    soles: Vec<String>,
+    parts: BTreeMap<String, Row>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    joint: String,
+    #[serde(default)]
+    toward: Option<String>,
+    #[serde(default)]
+    share: Option<f64>,
+    #[serde(default)]
+    rotation: Option<f64>,
+    #[serde(default)]
+    position: Option<f64>,
+    #[serde(default)]
+    rest: Option<[f64; 4]>,
+}
+
+/// A part of the model and what it follows.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    /// Body, or the body that the geom or site is on.
+    pub body: usize,
+    /// Where the part is in the body's frame; the origin for the body itself.
+    pub local: [f64; 3],
+    /// Whether it is the body itself.
+    pub whole: bool,
+    pub joint: usize,
+    /// The second joint and its share.
+    pub toward: Option<(usize, f64)>,
+    pub rotation: f64,
+    pub position: f64,
+    pub rest: Option<[f64; 4]>,
+}
+
+/// Which joint of a skeleton moves which body of a model.
+#[derive(Clone, Debug)]
+pub struct Mapping {
+    /// Bodies come in the order of the model, before the points on them.
+    pub(crate) parts: Vec<Part>,
+    /// Parts of the thighs.
+    pub(crate) hips: [usize; 2],
+    /// Bodies.
+    pub(crate) soles: Vec<usize>,
+}
+
+impl Mapping {
+    /// Reads a mapping for a skeleton and a model; the path is for messages.
+    ///
+    /// # Errors
+    /// If the text is malformed, or names what the skeleton or the model lacks.
+    pub fn parse(path: &Path, bytes: &[u8], skeleton: &Skeleton, model: &Model) -> Result<Self, MotionError> {
+        let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
+        if file.mapping != 1 {
+            return Err(MotionError::value(path, "mapping", file.mapping, "version 1 of the format"));
+        }
+        let mut parts = Vec::new();
+        for (name, row) in &file.parts {
+            parts.push((name.clone(), part(path, name, row, skeleton, model)?));
+        }
+        parts.sort_by_key(|(_, part)| (part.body, !part.whole));
+        let hip = |name: &String| {
+            parts.iter().position(|(known, part)| known == name && part.whole).ok_or_else(|| {
+                let hint = did_you_mean(name, parts.iter().map(|(name, _)| name.as_str()));
+                MotionError::value(path, "hips", name, format!("bodies that are among the parts{hint}"))
+            })
+        };
+        let hips = [hip(&file.hips[0])?, hip(&file.hips[1])?];
+        let soles = file.soles.iter().map(|name| {
+            let names = || model.bodies.iter().map(|body| body.name.as_str());
+            names().position(|known| known == name).ok_or_else(|| {
+                MotionError::value(path, "soles", name, format!("bodies of the model{}", did_you_mean(name, names())))
+            })
+        });
+        let soles = soles.collect::<Result<_, _>>()?;
+        Ok(Mapping { parts: parts.into_iter().map(|(_, part)| part).collect(), hips, soles })
+    }
+}
+
+fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) -> Result<Part, MotionError> {
+    let key = |field: &str| format!("parts.{name}.{field}");
+    let joint = |field: &str, wanted: &str| {
+        let names = || skeleton.bones.iter().map(|bone| bone.name.as_str());
+        names().position(|known| known == wanted).ok_or_else(|| {
+            let hint = did_you_mean(wanted, names());
+            let expected = format!("a joint of the skeleton{hint}; it has {}", names().collect::<Vec<_>>().join(", "));
+            MotionError::value(path, &key(field), format!("{wanted:?}"), expected)
+        })
+    };
+    let weight = |field: &str, value: Option<f64>, default: f64| match value.unwrap_or(default) {
+        value if (0.0..=1000.0).contains(&value) => Ok(value),
+        value => Err(MotionError::value(path, &key(field), value, "a weight from 0 to 1000")),
+    };
+    let (body, local, whole) = find(path, name, model)?;
+    let toward = match (&row.toward, row.share) {
+        (Some(other), share) => {
+            let share = share.unwrap_or(0.5);
+            if !(0.0..=1.0).contains(&share) {
+                return Err(MotionError::value(path, &key("share"), share, "a number from 0 to 1"));
+            }
+            Some((joint("toward", other)?, share))
+        }
+        (None, Some(share)) => return Err(MotionError::value(path, &key("share"), share, "a joint in toward beside it")),
+        (None, None) => None,
+    };
+    if let Some(rest) = row.rest.filter(|q| !((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-3)) {
+        return Err(MotionError::value(path, &key("rest"), format!("{rest:?}"), "a unit quaternion [w, x, y, z]"));
+    }
+    Ok(Part {
+        body,
+        local,
+        whole,
+        joint: joint("joint", &row.joint)?,
+        toward,
+        rotation: if whole { weight("rotation", row.rotation, 1.0)? } else { 0.0 },
+        position: weight("position", row.position, if whole { 0.0 } else { 1.0 })?,
+        rest: row.rest,
+    })
+}
+
+/// A body, geom or site by name: its body, its place there, and whether it is the body.
+fn find(path: &Path, name: &str, model: &Model) -> Result<(usize, [f64; 3], bool), MotionError> {
+    if let Some(body) = model.bodies.iter().position(|body| body.name == name).filter(|body| *body > 0) {
+        return Ok((body, [0.0; 3], true));
+    }
+    if let Some(geom) = model.geoms.iter().find(|geom| geom.name == name) {
+        return Ok((geom.body, geom.pos, false));
+    }
+    if let Some(site) = model.sites.iter().find(|site| site.name == name) {
+        return Ok((site.body, site.pos, false));
+    }
+    let names = model.bodies.iter().map(|body| body.name.as_str());
+    let names = names.chain(model.geoms.iter().map(|geom| geom.name.as_str()));
+    let hint = did_you_mean(name, names.chain(model.sites.iter().map(|site| site.name.as_str())));
+    Err(MotionError::value(path, "parts", format!("{name:?}"), format!("a body, geom or site of {}{hint}", model.name)))
+}

@@ -1,0 +1,95 @@
+//! From the motion of a skeleton to that of a model.
+//!
+//! The model's bones are turned as the skeleton's, which gives targets for orientations and positions at the model's own
+//! proportions. Inverse kinematics over all frames at once then finds joint angles that meet them within the joints' limits,
+//! above the ground and smoothly. What stands on the ground in that solution is held there in the next one.
+
+mod band;
+mod mapping;
+mod problem;
+mod target;
+
+pub use mapping::Mapping;
+
+use crate::clip::{About, Clip, Cycle};
+use crate::contact;
+use crate::error::MotionError;
+use crate::ground::Touch;
+use crate::layout::Layout;
+use crate::rotation::wxyz;
+use crate::skeleton::Animation;
+use glam::DVec3;
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+use problem::Problem;
+use std::path::Path;
+use target::{Target, Targets};
+
+/// Frames beyond each end of a cycle, s: there the next cycle begins, so that ends meet.
+const MARGIN: f64 = 0.4;
+
+/// Retargets an animation to a model, frame for frame. A free root begins above the world's origin. The path is for messages.
+///
+/// # Errors
+/// If the model cannot hold the result, for instance because it has no joints.
+pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Mapping) -> Result<Clip, MotionError> {
+    if model.joints.is_empty() {
+        return Err(MotionError::model(path, &model.name, "it has no joints"));
+    }
+    let clip = animation.clip();
+    let dt = clip.dt();
+    let targets = Targets::new(model, mapping, animation);
+    let cycle = animation.cycle();
+    // a cycle's last frame is the first of the next
+    let count = clip.frames() + usize::from(cycle.is_some());
+    let margin = if cycle.is_some() { libm::ceil(MARGIN / dt) as usize } else { 0 };
+    let all: Vec<Target> = (0..count + 2 * margin).map(|i| targets.at(i as i64 - margin as i64)).collect();
+    let touches = Touch::all(model);
+    let mut held = vec![vec![false; touches.len()]; all.len()];
+
+    let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
+    for (i, target) in all.iter().enumerate() {
+        let mut guess = vec![frames.last().cloned().unwrap_or_else(|| model.qpos0.clone())];
+        start(model, target, &mut guess[0]);
+        let one = std::slice::from_ref(target);
+        let problem = Problem { model, mapping, touches: &touches, targets: one, held: &held[i..=i], dt };
+        problem.solve(&mut guess, if i == 0 { 100 } else { 20 });
+        frames.append(&mut guess);
+    }
+    for pass in 0..3 {
+        if pass > 0 {
+            held = contact::held(model, &touches, &mapping.soles, &frames, dt);
+        }
+        Problem { model, mapping, touches: &touches, targets: &all, held: &held, dt }.solve(&mut frames, 25);
+    }
+
+    let mut frames = frames[margin..margin + count].to_vec();
+    frames.iter_mut().for_each(|frame| clamp(model, frame));
+    let about = About { model: model.name.clone(), ..clip.about().clone() };
+    let mut result = Clip::new(path, about, Layout::of(model), dt, None, &frames)?;
+    if let Some(Cycle { pos: [x, y], yaw }) = cycle {
+        let travel = targets.place(DVec3::new(x, y, 0.0));
+        result = result.closed(Cycle { pos: [travel.x, travel.y], yaw });
+    }
+    let result = contact::above_ground(model, &touches, &result);
+    let first = result.frame(0);
+    let start = DVec3::new(first[0], first.get(1).copied().unwrap_or(0.0), 0.0);
+    Ok(result.moved(-start))
+}
+
+/// Puts the first moving body where it should be, if it is free.
+fn start(model: &Model, target: &Target, qpos: &mut [f64]) {
+    if model.joints[0].kind == JointType::Free {
+        qpos[..3].copy_from_slice(&target.root.0.to_array());
+        qpos[3..7].copy_from_slice(&wxyz(target.root.1.normalize()));
+    }
+}
+
+/// Brings every joint within its limits.
+fn clamp(model: &Model, qpos: &mut [f64]) {
+    for joint in model.joints.iter().filter(|joint| joint.limited) {
+        if matches!(joint.kind, JointType::Hinge | JointType::Slide) {
+            qpos[joint.qpos_adr] = qpos[joint.qpos_adr].clamp(joint.range[0], joint.range[1]);
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Inverse kinematics as one least-squares problem over all frames, by Levenberg and Marquardt's method.
+
+use super::band::Band;
+use super::mapping::Mapping;
+use super::target::Target;
+use crate::ground::Touch;
+use crate::kinematics::Pose;
+use crate::rotation::{exp, log, quat, wxyz};
+use glam::DVec3;
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+
+/// Weights of what the mapping says nothing about. Orientations cost 1/rad.
+mod weight {
+    /// Of the point between the hips, 1/m: along the ground, and up.
+    pub const HIPS: [f64; 2] = [3.0, 6.0];
+    /// Of a joint beyond its limit, 1/rad or 1/m.
+    pub const LIMIT: f64 = 100.0;
+    /// Of depth below the ground, and of the height of what should touch it, 1/m.
+    pub const GROUND: f64 = 150.0;
+    /// Of a step's slide of what touches the ground, 1/m.
+    pub const SLIDE: f64 = 120.0;
+    /// Of a joint's distance from its reference, 1/rad: decides where nothing else does.
+    pub const REST: f64 = 0.02;
+    /// Of accelerations, s^2: motions faster than about 12 Hz are noise.
+    pub const SMOOTH: f64 = 1.8e-4;
+}
+/// Joints stay this far within their limits, rad or m, so that the penalty's give does not show.
+const LIMIT_MARGIN: f64 = 0.01;
+
+/// Frames in a row, what they should be, and which points touch the ground.
+pub(super) struct Problem<'a> {
+    pub model: &'a Model,
+    pub mapping: &'a Mapping,
+    pub touches: &'a [Touch],
+    pub targets: &'a [Target],
+    /// Per frame and touch: whether it is held.
+    pub held: &'a [Vec<bool>],
+    /// Seconds between frames.
+    pub dt: f64,
+}
+
+/// Takes a residual and its derivatives by the variables, `frame * nv + dof`.
+type Sink<'s> = dyn FnMut(f64, &[(usize, f64)]) + 's;
+
+impl Problem<'_> {
+    /// Improves the frames from where they are; the sum of squares that is left.
+    pub fn solve(&self, frames: &mut [Vec<f64>], iterations: usize) -> f64 {
+        let nv = self.model.nv;
+        let size = frames.len() * nv;
+        let (mut cost, mut damping) = (self.cost(frames), 1e-3);
+        for _ in 0..iterations {
+            let mut matrix = Band::new(size, (3 * nv).min(size.max(1)));
+            let mut slope = vec![0.0; size];
+            self.rows(frames, &mut |residual, by| {
+                for (k, (i, a)) in by.iter().enumerate() {
+                    slope[*i] -= a * residual;
+                    by[..=k].iter().for_each(|(j, b)| matrix.add(*i, *j, a * b));
+                }
+            });
+            let before = cost;
+            for _ in 0..8 {
+                let mut step = slope.clone();
+                if matrix.solve(damping, &mut step) {
+                    let tried: Vec<Vec<f64>> =
+                        frames.iter().zip(step.chunks(nv)).map(|(frame, step)| self.moved(frame, step)).collect();
+                    let there = self.cost(&tried);
+                    if there < cost {
+                        frames.clone_from_slice(&tried);
+                        cost = there;
+                        damping = (damping / 5.0).max(1e-9);
+                        break;
+                    }
+                }
+                damping *= 5.0;
+            }
+            if cost > before * (1.0 - 1e-4) {
+                break;
+            }
+        }
+        cost
+    }
+
+    fn cost(&self, frames: &[Vec<f64>]) -> f64 {
+        let mut cost = 0.0;
+        self.rows(frames, &mut |residual, _| cost += residual * residual);
+        cost
+    }
+
+    /// A pose moved along its degrees of freedom, those of free and ball joints about the world's axes.
+    fn moved(&self, qpos: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut out = qpos.to_vec();
+        let mut pose = None;
+        for joint in &self.model.joints {
+            let (k, v) = (joint.qpos_adr, joint.dof_adr);
+            match joint.kind {
+                JointType::Free => {
+                    (0..3).for_each(|i| out[k + i] += step[v + i]);
+                    let turned = exp(limited(DVec3::from_slice(&step[v + 3..]))) * quat(&qpos[k + 3..]);
+                    out[k + 3..k + 7].copy_from_slice(&wxyz(turned.normalize()));
+                }
+                JointType::Ball => {
+                    let pose = pose.get_or_insert_with(|| Pose::of(self.model, qpos));
+                    let local = pose.quat[joint.body].conjugate() * limited(DVec3::from_slice(&step[v..]));
+                    out[k..k + 4].copy_from_slice(&wxyz((quat(&qpos[k..]) * exp(local)).normalize()));
+                }
+                JointType::Hinge => out[k] += step[v].clamp(-1.0, 1.0),
+                JointType::Slide => out[k] += step[v],
+            }
+        }
+        out
+    }
+
+    /// All residuals.
+    fn rows(&self, frames: &[Vec<f64>], sink: &mut Sink) {
+        let poses: Vec<Pose> = frames.iter().map(|frame| Pose::of(self.model, frame)).collect();
+        for i in 0..frames.len() {
+            self.pose_rows(i, &poses[i], sink);
+            self.joint_rows(i, &frames[i], sink);
+            self.ground_rows(i, &poses, sink);
+        }
+        for i in 1..frames.len().saturating_sub(1) {
+            self.smooth_rows(i, &frames[i - 1..=i + 1], sink);
+        }
+    }
+
+    /// Orientations and positions of the parts and the hips.
+    fn pose_rows(&self, i: usize, pose: &Pose, sink: &mut Sink) {
+        let (target, base) = (&self.targets[i], i * self.model.nv);
+        for (k, part) in self.mapping.parts.iter().enumerate() {
+            let point = pose.point(part.body, DVec3::from_array(part.local));
+            if part.rotation > 0.0 {
+                let error = log(target.quat[k] * pose.quat[part.body].conjugate());
+                self.vector_rows(pose, part.body, point, base, sink, |turn, _| -turn, part.rotation * error, part.rotation);
+            }
+            if part.position > 0.0 {
+                let error = part.position * (target.pos[k] - point);
+                self.vector_rows(pose, part.body, point, base, sink, |_, shift| -shift, error, part.position);
+            }
+        }
+        let bodies = self.mapping.hips.map(|hip| self.mapping.parts[hip].body);
+        let [a, b] = bodies.map(|body| pose.pos[body]);
+        let error = target.hips - 0.5 * (a + b);
+        let mut by = vec![DVec3::ZERO; self.model.nv];
+        for body in bodies {
+            pose.motions(self.model, body, pose.pos[body], |dof, _, shift| by[dof] -= 0.5 * shift);
+        }
+        let [along, up] = weight::HIPS;
+        for (axis, weight) in [along, along, up].into_iter().enumerate() {
+            let row: Vec<_> =
+                by.iter().enumerate().filter(|(_, by)| by[axis] != 0.0).map(|(dof, by)| (base + dof, weight * by[axis])).collect();
+            sink(weight * error[axis], &row);
+        }
+    }
+
+    /// Three rows of a vector that depends on how one body moves.
+    #[allow(clippy::too_many_arguments)]
+    fn vector_rows(
+        &self,
+        pose: &Pose,
+        body: usize,
+        point: DVec3,
+        base: usize,
+        sink: &mut Sink,
+        effect: impl Fn(DVec3, DVec3) -> DVec3,
+        error: DVec3,
+        weight: f64,
+    ) {
+        let mut rows: [Vec<(usize, f64)>; 3] = Default::default();
+        pose.motions(self.model, body, point, |dof, turn, shift| {
+            let by = weight * effect(turn, shift);
+            (0..3).for_each(|axis| rows[axis].push((base + dof, by[axis])));
+        });
+        (0..3).for_each(|axis| sink(error[axis], &rows[axis]));
+    }
+
+    /// Limits, and the pull to the reference.
+    fn joint_rows(&self, i: usize, qpos: &[f64], sink: &mut Sink) {
+        for (k, joint) in self.model.joints.iter().enumerate() {
+            if !matches!(joint.kind, JointType::Hinge | JointType::Slide) || self.is_root(k) {
+                continue;
+            }
+            let (at, dof) = (qpos[joint.qpos_adr], i * self.model.nv + joint.dof_adr);
+            sink(weight::REST * (at - self.model.qpos0[joint.qpos_adr]), &[(dof, weight::REST)]);
+            let margin = LIMIT_MARGIN.min(0.1 * (joint.range[1] - joint.range[0]));
+            let beyond = if at < joint.range[0] + margin {
+                at - joint.range[0] - margin
+            } else {
+                (at - joint.range[1] + margin).max(0.0)
+            };
+            if joint.limited && beyond != 0.0 {
+                sink(weight::LIMIT * beyond, &[(dof, weight::LIMIT)]);
+            }
+        }
+    }
+
+    /// Whether a joint belongs to the first moving body, which carries the figure through the world.
+    fn is_root(&self, joint: usize) -> bool {
+        self.model.joints[joint].body == self.model.joints[0].body
+    }
+
+    /// Nothing below the ground; what is held touches it and does not slide.
+    fn ground_rows(&self, i: usize, poses: &[Pose], sink: &mut Sink) {
+        let (pose, nv) = (&poses[i], self.model.nv);
+        let mut row = Vec::new();
+        for (k, touch) in self.touches.iter().enumerate() {
+            let lowest = touch.lowest(pose);
+            let held = self.held[i][k];
+            if held || lowest.z < 0.0 {
+                row.clear();
+                pose.motions(self.model, touch.body, lowest, |dof, _, shift| {
+                    row.push((i * nv + dof, weight::GROUND * shift.z));
+                });
+                sink(weight::GROUND * lowest.z, &row);
+            }
+            if held && i + 1 < poses.len() && self.held[i + 1][k] {
+                // the point that touches now is where it was in the next frame
+                let local = pose.quat[touch.body].conjugate() * (lowest - pose.pos[touch.body]);
+                let there = poses[i + 1].point(touch.body, local);
+                for axis in 0..2 {
+                    row.clear();
+                    pose.motions(self.model, touch.body, lowest, |dof, _, shift| {
+                        row.push((i * nv + dof, -weight::SLIDE * shift[axis]));
+                    });
+                    poses[i + 1].motions(self.model, touch.body, there, |dof, _, shift| {
+                        row.push(((i + 1) * nv + dof, weight::SLIDE * shift[axis]));
+                    });
+                    sink(weight::SLIDE * (there - lowest)[axis], &row);
+                }
+            }
+        }
+    }
+
+    /// Accelerations between three frames.
+    fn smooth_rows(&self, i: usize, frames: &[Vec<f64>], sink: &mut Sink) {
+        let nv = self.model.nv;
+        let scale = weight::SMOOTH / (self.dt * self.dt);
+        let [a, b, c] = [&frames[0], &frames[1], &frames[2]];
+        let mut row = |value: f64, dof: usize| {
+            let by = [((i - 1) * nv + dof, scale), (i * nv + dof, -2.0 * scale), ((i + 1) * nv + dof, scale)];
+            sink(scale * value, &by);
+        };
+        for joint in &self.model.joints {
+            let (k, v) = (joint.qpos_adr, joint.dof_adr);
+            let mut turns = |k: usize, v: usize| {
+                let [a, b, c] = [a, b, c].map(|q| quat(&q[k..]));
+                let bend = log(c * b.conjugate()) - log(b * a.conjugate());
+                (0..3).for_each(|axis| row(bend[axis], v + axis));
+            };
+            match joint.kind {
+                JointType::Free => {
+                    turns(k + 3, v + 3);
+                    (0..3).for_each(|i| row(a[k + i] - 2.0 * b[k + i] + c[k + i], v + i));
+                }
+                JointType::Ball => turns(k, v),
+                JointType::Hinge | JointType::Slide => row(a[k] - 2.0 * b[k] + c[k], v),
+            }
+        }
+    }
+}
+
+/// No further than a radian at once.
+fn limited(turn: DVec3) -> DVec3 {
+    turn.clamp_length_max(1.0)
+}
