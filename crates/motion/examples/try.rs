@@ -6,6 +6,7 @@ fn main() {
     let model = marathon_physics::Model::from_xml_file(model).unwrap();
     let p = std::path::Path::new(src);
     let mut an = import::deepmimic(p, &std::fs::read(p).unwrap()).unwrap();
+    if an.wraps() && a.get(5).is_none() { an = an.looped(); }
     an = an.with_clip(an.clip().resample(p, 1.0 / 60.0).unwrap());
     let mp = std::path::Path::new(map);
     let m = Mapping::parse(mp, &std::fs::read(mp).unwrap(), an.skeleton(), &model).unwrap_or_else(|e| panic!("{e}"));

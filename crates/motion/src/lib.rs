@@ -35,6 +35,7 @@ pub mod import;
 
 pub mod kinematics;
 
+mod apart;
 mod ground;
 
 mod contact;

@@ -40,6 +40,7 @@ pub(crate) struct SkeletonPose {
 pub struct Animation {
     skeleton: Skeleton,
     clip: Clip,
+    wraps: bool,
 }
 
 /// One instant of a recording.
@@ -85,7 +86,7 @@ impl Skeleton {
 }
 
 impl Animation {
-    /// An animation of these keyframes, `dt` seconds apart. One that loops has its first pose again as its last, farther
+    /// An animation of these keyframes, `dt` seconds apart. It wraps if its last pose is meant to be its first again, farther
     /// on. The path is for messages.
     ///
     /// # Errors
@@ -95,7 +96,7 @@ impl Animation {
         about: About,
         skeleton: Skeleton,
         dt: f64,
-        looping: bool,
+        wraps: bool,
         keyframes: &[Keyframe],
     ) -> Result<Self, MotionError> {
         let kinds = std::iter::once(JointKind::Free).chain(std::iter::repeat(JointKind::Ball));
@@ -104,12 +105,8 @@ impl Animation {
             .iter()
             .map(|frame| frame.root.into_iter().chain(frame.rotations.iter().flatten().copied()).collect())
             .collect();
-        let mut clip = Clip::new(path, about, layout, dt, None, &rows)?;
-        if looping {
-            // recordings never close exactly; what is left is spread over the whole cycle, where it shows least
-            clip = clip.looped(clip.duration());
-        }
-        Ok(Animation { skeleton, clip })
+        let clip = Clip::new(path, about, layout, dt, None, &rows)?;
+        Ok(Animation { skeleton, clip, wraps })
     }
 
     /// The joints.
@@ -122,9 +119,20 @@ impl Animation {
         &self.clip
     }
 
+    /// Whether its last pose is meant to be its first again, farther on.
+    pub fn wraps(&self) -> bool {
+        self.wraps
+    }
+
+    /// The motion as an endless one. Recordings never close exactly; what is left is spread over the whole cycle, where it
+    /// shows least.
+    pub fn looped(&self) -> Self {
+        self.with_clip(self.clip.looped(self.clip.duration()))
+    }
+
     /// The same skeleton with its motion changed, by the edits of a [`Clip`].
     pub fn with_clip(&self, clip: Clip) -> Self {
-        Animation { skeleton: self.skeleton.clone(), clip }
+        Animation { skeleton: self.skeleton.clone(), clip, wraps: self.wraps }
     }
 
     /// How far a cycle gets, if the motion loops.

@@ -12,6 +12,7 @@ mod target;
 pub use mapping::Mapping;
 
 use crate::clip::{About, Clip, Cycle};
+use crate::apart::Couple;
 use crate::contact;
 use crate::error::MotionError;
 use crate::ground::Touch;
@@ -27,6 +28,8 @@ use target::{Target, Targets};
 
 /// Frames beyond each end of a cycle, s: there the next cycle begins, so that ends meet.
 const MARGIN: f64 = 0.4;
+/// Solutions over all frames; from the second on, what stands is held.
+const PASSES: usize = 4;
 
 /// Retargets an animation to a model, frame for frame. A free root begins above the world's origin. The path is for messages.
 ///
@@ -44,37 +47,64 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let count = clip.frames() + usize::from(cycle.is_some());
     let margin = if cycle.is_some() { libm::ceil(MARGIN / dt) as usize } else { 0 };
     let all: Vec<Target> = (0..count + 2 * margin).map(|i| targets.at(i as i64 - margin as i64)).collect();
-    let touches = Touch::all(model);
-    let mut held = vec![vec![false; touches.len()]; all.len()];
+    let (touches, couples) = (Touch::all(model), Couple::all(model));
+    let layout = Layout::of(model);
+    let cycle = cycle.map(|Cycle { pos: [x, y], yaw }| {
+        let travel = targets.place(DVec3::new(x, y, 0.0));
+        Cycle { pos: [travel.x, travel.y], yaw }
+    });
 
+    let mut held = vec![vec![false; touches.len()]; all.len()];
+    let none = held.clone();
+    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &couples, targets, held, dt };
+    // frame after frame; around a cycle twice, so that its begin knows its end
+    let mut guess = vec![model.qpos0.clone()];
     let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
-    for (i, target) in all.iter().enumerate() {
-        let mut guess = vec![frames.last().cloned().unwrap_or_else(|| model.qpos0.clone())];
-        start(model, target, &mut guess[0]);
-        let one = std::slice::from_ref(target);
-        let problem = Problem { model, mapping, touches: &touches, targets: one, held: &held[i..=i], dt };
-        problem.solve(&mut guess, if i == 0 { 100 } else { 20 });
-        frames.append(&mut guess);
+    for round in 0..if cycle.is_some() { 2 } else { 1 } {
+        frames.clear();
+        for (i, target) in all.iter().enumerate() {
+            start(model, target, &mut guess[0]);
+            let iterations = if round == 0 && i == 0 { 100 } else { 20 };
+            problem(std::slice::from_ref(target), &none[i..=i]).solve(&mut guess, iterations);
+            frames.push(guess[0].clone());
+        }
     }
-    for pass in 0..3 {
+    for pass in 0..PASSES {
+        if let Some(cycle) = &cycle {
+            repeat(cycle, &layout, &mut frames, margin);
+        }
         if pass > 0 {
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
         }
-        Problem { model, mapping, touches: &touches, targets: &all, held: &held, dt }.solve(&mut frames, 25);
+        let frame_set = Problem { held: &held, ..problem(&all, &none) };
+        frame_set.solve(&mut frames, 25);
     }
 
     let mut frames = frames[margin..margin + count].to_vec();
     frames.iter_mut().for_each(|frame| clamp(model, frame));
     let about = About { model: model.name.clone(), ..clip.about().clone() };
-    let mut result = Clip::new(path, about, Layout::of(model), dt, None, &frames)?;
-    if let Some(Cycle { pos: [x, y], yaw }) = cycle {
-        let travel = targets.place(DVec3::new(x, y, 0.0));
-        result = result.closed(Cycle { pos: [travel.x, travel.y], yaw });
+    let mut result = Clip::new(path, about, layout, dt, None, &frames)?;
+    if let Some(cycle) = cycle {
+        result = result.closed(cycle);
     }
     let result = contact::above_ground(model, &touches, &result);
     let first = result.frame(0);
     let start = DVec3::new(first[0], first.get(1).copied().unwrap_or(0.0), 0.0);
     Ok(result.moved(-start))
+}
+
+/// Makes the frames before and after a cycle what the cycle says.
+fn repeat(cycle: &Cycle, layout: &Layout, frames: &mut [Vec<f64>], margin: usize) {
+    // the last frame within is the first of the next cycle
+    let count = frames.len() - 2 * margin - 1;
+    for i in (0..margin).rev() {
+        frames[i] = frames[i + count].clone();
+        cycle.advance(layout, &mut frames[i], -1);
+    }
+    for i in margin + count..frames.len() {
+        frames[i] = frames[i - count].clone();
+        cycle.advance(layout, &mut frames[i], 1);
+    }
 }
 
 /// Puts the first moving body where it should be, if it is free.

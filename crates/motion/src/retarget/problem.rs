@@ -3,6 +3,7 @@
 use super::band::Band;
 use super::mapping::Mapping;
 use super::target::Target;
+use crate::apart::Couple;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use crate::rotation::{exp, log, quat, wxyz};
@@ -20,19 +21,26 @@ mod weight {
     pub const GROUND: f64 = 150.0;
     /// Of a step's slide of what touches the ground, 1/m.
     pub const SLIDE: f64 = 120.0;
+    /// Of the depth at which parts overlap, 1/m.
+    pub const APART: f64 = 60.0;
     /// Of a joint's distance from its reference, 1/rad: decides where nothing else does.
     pub const REST: f64 = 0.02;
     /// Of accelerations, s^2: motions faster than about 12 Hz are noise.
     pub const SMOOTH: f64 = 1.8e-4;
+    /// Of joint velocities, s: what is not asked for does not move.
+    pub const STILL: f64 = 0.004;
 }
 /// Joints stay this far within their limits, rad or m, so that the penalty's give does not show.
 const LIMIT_MARGIN: f64 = 0.01;
+/// Parts stay this far apart, m.
+const APART_MARGIN: f64 = 0.005;
 
 /// Frames in a row, what they should be, and which points touch the ground.
 pub(super) struct Problem<'a> {
     pub model: &'a Model,
     pub mapping: &'a Mapping,
     pub touches: &'a [Touch],
+    pub couples: &'a [Couple],
     pub targets: &'a [Target],
     /// Per frame and touch: whether it is held.
     pub held: &'a [Vec<bool>],
@@ -118,6 +126,10 @@ impl Problem<'_> {
             self.pose_rows(i, &poses[i], sink);
             self.joint_rows(i, &frames[i], sink);
             self.ground_rows(i, &poses, sink);
+            self.apart_rows(i, &poses[i], sink);
+        }
+        for i in 1..frames.len() {
+            self.still_rows(i, &frames[i - 1], &frames[i], sink);
         }
         for i in 1..frames.len().saturating_sub(1) {
             self.smooth_rows(i, &frames[i - 1..=i + 1], sink);
@@ -227,6 +239,36 @@ impl Problem<'_> {
                     });
                     sink(weight::SLIDE * (there - lowest)[axis], &row);
                 }
+            }
+        }
+    }
+
+    /// Parts do not overlap.
+    fn apart_rows(&self, i: usize, pose: &Pose, sink: &mut Sink) {
+        for couple in self.couples {
+            let gap = couple.gap(pose);
+            let lacking = APART_MARGIN - gap.distance;
+            if lacking > 0.0 {
+                let mut row = vec![0.0; self.model.nv];
+                for (k, sign) in [(0, 1.0), (1, -1.0)] {
+                    pose.motions(self.model, gap.bodies[k], gap.points[k], |dof, _, shift| {
+                        row[dof] -= weight::APART * sign * gap.normal.dot(shift);
+                    });
+                }
+                let row: Vec<_> =
+                    row.iter().enumerate().filter(|(_, by)| **by != 0.0).map(|(dof, by)| (i * row.len() + dof, *by)).collect();
+                sink(weight::APART * lacking, &row);
+            }
+        }
+    }
+
+    /// Velocities of the joints between two frames.
+    fn still_rows(&self, i: usize, before: &[f64], now: &[f64], sink: &mut Sink) {
+        let (nv, scale) = (self.model.nv, weight::STILL / self.dt);
+        for (k, joint) in self.model.joints.iter().enumerate() {
+            if matches!(joint.kind, JointType::Hinge | JointType::Slide) && !self.is_root(k) {
+                let by = [((i - 1) * nv + joint.dof_adr, -scale), (i * nv + joint.dof_adr, scale)];
+                sink(scale * (now[joint.qpos_adr] - before[joint.qpos_adr]), &by);
             }
         }
     }
