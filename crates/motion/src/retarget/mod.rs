@@ -28,8 +28,10 @@ use target::{Target, Targets};
 
 /// Frames beyond each end of a cycle, s: there the next cycle begins, so that ends meet.
 const MARGIN: f64 = 0.4;
-/// Solutions over all frames; from the second on, what stands is held.
+/// Solutions over all frames; from the second on, what stands is held and parts do not overlap.
 const PASSES: usize = 4;
+/// How much more the first solution is smoothed: limbs that found different ways in different frames come together.
+const CALM: f64 = 8.0;
 
 /// Retargets an animation to a model, frame for frame. A free root begins above the world's origin. The path is for messages.
 ///
@@ -56,7 +58,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
 
     let mut held = vec![vec![false; touches.len()]; all.len()];
     let none = held.clone();
-    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &couples, targets, held, dt };
+    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &[], targets, held, dt, calm: CALM };
     // frame after frame; around a cycle twice, so that its begin knows its end
     let mut guess = vec![model.qpos0.clone()];
     let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
@@ -76,8 +78,9 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         if pass > 0 {
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
         }
-        let frame_set = Problem { held: &held, ..problem(&all, &none) };
-        frame_set.solve(&mut frames, 25);
+        let rough = problem(&all, &none);
+        let fine = Problem { couples: &couples, held: &held, calm: 1.0, ..rough };
+        if pass == 0 { rough.solve(&mut frames, 25) } else { fine.solve(&mut frames, 25) };
     }
 
     let mut frames = frames[margin..margin + count].to_vec();

@@ -35,6 +35,7 @@ const LIMIT_MARGIN: f64 = 0.01;
 /// Parts stay this far apart, m.
 const APART_MARGIN: f64 = 0.005;
 
+#[derive(Clone, Copy)]
 /// Frames in a row, what they should be, and which points touch the ground.
 pub(super) struct Problem<'a> {
     pub model: &'a Model,
@@ -46,6 +47,8 @@ pub(super) struct Problem<'a> {
     pub held: &'a [Vec<bool>],
     /// Seconds between frames.
     pub dt: f64,
+    /// Factor on the weights of velocities and accelerations.
+    pub calm: f64,
 }
 
 /// Takes a residual and its derivatives by the variables, `frame * nv + dof`.
@@ -264,7 +267,7 @@ impl Problem<'_> {
 
     /// Velocities of the joints between two frames.
     fn still_rows(&self, i: usize, before: &[f64], now: &[f64], sink: &mut Sink) {
-        let (nv, scale) = (self.model.nv, weight::STILL / self.dt);
+        let (nv, scale) = (self.model.nv, self.calm * weight::STILL / self.dt);
         for (k, joint) in self.model.joints.iter().enumerate() {
             if matches!(joint.kind, JointType::Hinge | JointType::Slide) && !self.is_root(k) {
                 let by = [((i - 1) * nv + joint.dof_adr, -scale), (i * nv + joint.dof_adr, scale)];
@@ -276,7 +279,7 @@ impl Problem<'_> {
     /// Accelerations between three frames.
     fn smooth_rows(&self, i: usize, frames: &[Vec<f64>], sink: &mut Sink) {
         let nv = self.model.nv;
-        let scale = weight::SMOOTH / (self.dt * self.dt);
+        let scale = self.calm * weight::SMOOTH / (self.dt * self.dt);
         let [a, b, c] = [&frames[0], &frames[1], &frames[2]];
         let mut row = |value: f64, dof: usize| {
             let by = [((i - 1) * nv + dof, scale), (i * nv + dof, -2.0 * scale), ((i + 1) * nv + dof, scale)];
