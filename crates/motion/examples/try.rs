@@ -8,8 +8,8 @@ fn main() {
     let mut an = import::deepmimic(p, &std::fs::read(p).unwrap()).unwrap();
     if an.wraps() && a.get(5).is_none() { an = an.looped(); }
     an = an.with_clip(an.clip().resample(p, 1.0 / 60.0).unwrap());
-    let mp = std::path::Path::new(map);
-    let m = Mapping::parse(mp, &std::fs::read(mp).unwrap(), an.skeleton(), &model).unwrap_or_else(|e| panic!("{e}"));
+    let _ = map;
+    let m = Mapping::built_in(p, an.skeleton(), &model).unwrap_or_else(|e| panic!("{e}"));
     let t = std::time::Instant::now();
     let clip = retarget(p, &an, &model, &m).unwrap();
     let about = About {
@@ -20,5 +20,8 @@ fn main() {
     };
     let clip = clip.with_about(about);
     eprintln!("{} frames in {:.2} s, cycle {:?}", clip.frames(), t.elapsed().as_secs_f64(), clip.cycle());
+    let clip = clip.rounded();
+    let r = check(p, &clip, &model, m.soles()).unwrap();
+    eprintln!("    slide {:.1} cm {} f{} speed {:.3} m/s standing {:.2} jump {:.1} {:?}", 100.0*r.slide.value, r.slide.name, r.slide.frame, r.slide_speed, r.standing, r.jump.value, r.warnings());
     std::fs::write(out, clip.rounded().to_bytes()).unwrap();
 }

@@ -28,8 +28,8 @@ pub(crate) fn held(
         for i in 0..frames.len() {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(frames.len() - 1));
             let seconds = (after - before).max(1) as f64 * dt;
-            let speed = (slide(touch, &poses[before], &poses[i]) + slide(touch, &poses[i], &poses[after])) / seconds;
-            held[i][k] = low(i).z < HEIGHT && speed < SPEED;
+            let way = slide(touch, &poses[before], &poses[i]).length() + slide(touch, &poses[i], &poses[after]).length();
+            held[i][k] = low(i).z < HEIGHT && way / seconds < SPEED;
         }
         let shortest = libm::ceil(SHORTEST / dt) as usize;
         let mut begin = 0;
@@ -45,11 +45,11 @@ pub(crate) fn held(
     held
 }
 
-/// How far the lowest point of a touch slides along the ground until the next frame, m. Rolling is no slide.
-pub(crate) fn slide(touch: &Touch, now: &Pose, next: &Pose) -> f64 {
+/// How the lowest point of a touch slides along the ground until the next frame, m. Rolling is no slide.
+pub(crate) fn slide(touch: &Touch, now: &Pose, next: &Pose) -> DVec3 {
     let lowest = touch.lowest(now);
     let local = now.quat[touch.body].conjugate() * (lowest - now.pos[touch.body]);
-    (next.point(touch.body, local) - lowest).truncate().length()
+    (next.point(touch.body, local) - lowest).with_z(0.0)
 }
 
 /// The lowest point of a pose above the ground, m; negative below it.

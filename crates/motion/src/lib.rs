@@ -40,8 +40,13 @@ mod ground;
 
 mod contact;
 
+mod check;
+
+mod roles;
+
 mod retarget;
 
+pub use check::{Report, Worst, check};
 pub use clip::{About, Clip, Cycle};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};

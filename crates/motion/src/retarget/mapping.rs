@@ -3,7 +3,7 @@
 //! | entry | meaning |
 //! |---|---|
 //! | `mapping` | version of the format, 1 |
-//! | `skeleton`, `model` | what is mapped to what; for people |
+//! | `model` | name of the model |
 //! | `hips` | the bodies of the left and the right thigh, in this order: they tell the figure's front and the length of its legs |
 //! | `soles` | bodies that stand: what they touch does not slide |
 //! | `parts` | by name of a body, geom or site of the model: the joint that it follows |
@@ -12,13 +12,14 @@
 //!
 //! | entry | meaning |
 //! |---|---|
-//! | `joint` | joint of the skeleton |
+//! | `joint` | joint of the skeleton: its own name, or one of the names that many skeletons are understood by, such as `left_hip` |
 //! | `toward`, `share` | a second joint, and how far from the first to it the part's orientation lies, 0 to 1 |
 //! | `rotation` | weight of its orientation, 1/rad; 1 if absent; geoms and sites have none |
 //! | `position` | weight of its position, 1/m; 0 if absent |
 //! | `rest` | `[w, x, y, z]`, a turn of the part's reference orientation, in the model's axes, that makes it fit the skeleton's rest pose. If absent, the part is turned so that the bone to the next part points as in the skeleton |
 
 use crate::error::{MotionError, did_you_mean};
+use crate::roles;
 use crate::skeleton::Skeleton;
 use marathon_physics::Model;
 use serde::Deserialize;
@@ -29,9 +30,6 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 struct Document {
     mapping: u64,
-    #[allow(dead_code)]
-    skeleton: String,
-    #[allow(dead_code)]
     model: String,
     hips: [String; 2],
     #[serde(default)]
@@ -83,7 +81,48 @@ pub struct Mapping {
     pub(crate) soles: Vec<usize>,
 }
 
+/// Mappings that come with the crate, by the model's name. Their joints are those of [`roles`].
+const BUILT_IN: [(&str, &str); 3] = [
+    ("marathon_man", include_str!("../../../../assets/motions/mappings/marathon_man.json")),
+    ("humanoid", include_str!("../../../../assets/motions/mappings/humanoid.json")),
+    ("walker2d", include_str!("../../../../assets/motions/mappings/walker2d.json")),
+];
+
 impl Mapping {
+    /// The mapping that comes with Marathon for a model, if there is one. The path, of the motion, is for messages.
+    ///
+    /// # Errors
+    /// If there is none, or the skeleton's joints go by names that are not understood.
+    pub fn built_in(path: &Path, skeleton: &Skeleton, model: &Model) -> Result<Self, MotionError> {
+        let found = BUILT_IN.iter().find(|(name, _)| *name == model.name);
+        let Some((_, text)) = found else {
+            let known: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
+            let problem = format!("there is no mapping for it, only for {}; write one", known.join(", "));
+            return Err(MotionError::model(path, &model.name, problem));
+        };
+        Self::parse(path, text.as_bytes(), skeleton, model)
+    }
+
+    /// Every body with a joint follows the joint of its own name, by its orientation alone.
+    ///
+    /// # Errors
+    /// If the skeleton lacks a body's name, or a hip is not a body.
+    pub fn by_name(path: &Path, skeleton: &Skeleton, model: &Model, hips: [&str; 2]) -> Result<Self, MotionError> {
+        let rows = model.bodies.iter().filter(|body| body.joint_count > 0).map(|body| {
+            let name = serde_json::to_string(&body.name).expect("texts can be written");
+            format!("{name}: {{\"joint\": {name}}}")
+        });
+        let name = serde_json::to_string(&model.name).expect("texts can be written");
+        let parts = rows.collect::<Vec<_>>().join(", ");
+        let text = format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"parts\": {{{parts}}}}}");
+        Self::parse(path, text.as_bytes(), skeleton, model)
+    }
+
+    /// The bodies that stand, by index.
+    pub fn soles(&self) -> &[usize] {
+        &self.soles
+    }
+
     /// Reads a mapping for a skeleton and a model; the path is for messages.
     ///
     /// # Errors
@@ -92,6 +131,9 @@ impl Mapping {
         let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
         if file.mapping != 1 {
             return Err(MotionError::value(path, "mapping", file.mapping, "version 1 of the format"));
+        }
+        if file.model != model.name {
+            return Err(MotionError::value(path, "model", format!("{:?}", file.model), format!("{:?}", model.name)));
         }
         let mut parts = Vec::new();
         for (name, row) in &file.parts {
@@ -120,9 +162,10 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
     let key = |field: &str| format!("parts.{name}.{field}");
     let joint = |field: &str, wanted: &str| {
         let names = || skeleton.bones.iter().map(|bone| bone.name.as_str());
-        names().position(|known| known == wanted).ok_or_else(|| {
+        roles::find(skeleton, wanted).ok_or_else(|| {
             let hint = did_you_mean(wanted, names());
-            let expected = format!("a joint of the skeleton{hint}; it has {}", names().collect::<Vec<_>>().join(", "));
+            let all = names().collect::<Vec<_>>().join(", ");
+            let expected = format!("a joint of the skeleton{hint}; it has {all}");
             MotionError::value(path, &key(field), format!("{wanted:?}"), expected)
         })
     };

@@ -32,6 +32,8 @@ const MARGIN: f64 = 0.4;
 const PASSES: usize = 4;
 /// How much more the first solution is smoothed: limbs that found different ways in different frames come together.
 const CALM: f64 = 8.0;
+/// Joints of people are hardly faster, rad/s.
+const FASTEST: f64 = 25.0;
 
 /// Retargets an animation to a model, frame for frame. A free root begins above the world's origin. The path is for messages.
 ///
@@ -83,6 +85,13 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         if pass == 0 { rough.solve(&mut frames, 25) } else { fine.solve(&mut frames, 25) };
     }
 
+    // where a limb slips past another one, it may be too fast
+    let mut calm = 1.0;
+    while calm < CALM && fastest(model, &frames, dt) > FASTEST {
+        calm *= 2.0;
+        Problem { couples: &couples, held: &held, calm, ..problem(&all, &none) }.solve(&mut frames, 25);
+    }
+
     let mut frames = frames[margin..margin + count].to_vec();
     frames.iter_mut().for_each(|frame| clamp(model, frame));
     let about = About { model: model.name.clone(), ..clip.about().clone() };
@@ -94,6 +103,15 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let first = result.frame(0);
     let start = DVec3::new(first[0], first.get(1).copied().unwrap_or(0.0), 0.0);
     Ok(result.moved(-start))
+}
+
+/// The highest speed of a hinge, rad/s.
+fn fastest(model: &Model, frames: &[Vec<f64>], dt: f64) -> f64 {
+    let hinges = model.joints.iter().filter(|joint| joint.kind == JointType::Hinge);
+    let speeds = hinges.flat_map(|joint| {
+        frames.windows(2).map(|pair| (pair[1][joint.qpos_adr] - pair[0][joint.qpos_adr]).abs() / dt)
+    });
+    speeds.fold(0.0, f64::max)
 }
 
 /// Makes the frames before and after a cycle what the cycle says.

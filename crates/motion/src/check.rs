@@ -1,0 +1,175 @@
+//! What is wrong with a clip, if anything: limits, ground, overlaps, jumps, slides.
+
+use crate::apart::Couple;
+use crate::clip::Clip;
+use crate::contact::{self, clearance};
+use crate::error::MotionError;
+use crate::ground::Touch;
+use crate::kinematics::Pose;
+use glam::DVec3;
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+use serde::Serialize;
+use std::path::Path;
+
+/// Something measured over a clip where it is worst.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Worst {
+    /// How bad; the unit is that of the field of [`Report`].
+    pub value: f64,
+    /// The frame.
+    pub frame: usize,
+    /// The joint, body or bodies.
+    pub name: String,
+}
+
+/// A clip in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Frames.
+    pub frames: usize,
+    /// Length, s.
+    pub seconds: f64,
+    /// Furthest beyond a limit, rad or m.
+    pub limit: Worst,
+    /// Deepest below the ground, m.
+    pub depth: Worst,
+    /// Deepest overlap of two bodies that collide, m.
+    pub overlap: Worst,
+    /// Highest speed of a hinge, rad/s.
+    pub speed: Worst,
+    /// Largest change of a hinge's speed from frame to frame, rad/s.
+    pub jump: Worst,
+    /// Furthest that a sole slides while it stands, m.
+    pub slide: Worst,
+    /// Mean speed along the ground of what stands, m/s.
+    pub slide_speed: f64,
+    /// Share of the frames in which a sole stands.
+    pub standing: f64,
+}
+
+/// Bounds from which a value of [`Report`] is worth a warning.
+mod bound {
+    /// rad or m.
+    pub const LIMIT: f64 = 1e-3;
+    /// m.
+    pub const DEPTH: f64 = 1e-3;
+    /// m.
+    pub const OVERLAP: f64 = 5e-3;
+    /// rad/s.
+    pub const SPEED: f64 = 30.0;
+    /// rad/s in a sixtieth of a second.
+    pub const JUMP: f64 = 25.0;
+    /// m; a step's, as people notice it.
+    pub const SLIDE: f64 = 0.03;
+}
+
+impl Worst {
+    fn meet(&mut self, value: f64, frame: usize, name: impl FnOnce() -> String) {
+        if value > self.value {
+            *self = Worst { value, frame, name: name() };
+        }
+    }
+}
+
+/// Measures a clip of a model. Soles are the bodies that stand, by index. The path is for messages.
+///
+/// # Errors
+/// If the clip is another model's.
+pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result<Report, MotionError> {
+    clip.check_model(path, model)?;
+    let count = clip.frames() + usize::from(clip.cycle().is_some());
+    let frames: Vec<Vec<f64>> = (0..count as i64).map(|i| clip.frame_at(i)).collect();
+    let poses: Vec<Pose> = frames.iter().map(|frame| Pose::of(model, frame)).collect();
+    let (touches, couples) = (Touch::all(model), Couple::all(model));
+    let mut report = Report {
+        frames: clip.frames(),
+        seconds: clip.duration(),
+        limit: Worst::default(),
+        depth: Worst::default(),
+        overlap: Worst::default(),
+        speed: Worst::default(),
+        jump: Worst::default(),
+        slide: Worst::default(),
+        slide_speed: 0.0,
+        standing: 0.0,
+    };
+    let body = |i: usize| model.bodies[i].name.clone();
+    for (i, (frame, pose)) in frames.iter().zip(&poses).enumerate() {
+        for joint in model.joints.iter().filter(|joint| joint.limited && joint.kind != JointType::Ball) {
+            let at = frame[joint.qpos_adr];
+            let beyond = (joint.range[0] - at).max(at - joint.range[1]);
+            report.limit.meet(beyond, i, || joint.name.clone());
+        }
+        report.depth.meet(-clearance(&touches, pose), i, || {
+            let lowest = touches.iter().min_by(|a, b| a.lowest(pose).z.total_cmp(&b.lowest(pose).z));
+            lowest.map_or(String::new(), |touch| body(touch.body))
+        });
+        for couple in &couples {
+            let gap = couple.gap(pose);
+            report.overlap.meet(-gap.distance, i, || format!("{} and {}", body(gap.bodies[0]), body(gap.bodies[1])));
+        }
+    }
+    for joint in model.joints.iter().filter(|joint| joint.kind == JointType::Hinge) {
+        let speed = |i: usize| (frames[i + 1][joint.qpos_adr] - frames[i][joint.qpos_adr]) / clip.dt();
+        for i in 0..count - 1 {
+            report.speed.meet(speed(i).abs(), i, || joint.name.clone());
+            if i > 0 {
+                report.jump.meet((speed(i) - speed(i - 1)).abs() / (60.0 * clip.dt()), i, || joint.name.clone());
+            }
+        }
+    }
+    slides(model, &touches, soles, &poses, &frames, clip.dt(), &mut report);
+    Ok(report)
+}
+
+/// Slides of soles, stance by stance.
+fn slides(
+    model: &Model,
+    touches: &[Touch],
+    soles: &[usize],
+    poses: &[Pose],
+    frames: &[Vec<f64>],
+    dt: f64,
+    report: &mut Report,
+) {
+    let held = contact::held(model, touches, soles, frames, dt);
+    let (mut way, mut seconds) = (0.0, 0.0);
+    for (k, touch) in touches.iter().enumerate() {
+        let mut slid = DVec3::ZERO;
+        for i in 0..poses.len() - 1 {
+            if held[i][k] && held[i + 1][k] {
+                let step = contact::slide(touch, &poses[i], &poses[i + 1]);
+                slid += step;
+                report.slide.meet(slid.length(), i, || model.bodies[touch.body].name.clone());
+                way += step.length();
+                seconds += dt;
+            } else {
+                slid = DVec3::ZERO;
+            }
+        }
+    }
+    report.slide_speed = if seconds > 0.0 { way / seconds } else { 0.0 };
+    let standing = held.iter().filter(|touches| touches.contains(&true)).count();
+    report.standing = standing as f64 / held.len() as f64;
+}
+
+impl Report {
+    /// What a person should know, one sentence each; none if the clip is sound.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        let mut warn = |worst: &Worst, bound: f64, text: String| {
+            if worst.value > bound {
+                out.push(format!("frame {}: {text}", worst.frame));
+            }
+        };
+        let Report { limit, depth, overlap, speed, jump, slide, .. } = self;
+        warn(limit, bound::LIMIT, format!("{} is {:.3} rad beyond its limit", limit.name, limit.value));
+        warn(depth, bound::DEPTH, format!("{} is {:.1} mm below the ground", depth.name, 1e3 * depth.value));
+        warn(overlap, bound::OVERLAP, format!("{} overlap by {:.1} mm", overlap.name, 1e3 * overlap.value));
+        warn(speed, bound::SPEED, format!("{} turns at {:.0} rad/s", speed.name, speed.value));
+        warn(jump, bound::JUMP, format!("{} jumps by {:.0} rad/s", jump.name, jump.value));
+        warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
+        out
+    }
+}
