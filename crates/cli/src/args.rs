@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::bench::BenchArgs;
+use crate::motion::MotionArgs;
 use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
 use marathon_runs::{FilmOptions, PolicySource, RunOptions};
@@ -54,6 +55,8 @@ pub enum Command {
         /// Agent to tell about: the parts of its observation, its rewards, commands and options.
         agent: Option<String>,
     },
+    /// Make motion capture a character's own: read, retarget, check and draw clips.
+    Motion(MotionArgs),
     /// Measure the speed of the physics, the environments or the training.
     Bench(BenchArgs),
     /// Make the paper's experiments again: a table, a picture and a page each.

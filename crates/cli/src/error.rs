@@ -4,6 +4,7 @@ use crate::program;
 use marathon_config::ConfigError;
 use marathon_envs::EnvError;
 use marathon_learn::Error;
+use marathon_motion::MotionError;
 use marathon_physics::mjcf::MjcfError;
 use marathon_render::RenderError;
 use marathon_runs::RunError;
@@ -18,6 +19,9 @@ pub enum CliError {
     /// Of a model file.
     #[error(transparent)]
     Model(#[from] MjcfError),
+    /// Of a motion or a mapping.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// Of the pictures.
     #[error(transparent)]
     Render(#[from] RenderError),

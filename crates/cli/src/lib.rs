@@ -12,6 +12,7 @@ mod commands;
 mod console;
 mod error;
 mod interrupt;
+mod motion;
 mod program;
 mod python;
 mod study;
@@ -74,6 +75,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
+        Command::Motion(what) => motion::run(what, args.json),
         Command::Study(study) => study::run(study, args.json),
     }
 }

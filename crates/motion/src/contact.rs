@@ -62,5 +62,5 @@ pub(crate) fn above_ground(model: &Model, touches: &[Touch], clip: &Clip) -> Cli
     let depth = (0..clip.frames())
         .map(|i| -clearance(touches, &Pose::of(model, clip.frame(i))))
         .fold(0.0, f64::max);
-    clip.moved(DVec3::Z * depth)
+    clip.moved(model, DVec3::Z * depth)
 }

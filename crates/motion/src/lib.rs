@@ -29,10 +29,6 @@ mod layout;
 
 mod clip;
 
-mod skeleton;
-
-pub mod import;
-
 pub mod kinematics;
 
 mod apart;
@@ -41,6 +37,9 @@ mod ground;
 mod contact;
 
 mod check;
+mod skeleton;
+
+pub mod import;
 
 mod roles;
 
@@ -50,5 +49,5 @@ pub use check::{Report, Worst, check};
 pub use clip::{About, Clip, Cycle};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
-pub use retarget::{Mapping, retarget};
+pub use retarget::{Mapping, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};

@@ -2,9 +2,12 @@
 
 use crate::clip::{About, Clip, Cycle};
 use crate::error::MotionError;
+use crate::kinematics::Pose;
 use crate::layout::{JointKind, Layout};
 use crate::rotation::{quat, slerp, wxyz};
 use glam::{DQuat, DVec3};
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
 use std::path::Path;
 
 /// A joint of a skeleton.
@@ -107,6 +110,59 @@ impl Animation {
             .collect();
         let clip = Clip::new(path, about, layout, dt, None, &rows)?;
         Ok(Animation { skeleton, clip, wraps })
+    }
+
+    /// The motion of a model's bodies: a joint for each, named as the body, at the anchor of the body's first joint. The path
+    /// is for messages.
+    ///
+    /// # Errors
+    /// If the clip is not one of the model's, or the model has no moving body.
+    pub fn of_clip(path: &Path, model: &Model, clip: &Clip) -> Result<Self, MotionError> {
+        clip.check_model(path, model)?;
+        let Some(first) = model.joints.first().map(|joint| joint.body) else {
+            return Err(MotionError::model(path, &model.name, "it has no joints"));
+        };
+        // the bodies of the first tree
+        let tree = model.bodies[first].root_id;
+        let bodies: Vec<usize> = (1..model.bodies.len()).filter(|i| *i >= first && model.bodies[*i].root_id == tree).collect();
+        let anchor = |body: usize| {
+            let body = &model.bodies[body];
+            let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
+            let joint = joints.first().filter(|joint| joint.kind != JointType::Free);
+            joint.map_or(DVec3::ZERO, |joint| DVec3::from_array(joint.pos))
+        };
+        let rest = Pose::of(model, &model.qpos0);
+        let parent = |body: usize| bodies.iter().position(|other| *other == model.bodies[body].parent);
+        let local = |pose: &Pose, body: usize| {
+            let to = model.bodies[body].parent;
+            if body == first { pose.quat[body] } else { pose.quat[to].conjugate() * pose.quat[body] }
+        };
+        let bones = bodies.iter().map(|body| {
+            let up = model.bodies[*body].parent;
+            let offset = match parent(*body) {
+                Some(_) => {
+                    let way = rest.point(*body, anchor(*body)) - rest.point(up, anchor(up));
+                    rest.quat[up].conjugate() * way
+                }
+                None => DVec3::ZERO,
+            };
+            Bone {
+                name: model.bodies[*body].name.clone(),
+                parent: parent(*body),
+                offset: offset.to_array(),
+                rest: wxyz(local(&rest, *body)),
+            }
+        });
+        let skeleton = Skeleton { bones: bones.collect() };
+        let count = clip.frames() + usize::from(clip.cycle().is_some());
+        let keyframes: Vec<Keyframe> = (0..count as i64)
+            .map(|i| {
+                let pose = Pose::of(model, &clip.frame_at(i));
+                let rotations = bodies.iter().map(|body| wxyz(local(&pose, *body))).collect();
+                Keyframe { root: pose.point(first, anchor(first)).to_array(), rotations }
+            })
+            .collect();
+        Animation::new(path, clip.about().clone(), skeleton, clip.dt(), clip.cycle().is_some(), &keyframes)
     }
 
     /// The joints.

@@ -6,6 +6,7 @@ use crate::layout::{JointKind, Layout};
 use crate::rotation::{about_z, cubic, exp, heading, hermite, log, quat, wxyz};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
+use marathon_physics::model::JointType;
 use std::path::Path;
 
 impl Clip {
@@ -214,18 +215,22 @@ impl Clip {
         self.rebuilt(self.dt, cycle, &rows)
     }
 
-    /// The motion elsewhere: the first joint moved by so much, if it can be.
-    pub(crate) fn moved(&self, by: DVec3) -> Self {
+    /// The motion elsewhere: the first body moved by so much, as far as its joints can.
+    pub(crate) fn moved(&self, model: &Model, by: DVec3) -> Self {
         let mut rows = self.rows();
-        for row in &mut rows {
-            match self.layout.joints.first().map(|joint| joint.kind) {
-                Some(JointKind::Free) => (0..3).for_each(|i| row[i] += by[i]),
-                _ => return self.clone(),
+        for joint in model.joints.iter().filter(|joint| joint.body == model.joints[0].body) {
+            let k = joint.qpos_adr;
+            for row in &mut rows {
+                match joint.kind {
+                    JointType::Free => (0..3).for_each(|i| row[k + i] += by[i]),
+                    JointType::Slide => row[k] += DVec3::from_array(joint.axis).dot(by),
+                    JointType::Ball | JointType::Hinge => {}
+                }
             }
         }
         // the turns of a cycle are about the world's origin
         let cycle = self.cycle.map(|cycle| {
-            let flat = DVec3::new(by.x, by.y, 0.0);
+            let flat = by.with_z(0.0);
             let shift = flat - about_z(cycle.yaw) * flat;
             Cycle { pos: [cycle.pos[0] + shift.x, cycle.pos[1] + shift.y], yaw: cycle.yaw }
         });

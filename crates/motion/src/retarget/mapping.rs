@@ -70,6 +70,18 @@ pub(crate) struct Part {
     pub rest: Option<[f64; 4]>,
 }
 
+/// The bodies of a model that stand, by index: those of the mapping that comes with Marathon, or else all that are called
+/// feet.
+pub fn soles(model: &Model) -> Vec<usize> {
+    let built_in = BUILT_IN.iter().find(|(name, _)| *name == model.name);
+    let file = built_in.and_then(|(_, text)| serde_json::from_str::<Document>(text).ok());
+    let stands = |name: &String| match &file {
+        Some(file) => file.soles.contains(name),
+        None => name.to_ascii_lowercase().contains("foot"),
+    };
+    (1..model.bodies.len()).filter(|i| stands(&model.bodies[*i].name)).collect()
+}
+
 /// Which joint of a skeleton moves which body of a model.
 #[derive(Clone, Debug)]
 pub struct Mapping {

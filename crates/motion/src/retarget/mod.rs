@@ -9,13 +9,14 @@ mod mapping;
 mod problem;
 mod target;
 
-pub use mapping::Mapping;
+pub use mapping::{Mapping, soles};
 
 use crate::clip::{About, Clip, Cycle};
 use crate::apart::Couple;
 use crate::contact;
 use crate::error::MotionError;
 use crate::ground::Touch;
+use crate::kinematics::Pose;
 use crate::layout::Layout;
 use crate::rotation::wxyz;
 use crate::skeleton::Animation;
@@ -100,9 +101,8 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         result = result.closed(cycle);
     }
     let result = contact::above_ground(model, &touches, &result);
-    let first = result.frame(0);
-    let start = DVec3::new(first[0], first.get(1).copied().unwrap_or(0.0), 0.0);
-    Ok(result.moved(-start))
+    let first = Pose::of(model, result.frame(0)).pos[model.joints[0].body];
+    Ok(result.moved(model, -first.with_z(0.0)))
 }
 
 /// The highest speed of a hinge, rad/s.

@@ -93,11 +93,6 @@ impl<'a> Targets<'a> {
         Targets { model, mapping, animation, rest, source, facing, align, scale, leg, ankle, source_ankle }
     }
 
-    /// Length of the model's legs over that of the skeleton's.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// A position of the skeleton in the model's world, but for its height.
     pub fn place(&self, pos: DVec3) -> DVec3 {
         self.scale * (self.facing * pos)

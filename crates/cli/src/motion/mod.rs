@@ -1,0 +1,163 @@
+//! `marathon motion`: from a recording of a person to a clip of a character, and a look at it.
+
+mod import;
+mod model;
+mod show;
+
+use crate::error::CliError;
+use clap::{Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+const HELP: &str = "\
+Examples:
+  marathon motion import walk.bvh --model humanoid --out walk.motion    a recording, as the humanoid would do it
+  marathon motion check walk.motion                                     limits, ground, overlaps, jumps, slides
+  marathon motion render walk.motion --out walk.png                     see it
+  marathon motion retarget walk.motion --model walker2d --out w.motion  the same by another character";
+
+/// Options of `motion`.
+#[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true, after_help = HELP)]
+pub struct MotionArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub what: What,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum What {
+    /// Read a recording (.bvh, or .txt and .json of DeepMimic) and write it as a clip of a character.
+    Import(ImportArgs),
+    /// Write a clip of one character as one of another.
+    Retarget(RetargetArgs),
+    /// Measure what is wrong with clips; the exit code is 1 if anything is.
+    Check(CheckArgs),
+    /// Draw a clip: a strip of frames, an animation or a film.
+    Render(RenderArgs),
+}
+
+/// Whether a motion begins again at its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Looping {
+    /// As the recording says; most formats say nothing, which means none.
+    Auto,
+    /// The last pose is the first again, farther on.
+    Wrap,
+    /// It ends.
+    None,
+}
+
+/// What is done to a motion, and what is written about it.
+#[derive(Debug, clap::Args)]
+pub struct Edits {
+    /// Clip to write; its name ends in .motion.
+    #[arg(long, value_name = "F.motion")]
+    pub out: PathBuf,
+    /// Which joint moves which body [default: the mapping that comes with Marathon for the model].
+    #[arg(long, value_name = "F.json")]
+    pub mapping: Option<PathBuf>,
+    /// Whether the motion begins again at its end.
+    #[arg(long = "loop", value_name = "HOW", value_enum, default_value_t = Looping::Auto)]
+    pub looping: Looping,
+    /// Part of the recording to use, seconds.
+    #[arg(long, value_names = ["FROM", "TO"], num_args = 2)]
+    pub trim: Option<Vec<f64>>,
+    /// Frames per second of the clip.
+    #[arg(long, value_name = "HZ", default_value_t = 60.0)]
+    pub fps: f64,
+    /// Standard deviation of a Gaussian filter over the recording, seconds.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    pub smooth: f64,
+    /// Exchange left and right.
+    #[arg(long)]
+    pub mirror: bool,
+    /// Begin with the heading +x.
+    #[arg(long)]
+    pub forward: bool,
+    /// Name of the motion [default: that of the file written].
+    #[arg(long, value_name = "TEXT")]
+    pub name: Option<String>,
+    /// Who made the recording.
+    #[arg(long, value_name = "TEXT")]
+    pub source: Option<String>,
+    /// License of the recording.
+    #[arg(long, value_name = "TEXT")]
+    pub license: Option<String>,
+}
+
+/// Options of `motion import`.
+#[derive(Debug, clap::Args)]
+pub struct ImportArgs {
+    /// Recording to read.
+    pub recording: PathBuf,
+    /// Character: an agent, or an MJCF file.
+    #[arg(long, value_name = "AGENT|F.xml")]
+    pub model: String,
+    #[command(flatten)]
+    pub edits: Edits,
+}
+
+/// Options of `motion retarget`.
+#[derive(Debug, clap::Args)]
+pub struct RetargetArgs {
+    /// Clip to read.
+    pub clip: PathBuf,
+    /// Character of the clip that is read: an agent, or an MJCF file [default: the agent that the clip names].
+    #[arg(long, value_name = "AGENT|F.xml")]
+    pub from: Option<String>,
+    /// Character of the clip that is written: an agent, or an MJCF file.
+    #[arg(long, value_name = "AGENT|F.xml")]
+    pub model: String,
+    #[command(flatten)]
+    pub edits: Edits,
+}
+
+/// Options of `motion check`.
+#[derive(Debug, clap::Args)]
+pub struct CheckArgs {
+    /// Clips to read.
+    #[arg(required = true)]
+    pub clips: Vec<PathBuf>,
+    /// Character: an agent, or an MJCF file [default: the agent that the clip names].
+    #[arg(long, value_name = "AGENT|F.xml")]
+    pub model: Option<String>,
+}
+
+/// Options of `motion render`.
+#[derive(Debug, clap::Args)]
+pub struct RenderArgs {
+    /// Clip to read.
+    pub clip: PathBuf,
+    /// Character: an agent, or an MJCF file [default: the agent that the clip names].
+    #[arg(long, value_name = "AGENT|F.xml")]
+    pub model: Option<String>,
+    /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Length, seconds [default: that of the clip].
+    #[arg(long, value_name = "S")]
+    pub seconds: Option<f64>,
+    /// Frames of a .png strip.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub frames: u64,
+    /// Frames per second of a film.
+    #[arg(long, value_name = "HZ", default_value_t = 25.0)]
+    pub fps: f64,
+    /// Width of a frame, pixels [default: 240 for .png, 480 otherwise].
+    #[arg(long, value_name = "PIXELS")]
+    pub width: Option<usize>,
+}
+
+/// Runs one of the commands.
+///
+/// # Errors
+/// If a file cannot be read or written, a model or motion is wrong, or `check` finds something.
+pub fn run(args: &MotionArgs, json: bool) -> Result<(), CliError> {
+    match &args.what {
+        What::Import(import) => import::import(import, json),
+        What::Retarget(retarget) => import::retarget(retarget, json),
+        What::Check(check) => show::check(check, json),
+        What::Render(render) => show::render(render, json),
+    }
+}

@@ -1,0 +1,98 @@
+//! `marathon motion check` and `render`.
+
+use super::{CheckArgs, RenderArgs, model};
+use crate::console::{print_json, say};
+use crate::error::CliError;
+use crate::interrupt;
+use marathon_motion::{Report, soles};
+use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene};
+use marathon_runs::text::path_word;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Measures clips.
+pub fn check(args: &CheckArgs, json: bool) -> Result<(), CliError> {
+    let (mut documents, mut found) = (Vec::new(), 0);
+    for path in &args.clips {
+        let clip = model::clip(path)?;
+        let model = model::of_clip(path, &clip, args.model.as_deref())?;
+        let report = marathon_motion::check(path, &clip, &model, &soles(&model))?;
+        if json {
+            documents.push(document(path, &report));
+        } else {
+            say(format!("{}: {}", path_word(path), line(&report)));
+            report.warnings().iter().for_each(|warning| say(format!("  {warning}")));
+        }
+        found += usize::from(!report.warnings().is_empty());
+    }
+    if json {
+        print_json(&json!({ "clips": documents }));
+    }
+    match found {
+        0 => Ok(()),
+        n => Err(CliError::Process(format!("{n} of {} clips have something wrong", args.clips.len()))),
+    }
+}
+
+/// A report with its file and its warnings.
+pub fn document(path: &Path, report: &Report) -> Value {
+    json!({ "clip": path.to_string_lossy(), "report": report, "warnings": report.warnings() })
+}
+
+/// A report in a line.
+pub fn line(report: &Report) -> String {
+    format!(
+        "{} frames, {:.2} s; stands in {:.0} % of it, slides {:.1} cm at most and {:.1} cm/s on average; \
+         joints turn at {:.0} rad/s at most",
+        report.frames,
+        report.seconds,
+        1e2 * report.standing,
+        1e2 * report.slide.value,
+        1e2 * report.slide_speed,
+        report.speed.value
+    )
+}
+
+/// Draws a clip.
+pub fn render(args: &RenderArgs, json: bool) -> Result<(), CliError> {
+    let clip = model::clip(&args.clip)?;
+    let model = model::of_clip(&args.clip, &clip, args.model.as_deref())?;
+    let seconds = args.seconds.unwrap_or(clip.duration());
+    if !(seconds > 0.0 && seconds <= 3600.0) {
+        return Err(CliError::Usage(format!("--seconds is {seconds}, expected up to 3600")));
+    }
+    if !(1.0..=240.0).contains(&args.fps) {
+        return Err(CliError::Usage(format!("--fps is {}, expected 1 to 240", args.fps)));
+    }
+    let still = Format::of(&args.out)? == Format::Png;
+    let width = args.width.unwrap_or(if still { 240 } else { 480 });
+    // video encoders want even sides
+    let height = if still { width * 4 / 3 } else { width * 9 / 16 / 2 * 2 };
+    let count = if still { args.frames as usize } else { (seconds * args.fps).round().max(1.0) as usize };
+    let step = if still { seconds / (count.max(2) - 1) as f64 } else { 1.0 / args.fps };
+
+    interrupt::install("leaving without a picture")?;
+    let scene = Scene::new(&model);
+    let renderer = Renderer::new(width, height)?;
+    let mut camera = Follow::new(&scene, 1, width, height);
+    let mut recorder = Recorder::create(&args.out, args.fps, count.div_ceil(count.div_ceil(8)))?;
+    let mut qpos = vec![0.0; model.nq];
+    for i in 0..count {
+        let time = i as f64 * step;
+        clip.qpos(time, &mut qpos);
+        let frame = scene.frame(&[&qpos])?;
+        let mut image = renderer.render(&frame, &camera.update(&frame, step));
+        image.caption(Corner::TopLeft, &[format!("{} {time:.2} s", clip.about().name)]);
+        recorder.push(&image)?;
+        if interrupt::requested() {
+            return Err(CliError::Interrupted("nothing was written".into()));
+        }
+    }
+    recorder.finish()?;
+    if json {
+        print_json(&json!({ "out": args.out.to_string_lossy(), "frames": count, "width": width, "height": height }));
+    } else {
+        say(format!("wrote {} ({count} frames of {width}x{height})", path_word(&args.out)));
+    }
+    Ok(())
+}
