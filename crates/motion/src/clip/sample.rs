@@ -132,7 +132,7 @@ impl Clip {
     /// The velocity that leads from `a` to `b`, with angular velocities in the body axes of `here`.
     fn difference(&self, a: &[f64], here: &[f64], b: &[f64], seconds: f64) -> Vec<f64> {
         let angular = |k: usize| {
-            let (from, middle, to) = (quat(&a[k..]), quat(&here[k..]), quat(&b[k..]));
+            let [from, middle, to] = [a, here, b].map(|qpos| quat(&qpos[k..]).normalize());
             let world = from * log(from.conjugate() * to) / seconds;
             (middle.conjugate() * world).to_array()
         };

@@ -66,10 +66,11 @@ pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     let width: usize = nodes.iter().map(|node| node.channels.len()).sum();
     let numbers: Vec<f64> = (0..count as usize * width)
         .map(|i| {
-            words.number().map_err(|error| match words.next >= words.words.len() {
-                true => MotionError::frame(path, i / width.max(1), format!("the file ends; expected {count} frames")),
-                false => error,
-            })
+            if words.next == words.words.len() {
+                let problem = format!("the file ends; expected {count} frames");
+                return Err(MotionError::frame(path, i / width.max(1), problem));
+            }
+            words.number()
         })
         .collect::<Result<_, _>>()?;
     if let Some((line, _, word)) = words.words.get(words.next) {

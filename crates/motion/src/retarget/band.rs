@@ -1,6 +1,7 @@
 //! Symmetric positive definite matrices whose entries lie near the diagonal.
 
 /// The lower half of a matrix: entry `(i, j)` with `i - width < j <= i`.
+#[derive(Clone)]
 pub(super) struct Band {
     size: usize,
     width: usize,

@@ -6,6 +6,7 @@
 //! | `model` | name of the model |
 //! | `hips` | the bodies of the left and the right thigh, in this order: they tell the figure's front and the length of its legs |
 //! | `soles` | bodies that stand: what they touch does not slide |
+//! | `smooth` | factor on the smoothing of the result; 1 if absent, 0 for recordings that are smooth already |
 //! | `parts` | by name of a body, geom or site of the model: the joint that it follows |
 //!
 //! A part has:
@@ -22,6 +23,7 @@ use crate::error::{MotionError, did_you_mean};
 use crate::roles;
 use crate::skeleton::Skeleton;
 use marathon_physics::Model;
+use marathon_physics::model::JointType;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,6 +36,8 @@ struct Document {
     hips: [String; 2],
     #[serde(default)]
     soles: Vec<String>,
+    #[serde(default)]
+    smooth: Option<f64>,
     parts: BTreeMap<String, Row>,
 }
 
@@ -58,7 +62,7 @@ struct Row {
 pub(crate) struct Part {
     /// Body, or the body that the geom or site is on.
     pub body: usize,
-    /// Where the part is in the body's frame; the origin for the body itself.
+    /// Where the part is in the body's frame: of a body, it is where it turns about its first joint.
     pub local: [f64; 3],
     /// Whether it is the body itself.
     pub whole: bool,
@@ -91,6 +95,8 @@ pub struct Mapping {
     pub(crate) hips: [usize; 2],
     /// Bodies.
     pub(crate) soles: Vec<usize>,
+    /// Factor on the smoothing of the result.
+    pub(crate) smooth: f64,
 }
 
 /// Mappings that come with the crate, by the model's name. Their joints are those of [`roles`].
@@ -115,7 +121,7 @@ impl Mapping {
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
-    /// Every body with a joint follows the joint of its own name, by its orientation alone.
+    /// Every body with a joint follows the joint of its own name, by its orientation alone, and nothing is smoothed.
     ///
     /// # Errors
     /// If the skeleton lacks a body's name, or a hip is not a body.
@@ -126,7 +132,7 @@ impl Mapping {
         });
         let name = serde_json::to_string(&model.name).expect("texts can be written");
         let parts = rows.collect::<Vec<_>>().join(", ");
-        let text = format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"parts\": {{{parts}}}}}");
+        let text = format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"smooth\": 0, \"parts\": {{{parts}}}}}");
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
@@ -166,7 +172,11 @@ impl Mapping {
             })
         });
         let soles = soles.collect::<Result<_, _>>()?;
-        Ok(Mapping { parts: parts.into_iter().map(|(_, part)| part).collect(), hips, soles })
+        let smooth = file.smooth.unwrap_or(1.0);
+        if !(0.0..=100.0).contains(&smooth) {
+            return Err(MotionError::value(path, "smooth", smooth, "a factor from 0 to 100"));
+        }
+        Ok(Mapping { smooth, parts: parts.into_iter().map(|(_, part)| part).collect(), hips, soles })
     }
 }
 
@@ -215,7 +225,9 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
 /// A body, geom or site by name: its body, its place there, and whether it is the body.
 fn find(path: &Path, name: &str, model: &Model) -> Result<(usize, [f64; 3], bool), MotionError> {
     if let Some(body) = model.bodies.iter().position(|body| body.name == name).filter(|body| *body > 0) {
-        return Ok((body, [0.0; 3], true));
+        let joint = &model.joints[model.bodies[body].joint_start..][..model.bodies[body].joint_count];
+        let joint = joint.first().filter(|joint| joint.kind != JointType::Free);
+        return Ok((body, joint.map_or([0.0; 3], |joint| joint.pos), true));
     }
     if let Some(geom) = model.geoms.iter().find(|geom| geom.name == name) {
         return Ok((geom.body, geom.pos, false));

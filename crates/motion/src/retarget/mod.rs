@@ -61,7 +61,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
 
     let mut held = vec![vec![false; touches.len()]; all.len()];
     let none = held.clone();
-    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &[], targets, held, dt, calm: CALM };
+    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &[], targets, held, dt, calm: CALM * mapping.smooth };
     // frame after frame; around a cycle twice, so that its begin knows its end
     let mut guess = vec![model.qpos0.clone()];
     let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
@@ -82,13 +82,13 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
         }
         let rough = problem(&all, &none);
-        let fine = Problem { couples: &couples, held: &held, calm: 1.0, ..rough };
+        let fine = Problem { couples: &couples, held: &held, calm: mapping.smooth, ..rough };
         if pass == 0 { rough.solve(&mut frames, 25) } else { fine.solve(&mut frames, 25) };
     }
 
     // where a limb slips past another one, it may be too fast
-    let mut calm = 1.0;
-    while calm < CALM && fastest(model, &frames, dt) > FASTEST {
+    let mut calm = mapping.smooth;
+    while calm > 0.0 && calm < CALM * mapping.smooth && fastest(model, &frames, dt) > FASTEST {
         calm *= 2.0;
         Problem { couples: &couples, held: &held, calm, ..problem(&all, &none) }.solve(&mut frames, 25);
     }

@@ -32,11 +32,15 @@ mod weight {
 }
 /// Joints stay this far within their limits, rad or m, so that the penalty's give does not show.
 const LIMIT_MARGIN: f64 = 0.01;
+/// Ground and parts that are nearer than this are kept in mind, m.
+const NEAR: f64 = 0.1;
+/// How often a step is made again because it crosses bounds.
+const CROSSINGS: usize = 4;
 /// Parts stay this far apart, m.
 const APART_MARGIN: f64 = 0.005;
 
-#[derive(Clone, Copy)]
 /// Frames in a row, what they should be, and which points touch the ground.
+#[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     pub model: &'a Model,
     pub mapping: &'a Mapping,
@@ -51,8 +55,62 @@ pub(super) struct Problem<'a> {
     pub calm: f64,
 }
 
-/// Takes a residual and its derivatives by the variables, `frame * nv + dof`.
-type Sink<'s> = dyn FnMut(f64, &[(usize, f64)]) + 's;
+/// A residual, and its derivatives by the variables, `frame * nv + dof`.
+enum Row<'r> {
+    /// Costs its square.
+    Even(f64, &'r [(usize, f64)]),
+    /// Costs its square while it is negative: a distance from where it must not be.
+    Bound(f64, &'r [(usize, f64)]),
+}
+
+type Sink<'s> = dyn FnMut(Row) + 's;
+
+/// A row of [`Row::Bound`] that is kept.
+struct Bound {
+    residual: f64,
+    by: Vec<(usize, f64)>,
+    active: bool,
+}
+
+/// The sum of squares near the present frames, as a quadratic function of their change.
+struct Quadratic {
+    matrix: Band,
+    slope: Vec<f64>,
+    bounds: Vec<Bound>,
+}
+
+impl Quadratic {
+    fn add(&mut self, residual: f64, by: &[(usize, f64)]) {
+        for (k, (i, a)) in by.iter().enumerate() {
+            self.slope[*i] -= a * residual;
+            by[..=k].iter().for_each(|(j, b)| self.matrix.add(*i, *j, a * b));
+        }
+    }
+
+    /// The change that makes it smallest. A bound that the change would cross counts from then on.
+    fn step(&self, damping: f64) -> Option<Vec<f64>> {
+        let mut active: Vec<bool> = self.bounds.iter().map(|bound| bound.active).collect();
+        for round in 0.. {
+            let mut sum = Quadratic { matrix: self.matrix.clone(), slope: self.slope.clone(), bounds: Vec::new() };
+            for (bound, _) in self.bounds.iter().zip(&active).filter(|(_, active)| **active) {
+                sum.add(bound.residual, &bound.by);
+            }
+            if !sum.matrix.solve(damping, &mut sum.slope) {
+                return None;
+            }
+            let mut crossed = false;
+            for (bound, active) in self.bounds.iter().zip(&mut active).filter(|(_, active)| !**active) {
+                let there = bound.residual + bound.by.iter().map(|(i, a)| a * sum.slope[*i]).sum::<f64>();
+                *active = there < 0.0;
+                crossed |= *active;
+            }
+            if !crossed || round == CROSSINGS {
+                return Some(sum.slope);
+            }
+        }
+        None
+    }
+}
 
 impl Problem<'_> {
     /// Improves the frames from where they are; the sum of squares that is left.
@@ -61,18 +119,17 @@ impl Problem<'_> {
         let size = frames.len() * nv;
         let (mut cost, mut damping) = (self.cost(frames), 1e-3);
         for _ in 0..iterations {
-            let mut matrix = Band::new(size, (3 * nv).min(size.max(1)));
-            let mut slope = vec![0.0; size];
-            self.rows(frames, &mut |residual, by| {
-                for (k, (i, a)) in by.iter().enumerate() {
-                    slope[*i] -= a * residual;
-                    by[..=k].iter().for_each(|(j, b)| matrix.add(*i, *j, a * b));
+            let matrix = Band::new(size, (3 * nv).min(size.max(1)));
+            let mut near = Quadratic { matrix, slope: vec![0.0; size], bounds: Vec::new() };
+            self.rows(frames, &mut |row| match row {
+                Row::Even(residual, by) => near.add(residual, by),
+                Row::Bound(residual, by) => {
+                    near.bounds.push(Bound { residual, by: by.to_vec(), active: residual < 0.0 });
                 }
             });
             let before = cost;
-            for _ in 0..8 {
-                let mut step = slope.clone();
-                if matrix.solve(damping, &mut step) {
+            for _ in 0..10 {
+                if let Some(step) = near.step(damping) {
                     let tried: Vec<Vec<f64>> =
                         frames.iter().zip(step.chunks(nv)).map(|(frame, step)| self.moved(frame, step)).collect();
                     let there = self.cost(&tried);
@@ -94,7 +151,10 @@ impl Problem<'_> {
 
     fn cost(&self, frames: &[Vec<f64>]) -> f64 {
         let mut cost = 0.0;
-        self.rows(frames, &mut |residual, _| cost += residual * residual);
+        self.rows(frames, &mut |row| match row {
+            Row::Even(residual, _) => cost += residual * residual,
+            Row::Bound(residual, _) => cost += residual.min(0.0) * residual.min(0.0),
+        });
         cost
     }
 
@@ -153,18 +213,20 @@ impl Problem<'_> {
                 self.vector_rows(pose, part.body, point, base, sink, |_, shift| -shift, error, part.position);
             }
         }
-        let bodies = self.mapping.hips.map(|hip| self.mapping.parts[hip].body);
-        let [a, b] = bodies.map(|body| pose.pos[body]);
-        let error = target.hips - 0.5 * (a + b);
+        let hips = self.mapping.hips.map(|hip| {
+            let part = &self.mapping.parts[hip];
+            (part.body, pose.point(part.body, DVec3::from_array(part.local)))
+        });
+        let error = target.hips - 0.5 * (hips[0].1 + hips[1].1);
         let mut by = vec![DVec3::ZERO; self.model.nv];
-        for body in bodies {
-            pose.motions(self.model, body, pose.pos[body], |dof, _, shift| by[dof] -= 0.5 * shift);
+        for (body, point) in hips {
+            pose.motions(self.model, body, point, |dof, _, shift| by[dof] -= 0.5 * shift);
         }
         let [along, up] = weight::HIPS;
         for (axis, weight) in [along, along, up].into_iter().enumerate() {
             let row: Vec<_> =
                 by.iter().enumerate().filter(|(_, by)| by[axis] != 0.0).map(|(dof, by)| (base + dof, weight * by[axis])).collect();
-            sink(weight * error[axis], &row);
+            sink(Row::Even(weight * error[axis], &row));
         }
     }
 
@@ -186,7 +248,7 @@ impl Problem<'_> {
             let by = weight * effect(turn, shift);
             (0..3).for_each(|axis| rows[axis].push((base + dof, by[axis])));
         });
-        (0..3).for_each(|axis| sink(error[axis], &rows[axis]));
+        (0..3).for_each(|axis| sink(Row::Even(error[axis], &rows[axis])));
     }
 
     /// Limits, and the pull to the reference.
@@ -196,15 +258,12 @@ impl Problem<'_> {
                 continue;
             }
             let (at, dof) = (qpos[joint.qpos_adr], i * self.model.nv + joint.dof_adr);
-            sink(weight::REST * (at - self.model.qpos0[joint.qpos_adr]), &[(dof, weight::REST)]);
+            sink(Row::Even(weight::REST * (at - self.model.qpos0[joint.qpos_adr]), &[(dof, weight::REST)]));
             let margin = LIMIT_MARGIN.min(0.1 * (joint.range[1] - joint.range[0]));
-            let beyond = if at < joint.range[0] + margin {
-                at - joint.range[0] - margin
-            } else {
-                (at - joint.range[1] + margin).max(0.0)
-            };
-            if joint.limited && beyond != 0.0 {
-                sink(weight::LIMIT * beyond, &[(dof, weight::LIMIT)]);
+            if joint.limited {
+                let [below, above] = [at - joint.range[0] - margin, joint.range[1] - margin - at];
+                sink(Row::Bound(weight::LIMIT * below, &[(dof, weight::LIMIT)]));
+                sink(Row::Bound(weight::LIMIT * above, &[(dof, -weight::LIMIT)]));
             }
         }
     }
@@ -221,12 +280,13 @@ impl Problem<'_> {
         for (k, touch) in self.touches.iter().enumerate() {
             let lowest = touch.lowest(pose);
             let held = self.held[i][k];
-            if held || lowest.z < 0.0 {
+            if held || lowest.z < NEAR {
                 row.clear();
                 pose.motions(self.model, touch.body, lowest, |dof, _, shift| {
                     row.push((i * nv + dof, weight::GROUND * shift.z));
                 });
-                sink(weight::GROUND * lowest.z, &row);
+                let height = weight::GROUND * lowest.z;
+                sink(if held { Row::Even(height, &row) } else { Row::Bound(height, &row) });
             }
             if held && i + 1 < poses.len() && self.held[i + 1][k] {
                 // the point that touches now is where it was in the next frame
@@ -240,7 +300,7 @@ impl Problem<'_> {
                     poses[i + 1].motions(self.model, touch.body, there, |dof, _, shift| {
                         row.push(((i + 1) * nv + dof, weight::SLIDE * shift[axis]));
                     });
-                    sink(weight::SLIDE * (there - lowest)[axis], &row);
+                    sink(Row::Even(weight::SLIDE * (there - lowest)[axis], &row));
                 }
             }
         }
@@ -250,17 +310,16 @@ impl Problem<'_> {
     fn apart_rows(&self, i: usize, pose: &Pose, sink: &mut Sink) {
         for couple in self.couples {
             let gap = couple.gap(pose);
-            let lacking = APART_MARGIN - gap.distance;
-            if lacking > 0.0 {
+            if gap.distance < NEAR {
                 let mut row = vec![0.0; self.model.nv];
                 for (k, sign) in [(0, 1.0), (1, -1.0)] {
                     pose.motions(self.model, gap.bodies[k], gap.points[k], |dof, _, shift| {
-                        row[dof] -= weight::APART * sign * gap.normal.dot(shift);
+                        row[dof] += weight::APART * sign * gap.normal.dot(shift);
                     });
                 }
                 let row: Vec<_> =
                     row.iter().enumerate().filter(|(_, by)| **by != 0.0).map(|(dof, by)| (i * row.len() + dof, *by)).collect();
-                sink(weight::APART * lacking, &row);
+                sink(Row::Bound(weight::APART * (gap.distance - APART_MARGIN), &row));
             }
         }
     }
@@ -271,7 +330,7 @@ impl Problem<'_> {
         for (k, joint) in self.model.joints.iter().enumerate() {
             if matches!(joint.kind, JointType::Hinge | JointType::Slide) && !self.is_root(k) {
                 let by = [((i - 1) * nv + joint.dof_adr, -scale), (i * nv + joint.dof_adr, scale)];
-                sink(scale * (now[joint.qpos_adr] - before[joint.qpos_adr]), &by);
+                sink(Row::Even(scale * (now[joint.qpos_adr] - before[joint.qpos_adr]), &by));
             }
         }
     }
@@ -283,7 +342,7 @@ impl Problem<'_> {
         let [a, b, c] = [&frames[0], &frames[1], &frames[2]];
         let mut row = |value: f64, dof: usize| {
             let by = [((i - 1) * nv + dof, scale), (i * nv + dof, -2.0 * scale), ((i + 1) * nv + dof, scale)];
-            sink(scale * value, &by);
+            sink(Row::Even(scale * value, &by));
         };
         for joint in &self.model.joints {
             let (k, v) = (joint.qpos_adr, joint.dof_adr);

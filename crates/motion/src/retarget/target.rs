@@ -48,7 +48,7 @@ impl<'a> Targets<'a> {
         let [left, right] = mapping.hips.map(|hip| &mapping.parts[hip]);
         let angle = |v: DVec3| libm::atan2(v.y, v.x);
         let theirs = source.pos[left.joint] - source.pos[right.joint];
-        let ours = rest.pos[left.body] - rest.pos[right.body];
+        let ours = place(&rest, left) - place(&rest, right);
         let both = [theirs, ours].iter().all(|v| v.truncate().length() > 1e-3);
         let facing = if both { about_z(angle(ours) - angle(theirs)) } else { DQuat::IDENTITY };
 
@@ -58,7 +58,7 @@ impl<'a> Targets<'a> {
                 (Some(turn), _) => quat(&turn).normalize(),
                 (None, Some(next)) if part.toward.is_none() => {
                     let next = &mapping.parts[*next];
-                    let ours = place(&rest, next) - rest.pos[part.body];
+                    let ours = place(&rest, next) - place(&rest, part);
                     let theirs = facing * (source.pos[next.joint] - source.pos[part.joint]);
                     between(ours, theirs)
                 }
@@ -81,7 +81,7 @@ impl<'a> Targets<'a> {
             below.map(|touch| touch.lowest(&rest).z).fold(f64::INFINITY, f64::min)
         };
         let sole = low(foot_body);
-        let ankle = if sole.is_finite() { rest.pos[foot_body].z - sole } else { 0.0 };
+        let ankle = if sole.is_finite() { place(&rest, &mapping.parts[foot]).z - sole } else { 0.0 };
         let mut heights: Vec<f64> = (0..animation.clip().frames() as i64)
             .flat_map(|i| {
                 let pose = animation.pose(i);
@@ -114,8 +114,9 @@ impl<'a> Targets<'a> {
             .collect();
 
         let bodies = self.bodies(&quats);
-        let middle = |poses: &[DVec3]| {
-            let [a, b] = self.mapping.hips.map(|hip| poses[parts[hip].body]);
+        let middle = {
+            let at = |part: &Part| bodies.0[part.body] + bodies.1[part.body] * DVec3::from_array(part.local);
+            let [a, b] = self.mapping.hips.map(|hip| at(&parts[hip]));
             0.5 * (a + b)
         };
         let [a, b] = self.mapping.hips.map(|hip| pose.pos[parts[hip].joint]);
@@ -124,7 +125,7 @@ impl<'a> Targets<'a> {
         // the taller ankle counts as far as the figure stands
         let upright = (height * self.scale / self.leg.max(1e-3)).clamp(0.0, 1.0);
         hips.z = self.scale * height + self.ankle * upright + self.scale * self.source_ankle * (1.0 - upright);
-        let shift = hips - middle(&bodies.0);
+        let shift = hips - middle;
         let pos = parts
             .iter()
             .map(|part| bodies.0[part.body] + shift + bodies.1[part.body] * DVec3::from_array(part.local))

@@ -1,0 +1,149 @@
+//! Retargeting respects limits, ground, contacts and bones; the identity mapping gives the clip again; what ships is sound.
+
+mod common;
+
+use common::{all_shipped, file, model, shipped};
+use glam::{DQuat, DVec3};
+use marathon_motion::kinematics::Pose;
+use marathon_motion::{Animation, Mapping, check, import, retarget, soles};
+
+#[test]
+fn shipped_clips_have_nothing_to_warn_of() {
+    for character in ["marathon_man", "humanoid", "walker2d"] {
+        let model = model(character);
+        let names = all_shipped(character);
+        assert!(names.contains(&"walk".to_string()) && names.contains(&"run".to_string()), "{character}: {names:?}");
+        for name in names {
+            let clip = shipped(character, &name);
+            let report = check(name.as_ref(), &clip, &model, &soles(&model)).unwrap();
+            // getting up, rolling and punching, people do slide a foot
+            let slides = ["getup_facedown", "getup_faceup", "roll", "punch", "dance"].contains(&name.as_str());
+            let warnings = report.warnings();
+            let sound = warnings.is_empty() || slides && warnings.iter().all(|text| text.contains("slid"));
+            assert!(sound, "{character}, {name}: {warnings:#?}");
+            assert!(report.slide.value < 0.1, "{character}, {name}: {:?}", report.slide);
+            let about = clip.about();
+            assert_eq!(about.name, name);
+            assert!(about.source.contains("DeepMimic") && about.license == "Zlib", "{about:?}");
+        }
+    }
+}
+
+#[test]
+fn a_clip_onto_its_own_model_is_the_clip_again() {
+    let model = model("marathon_man");
+    for name in ["walk", "run", "backflip", "kick", "spin", "cartwheel"] {
+        let clip = shipped("marathon_man", name);
+        let animation = Animation::of_clip(name.as_ref(), &model, &clip).unwrap();
+        let animation = if animation.wraps() { animation.looped() } else { animation };
+        let hips = ["left_thigh", "right_thigh"];
+        let mapping = Mapping::by_name(name.as_ref(), animation.skeleton(), &model, hips).unwrap();
+        let again = retarget(name.as_ref(), &animation, &model, &mapping).unwrap();
+        assert_eq!(again.frames(), clip.frames());
+        let (mut joints, mut place) = (0.0_f64, 0.0_f64);
+        for i in 0..clip.frames() {
+            for joint in model.joints.iter().skip(1) {
+                joints = joints.max((again.frame(i)[joint.qpos_adr] - clip.frame(i)[joint.qpos_adr]).abs());
+            }
+            place = place.max((DVec3::from_slice(again.frame(i)) - DVec3::from_slice(clip.frame(i))).length());
+        }
+        println!("{name}: {joints:.4} rad, {place:.4} m");
+        assert!(joints < 0.02 && place < 0.008, "{name}: {joints} rad, {place} m");
+    }
+}
+
+#[test]
+fn retargeting_gives_the_same_bits_again() {
+    let (humanoid, man) = (model("humanoid"), model("marathon_man"));
+    let clip = shipped("marathon_man", "run");
+    let bytes = || {
+        let animation = Animation::of_clip("run".as_ref(), &man, &clip).unwrap();
+        let text = r#"{"mapping": 1, "model": "humanoid", "hips": ["left_thigh", "right_thigh"], "soles": ["left_foot"],
+            "parts": {"torso": {"joint": "torso"}, "left_thigh": {"joint": "left_thigh"},
+            "right_thigh": {"joint": "right_thigh"}, "left_shin": {"joint": "left_shin"}}}"#;
+        let mapping = Mapping::parse("m.json".as_ref(), text.as_bytes(), animation.skeleton(), &humanoid).unwrap();
+        retarget("run".as_ref(), &animation, &humanoid, &mapping).unwrap().to_bytes()
+    };
+    assert_eq!(bytes(), bytes());
+}
+
+/// A recording of a figure in T-pose with Mixamo's names, in centimeters and with y up, which raises its left leg to the
+/// front, bends the knee, and lifts its right arm from the T-pose straight up.
+fn mixamo(frames: usize) -> String {
+    let limb = |names: [&str; 3], at: [f64; 3], step: [f64; 3], end: [f64; 3]| {
+        let v = |v: [f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
+        let channels = "CHANNELS 3 Zrotation Xrotation Yrotation";
+        format!(
+            "JOINT mixamorig:{} {{ OFFSET {} {channels}\nJOINT mixamorig:{} {{ OFFSET {} {channels}\n\
+             JOINT mixamorig:{} {{ OFFSET {} {channels}\nEnd Site {{ OFFSET {} }} }} }} }}\n",
+            names[0], v(at), names[1], v(step), names[2], v(step), v(end)
+        )
+    };
+    let leg = |side: &str, x: f64| {
+        let names = ["UpLeg", "Leg", "Foot"].map(|part| format!("{side}{part}"));
+        limb([&names[0], &names[1], &names[2]], [x, -5.0, 0.0], [0.0, -42.0, 0.0], [0.0, -6.0, 15.0])
+    };
+    let arm = |side: &str, x: f64| {
+        let names = ["Arm", "ForeArm", "Hand"].map(|part| format!("{side}{part}"));
+        limb([&names[0], &names[1], &names[2]], [17.0 * x, 12.0, 0.0], [27.0 * x, 0.0, 0.0], [10.0 * x, 0.0, 0.0])
+    };
+    let mut text = format!(
+        "HIERARCHY\nROOT mixamorig:Hips\n{{ OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n\
+         {}{}JOINT mixamorig:Spine2 {{ OFFSET 0 40 0 CHANNELS 3 Zrotation Xrotation Yrotation\n\
+         {}{}JOINT mixamorig:Head {{ OFFSET 0 25 0 CHANNELS 3 Zrotation Xrotation Yrotation End Site {{ OFFSET 0 20 0 }} }} }} }}\n\
+         MOTION\nFrames: {frames}\nFrame Time: 0.0166667\n",
+        leg("Left", 10.0),
+        leg("Right", -10.0),
+        arm("Left", 1.0),
+        arm("Right", -1.0)
+    );
+    for i in 0..frames {
+        let share = i as f64 / (frames - 1) as f64;
+        // root; left leg: x turns the thigh forward with a negative angle, the shin back with a positive one
+        text.push_str("0 95 0 0 0 0 ");
+        text.push_str(&format!("0 {} 0 0 {} 0 0 0 0 ", -60.0 * share, 90.0 * share));
+        text.push_str("0 0 0 0 0 0 0 0 0 0 0 0 ");
+        // left arm down, right arm from down to straight ahead
+        text.push_str("-80 0 0 0 0 0 0 0 0 ");
+        text.push_str(&format!("80 {} 0 0 0 0 0 0 0 0 0 0\n", -80.0 * share));
+    }
+    text
+}
+
+#[test]
+fn a_recording_of_another_skeleton_unit_and_pose_moves_the_same_limbs() {
+    for character in ["marathon_man", "humanoid"] {
+        let model = model(character);
+        let animation = import::bvh("mixamo.bvh".as_ref(), mixamo(61).as_bytes()).unwrap();
+        let mapping = Mapping::built_in("mixamo.bvh".as_ref(), animation.skeleton(), &model).unwrap();
+        let clip = retarget("mixamo.bvh".as_ref(), &animation, &model, &mapping).unwrap();
+        let body = |name: &str| model.bodies.iter().position(|body| body.name == name).expect("a body");
+        let way = |frame: usize, a: &str, b: &str| {
+            let pose = Pose::of(&model, clip.frame(frame));
+            (pose.pos[body(b)] - pose.pos[body(a)]).normalize()
+        };
+        // in degrees from where they should point; +x is forward
+        let off = |found: DVec3, wanted: DVec3| found.angle_between(wanted.normalize()).to_degrees();
+        let (last, down) = (clip.frames() - 1, DVec3::NEG_Z);
+        let raised = DQuat::from_rotation_y(-60f64.to_radians()) * down;
+        let bent = DQuat::from_rotation_y(30f64.to_radians()) * down;
+        let found = [
+            off(way(0, "left_thigh", "left_shin"), down),
+            off(way(last, "left_thigh", "left_shin"), raised),
+            off(way(last, "left_shin", "left_foot"), bent),
+            off(way(last, "right_thigh", "right_shin"), down),
+        ];
+        assert!(found.iter().all(|off| *off < 8.0), "{character}: legs off by {found:?} degrees");
+        let lower = if character == "humanoid" { "left_lower_arm" } else { "left_larm" };
+        assert!(off(way(0, "left_upper_arm", lower), down) < 30.0, "{character}");
+        let report = check("mixamo.bvh".as_ref(), &clip, &model, &soles(&model)).unwrap();
+        assert_eq!(report.warnings(), Vec::<String>::new(), "{character}");
+    }
+}
+
+#[test]
+fn the_shipped_mappings_are_in_the_repository() {
+    for name in ["marathon_man", "humanoid", "walker2d"] {
+        assert!(file(&format!("assets/motions/mappings/{name}.json")).exists(), "{name}");
+    }
+}
