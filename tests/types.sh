@@ -8,5 +8,5 @@ cargo check --quiet --release --manifest-path fuzz/Cargo.toml --no-default-featu
 if command -v rustup > /dev/null; then
   rustup --quiet target add wasm32-unknown-unknown
 fi
-core=(-p marathon-physics -p marathon-envs -p marathon-learn -p marathon-config)
+core=(-p marathon-physics -p marathon-motion -p marathon-envs -p marathon-learn -p marathon-config)
 cargo check --quiet --release --target wasm32-unknown-unknown "${core[@]}"

@@ -14,13 +14,7 @@ const SPEED: f64 = 0.6;
 const SHORTEST: f64 = 0.05;
 
 /// Per frame and touch: whether a sole stands on the ground there.
-pub(crate) fn held(
-    model: &Model,
-    touches: &[Touch],
-    soles: &[usize],
-    frames: &[Vec<f64>],
-    dt: f64,
-) -> Vec<Vec<bool>> {
+pub(crate) fn held(model: &Model, touches: &[Touch], soles: &[usize], frames: &[Vec<f64>], dt: f64) -> Vec<Vec<bool>> {
     let poses: Vec<Pose> = frames.iter().map(|frame| Pose::of(model, frame)).collect();
     let mut held = vec![vec![false; touches.len()]; frames.len()];
     for (k, touch) in touches.iter().enumerate().filter(|(_, touch)| soles.contains(&touch.body)) {
@@ -28,7 +22,8 @@ pub(crate) fn held(
         for i in 0..frames.len() {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(frames.len() - 1));
             let seconds = (after - before).max(1) as f64 * dt;
-            let way = slide(touch, &poses[before], &poses[i]).length() + slide(touch, &poses[i], &poses[after]).length();
+            let way =
+                slide(touch, &poses[before], &poses[i]).length() + slide(touch, &poses[i], &poses[after]).length();
             held[i][k] = low(i).z < HEIGHT && way / seconds < SPEED;
         }
         let shortest = libm::ceil(SHORTEST / dt) as usize;
@@ -59,8 +54,6 @@ pub(crate) fn clearance(touches: &[Touch], pose: &Pose) -> f64 {
 
 /// The clip lifted as a whole, so that nothing is below the ground.
 pub(crate) fn above_ground(model: &Model, touches: &[Touch], clip: &Clip) -> Clip {
-    let depth = (0..clip.frames())
-        .map(|i| -clearance(touches, &Pose::of(model, clip.frame(i))))
-        .fold(0.0, f64::max);
+    let depth = (0..clip.frames()).map(|i| -clearance(touches, &Pose::of(model, clip.frame(i)))).fold(0.0, f64::max);
     clip.moved(model, DVec3::Z * depth)
 }

@@ -124,7 +124,8 @@ impl Animation {
         };
         // the bodies of the first tree
         let tree = model.bodies[first].root_id;
-        let bodies: Vec<usize> = (1..model.bodies.len()).filter(|i| *i >= first && model.bodies[*i].root_id == tree).collect();
+        let bodies: Vec<usize> =
+            (1..model.bodies.len()).filter(|i| *i >= first && model.bodies[*i].root_id == tree).collect();
         let anchor = |body: usize| {
             let body = &model.bodies[body];
             let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];

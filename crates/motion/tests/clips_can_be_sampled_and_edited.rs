@@ -9,11 +9,8 @@ use marathon_motion::kinematics::Pose;
 use marathon_motion::{Clip, Cycle};
 use marathon_physics::Model;
 
-const CYCLES: [Cycle; 3] = [
-    Cycle { pos: [1.3, 0.2], yaw: 0.0 },
-    Cycle { pos: [0.9, 0.0], yaw: 0.7 },
-    Cycle { pos: [-0.4, 0.0], yaw: -2.1 },
-];
+const CYCLES: [Cycle; 3] =
+    [Cycle { pos: [1.3, 0.2], yaw: 0.0 }, Cycle { pos: [0.9, 0.0], yaw: 0.7 }, Cycle { pos: [-0.4, 0.0], yaw: -2.1 }];
 
 fn qpos(clip: &Clip, time: f64) -> Vec<f64> {
     let mut out = vec![0.0; clip.layout().nq()];

@@ -24,6 +24,7 @@ fn of_clips() {
         ("[\"root\", \"free\"]", "[\"root\", \"hinge\"]", "bad.motion: frame 0: found 28 numbers, expected 22"),
         (frame, "    [0, 0, 1],", "bad.motion: frame 0: found 3 numbers, expected 28"),
         ("    [0, 0, 1", "    [0, 0, 1e999", "bad.motion:34:"),
+        ("    [0, 0, 1.", "    [0, 0, 1234567", "bad.motion: frame 0: number 2 is 1234567"),
         ("    [0, 0, 1.", "    [0, 0, \"1.\", ", "bad.motion:34:"),
         ("]\n  ]\n}", "]\n  ]\n", "bad.motion:129:0: EOF while parsing an object"),
     ];
@@ -40,7 +41,10 @@ fn of_clips() {
 fn of_clips_of_other_models() {
     let clip = shipped("marathon_man", "walk");
     let error = clip.check_model("walk.motion".as_ref(), &model("humanoid")).unwrap_err().to_string();
-    assert!(error.starts_with("walk.motion: not a motion of the model humanoid: joint 4 is \"right_hip_y\""), "{error}");
+    assert!(
+        error.starts_with("walk.motion: not a motion of the model humanoid: joint 4 is \"right_hip_y\""),
+        "{error}"
+    );
 }
 
 #[test]
@@ -58,6 +62,7 @@ fn of_deepmimic() {
         ("none", "maybe", "m.txt: Loop: found \"maybe\", expected \"wrap\" or \"none\""),
         ("[0.1,", "[", "m.txt: frame 0: found 43 numbers, expected 44"),
         ("[0.1,", "[0.0,", "m.txt: frame 0: lasts 0 s, expected 0.0001 to 10"),
+        ("[0.1,", "[0.0005,", "m.txt: frame 1: lasts 0.1 s, expected up to 100 times the first frame's 0.0005 s"),
         ("0.9,0.0,1.0", "0.9,0.0,0.1", "m.txt: frame 0: the quaternion that ends at number 8 is 0.100 long"),
         ("[0.1,", "[true,", "m.txt:3:5: invalid type: boolean `true`, expected f64"),
         ("]}", "", "m.txt:5:"),
@@ -99,7 +104,10 @@ fn of_bvh() {
 #[test]
 fn of_recordings_of_unknown_kind() {
     let error = import::any("dance.fbx".as_ref(), b"").unwrap_err().to_string();
-    assert!(error.starts_with("dance.fbx: a recording with the ending \"fbx\" is not supported; expected .bvh"), "{error}");
+    assert!(
+        error.starts_with("dance.fbx: a recording with the ending \"fbx\" is not supported; expected .bvh"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -114,12 +122,32 @@ fn of_mappings() {
     let cases = [
         ("\"mapping\": 1", "\"mapping\": 2", "m.json: mapping: found 2, expected version 1 of the format"),
         ("\"model\": \"humanoid\"", "\"model\": \"ant\"", "m.json: model: found \"ant\", expected \"humanoid\""),
-        ("\"torso\":", "\"torzo\":", "m.json: parts: found \"torzo\", expected a body, geom or site of humanoid; did you mean torso?"),
-        ("\"left_hip\"", "\"left_hipp\"", "m.json: parts.left_thigh.joint: found \"left_hipp\", expected a joint of the skeleton; did you mean left_hip?"),
-        ("\"rotation\": 0.3", "\"rotation\": -1", "m.json: parts.lower_waist.rotation: found -1, expected a weight from 0 to 1000"),
+        (
+            "\"torso\":",
+            "\"torzo\":",
+            "m.json: parts: found \"torzo\", expected a body, geom or site of humanoid; did you mean torso?",
+        ),
+        (
+            "\"left_hip\"",
+            "\"left_hipp\"",
+            "m.json: parts.left_thigh.joint: found \"left_hipp\", expected a joint of the skeleton; did you mean left_hip?",
+        ),
+        (
+            "\"rotation\": 0.3",
+            "\"rotation\": -1",
+            "m.json: parts.lower_waist.rotation: found -1, expected a weight from 0 to 1000",
+        ),
         ("\"share\": 0.5", "\"share\": 2", "m.json: parts.lower_waist.share: found 2, expected a number from 0 to 1"),
-        ("\"hips\": [\"left_thigh\"", "\"hips\": [\"left_tigh\"", "m.json: hips: found left_tigh, expected bodies that are among the parts; did you mean left_thigh?"),
-        ("\"soles\": [\"left_foot\"", "\"soles\": [\"left_fot\"", "m.json: soles: found left_fot, expected bodies of the model; did you mean left_foot?"),
+        (
+            "\"hips\": [\"left_thigh\"",
+            "\"hips\": [\"left_tigh\"",
+            "m.json: hips: found left_tigh, expected bodies that are among the parts; did you mean left_thigh?",
+        ),
+        (
+            "\"soles\": [\"left_foot\"",
+            "\"soles\": [\"left_fot\"",
+            "m.json: soles: found left_fot, expected bodies of the model; did you mean left_foot?",
+        ),
         ("\"position\": 3", "\"positon\": 3", "m.json:"),
     ];
     for (from, to, expected) in cases {

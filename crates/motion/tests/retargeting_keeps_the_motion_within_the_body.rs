@@ -16,12 +16,13 @@ fn shipped_clips_have_nothing_to_warn_of() {
         for name in names {
             let clip = shipped(character, &name);
             let report = check(name.as_ref(), &clip, &model, &soles(&model)).unwrap();
-            // getting up, rolling and punching, people do slide a foot
-            let slides = ["getup_facedown", "getup_faceup", "roll", "punch", "dance"].contains(&name.as_str());
+            // here the recorded people drag a foot along the ground
+            let drags = ["cartwheel", "dance", "getup_facedown", "getup_faceup", "punch", "roll"];
+            let slides = drags.contains(&name.as_str());
             let warnings = report.warnings();
             let sound = warnings.is_empty() || slides && warnings.iter().all(|text| text.contains("slid"));
             assert!(sound, "{character}, {name}: {warnings:#?}");
-            assert!(report.slide.value < 0.1, "{character}, {name}: {:?}", report.slide);
+            assert!(report.slide.value < 0.06, "{character}, {name}: {:?}", report.slide);
             let about = clip.about();
             assert_eq!(about.name, name);
             assert!(about.source.contains("DeepMimic") && about.license == "Zlib", "{about:?}");
@@ -76,7 +77,13 @@ fn mixamo(frames: usize) -> String {
         format!(
             "JOINT mixamorig:{} {{ OFFSET {} {channels}\nJOINT mixamorig:{} {{ OFFSET {} {channels}\n\
              JOINT mixamorig:{} {{ OFFSET {} {channels}\nEnd Site {{ OFFSET {} }} }} }} }}\n",
-            names[0], v(at), names[1], v(step), names[2], v(step), v(end)
+            names[0],
+            v(at),
+            names[1],
+            v(step),
+            names[2],
+            v(step),
+            v(end)
         )
     };
     let leg = |side: &str, x: f64| {

@@ -131,7 +131,8 @@ impl Clip {
             .map(|i| {
                 // at the ends of a clip the window narrows, which keeps it symmetric
                 let reach = if self.cycle.is_some() { reach } else { reach.min(i).min(count - 1 - i) };
-                let weights: Vec<f64> = (-reach..=reach).map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2))).collect();
+                let weights: Vec<f64> =
+                    (-reach..=reach).map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2))).collect();
                 let total: f64 = weights.iter().sum();
                 let middle = self.frame(i as usize);
                 let mut row = middle.to_vec();
@@ -241,8 +242,7 @@ impl Clip {
     pub fn rounded(&self) -> Self {
         // adding zero makes -0 a 0
         let round = |value: f64| libm::round(value * 1e6) / 1e6 + 0.0;
-        let rows: Vec<Vec<f64>> =
-            self.rows().into_iter().map(|row| row.into_iter().map(round).collect()).collect();
+        let rows: Vec<Vec<f64>> = self.rows().into_iter().map(|row| row.into_iter().map(round).collect()).collect();
         let cycle = self.cycle.map(|Cycle { pos, yaw }| Cycle { pos: pos.map(round), yaw: round(yaw) });
         self.rebuilt(self.dt, cycle, &rows)
     }

@@ -11,6 +11,9 @@ use glam::DVec3;
 use marathon_physics::Model;
 use std::path::Path;
 
+/// The largest number of a clip, m or rad. Larger ones are mistakes, and their differences would not stay finite.
+const LARGEST: f64 = 1e6;
+
 /// Where a clip comes from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct About {
@@ -83,8 +86,9 @@ impl Clip {
                 let problem = format!("found {} numbers, expected {}, the joints' positions", frame.len(), layout.nq());
                 return Err(MotionError::frame(path, i, problem));
             }
-            if let Some(k) = frame.iter().position(|value| !value.is_finite()) {
-                return Err(MotionError::frame(path, i, format!("number {k} is {}, expected a finite one", frame[k])));
+            if let Some(k) = frame.iter().position(|value| !(value.abs() <= LARGEST)) {
+                let problem = format!("number {k} is {}, expected one from -{LARGEST} to {LARGEST}", frame[k]);
+                return Err(MotionError::frame(path, i, problem));
             }
             let before = i.checked_sub(1).map(|i| all[i * layout.nq()..].to_vec());
             all.extend_from_slice(frame);
@@ -180,10 +184,10 @@ impl Clip {
 /// A cycle needs a first joint that can travel as it says.
 fn check_cycle(path: &Path, cycle: &Cycle, layout: &Layout) -> Result<(), MotionError> {
     let [x, y] = cycle.pos;
-    if !(x.is_finite() && y.is_finite() && cycle.yaw.is_finite()) {
-        return Err(MotionError::value(path, "cycle", format!("[{x}, {y}, {}]", cycle.yaw), "finite numbers"));
-    }
     let found = || format!("[{x}, {y}, {}]", cycle.yaw);
+    if ![x, y, cycle.yaw].iter().all(|value| value.abs() <= LARGEST) {
+        return Err(MotionError::value(path, "cycle", found(), format!("numbers from -{LARGEST} to {LARGEST}")));
+    }
     match layout.joints.first().map(|joint| joint.kind) {
         Some(JointKind::Free) => Ok(()),
         Some(JointKind::Slide) if y == 0.0 && cycle.yaw == 0.0 => Ok(()),

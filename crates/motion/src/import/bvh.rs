@@ -84,6 +84,10 @@ pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     };
     let z_up = extent(2) > 1.2 * extent(1);
     let height = if z_up { extent(2) } else { extent(1) };
+    if let Some(node) = nodes.iter().find(|node| !(node.offset.abs().max_element() <= 1e6)) {
+        let found = format!("{} of {:?}", node.offset, node.name);
+        return Err(MotionError::value(path, "OFFSET", found, "numbers from -1000000 to 1000000"));
+    }
     if !(height > 0.0) {
         return Err(MotionError::value(path, "HIERARCHY", "joints that all lie in one point", "a figure"));
     }
@@ -181,7 +185,9 @@ fn channels(words: &mut Words) -> Result<Vec<Channel>, MotionError> {
             match word.get(1..).map(str::to_ascii_lowercase).as_deref() {
                 Some("position") if axis < 3 => Ok(Channel::Position(axis)),
                 Some("rotation") if axis < 3 => Ok(Channel::Rotation(axis)),
-                _ => Err(words.wrong(line, format!("found {word:?}, expected a channel such as Xposition or Zrotation"))),
+                _ => {
+                    Err(words.wrong(line, format!("found {word:?}, expected a channel such as Xposition or Zrotation")))
+                }
             }
         })
         .collect()
@@ -229,8 +235,11 @@ impl<'a> Words<'a> {
     }
 
     fn word(&mut self) -> Result<&'a str, MotionError> {
-        let (_, _, word) =
-            self.words.get(self.next).copied().ok_or_else(|| self.wrong(self.line(), "the file ends too early".into()))?;
+        let (_, _, word) = self
+            .words
+            .get(self.next)
+            .copied()
+            .ok_or_else(|| self.wrong(self.line(), "the file ends too early".into()))?;
         self.next += 1;
         Ok(word)
     }

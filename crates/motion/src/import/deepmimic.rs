@@ -127,6 +127,10 @@ fn even(path: &Path, frames: &[Vec<f64>], keyframes: Vec<Keyframe>) -> Result<(f
         return Err(MotionError::frame(path, i, problem));
     }
     let dt = frames.first().map_or(0.0, |frame| frame[0]);
+    if let Some(i) = between.iter().position(|frame| frame[0] > 100.0 * dt) {
+        let problem = format!("lasts {} s, expected up to 100 times the first frame's {dt} s", frames[i][0]);
+        return Err(MotionError::frame(path, i, problem));
+    }
     if between.iter().all(|frame| (frame[0] - dt).abs() < 0.02 * dt) {
         return Ok((dt, keyframes));
     }

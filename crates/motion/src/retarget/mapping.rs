@@ -132,7 +132,8 @@ impl Mapping {
         });
         let name = serde_json::to_string(&model.name).expect("texts can be written");
         let parts = rows.collect::<Vec<_>>().join(", ");
-        let text = format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"smooth\": 0, \"parts\": {{{parts}}}}}");
+        let text =
+            format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"smooth\": 0, \"parts\": {{{parts}}}}}");
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
@@ -204,7 +205,9 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
             }
             Some((joint("toward", other)?, share))
         }
-        (None, Some(share)) => return Err(MotionError::value(path, &key("share"), share, "a joint in toward beside it")),
+        (None, Some(share)) => {
+            return Err(MotionError::value(path, &key("share"), share, "a joint in toward beside it"));
+        }
         (None, None) => None,
     };
     if let Some(rest) = row.rest.filter(|q| !((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-3)) {

@@ -11,8 +11,8 @@ mod target;
 
 pub use mapping::{Mapping, soles};
 
-use crate::clip::{About, Clip, Cycle};
 use crate::apart::Couple;
+use crate::clip::{About, Clip, Cycle};
 use crate::contact;
 use crate::error::MotionError;
 use crate::ground::Touch;
@@ -61,7 +61,16 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
 
     let mut held = vec![vec![false; touches.len()]; all.len()];
     let none = held.clone();
-    let problem = |targets, held| Problem { model, mapping, touches: &touches, couples: &[], targets, held, dt, calm: CALM * mapping.smooth };
+    let problem = |targets, held| Problem {
+        model,
+        mapping,
+        touches: &touches,
+        couples: &[],
+        targets,
+        held,
+        dt,
+        calm: CALM * mapping.smooth,
+    };
     // frame after frame; around a cycle twice, so that its begin knows its end
     let mut guess = vec![model.qpos0.clone()];
     let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
@@ -83,7 +92,11 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         }
         let rough = problem(&all, &none);
         let fine = Problem { couples: &couples, held: &held, calm: mapping.smooth, ..rough };
-        if pass == 0 { rough.solve(&mut frames, 25) } else { fine.solve(&mut frames, 25) };
+        if pass == 0 {
+            rough.solve(&mut frames, 25)
+        } else {
+            fine.solve(&mut frames, 25)
+        };
     }
 
     // where a limb slips past another one, it may be too fast
@@ -108,9 +121,8 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
 /// The highest speed of a hinge, rad/s.
 fn fastest(model: &Model, frames: &[Vec<f64>], dt: f64) -> f64 {
     let hinges = model.joints.iter().filter(|joint| joint.kind == JointType::Hinge);
-    let speeds = hinges.flat_map(|joint| {
-        frames.windows(2).map(|pair| (pair[1][joint.qpos_adr] - pair[0][joint.qpos_adr]).abs() / dt)
-    });
+    let speeds = hinges
+        .flat_map(|joint| frames.windows(2).map(|pair| (pair[1][joint.qpos_adr] - pair[0][joint.qpos_adr]).abs() / dt));
     speeds.fold(0.0, f64::max)
 }
 

@@ -206,7 +206,16 @@ impl Problem<'_> {
             let point = pose.point(part.body, DVec3::from_array(part.local));
             if part.rotation > 0.0 {
                 let error = log(target.quat[k] * pose.quat[part.body].conjugate());
-                self.vector_rows(pose, part.body, point, base, sink, |turn, _| -turn, part.rotation * error, part.rotation);
+                self.vector_rows(
+                    pose,
+                    part.body,
+                    point,
+                    base,
+                    sink,
+                    |turn, _| -turn,
+                    part.rotation * error,
+                    part.rotation,
+                );
             }
             if part.position > 0.0 {
                 let error = part.position * (target.pos[k] - point);
@@ -224,8 +233,12 @@ impl Problem<'_> {
         }
         let [along, up] = weight::HIPS;
         for (axis, weight) in [along, along, up].into_iter().enumerate() {
-            let row: Vec<_> =
-                by.iter().enumerate().filter(|(_, by)| by[axis] != 0.0).map(|(dof, by)| (base + dof, weight * by[axis])).collect();
+            let row: Vec<_> = by
+                .iter()
+                .enumerate()
+                .filter(|(_, by)| by[axis] != 0.0)
+                .map(|(dof, by)| (base + dof, weight * by[axis]))
+                .collect();
             sink(Row::Even(weight * error[axis], &row));
         }
     }
@@ -317,8 +330,12 @@ impl Problem<'_> {
                         row[dof] += weight::APART * sign * gap.normal.dot(shift);
                     });
                 }
-                let row: Vec<_> =
-                    row.iter().enumerate().filter(|(_, by)| **by != 0.0).map(|(dof, by)| (i * row.len() + dof, *by)).collect();
+                let row: Vec<_> = row
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, by)| **by != 0.0)
+                    .map(|(dof, by)| (i * row.len() + dof, *by))
+                    .collect();
                 sink(Row::Bound(weight::APART * (gap.distance - APART_MARGIN), &row));
             }
         }

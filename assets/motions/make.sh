@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Makes all clips again from the motions in the wheel of pybullet 3.2.7. Needs pip, unzip and the marathon command.
+set -euo pipefail
+cd "$(dirname "$0")"
+marathon="${MARATHON:-marathon}"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+pip download --quiet pybullet==3.2.7 --no-deps --only-binary :all: --python-version 3.11 --platform manylinux2014_x86_64 --dest "$work"
+unzip -q "$work"/pybullet-*.whl 'pybullet_data/data/motions/*' -d "$work"
+from="$work/pybullet_data/data/motions"
+source="DeepMimic (Peng et al., 2018), from pybullet 3.2.7; retargeted by Marathon"
+
+make() { # character, clip, file, further options
+  "$marathon" motion import "$from/$3.txt" --model "../agents/$1.xml" --out "$1/$2.motion" \
+    --source "$source" --license Zlib "${@:4}"
+}
+for clip in walk run backflip cartwheel roll spin jump crawl kick punch getup_facedown getup_faceup; do
+  make marathon_man "$clip" "humanoid3d_$clip"
+done
+make marathon_man spinkick humanoid3d_spinkick --loop none
+make marathon_man dance humanoid3d_dance_b
+make marathon_man walk_left walker/turn_left1
+make marathon_man walk_right walker/turn_right1
+for character in humanoid walker2d; do
+  for clip in walk run; do
+    make "$character" "$clip" "humanoid3d_$clip"
+  done
+done
