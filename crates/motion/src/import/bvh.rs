@@ -57,7 +57,7 @@ pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     words.expect("MOTION")?;
     words.expect("Frames:")?;
     let (line, count) = (words.line(), words.number()?);
-    if !(count >= 2.0 && count <= 1e7 && count == count.trunc()) {
+    if !(2.0..=1e7).contains(&count) || count != count.trunc() {
         return Err(words.wrong(line, format!("found {count} frames, expected two or more")));
     }
     words.expect("Frame")?;
