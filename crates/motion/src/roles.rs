@@ -6,17 +6,17 @@ use crate::skeleton::Skeleton;
 /// without a prefix such as `mixamorig:`, without their side and without punctuation.
 ///
 /// Sources of the names: DeepMimic; Mixamo and Autodesk's HumanIK, whose names CMU's motions in BVH and LAFAN1 have; CMU's
-/// ASF; Unity's and VRM's humanoid; Blender's Rigify; Bandai Namco's motions.
+/// ASF; Unity's and VRM's humanoid; Blender's Rigify; Bandai Namco's motions; the bodies of Marathon's own models.
 const ROLES: [(&str, &[&str]); 11] = [
-    ("root", &["root", "hips", "hip", "pelvis"]),
-    ("chest", &["chest", "spine2", "spine3", "upperchest", "thorax", "spine003", "spine1", "spine"]),
+    ("root", &["root", "hips", "hip", "pelvis", "butt"]),
+    ("chest", &["chest", "spine2", "spine3", "upperchest", "thorax", "spine003", "spine1", "spine", "torso"]),
     ("neck", &["neck", "neck1", "head"]),
     ("hip", &["hip", "upleg", "upperleg", "thigh", "femur"]),
     ("knee", &["knee", "leg", "lowerleg", "shin", "calf", "tibia"]),
     ("ankle", &["ankle", "foot"]),
     ("toe", &["toe", "toebase", "toes"]),
     ("shoulder", &["shoulder", "arm", "upperarm", "humerus"]),
-    ("elbow", &["elbow", "forearm", "lowerarm", "radius"]),
+    ("elbow", &["elbow", "forearm", "lowerarm", "radius", "larm"]),
     ("wrist", &["wrist", "hand"]),
     ("head", &["head"]),
 ];

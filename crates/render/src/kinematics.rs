@@ -1,9 +1,8 @@
-//! Forward kinematics: world poses of all geoms from `qpos` alone, in `f64`.
-//!
-//! The same composition as MuJoCo's `mj_kinematics`, so results agree with `geom_xpos` and `geom_xmat`.
+//! World poses of all geoms from `qpos` alone, in `f64`. They agree with MuJoCo's `geom_xpos` and `geom_xmat`.
 
 use glam::{DMat3, DQuat, DVec3};
-use marathon_physics::model::{JointType, Model};
+use marathon_motion::kinematics;
+use marathon_physics::model::Model;
 
 use crate::error::RenderError;
 
@@ -41,7 +40,7 @@ pub struct Pose {
 /// Computes the pose of every geom. `agent` is only used to name the culprit in errors.
 pub(crate) fn pose(model: &Model, qpos: &[f64], agent: usize) -> Result<Pose, RenderError> {
     check(model, qpos, agent)?;
-    let (pos, quat) = bodies(model, qpos);
+    let kinematics::Pose { pos, quat, .. } = kinematics::Pose::of(model, qpos);
 
     let geoms = model
         .geoms
@@ -79,46 +78,6 @@ fn check(model: &Model, qpos: &[f64], agent: usize) -> Result<(), RenderError> {
     }
 }
 
-/// Positions and orientations of all bodies in the world.
-fn bodies(model: &Model, qpos: &[f64]) -> (Vec<DVec3>, Vec<DQuat>) {
-    let mut xpos = vec![DVec3::ZERO; model.bodies.len()];
-    let mut xquat = vec![DQuat::IDENTITY; model.bodies.len()];
-
-    for (i, body) in model.bodies.iter().enumerate().skip(1) {
-        let parent = body.parent;
-        let mut pos = xpos[parent] + xquat[parent] * dvec(body.pos);
-        let mut quat = xquat[parent] * dquat(body.quat);
-
-        for joint in &model.joints[body.joint_start..body.joint_start + body.joint_count] {
-            let q = &qpos[joint.qpos_adr..];
-            let anchor = pos + quat * dvec(joint.pos);
-            match joint.kind {
-                JointType::Free => {
-                    pos = DVec3::new(q[0], q[1], q[2]);
-                    quat = unit_quat([q[3], q[4], q[5], q[6]]);
-                }
-                JointType::Slide => {
-                    pos += (q[0] - model.qpos0[joint.qpos_adr]) * (quat * dvec(joint.axis));
-                }
-                JointType::Ball => {
-                    quat *= unit_quat([q[0], q[1], q[2], q[3]]);
-                    pos = anchor - quat * dvec(joint.pos);
-                }
-                JointType::Hinge => {
-                    // the platform's sin and cos differ between systems, libm's do not
-                    let half = 0.5 * (q[0] - model.qpos0[joint.qpos_adr]);
-                    let axis = libm::sin(half) * dvec(joint.axis);
-                    quat *= DQuat::from_xyzw(axis.x, axis.y, axis.z, libm::cos(half));
-                    pos = anchor - quat * dvec(joint.pos);
-                }
-            }
-        }
-        xpos[i] = pos;
-        xquat[i] = quat.normalize();
-    }
-    (xpos, xquat)
-}
-
 fn dvec(v: [f64; 3]) -> DVec3 {
     DVec3::from_array(v)
 }
@@ -126,11 +85,4 @@ fn dvec(v: [f64; 3]) -> DVec3 {
 /// MuJoCo stores `[w, x, y, z]`.
 fn dquat(q: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(q[1], q[2], q[3], q[0])
-}
-
-/// Normalizes; a zero quaternion is the identity, as in MuJoCo's `mju_normalize4`.
-fn unit_quat(q: [f64; 4]) -> DQuat {
-    let quat = dquat(q);
-    let norm = quat.length();
-    if norm < 1e-15 { DQuat::IDENTITY } else { quat / norm }
 }

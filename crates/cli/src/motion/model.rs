@@ -19,21 +19,23 @@ pub fn load(name: &str) -> Result<Model, CliError> {
 pub fn of_clip(path: &Path, clip: &Clip, asked: Option<&str>) -> Result<Model, CliError> {
     let model = match asked {
         Some(name) => load(name)?,
-        None => {
-            let name = &clip.about().model;
-            let agents = [name.clone(), name.replace('_', "")];
-            let found = agents.iter().find_map(|name| registry::agent(name).ok());
-            match found {
-                Some(agent) => agent.model()?,
-                None => {
-                    let text = format!("{} is of the model {name:?}, which is no agent; say --model", path_word(path));
-                    return Err(CliError::Usage(text));
-                }
-            }
-        }
+        None => named(path, clip)?,
     };
     clip.check_model(path, &model)?;
     Ok(model)
+}
+
+/// The model of the first agent that moves as the clip does and has the name that the clip says.
+fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
+    let name = &clip.about().model;
+    for id in registry::ids() {
+        let model = registry::agent(&id)?.model()?;
+        if model.name == *name && clip.check_model(path, &model).is_ok() {
+            return Ok(model);
+        }
+    }
+    let text = format!("{} is of the model {name:?}, which is no agent's; say --model", path_word(path));
+    Err(CliError::Usage(text))
 }
 
 /// Reads a clip.
