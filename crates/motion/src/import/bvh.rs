@@ -4,6 +4,7 @@
 //! z. Lengths are taken for meters, centimeters, inches or CMU's unit, whichever makes the figure nearest to 1.7 m tall.
 //! Positions of joints other than the root are read and dropped: bones keep their length.
 
+use super::unit;
 use crate::clip::About;
 use crate::error::MotionError;
 use crate::rotation::{exp, wxyz};
@@ -11,10 +12,6 @@ use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 
-/// Meters of the units in use: meter, centimeter, inch, CMU's unit (a sixteenth of 0.45 inch's inverse: 1/0.45 inch).
-const UNITS: [f64; 4] = [1.0, 0.01, 0.0254, 0.0254 / 0.45];
-/// A tall figure's rest pose from the lowest to the highest joint, m. The head's top is no joint in all files.
-const HEIGHT: f64 = 1.65;
 /// More joints, or deeper ones, are not of a figure.
 const MOST_JOINTS: usize = 1000;
 
@@ -91,8 +88,7 @@ pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     if !(height > 0.0) {
         return Err(MotionError::value(path, "HIERARCHY", "joints that all lie in one point", "a figure"));
     }
-    let fit = |unit: f64| libm::log(unit * height / HEIGHT).abs();
-    let unit = UNITS.into_iter().min_by(|a, b| fit(*a).total_cmp(&fit(*b))).unwrap_or(1.0);
+    let unit = unit(height);
     // y to z, z to -y
     let upright = if z_up { DQuat::IDENTITY } else { exp(DVec3::X * std::f64::consts::FRAC_PI_2) };
 
