@@ -14,10 +14,11 @@ const MOST_NUMBERS: usize = 20_000;
 fuzz_target!(|data: &[u8]| {
     let Some((kind, bytes)) = data.split_first() else { return };
     let read = |name: &str| import::any(name.as_ref(), bytes).map(|animation| animation.clip().clone());
-    let clip = match kind % 4 {
+    let clip = match kind % 5 {
         0 => Clip::parse("fuzzed.motion".as_ref(), bytes),
         1 => read("fuzzed.bvh"),
         2 => read("fuzzed.json"),
+        3 => read("fuzzed.glb"),
         _ => {
             let (animation, model) = figure();
             if let Err(error) = Mapping::parse("fuzzed.json".as_ref(), bytes, animation.skeleton(), model) {

@@ -27,7 +27,7 @@ pub struct MotionArgs {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// Read a recording (.bvh, or .txt and .json of DeepMimic) and write it as a clip of a character.
+    /// Read a recording (.bvh, .glb, or .txt and .json of DeepMimic) and write it as a clip of a character.
     Import(ImportArgs),
     /// Write a clip of one character as one of another.
     Retarget(RetargetArgs),

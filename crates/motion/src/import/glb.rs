@@ -9,9 +9,11 @@ use crate::error::MotionError;
 use crate::rotation::{exp, slerp, wxyz};
 use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
-use gltf::animation::Interpolation;
+use gltf::accessor::{DataType, Dimensions};
 use gltf::animation::util::ReadOutputs;
-use gltf::{Document, Gltf, Node};
+use gltf::animation::{Interpolation, Property};
+use gltf::json::validation::Checked;
+use gltf::{Accessor, Document, Gltf, Node};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -44,7 +46,7 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     let Gltf { document, blob } =
         Gltf::from_slice(bytes).map_err(|error| wrong("glTF", error.to_string(), "a .glb file of glTF 2.0"))?;
     let blob = blob.ok_or_else(|| wrong("buffers", "buffers in other files".into(), "one .glb file with all data"))?;
-    check_accessors(path, &document, &blob)?;
+    check_channels(path, &document, &blob)?;
     let animation = document
         .animations()
         .next()
@@ -52,6 +54,9 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
 
     let mut tracks: BTreeMap<usize, Tracks> = BTreeMap::new();
     for (i, channel) in animation.channels().enumerate() {
+        if !matches!(channel.target().property(), Property::Rotation | Property::Translation) {
+            continue;
+        }
         let reader = channel.reader(|buffer| (buffer.index() == 0).then_some(blob.as_slice()));
         let (Some(times), Some(outputs)) = (reader.read_inputs(), reader.read_outputs()) else {
             return Err(wrong(&format!("animations[0].channels[{i}]"), "no data".into(), "times and values"));
@@ -83,7 +88,7 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     }
 
     let nodes: Vec<Node> = document.nodes().collect();
-    let parents = parents(&nodes);
+    let parents = parents(path, &nodes)?;
     let root = root(&joints, &parents);
     let mut order = Vec::new();
     walk(path, &nodes[root], &joints, None, 0, &mut order)?;
@@ -116,7 +121,7 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
         })
         .flatten()
         .fold(0.0, |end: f64, time| end.max(*time));
-    if !(end >= DT && end <= LONGEST) {
+    if !(DT..=LONGEST).contains(&end) {
         return Err(wrong("animations[0]", format!("{end} s"), "from a sixtieth of a second to an hour"));
     }
     let keyframes: Vec<Keyframe> = (0..=libm::round(end / DT) as usize)
@@ -171,37 +176,81 @@ fn track<T: Copy>(
     Ok(Track { times, values })
 }
 
-/// Everything that an accessor reads must lie within the file.
-fn check_accessors(path: &Path, document: &Document, blob: &[u8]) -> Result<(), MotionError> {
-    let animations = document.animations().flat_map(|animation| animation.samplers().collect::<Vec<_>>());
-    for accessor in animations.flat_map(|sampler| [sampler.input(), sampler.output()]) {
-        let place = format!("accessors[{}]", accessor.index());
-        let Some(view) = accessor.view().filter(|_| accessor.sparse().is_none()) else {
-            return Err(MotionError::value(path, &place, "a sparse accessor", "one with a buffer view"));
+/// What the library takes for granted: channels of known kinds with samplers that exist, accessors of the types that belong
+/// to them, and data within the file.
+fn check_channels(path: &Path, document: &Document, blob: &[u8]) -> Result<(), MotionError> {
+    let Some(json) = document.as_json().animations.first() else { return Ok(()) };
+    for (i, channel) in json.channels.iter().enumerate() {
+        let place = format!("animations[0].channels[{i}]");
+        let Checked::Valid(property) = channel.target.path else {
+            return Err(MotionError::value(path, &place, "an unknown path", "rotation or translation"));
         };
-        let stride = view.stride().unwrap_or(accessor.size());
-        let within = (accessor.count().checked_sub(1))
-            .and_then(|gaps| gaps.checked_mul(stride))
-            .and_then(|bytes| bytes.checked_add(accessor.size()))
-            .and_then(|bytes| bytes.checked_add(accessor.offset()))
-            .is_some_and(|bytes| bytes <= view.length());
-        let inside = view.offset().checked_add(view.length()).is_some_and(|end| end <= blob.len());
-        if !within || !inside || view.buffer().index() != 0 {
-            return Err(MotionError::value(path, &place, "data beyond the end", "data within the file"));
+        if channel.target.node.value() >= document.nodes().len() {
+            let found = format!("node {}", channel.target.node.value());
+            return Err(MotionError::value(path, &place, found, format!("one of {} nodes", document.nodes().len())));
         }
+        let Some(sampler) = json.samplers.get(channel.sampler.value()) else {
+            let (found, count) = (channel.sampler.value(), json.samplers.len());
+            return Err(MotionError::value(
+                path,
+                &place,
+                format!("sampler {found}"),
+                format!("one of {count} samplers"),
+            ));
+        };
+        if !matches!(sampler.interpolation, Checked::Valid(_)) {
+            return Err(MotionError::value(path, &place, "an unknown interpolation", "LINEAR, STEP or CUBICSPLINE"));
+        }
+        let kind = match property {
+            Property::Rotation => Dimensions::Vec4,
+            Property::Translation => Dimensions::Vec3,
+            Property::Scale | Property::MorphTargetWeights => continue,
+        };
+        let numbers = |index: usize, kind: Dimensions| {
+            let accessor = document.accessors().nth(index);
+            let fits = |accessor: &Accessor| accessor.dimensions() == kind && accessor.data_type() == DataType::F32;
+            match accessor.filter(fits) {
+                Some(accessor) => check_accessor(path, &accessor, blob),
+                None => Err(MotionError::value(path, &place, format!("accessor {index}"), format!("floats, {kind:?}"))),
+            }
+        };
+        numbers(sampler.input.value(), Dimensions::Scalar)?;
+        numbers(sampler.output.value(), kind)?;
+    }
+    Ok(())
+}
+
+/// Everything that an accessor reads must lie within the file.
+fn check_accessor(path: &Path, accessor: &Accessor, blob: &[u8]) -> Result<(), MotionError> {
+    let place = format!("accessors[{}]", accessor.index());
+    let Some(view) = accessor.view().filter(|_| accessor.sparse().is_none()) else {
+        return Err(MotionError::value(path, &place, "a sparse accessor", "one with a buffer view"));
+    };
+    let stride = view.stride().unwrap_or(accessor.size());
+    let within = (accessor.count().checked_sub(1))
+        .and_then(|gaps| gaps.checked_mul(stride))
+        .and_then(|bytes| bytes.checked_add(accessor.size()))
+        .and_then(|bytes| bytes.checked_add(accessor.offset()))
+        .is_some_and(|bytes| bytes <= view.length());
+    let inside = view.offset().checked_add(view.length()).is_some_and(|end| end <= blob.len());
+    if !within || !inside || view.buffer().index() != 0 || stride < accessor.size() {
+        return Err(MotionError::value(path, &place, "data beyond the end", "data within the file"));
     }
     Ok(())
 }
 
 /// The parent of each node.
-fn parents(nodes: &[Node]) -> Vec<Option<usize>> {
+fn parents(path: &Path, nodes: &[Node]) -> Result<Vec<Option<usize>>, MotionError> {
     let mut parents = vec![None; nodes.len()];
     for node in nodes {
         for child in node.children() {
-            parents[child.index()] = Some(node.index());
+            if parents[child.index()].replace(node.index()).is_some() {
+                let found = format!("node {} below two nodes", child.index());
+                return Err(MotionError::value(path, "nodes", found, "one parent for each node"));
+            }
         }
     }
-    parents
+    Ok(parents)
 }
 
 /// The joint from which most joints hang.
