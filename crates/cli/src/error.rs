@@ -45,6 +45,9 @@ pub enum CliError {
     /// The command line makes no sense.
     #[error("{0}")]
     Usage(String),
+    /// A check has found something; its report is on stdout.
+    #[error("{0}")]
+    Found(String),
     /// The user pressed Ctrl-C; the text says what is left and how to go on.
     #[error("interrupted: {0}")]
     Interrupted(String),

@@ -34,8 +34,8 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
             Ok(()) => 0,
             Err(error) => {
                 console::note(format!("error: {error}"));
-                // an interrupted run has printed its summary already
-                if args.json && !matches!(error, CliError::Interrupted(_)) {
+                // an interrupted run has printed its summary already, a check its report
+                if args.json && !matches!(error, CliError::Interrupted(_) | CliError::Found(_)) {
                     console::print_json(&serde_json::json!({ "error": error.to_string() }));
                 }
                 error.exit_code()

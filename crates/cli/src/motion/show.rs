@@ -30,7 +30,7 @@ pub fn check(args: &CheckArgs, json: bool) -> Result<(), CliError> {
     }
     match found {
         0 => Ok(()),
-        n => Err(CliError::Process(format!("{n} of {} clips have something wrong", args.clips.len()))),
+        n => Err(CliError::Found(format!("{n} of {} clips have something wrong", args.clips.len()))),
     }
 }
 

@@ -1,0 +1,108 @@
+//! `marathon motion` turns a recording into a checked clip in one command, draws it, makes it another character's, and says
+//! what is wrong with bad ones.
+
+mod common;
+
+use common::{assert_no_leftovers, fail, json, run, succeed};
+use std::path::{Path, PathBuf};
+
+/// A clip that comes with Marathon.
+fn shipped(name: &str) -> String {
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions").join(name);
+    path.to_string_lossy().into_owned()
+}
+
+/// A person in DeepMimic's format who stands, then bends the right elbow.
+fn recording() -> String {
+    let frame = |elbow: f64| {
+        let turns = |count: usize| ",1,0,0,0".repeat(count);
+        let [four, two, one] = [4, 2, 1].map(turns);
+        format!("[0.0333,0,0.88,0{four},0{two},{elbow}{one},0{two},0]")
+    };
+    let frames: Vec<String> = (0..20).map(|i| frame(0.05 * f64::from(i))).collect();
+    format!("{{\"Loop\": \"none\", \"Frames\": [{}]}}", frames.join(",\n"))
+}
+
+#[test]
+fn a_recording_becomes_a_checked_clip() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("bend.txt"), recording()).unwrap();
+    let import =
+        ["motion", "import", "bend.txt", "--model", "humanoid", "--out", "bend.motion", "--license", "CC0-1.0"];
+    let text = succeed(temp.path(), &import);
+    assert!(text.starts_with("wrote bend.motion: 39 frames, 0.63 s; stands in 100 % of it"), "{text}");
+    assert_eq!(text.lines().count(), 1, "no warning: {text}");
+    let file = std::fs::read_to_string(temp.path().join("bend.motion")).unwrap();
+    for line in ["\"name\": \"bend\"", "\"model\": \"humanoid\"", "\"license\": \"CC0-1.0\"", "\"loop\": \"none\""] {
+        assert!(file.contains(line), "{line}");
+    }
+    // the model is found by the clip's own word for it
+    let report = json(&succeed(temp.path(), &["--json", "motion", "check", "bend.motion"]));
+    assert_eq!(report["clips"][0]["warnings"], serde_json::json!([]));
+    assert_eq!(report["clips"][0]["report"]["frames"], 39);
+    assert_no_leftovers(temp.path());
+}
+
+#[test]
+fn a_clip_is_drawn() {
+    let temp = tempfile::tempdir().unwrap();
+    let (clip, out) = (shipped("walker2d/run.motion"), temp.path().join("run.png"));
+    let args = ["--json", "motion", "render", &clip, "--out", "run.png", "--frames", "3", "--width", "60"];
+    let report = json(&succeed(temp.path(), &args));
+    assert_eq!((&report["frames"], &report["width"], &report["height"]), (&3.into(), &60.into(), &80.into()));
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(out).unwrap()));
+    let reader = decoder.read_info().unwrap();
+    assert_eq!((reader.info().width, reader.info().height), (3 * 60 + 2, 80));
+}
+
+#[test]
+fn a_clip_of_one_character_becomes_one_of_another() {
+    let temp = tempfile::tempdir().unwrap();
+    let clip = shipped("humanoid/walk.motion");
+    let text = succeed(temp.path(), &["motion", "retarget", &clip, "--model", "walker2d", "--out", "walk.motion"]);
+    assert!(text.starts_with("wrote walk.motion: 76 frames, 1.27 s"), "{text}");
+    // whose the recording was is not forgotten
+    let file = std::fs::read_to_string(temp.path().join("walk.motion")).unwrap();
+    assert!(file.contains("DeepMimic") && file.contains("\"model\": \"walker2d\""), "{file}");
+    succeed(temp.path(), &["motion", "check", "walk.motion"]);
+}
+
+#[test]
+fn a_clip_with_a_foot_in_the_ground_fails_the_check() {
+    let temp = tempfile::tempdir().unwrap();
+    let good = std::fs::read_to_string(shipped("walker2d/walk.motion")).unwrap();
+    let row = good.lines().find(|line| line.starts_with("    [0, ")).expect("the first frame");
+    let numbers: Vec<&str> = row.trim().trim_matches(['[', ']', ',']).split(", ").collect();
+    let low = (numbers[1].parse::<f64>().unwrap() - 0.05).to_string();
+    let bad = good.replacen(row, &row.replacen(numbers[1], &low, 1), 1);
+    std::fs::write(temp.path().join("bad.motion"), bad).unwrap();
+    let output = run(temp.path(), &["--json", "motion", "check", "bad.motion"]);
+    assert_eq!(output.status.code(), Some(1));
+    let report = json(&String::from_utf8(output.stdout).unwrap());
+    let depth = report["clips"][0]["report"]["depth"]["value"].as_f64().unwrap();
+    assert!((0.045..=0.05).contains(&depth), "{depth}");
+    let warning = report["clips"][0]["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("foot is 4") && warning.contains("mm below the ground"), "{warning}");
+}
+
+#[test]
+fn errors_say_what_to_do() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("bend.txt"), recording()).unwrap();
+    std::fs::write(temp.path().join("dance.fbx"), "").unwrap();
+    let import = |file: &str, model: &str, out: &str, code: i32| {
+        fail(temp.path(), code, &["motion", "import", file, "--model", model, "--out", out])
+    };
+    let text = import("dance.fbx", "humanoid", "a.motion", 1);
+    assert!(
+        text.contains("dance.fbx: a recording with the ending \"fbx\" is not supported; expected .bvh, .glb"),
+        "{text}"
+    );
+    let text = import("bend.txt", "ant", "a.motion", 1);
+    assert!(text.contains("there is no mapping for it, only for marathon_man, humanoid, walker2d"), "{text}");
+    let text = import("bend.txt", "humanoid", "a.json", 2);
+    assert!(text.contains("--out is a.json, expected a name that ends with .motion"), "{text}");
+    let text = import("none.bvh", "humanoid", "a.motion", 1);
+    assert!(text.contains("none.bvh"), "{text}");
+    assert!(!temp.path().join("a.motion").exists());
+}
