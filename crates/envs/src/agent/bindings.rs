@@ -73,6 +73,8 @@ pub(crate) struct Bindings<T: Real> {
     pub grounds: Vec<usize>,
     pub pairs: Vec<Pair<T::Scalar>>,
     pub motors: Vec<Motor<T::Scalar>>,
+    /// Moving bodies with mass, and their share of the whole.
+    pub mass_shares: Vec<(usize, T::Scalar)>,
     /// Coordinates of the root that move the agent along +x, and how much.
     pub along_x: Vec<(usize, T::Scalar)>,
 }
@@ -206,6 +208,10 @@ impl<T: Real> Bindings<T> {
                 _ => {}
             }
         }
+        let moving: Vec<usize> =
+            (1..model.bodies.len()).filter(|b| model.bodies[*b].weld_id != 0 && model.bodies[*b].mass > 0.0).collect();
+        let mass: f64 = moving.iter().map(|b| model.bodies[*b].mass).sum();
+        let mass_shares = moving.into_iter().map(|b| (b, T::scalar(model.bodies[b].mass / mass))).collect();
         let view = facts.view;
         let measure = MeasurePlan {
             of_last_step: view.of_last_step,
@@ -215,7 +221,7 @@ impl<T: Real> Bindings<T> {
             joints: view.joints,
             touch_sites,
         };
-        Ok(Bindings { parts, bodies, touch, measure, feet, not_feet, grounds, pairs, motors, along_x })
+        Ok(Bindings { parts, bodies, touch, measure, feet, not_feet, grounds, pairs, motors, mass_shares, along_x })
     }
 }
 

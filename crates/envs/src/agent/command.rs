@@ -2,6 +2,10 @@
 
 use std::ops::RangeInclusive;
 
+use marathon_physics::lanes::Real;
+
+use super::reference::{Frame, Reference};
+
 /// One number of an agent's command, see [`Facts::command`](crate::Facts::command).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommandRange {
@@ -23,7 +27,7 @@ impl CommandRange {
 }
 
 /// Where an agent turns its action into the controls of its actuators, see [`Agent::ctrl`](crate::Agent::ctrl).
-pub struct Ctrl<'a, T> {
+pub struct Ctrl<'a, T: Real> {
     /// The action, as [`Facts::controls`](crate::Facts::controls) says; a number per actuator.
     pub action: &'a [T],
     /// Control of each actuator until the next decision, to be written: a motor's share of its strength, the target of a
@@ -39,4 +43,17 @@ pub struct Ctrl<'a, T> {
     pub qvel: &'a [T],
     /// Seconds between decisions.
     pub dt: f64,
+    pub(crate) reference: Option<&'a Reference<T>>,
+}
+
+impl<T: Real> Ctrl<'_, T> {
+    /// What the clip that the agent follows shows `ahead` decisions from now, at most
+    /// [`MOST_AHEAD`](super::reference::MOST_AHEAD); the decision to be made leads to the next.
+    ///
+    /// # Panics
+    /// If its facts name no clip, or it is asked for more.
+    #[inline(always)]
+    pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
+        self.reference.expect("the facts name a clip").frame(self.memory, ahead)
+    }
 }

@@ -2,6 +2,9 @@
 
 use std::borrow::Cow;
 use std::path::PathBuf;
+use std::sync::Arc;
+
+use marathon_motion::Clip;
 
 use super::{CommandRange, RoleFacts};
 
@@ -48,6 +51,9 @@ pub struct Facts {
     pub command: Vec<CommandRange>,
     /// Who decides in the task, if more than one does; empty: one who has it all.
     pub roles: Vec<RoleFacts>,
+    /// The motion that the agent follows, of the model's joints; then the first [`Following::SLOTS`](crate::Following::SLOTS)
+    /// of its memory tell where it is in the clip.
+    pub clip: Option<Arc<Clip>>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
     /// What it sees of the physics.
@@ -77,6 +83,7 @@ impl Default for Facts {
             touch_sites: Vec::new(),
             command: Vec::new(),
             roles: Vec::new(),
+            clip: None,
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),

@@ -10,6 +10,7 @@ use marathon_physics::Readings;
 use marathon_physics::lanes::Real;
 
 use super::bindings::Bindings;
+use super::reference::{Frame, Reference, center_of_mass};
 use super::{Body, Motors, Part};
 
 /// Speed in m/s that [`Senses::velocity`] calls 1.
@@ -23,6 +24,8 @@ pub const MAX_BONUS: f64 = 0.5;
 pub struct Senses<'a, T: Real> {
     pub(crate) readings: Readings<'a, T>,
     pub(crate) bindings: &'a Bindings<T>,
+    /// What the agent follows.
+    pub(crate) reference: Option<&'a Reference<T>>,
     /// As [`Facts::controls`](crate::Facts::controls) says.
     pub(crate) action: &'a [T],
     /// The command that the present question is about.
@@ -63,6 +66,30 @@ impl<T: Real> Senses<'_, T> {
         turn(&self.readings.body_axes(part.body), &part.up)
     }
 
+    /// Axes of the body that a part belongs to (columns x, y, z).
+    #[inline(always)]
+    pub fn axes(&self, part: Part) -> [[T; 3]; 3] {
+        self.readings.body_axes(self.bindings.parts[part.0].body)
+    }
+
+    /// Angular velocity of the body that a part belongs to, world axes, rad/s.
+    #[inline(always)]
+    pub fn angular_velocity(&self, part: Part) -> [T; 3] {
+        self.readings.body_angular_velocity(self.bindings.parts[part.0].body)
+    }
+
+    /// Center of mass of everything that moves, m, by the model's own masses.
+    #[inline(always)]
+    pub fn center_of_mass(&self) -> [T; 3] {
+        center_of_mass(&self.readings, &self.bindings.mass_shares)[0]
+    }
+
+    /// Velocity of the center of mass, m/s.
+    #[inline(always)]
+    pub fn center_of_mass_velocity(&self) -> [T; 3] {
+        center_of_mass(&self.readings, &self.bindings.mass_shares)[1]
+    }
+
     /// Number of touch sensors.
     #[inline(always)]
     pub fn touch_count(&self) -> usize {
@@ -73,6 +100,12 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn touch(&self, i: usize) -> T::Mask {
         if self.fresh { T::none() } else { self.readings.touching(self.bindings.touch[i]) }
+    }
+
+    /// Whether a part touched the ground in any physics step of the decision. False at the start of an episode.
+    #[inline(always)]
+    pub fn touched_ground(&self, part: Part) -> T::Mask {
+        if self.fresh { T::none() } else { self.readings.touched(self.bindings.parts[part.0].geom) }
     }
 
     /// What touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites) feels, N: the value of MuJoCo's touch sensor
@@ -160,6 +193,39 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn memory(&self, i: usize) -> T {
         self.memory[i]
+    }
+
+    /// What the clip that the agent follows shows `ahead` decisions from where it is, at most
+    /// [`MOST_AHEAD`](super::reference::MOST_AHEAD); 0 is where the agent should be now.
+    ///
+    /// # Panics
+    /// If its facts name no clip, or it is asked for more.
+    #[inline(always)]
+    pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
+        self.followed().frame(self.memory, ahead)
+    }
+
+    /// Moves on in the clip by a decision: to be called once by [`Agent::remember`](crate::Agent::remember).
+    #[inline(always)]
+    pub fn follow(&self, memory: &mut [T]) {
+        self.followed().advance(memory);
+    }
+
+    /// Lanes in which the clip is over; never if it loops.
+    #[inline(always)]
+    pub fn clip_over(&self) -> T::Mask {
+        self.followed().over(self.memory)
+    }
+
+    /// Lowest place that the clip has for a part's center, m.
+    #[inline(always)]
+    pub fn lowest_in_clip(&self, part: Part) -> f64 {
+        self.followed().lowest(part)
+    }
+
+    #[inline(always)]
+    fn followed(&self) -> &Reference<T> {
+        self.reference.expect("the facts name a clip")
     }
 
     /// Index of a body, for the [readings](Senses::readings).

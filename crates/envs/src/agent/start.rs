@@ -4,6 +4,7 @@ use marathon_physics::Model;
 
 use super::ResetNoise;
 use super::bindings::Blueprint;
+use super::reference::{Following, Timeline};
 use crate::episode_rng::EpisodeRng;
 
 /// The state in which an episode starts, in the making.
@@ -26,6 +27,7 @@ pub struct Start<'a> {
     /// a motion.
     pub memory: &'a mut [f64],
     pub(crate) grounds: &'a mut Vec<(usize, Vec<f32>)>,
+    pub(crate) timeline: Option<&'a Timeline>,
     pub(crate) blueprint: &'a Blueprint,
 }
 
@@ -33,6 +35,23 @@ impl Start<'_> {
     /// The model.
     pub fn model(&self) -> &Model {
         &self.blueprint.model
+    }
+
+    /// Number of rows of the clip that the agent follows: its decisions, several cycles of a clip that loops. 0 without one.
+    pub fn clip_rows(&self) -> usize {
+        self.timeline.map_or(0, |timeline| timeline.qpos.len())
+    }
+
+    /// Puts the agent into a row of the clip that it follows, with its velocities.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn start_in_clip(&mut self, row: usize) {
+        let timeline = self.timeline.expect("the facts name a clip");
+        self.qpos.copy_from_slice(&timeline.qpos[row]);
+        self.qvel.copy_from_slice(&timeline.qvel[row]);
+        self.memory[..Following::SLOTS].fill(0.0);
+        self.memory[Following::ROW] = row as f64;
     }
 
     /// Gives the agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the

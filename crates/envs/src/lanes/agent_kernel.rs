@@ -67,7 +67,7 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
     }
 
     fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>) {
-        T::enter(Drive { agent: self, dt: task.spec.dt, group });
+        T::enter(Drive { agent: self, task, group });
     }
 
     fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived {
@@ -78,7 +78,7 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
 /// What [`AgentKernel::control`] runs.
 struct Drive<'a, T: Real, A> {
     agent: &'a A,
-    dt: f64,
+    task: &'a Task<T>,
     group: &'a mut LaneGroup<T>,
 }
 
@@ -88,7 +88,9 @@ impl<T: Real, A: Agent> Kernel<T> for Drive<'_, T, A> {
     fn run(self) {
         let LaneGroup { physics, memory, action, commands, .. } = self.group;
         let Group { qpos, qvel, ctrl, .. } = physics;
-        self.agent.ctrl(&mut Ctrl { action, ctrl, memory, command: &commands.present, qpos, qvel, dt: self.dt });
+        let reference = self.task.reference.as_ref();
+        let command = &commands.present;
+        self.agent.ctrl(&mut Ctrl { action, ctrl, memory, command, qpos, qvel, dt: self.task.spec.dt, reference });
     }
 }
 
@@ -115,6 +117,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             bindings: &task.bindings,
+            reference: task.reference.as_ref(),
             action,
             command: &commands.present,
             memory: &[],

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use marathon_motion::Clip;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::Actuator;
 use marathon_physics::{Model, Sim, Work};
@@ -10,6 +11,7 @@ use super::agent_kernel::AgentKernel;
 use super::group::{LaneGroup, Rehearsal};
 use super::roles;
 use crate::agent::bindings::{Bindings, Blueprint, sim_options};
+use crate::agent::reference::Reference;
 use crate::agent::{CommandRange, Controls, FORWARD, Facts, Options, Start};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
@@ -29,6 +31,8 @@ pub(crate) struct Task<T: Real> {
     pub blueprint: Blueprint,
     pub bindings: Bindings<T>,
     pub sim: Sim<T>,
+    /// What the agents follow.
+    pub reference: Option<Reference<T>>,
 }
 
 /// Makes shards of an agent for one lane width.
@@ -70,7 +74,10 @@ impl<T: Real> AgentFactory<T> {
             nv: blueprint.model.nv,
             options,
         };
-        let mut task = Task { agent, facts, spec, blueprint, bindings, sim };
+        let table = |clip: &Arc<Clip>| Reference::new(clip, spec.dt, &blueprint, &bindings);
+        let reference = facts.clip.as_ref().map(table).transpose();
+        let reference = reference.map_err(|problem| EnvError::Agent { id: id(), problem })?;
+        let mut task = Task { agent, facts, spec, blueprint, bindings, sim, reference };
         task.spec.observations = task.rehearse()?;
         task.spec.obs = task.spec.observations.last().map_or(0, |group| group.range.end);
         task.spec.roles = roles::of(&task.facts, &task.spec)
@@ -203,6 +210,7 @@ impl<T: Real> Task<T> {
             settle: 0,
             memory,
             grounds,
+            timeline: self.reference.as_ref().map(|reference| &reference.timeline),
             blueprint,
         };
         self.agent.draw(&mut start);

@@ -6,6 +6,7 @@
 pub mod ant;
 pub mod hopper;
 pub mod humanoid;
+pub mod marathon_man;
 pub mod walker2d;
 
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use crate::any_agent::AnyAgent;
 
 /// All of them, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
-    vec![
+    let mut out: Vec<Arc<dyn AnyAgent>> = vec![
         Arc::new(hopper::HopperV0),
         Arc::new(hopper::HopperV1),
         Arc::new(walker2d::Walker2dV0),
@@ -23,7 +24,9 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(humanoid::HumanoidV1),
         Arc::new(ant::AntV0),
         Arc::new(ant::AntV1),
-    ]
+    ];
+    out.extend(marathon_man::all());
+    out
 }
 
 /// Names besides the registered ones, which are the ids without their version. `(alias, id)`.

@@ -1,0 +1,403 @@
+//! The motion that an agent follows: a clip as a constant table with a row per decision.
+//!
+//! The table is made once, with the physics' own kinematics. Each agent has its own row in it and its own place in the
+//! world where the clip has begun: the first [`Following::SLOTS`] slots of its memory, which zeros make the clip's first
+//! frame at the world's origin. A looping clip goes on from there for as long as one likes.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use marathon_motion::{Clip, Cycle};
+use marathon_physics::lanes::{MAX_LANES, Real};
+use marathon_physics::{Group, Model, Readings, Sim, Work};
+
+use super::Part;
+use super::bindings::{Bindings, Blueprint};
+
+/// How much of the future a [`Frame`] can show, decisions.
+pub const MOST_AHEAD: usize = 16;
+
+/// Most cycles of a looping clip in a table.
+const MOST_CYCLES: usize = 64;
+
+/// Height above the ground up to which a foot of a clip counts as set down, m. Motion capture is not more precise.
+const CONTACT_MARGIN: f64 = 0.01;
+
+/// Where an agent is in the clip that it follows: the first slots of its memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Following;
+
+impl Following {
+    /// Slots it needs: the row, and where the clip's present lap has begun.
+    pub const SLOTS: usize = 4;
+    pub(crate) const ROW: usize = 0;
+    const X: usize = 1;
+    const Y: usize = 2;
+    const YAW: usize = 3;
+}
+
+/// A clip at the pace of decisions, in double precision: where episodes start.
+pub(crate) struct Timeline {
+    pub qpos: Vec<Vec<f64>>,
+    pub qvel: Vec<Vec<f64>>,
+    /// Share of the clip, or of its cycle, that is over, by row.
+    pub phase: Vec<f64>,
+    /// What all rows together get to, if the clip loops.
+    pub lap: Option<Cycle>,
+}
+
+impl Timeline {
+    /// A looping clip is cut into whole laps of as many cycles as it takes for their length to be a whole number of
+    /// decisions; what remains is less than a hundredth of a decision for clips of 30 or 60 frames a second, and is spread.
+    fn new(clip: &Clip, dt: f64) -> Timeline {
+        let decisions = clip.duration() / dt;
+        let (rows, step, lap) = match clip.cycle() {
+            None => ((decisions + 1e-9).floor() as usize + 1, dt, None),
+            Some(cycle) => {
+                let cycles = fitting_cycles(decisions);
+                let rows = (cycles as f64 * decisions).round();
+                (rows as usize, cycles as f64 * clip.duration() / rows, Some(repeated(cycle, cycles)))
+            }
+        };
+        let (nq, nv) = (clip.layout().nq(), clip.layout().nv());
+        let mut out = Timeline { qpos: Vec::new(), qvel: Vec::new(), phase: Vec::new(), lap };
+        for row in 0..rows {
+            let (time, mut qpos, mut qvel) = (row as f64 * step, vec![0.0; nq], vec![0.0; nv]);
+            clip.qpos(time, &mut qpos);
+            clip.qvel(time, &mut qvel);
+            qvel.iter_mut().for_each(|v| *v *= step / dt);
+            out.phase.push(clip.phase(time));
+            out.qpos.push(qpos);
+            out.qvel.push(qvel);
+        }
+        out
+    }
+}
+
+/// Number of cycles that is nearest to a whole number of decisions, no fewer than [`MOST_AHEAD`].
+fn fitting_cycles(decisions: f64) -> usize {
+    let remainder = |cycles: usize| (cycles as f64 * decisions - (cycles as f64 * decisions).round()).abs();
+    let least = (MOST_AHEAD as f64 / decisions).ceil().max(1.0) as usize;
+    let mut best = least;
+    for cycles in least..least + MOST_CYCLES {
+        // a shorter table that is as good is better
+        if remainder(cycles) < remainder(best) - 1e-6 {
+            best = cycles;
+        }
+    }
+    best
+}
+
+/// Several cycles in a row.
+fn repeated(cycle: Cycle, times: usize) -> Cycle {
+    let (sin, cos) = (libm::sin(cycle.yaw), libm::cos(cycle.yaw));
+    let mut sum = Cycle::default();
+    for _ in 0..times {
+        let [x, y] = sum.pos;
+        sum.pos = [cos * x - sin * y + cycle.pos[0], sin * x + cos * y + cycle.pos[1]];
+        sum.yaw += cycle.yaw;
+    }
+    sum
+}
+
+/// Where the numbers of a row are.
+struct Columns {
+    qpos: usize,
+    qvel: usize,
+    /// Position and velocity of each part, 6 numbers.
+    parts: usize,
+    /// Axes and angular velocity of each part's body, 12 numbers.
+    bodies: usize,
+    /// Center of mass and its velocity.
+    center: usize,
+    /// Touch sites, 0 or 1.
+    touch: usize,
+    /// Sine and cosine of the phase's angle and of twice that, then the phase.
+    phase: usize,
+    /// Yaw of the direction of travel.
+    facing: usize,
+    width: usize,
+}
+
+/// What agents follow: a clip as a table in lane precision.
+pub(crate) struct Reference<T: Real> {
+    pub timeline: Timeline,
+    columns: Columns,
+    /// `[row][column]`.
+    table: Vec<T::Scalar>,
+    /// Lowest place of each part's center in the clip, m.
+    lowest: Vec<f64>,
+}
+
+impl<T: Real> Reference<T> {
+    /// The table of a clip for an agent that decides every `dt` seconds.
+    ///
+    /// # Errors
+    /// If the clip is of another model.
+    pub fn new(clip: &Clip, dt: f64, blueprint: &Blueprint, bindings: &Bindings<T>) -> Result<Self, String> {
+        let model = &blueprint.model;
+        clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
+        let timeline = Timeline::new(clip, dt);
+        let qvel = model.nq;
+        let parts = qvel + model.nv;
+        let bodies = parts + 6 * bindings.parts.len();
+        let center = bodies + 12 * bindings.parts.len();
+        let touch = center + 6;
+        let phase = touch + bindings.measure.touch_sites.len();
+        let facing = phase + 5;
+        let columns = Columns { qpos: 0, qvel, parts, bodies, center, touch, phase, facing, width: facing + 1 };
+
+        let sim = Sim::<f64>::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
+        let (mut group, mut work) = (Group::new(&sim), Work::new(&sim));
+        let shares: Vec<(usize, f64)> = bindings.mass_shares.iter().map(|(b, x)| (*b, T::widen(*x))).collect();
+        let mut rows = Vec::new();
+        let mut lowest = vec![f64::INFINITY; bindings.parts.len()];
+        for (i, (qpos, qvel)) in timeline.qpos.iter().zip(&timeline.qvel).enumerate() {
+            group.reset_lane(&sim, 0, qpos, qvel);
+            sim.refresh(&mut work, &group);
+            let r = Readings::new(&sim, &group, &work);
+            rows.extend(qpos);
+            rows.extend(qvel);
+            for (part, low) in bindings.parts.iter().zip(&mut lowest) {
+                let position = r.geom_pos(part.geom);
+                *low = low.min(position[2]);
+                rows.extend(position);
+                rows.extend(r.geom_velocity(part.geom));
+            }
+            for part in &bindings.parts {
+                rows.extend(r.body_axes(part.body).as_flattened());
+                rows.extend(r.body_angular_velocity(part.body));
+            }
+            let [position, velocity] = center_of_mass(&r, &shares);
+            rows.extend(position);
+            rows.extend(velocity);
+            for site in &bindings.measure.touch_sites {
+                rows.push(f64::from(u8::from(set_down(model, &r, *site))));
+            }
+            let angle = TAU * timeline.phase[i];
+            for angle in [angle, 2.0 * angle] {
+                rows.extend([libm::sin(angle), libm::cos(angle)]);
+            }
+            rows.push(timeline.phase[i]);
+            // the turn of a lap is spread evenly
+            rows.push(timeline.lap.map_or(0.0, |lap| lap.yaw * i as f64 / timeline.qpos.len() as f64));
+        }
+        let table = rows.into_iter().map(T::scalar).collect();
+        Ok(Reference { timeline, columns, table, lowest })
+    }
+
+    /// Rows of the table.
+    fn rows(&self) -> usize {
+        self.timeline.qpos.len()
+    }
+
+    /// What the clip shows `ahead` decisions from where the agents are.
+    #[inline(always)]
+    pub fn frame(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
+        assert!(ahead <= MOST_AHEAD, "a clip is shown for {MOST_AHEAD} decisions ahead");
+        let at = self.place(memory, ahead);
+        let mut rows: [&[T::Scalar]; MAX_LANES] = [&[]; MAX_LANES];
+        for (lane, row) in rows[..T::LANES].iter_mut().enumerate() {
+            // whatever a snapshot may have held
+            let i = (T::widen(at[Following::ROW].get(lane)) as usize).min(self.rows() - 1);
+            *row = &self.table[i * self.columns.width..][..self.columns.width];
+        }
+        let (sin, cos) = at[Following::YAW].sin_cos();
+        Frame { columns: &self.columns, rows, origin: [at[Following::X], at[Following::Y]], turn: [cos, sin] }
+    }
+
+    /// Where agents will be after `ahead` decisions.
+    #[inline(always)]
+    fn place(&self, memory: &[T], ahead: usize) -> [T; Following::SLOTS] {
+        let [row, x, y, yaw] = [0, 1, 2, 3].map(|i| memory[i]);
+        let (count, row) = (T::lit(self.rows() as f64), row + T::lit(ahead as f64));
+        let Some(lap) = self.timeline.lap else {
+            return [row.min(count - T::lit(1.0)), x, y, yaw];
+        };
+        let (sin, cos) = yaw.sin_cos();
+        let [dx, dy] = lap.pos.map(T::lit);
+        let around = T::not(row.lt(count));
+        [
+            row - T::masked(around, count),
+            x + T::masked(around, sin.neg_mul_add(dy, cos * dx)),
+            y + T::masked(around, sin.mul_add(dx, cos * dy)),
+            yaw + T::masked(around, T::lit(lap.yaw)),
+        ]
+    }
+
+    /// A decision has been made.
+    #[inline(always)]
+    pub fn advance(&self, memory: &mut [T]) {
+        let next = self.place(memory, 1);
+        memory[..Following::SLOTS].copy_from_slice(&next);
+    }
+
+    /// Lanes in which a clip that does not loop has come to its end.
+    #[inline(always)]
+    pub fn over(&self, memory: &[T]) -> T::Mask {
+        if self.timeline.lap.is_some() {
+            return T::none();
+        }
+        T::not(memory[Following::ROW].lt(T::lit(self.rows() as f64 - 1.0)))
+    }
+
+    /// Lowest place of a part's center in the clip, m.
+    pub fn lowest(&self, part: Part) -> f64 {
+        self.lowest[part.0]
+    }
+}
+
+/// Whether a touch site of a clip is on the ground, which is level.
+fn set_down(model: &Model, readings: &Readings<f64>, site: usize) -> bool {
+    readings.site_pos(site)[2] < model.sites[site].size[0] + CONTACT_MARGIN
+}
+
+/// Center of mass and its velocity, from each moving body's share of the mass.
+#[inline(always)]
+pub(crate) fn center_of_mass<T: Real>(r: &Readings<T>, shares: &[(usize, T::Scalar)]) -> [[T; 3]; 2] {
+    let mut sums = [[T::zero(); 3]; 2];
+    for (body, share) in shares {
+        let share = T::splat(*share);
+        for (sum, of_body) in sums.iter_mut().zip([r.body_com(*body), r.body_com_velocity(*body)]) {
+            for (sum, x) in sum.iter_mut().zip(of_body) {
+                *sum = x.mul_add(share, *sum);
+            }
+        }
+    }
+    sums
+}
+
+/// What a clip shows at a moment of each agent's own: what [`Senses`](crate::Senses) tells of the agent, in the same axes.
+pub struct Frame<'a, T: Real> {
+    columns: &'a Columns,
+    rows: [&'a [T::Scalar]; MAX_LANES],
+    /// Where the clip's own origin is in the world.
+    origin: [T; 2],
+    /// Cosine and sine of the clip's turn about the vertical axis.
+    turn: [T; 2],
+}
+
+impl<T: Real> Frame<'_, T> {
+    /// A number of each agent's row.
+    #[inline(always)]
+    fn column(&self, column: usize) -> T {
+        let mut lanes = [T::Scalar::default(); MAX_LANES];
+        for (x, row) in lanes.iter_mut().zip(&self.rows[..T::LANES]) {
+            *x = row[column];
+        }
+        T::load(&lanes[..T::LANES])
+    }
+
+    /// A vector of the row, in world axes.
+    #[inline(always)]
+    fn vector(&self, column: usize) -> [T; 3] {
+        let ([cos, sin], [x, y]) = (self.turn, [self.column(column), self.column(column + 1)]);
+        [sin.neg_mul_add(y, cos * x), sin.mul_add(x, cos * y), self.column(column + 2)]
+    }
+
+    #[inline(always)]
+    fn point(&self, column: usize) -> [T; 3] {
+        let [x, y, z] = self.vector(column);
+        [x + self.origin[0], y + self.origin[1], z]
+    }
+
+    /// Coordinate `i` of a joint other than a free one, which would be that of the clip's own frame.
+    #[inline(always)]
+    pub fn qpos(&self, i: usize) -> T {
+        self.column(self.columns.qpos + i)
+    }
+
+    /// Velocity `i` of a joint other than a free one.
+    #[inline(always)]
+    pub fn qvel(&self, i: usize) -> T {
+        self.column(self.columns.qvel + i)
+    }
+
+    /// Position of a part's center in the world, m.
+    #[inline(always)]
+    pub fn position(&self, part: Part) -> [T; 3] {
+        self.point(self.columns.parts + 6 * part.0)
+    }
+
+    /// Velocity of a part's center, world axes, m/s.
+    #[inline(always)]
+    pub fn linear_velocity(&self, part: Part) -> [T; 3] {
+        self.vector(self.columns.parts + 6 * part.0 + 3)
+    }
+
+    /// Axes of the body that a part belongs to (columns x, y, z).
+    #[inline(always)]
+    pub fn axes(&self, part: Part) -> [[T; 3]; 3] {
+        let first = self.columns.bodies + 12 * part.0;
+        [self.vector(first), self.vector(first + 3), self.vector(first + 6)]
+    }
+
+    /// Angular velocity of the body that a part belongs to, world axes, rad/s.
+    #[inline(always)]
+    pub fn angular_velocity(&self, part: Part) -> [T; 3] {
+        self.vector(self.columns.bodies + 12 * part.0 + 9)
+    }
+
+    /// Center of mass, m.
+    #[inline(always)]
+    pub fn center_of_mass(&self) -> [T; 3] {
+        self.point(self.columns.center)
+    }
+
+    /// Velocity of the center of mass, m/s.
+    #[inline(always)]
+    pub fn center_of_mass_velocity(&self) -> [T; 3] {
+        self.vector(self.columns.center + 3)
+    }
+
+    /// Whether touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites) is on level ground.
+    #[inline(always)]
+    pub fn touch(&self, i: usize) -> T::Mask {
+        T::lit(0.5).lt(self.column(self.columns.touch + i))
+    }
+
+    /// Share of the clip, or of its cycle, that is over: 0 to 1.
+    #[inline(always)]
+    pub fn phase(&self) -> T {
+        self.column(self.columns.phase + 4)
+    }
+
+    /// The phase as an angle, without a jump: its sine and cosine, and those of twice the angle.
+    #[inline(always)]
+    pub fn phase_angles(&self) -> [T; 4] {
+        [0, 1, 2, 3].map(|i| self.column(self.columns.phase + i))
+    }
+
+    /// The direction of travel, cosine and sine of its angle from +x: where the clip begins it faces +x, and the turn of a
+    /// lap is spread evenly. (That of the body is not defined in the middle of a flip.)
+    #[inline(always)]
+    pub fn facing(&self) -> [T; 2] {
+        let (sin, cos) = self.column(self.columns.facing).sin_cos();
+        let [c, s] = self.turn;
+        [s.neg_mul_add(sin, c * cos), s.mul_add(cos, c * sin)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laps_are_whole_numbers_of_decisions() {
+        for (seconds, cycles, rows) in [(38.0 / 30.0, 3, 152.0), (0.8, 1, 32.0), (1.75, 1, 70.0), (0.05, 8, 16.0)] {
+            let decisions = seconds / 0.025;
+            let found = fitting_cycles(decisions);
+            assert_eq!(found, cycles, "{seconds} s");
+            assert!((found as f64 * decisions - rows).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn cycles_add_up() {
+        let quarter = Cycle { pos: [1.0, 0.0], yaw: TAU / 4.0 };
+        let round = repeated(quarter, 4);
+        assert!(round.pos.iter().all(|x| x.abs() < 1e-12) && (round.yaw - TAU).abs() < 1e-12);
+        let half = repeated(quarter, 2);
+        assert!((half.pos[0] - 1.0).abs() < 1e-12 && (half.pos[1] - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,202 @@
+//! The figure: its parts, joints and motors, and its model for each way to move.
+
+use marathon_physics::Model;
+
+use crate::agent::options::OptionValue;
+use crate::agent::{Part, Value};
+
+/// The figure with motors.
+const MODEL: &str = include_str!("../../../../../../assets/agents/marathon_man.xml");
+/// The original's drive, which stands by the motors, as the model's defaults have it.
+const DRIVE: &str = r#"damping="1" stiffness="1" "#;
+
+/// The tracked parts of the original, in its order.
+pub const PARTS: [&str; 17] = [
+    "butt",
+    "lower_waist",
+    "torso",
+    "upper_waist",
+    "head",
+    "right_thigh",
+    "right_shin",
+    "right_right_foot",
+    "left_thigh",
+    "left_shin",
+    "left_left_foot",
+    "right_upper_arm",
+    "right_larm",
+    "right_hand",
+    "left_upper_arm",
+    "left_larm",
+    "left_hand",
+];
+/// The root of observations.
+pub const BUTT: Part = Part::named(&PARTS, "butt");
+const TORSO: Part = Part::named(&PARTS, "torso");
+const HEAD: Part = Part::named(&PARTS, "head");
+const RIGHT_FOOT: Part = Part::named(&PARTS, "right_right_foot");
+const LEFT_FOOT: Part = Part::named(&PARTS, "left_left_foot");
+const RIGHT_HAND: Part = Part::named(&PARTS, "right_hand");
+const LEFT_HAND: Part = Part::named(&PARTS, "left_hand");
+/// DeepMimic's end effectors.
+pub const END_EFFECTORS: [Part; 4] = [RIGHT_FOOT, LEFT_FOOT, RIGHT_HAND, LEFT_HAND];
+/// The original's end effectors.
+pub const PAPER_END_EFFECTORS: [Part; 5] = [RIGHT_FOOT, LEFT_FOOT, RIGHT_HAND, LEFT_HAND, TORSO];
+/// Parts that must not touch the ground, unless the clip has them there.
+pub const TRUNK: [Part; 5] =
+    [TORSO, HEAD, BUTT, Part::named(&PARTS, "lower_waist"), Part::named(&PARTS, "upper_waist")];
+
+/// All tracked parts.
+pub fn parts() -> impl Iterator<Item = Part> {
+    (0..PARTS.len()).map(Part)
+}
+
+/// Sites with touch sensors.
+pub const TOUCH: [&str; 6] =
+    ["right_foot_toe_l", "right_foot_toe_r", "right_foot_heel", "left_foot_toe_l", "left_foot_toe_r", "left_foot_heel"];
+
+/// A hinge with its motor.
+pub struct Joint {
+    /// Name of the joint and of its motor.
+    pub name: &'static str,
+    /// Share of the joint in DeepMimic's pose and velocity errors, before they are normalized.
+    pub weight: f64,
+    /// Stiffness of the servo, N m/rad. A tenth of it is the damping, N m s/rad.
+    pub stiffness: f64,
+    /// Strength of the motor, N m.
+    pub strength: f64,
+    /// Strength in the original, N m.
+    pub original: f64,
+}
+
+const fn joint(name: &'static str, weight: f64, stiffness: f64, strength: f64, original: f64) -> Joint {
+    Joint { name, weight, stiffness, strength, original }
+}
+
+/// The hinges in the order of `qpos`, behind the free joint. Weights are DeepMimic's; its stiffness, as its strength, is
+/// scaled by the mass, 82 kg for 45 (1000 in the chest, 500 in hip and knee, 400 in ankle and shoulder, 300 in the elbow).
+pub const JOINTS: [Joint; 21] = [
+    joint("abdomen_z", 0.5, 1820.0, 180.0, 40.0),
+    joint("abdomen_y", 0.5, 1820.0, 360.0, 40.0),
+    joint("abdomen_x", 0.5, 1820.0, 360.0, 40.0),
+    joint("right_hip_y", 0.5, 910.0, 360.0, 120.0),
+    joint("right_hip_x", 0.5, 910.0, 240.0, 40.0),
+    joint("right_hip_z", 0.5, 910.0, 120.0, 40.0),
+    joint("right_knee", 0.3, 910.0, 270.0, 80.0),
+    joint("right_ankle_y", 0.2, 730.0, 160.0, 20.0),
+    joint("right_ankle_z", 0.2, 730.0, 80.0, 20.0),
+    joint("left_hip_y", 0.5, 910.0, 360.0, 120.0),
+    joint("left_hip_x", 0.5, 910.0, 240.0, 40.0),
+    joint("left_hip_z", 0.5, 910.0, 120.0, 40.0),
+    joint("left_knee", 0.3, 910.0, 270.0, 80.0),
+    joint("left_ankle_y", 0.2, 730.0, 160.0, 20.0),
+    joint("left_ankle_z", 0.2, 730.0, 80.0, 20.0),
+    joint("right_shoulder_y", 0.3, 730.0, 180.0, 20.0),
+    joint("right_shoulder_x", 0.3, 730.0, 180.0, 20.0),
+    joint("right_elbow", 0.2, 550.0, 110.0, 40.0),
+    joint("left_shoulder_y", 0.3, 730.0, 180.0, 20.0),
+    joint("left_shoulder_x", 0.3, 730.0, 180.0, 20.0),
+    joint("left_elbow", 0.2, 550.0, 110.0, 40.0),
+];
+/// Damping of a servo for its stiffness, s: DeepMimic's.
+pub const DAMPING_TIME: f64 = 0.1;
+/// Where the hinges begin in `qpos`.
+pub const FIRST_QPOS: usize = 7;
+/// Where they begin in `qvel`.
+pub const FIRST_QVEL: usize = 6;
+
+/// The motors in the original's order: joints by number.
+pub const ACTIONS: [usize; 21] = [2, 1, 0, 3, 5, 4, 6, 7, 8, 9, 11, 10, 12, 13, 14, 16, 15, 17, 19, 18, 20];
+
+/// What an action does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// It moves the target of a servo away from the clip's next pose.
+    Pd,
+    /// It is the target of a servo: the range of the joint.
+    PdRange,
+    /// It is a share of the motor's strength.
+    Torque,
+    /// It is the target velocity of the original's weak drive.
+    Servo,
+}
+
+impl OptionValue for Control {
+    const EXPECTED: &'static str = "pd, pd_range, torque or servo";
+    fn value(&self) -> Value {
+        let name = match self {
+            Control::Pd => "pd",
+            Control::PdRange => "pd_range",
+            Control::Torque => "torque",
+            Control::Servo => "servo",
+        };
+        name.into()
+    }
+    fn read(value: &Value) -> Option<Self> {
+        [Control::Pd, Control::PdRange, Control::Torque, Control::Servo].into_iter().find(|c| c.value() == *value)
+    }
+}
+
+/// The model with the actuators of a way to move.
+pub fn model(control: Control) -> String {
+    if control == Control::Torque {
+        return MODEL.into();
+    }
+    let without_drive = MODEL.replace(DRIVE, "");
+    let (head, rest) = without_drive.split_once("<actuator>").expect("the model has actuators");
+    let (_, tail) = rest.split_once("</actuator>").expect("the section ends");
+    let mut text = format!("{head}<actuator>\n");
+    let compiled = Model::from_xml_str(MODEL, "marathon_man").expect("the model is valid");
+    for i in ACTIONS {
+        let Joint { name, stiffness, strength, original, .. } = &JOINTS[i];
+        let damping = DAMPING_TIME * stiffness;
+        let law = match control {
+            // the drive's spring and damper of 1, its forces bounded at the author's 2.5 times the strength
+            Control::Servo => {
+                let bound = 2.5 * original;
+                format!(r#"gainprm="{original}" biasprm="0 -1 -1" forcerange="-{bound} {bound}""#)
+            }
+            _ => {
+                let [low, high] = compiled.joints[1 + i].range;
+                let (middle, reach) = match control {
+                    Control::PdRange => (0.5 * (low + high), 0.5 * (high - low)),
+                    _ => (0.0, 1.0),
+                };
+                let (gain, bias) = (stiffness * reach, stiffness * middle);
+                format!(
+                    r#"gainprm="{gain}" biasprm="{bias} -{stiffness} -{damping}" forcerange="-{strength} {strength}""#
+                )
+            }
+        };
+        text += &format!("    <general name=\"{name}\" joint=\"{name}\" biastype=\"affine\" {law}/>\n");
+    }
+    text + "  </actuator>" + tail
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The tables above are those of the model.
+    #[test]
+    fn joints_and_motors_are_the_models() {
+        for control in [Control::Pd, Control::PdRange, Control::Torque, Control::Servo] {
+            let model = Model::from_xml_str(&super::model(control), "marathon_man").unwrap();
+            let names: Vec<&str> = model.joints[1..].iter().map(|joint| joint.name.as_str()).collect();
+            assert_eq!(names, JOINTS.each_ref().map(|joint| joint.name));
+            for (actuator, joint) in model.actuators.iter().zip(ACTIONS) {
+                assert_eq!(actuator.name, JOINTS[joint].name);
+                if control == Control::Torque {
+                    assert_eq!(actuator.gear[0], JOINTS[joint].strength);
+                } else {
+                    assert!(actuator.force_limited);
+                    assert_eq!(actuator.force_range[1] == JOINTS[joint].strength, control != Control::Servo);
+                }
+            }
+            let mass: f64 = model.bodies.iter().map(|body| body.mass).sum();
+            assert!((mass - 82.01).abs() < 1e-9);
+            let damped = model.dofs[6..].iter().all(|dof| dof.damping == 1.0);
+            assert_eq!(damped, control == Control::Torque);
+        }
+    }
+}

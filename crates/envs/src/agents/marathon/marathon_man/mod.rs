@@ -1,0 +1,293 @@
+//! Marathon Man: a figure of 82 kg and 21 motors that moves like the person in a motion clip.
+//!
+//! | observation | content |
+//! |---|---|
+//! | 0..4 | phase of the clip: sine and cosine of its angle, and of twice that |
+//! | 4 | height of the butt, m |
+//! | 5..11 | forward and up axis of the butt |
+//! | 11..17 | velocity of the butt, m/s, and its angular velocity, rad/s |
+//! | 17..38, 38..59 | angles of the 21 joints, rad, and their velocities, rad/s |
+//! | 59..65 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
+//! | 65..68 | how far the clip's butt is from the agent's own, m |
+//! | 68..89 | how far the clip's next angles are from the agent's own, rad |
+//!
+//! Vectors are in the clip's [direction of travel](crate::Frame::facing). Rewards: [`reward`]; what an action does:
+//! [`Control`]. The episode ends when the trunk touches the ground, unless the clip has it there; when the agent is too far
+//! from the clip; when a clip that does not loop is over.
+
+mod body;
+pub mod clips;
+pub mod reward;
+
+use std::sync::Arc;
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+use crate::agent::options::OptionValue;
+use crate::agent::{
+    Agent, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms, Value,
+    names,
+};
+use crate::any_agent::AnyAgent;
+
+pub use body::Control;
+use body::{ACTIONS, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model, parts};
+use clips::ClipName;
+pub use reward::Reward;
+
+/// Physics steps per decision: 200 Hz physics, 40 Hz control.
+const FRAME_SKIP: usize = 5;
+/// 20 seconds.
+const MAX_EPISODE_STEPS: usize = 800;
+/// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
+const LYING: f64 = 0.15;
+
+/// Where an episode starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartAt {
+    /// At any decision of the clip.
+    Random,
+    /// At its beginning.
+    First,
+}
+
+impl OptionValue for StartAt {
+    const EXPECTED: &'static str = "random or first";
+    fn value(&self) -> Value {
+        match self {
+            StartAt::Random => "random".into(),
+            StartAt::First => "first".into(),
+        }
+    }
+    fn read(value: &Value) -> Option<Self> {
+        [StartAt::Random, StartAt::First].into_iter().find(|start| start.value() == *value)
+    }
+}
+
+crate::options! {
+    /// Arguments of Marathon Man.
+    pub struct Arguments {
+        /// Motion to follow: a clip's name.
+        clip: ClipName = ClipName("walk".into()),
+        /// Reward: `deepmimic` (Peng et al., 2018), or `paper` (Booth and Booth, 2019).
+        reward: Reward = Reward::DeepMimic,
+        /// What an action does: `pd` moves the target of a servo away from the clip's next pose, `pd_range` is the target
+        /// within the joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's
+        /// drive.
+        control: Control = Control::Pd,
+        /// Where an episode starts: at `random` decisions of the clip, or at the `first`.
+        start: StartAt = StartAt::Random,
+        /// Mean distance of the parts from where the clip has them that ends an episode, m. With the reward `paper`, a sum of
+        /// its first five terms below 0.334 ends it instead.
+        distance: Scale = Scale(0.5),
+        /// Most that an action of `pd` moves a target, rad.
+        reach: Scale = Scale(0.5),
+    }
+}
+
+/// Marathon Man with a clip.
+#[derive(Clone, Debug)]
+pub struct MarathonMan {
+    id: &'static str,
+    summary: &'static str,
+    /// Whether the clip is an argument.
+    any_clip: bool,
+    arguments: Arguments,
+}
+
+/// Marathon Man with each clip that comes with the crate, and with any.
+pub fn all() -> Vec<Arc<dyn AnyAgent>> {
+    const TASKS: [(&str, &str, &str); 1] = [("MarathonManWalk-v0", "walk", "walk as a person does")];
+    let any = MarathonMan {
+        id: "MarathonMan-v0",
+        summary: "a figure of 21 motors: move as a motion clip does",
+        any_clip: true,
+        arguments: Arguments::default(),
+    };
+    let mut out: Vec<Arc<dyn AnyAgent>> = vec![Arc::new(any)];
+    for (id, clip, summary) in TASKS {
+        let arguments = Arguments { clip: ClipName(clip.into()), ..Arguments::default() };
+        out.push(Arc::new(MarathonMan { id, summary, any_clip: false, arguments }));
+    }
+    out
+}
+
+impl MarathonMan {
+    /// Mean distance of the parts from where the clip has them, m; from the butt's own place, or in the world.
+    #[inline(always)]
+    fn distance<T: Real>(s: &Senses<T>, from_butt: bool) -> T {
+        let clip = s.reference(0);
+        let mut gap = [T::zero(); 3];
+        if from_butt {
+            gap = sub(s.position(BUTT), clip.position(BUTT));
+        }
+        let mut sum = T::zero();
+        for part in parts() {
+            sum += norm2(sub(sub(s.position(part), clip.position(part)), gap)).sqrt();
+        }
+        sum * T::lit(1.0 / PARTS.len() as f64)
+    }
+
+    /// Lanes in which a part of the trunk touched the ground although the clip does not have it there.
+    #[inline(always)]
+    fn fallen<T: Real>(s: &Senses<T>) -> T::Mask {
+        let mut fallen = T::none();
+        for part in TRUNK {
+            if s.lowest_in_clip(part) > LYING {
+                fallen = T::or(fallen, s.touched_ground(part));
+            }
+        }
+        fallen
+    }
+}
+
+impl Agent for MarathonMan {
+    fn facts(&self) -> Facts {
+        let Arguments { clip, reward, control, .. } = &self.arguments;
+        Facts {
+            id: self.id.into(),
+            summary: self.summary.into(),
+            model: model(*control).into(),
+            frame_skip: FRAME_SKIP,
+            max_episode_steps: MAX_EPISODE_STEPS,
+            observation: Some(89),
+            actions: names(ACTIONS.map(|i| JOINTS[i].name)),
+            reward_terms: names(reward.terms()),
+            info: names(["joint_error", "position_error", "phase"]),
+            metrics: names(["forward", "joint_error", "position_error"]),
+            parts: names(PARTS),
+            touch_sites: names(TOUCH),
+            clip: clips::find(&clip.0),
+            memory: Following::SLOTS,
+            termination_reward: None,
+            ..Facts::default()
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        let all = self.arguments.infos().into_iter();
+        all.filter(|info| self.any_clip || info.name != "clip").collect()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(MarathonMan { arguments: self.arguments.with(options), ..*self })
+    }
+
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        let expected = JOINTS.each_ref().map(|joint| joint.name);
+        let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
+        if found == expected {
+            Ok(())
+        } else {
+            Err(format!("its model has the joints {found:?}, expected {expected:?}"))
+        }
+    }
+
+    fn reset(&self, start: &mut Start) {
+        let row = match self.arguments.start {
+            StartAt::Random => start.random.whole(0, start.clip_rows() - 1),
+            StartAt::First => 0,
+        };
+        start.start_in_clip(row);
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    #[inline(always)]
+    fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
+        match self.arguments.control {
+            Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
+            Control::Pd => {
+                let reach = T::lit(self.arguments.reach.0);
+                for (i, joint) in ACTIONS.into_iter().enumerate() {
+                    let clip = c.reference(1);
+                    // the servo's damping, which slows every motion, is not to slow the clip's own
+                    let target =
+                        clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
+                    c.ctrl[i] = c.action[i].mul_add(reach, target);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        s.follow(memory);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let (now, next) = (s.reference(0), s.reference(1));
+        let [cos, sin] = now.facing();
+        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z];
+        let r = s.readings();
+        out.group("phase");
+        for x in now.phase_angles() {
+            out.scalar(x);
+        }
+        out.group("height");
+        out.scalar(s.height(BUTT));
+        out.group("orientation");
+        out.vector(turned(s.forward(BUTT)));
+        out.vector(turned(s.up(BUTT)));
+        out.group("velocity");
+        out.vector(turned(s.linear_velocity(BUTT)));
+        out.group("angular_velocity");
+        out.vector(turned(s.angular_velocity(BUTT)));
+        out.group("joint_positions");
+        for i in 0..JOINTS.len() {
+            out.scalar(r.qpos(FIRST_QPOS + i));
+        }
+        out.group("joint_velocities");
+        for i in 0..JOINTS.len() {
+            out.scalar(r.qvel(FIRST_QVEL + i));
+        }
+        out.group("touch");
+        for i in 0..TOUCH.len() {
+            out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
+        }
+        out.group("place_in_clip");
+        out.vector(turned(sub(now.position(BUTT), s.position(BUTT))));
+        out.group("next_pose");
+        for i in 0..JOINTS.len() {
+            out.scalar(next.qpos(FIRST_QPOS + i) - r.qpos(FIRST_QPOS + i));
+        }
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        self.arguments.reward.add(s, terms);
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let far = match self.arguments.reward {
+            Reward::DeepMimic => T::lit(self.arguments.distance.0).lt(Self::distance(s, false)),
+            Reward::Paper => reward::too_far(s),
+        };
+        T::or(T::or(far, Self::fallen(s)), s.clip_over())
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let (clip, r) = (s.reference(0), s.readings());
+        let mut error = T::zero();
+        for i in 0..JOINTS.len() {
+            error += (r.qpos(FIRST_QPOS + i) - clip.qpos(FIRST_QPOS + i)).abs();
+        }
+        out.scalar(error * T::lit(1.0 / JOINTS.len() as f64));
+        out.scalar(Self::distance(s, true));
+        out.scalar(clip.phase());
+    }
+}
+
+#[inline(always)]
+fn sub<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Square of a vector's length.
+#[inline(always)]
+fn norm2<T: Real>([x, y, z]: [T; 3]) -> T {
+    x.mul_add(x, y.mul_add(y, z * z))
+}
