@@ -27,7 +27,7 @@ macro_rules! shipped {
     };
 }
 
-static SHIPPED: [Shipped; 1] = shipped!["walk"];
+static SHIPPED: [Shipped; 3] = shipped!["walk", "run", "backflip"];
 
 /// Clips of callers.
 static ADDED: RwLock<Vec<(String, Arc<Clip>)>> = RwLock::new(Vec::new());

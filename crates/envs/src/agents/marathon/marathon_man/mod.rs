@@ -98,7 +98,11 @@ pub struct MarathonMan {
 
 /// Marathon Man with each clip that comes with the crate, and with any.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
-    const TASKS: [(&str, &str, &str); 1] = [("MarathonManWalk-v0", "walk", "walk as a person does")];
+    const TASKS: [(&str, &str, &str); 3] = [
+        ("MarathonManWalk-v0", "walk", "a figure of 21 motors: walk as a person does"),
+        ("MarathonManRun-v0", "run", "a figure of 21 motors: run as a person does"),
+        ("MarathonManBackflip-v0", "backflip", "a figure of 21 motors: one backflip after another"),
+    ];
     let any = MarathonMan {
         id: "MarathonMan-v0",
         summary: "a figure of 21 motors: move as a motion clip does",
