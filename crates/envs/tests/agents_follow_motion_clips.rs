@@ -1,0 +1,242 @@
+//! An agent that follows a clip sees, earns and fails by what the clip shows where the agent is in it.
+//!
+//! Marathon Man plays the same actions in this engine (double precision) and in MuJoCo, where `tests/oracle/imitation.py`
+//! computes everything in plain Python. The clip's poses that it is told are those of [`Clip::qpos`] at times that never
+//! wrap around, so that the table of the environment, which does, has to agree with them; one clip walks in circles.
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::{action, make, oracle, play};
+use marathon_envs::agents::marathon::marathon_man::clips;
+use marathon_envs::{AgentState, Autoreset, Options, VecEnv, VecEnvOptions};
+use marathon_motion::{About, Clip, Cycle};
+use marathon_physics::lanes::Isa;
+use serde_json::{Value, json};
+
+/// Starts per case.
+const EPISODES: usize = 4;
+/// Decisions per start: short enough that chaos has not grown beyond the tolerance.
+const DECISIONS: usize = 25;
+/// Observations are stored in single precision.
+const TOLERANCE: f64 = 5e-5;
+/// Size of the actions: none, gentle, middling and wild, which is clipped.
+const SCALES: [f32; EPISODES] = [0.0, 0.1, 0.5, 1.3];
+
+/// A clip that comes with the crate.
+fn shipped(name: &str) -> Arc<Clip> {
+    clips::find(name).unwrap_or_else(|| panic!("there is a clip '{name}'"))
+}
+
+/// The walk on a circle: each cycle turns to the left.
+fn circling() -> Clip {
+    let walk = shipped("walk");
+    let frames: Vec<Vec<f64>> = (0..walk.frames()).map(|i| walk.frame(i).to_vec()).collect();
+    let cycle = walk.cycle().map(|cycle| Cycle { yaw: 0.5, ..cycle });
+    let about = About { name: "circling".into(), ..walk.about().clone() };
+    Clip::new(Path::new("circling"), about, walk.layout().clone(), walk.dt(), cycle, &frames).expect("a clip")
+}
+
+/// A figure that stands still for a second, once.
+fn standing() -> Clip {
+    let model = marathon_envs::agent("MarathonMan-v0").unwrap().model().unwrap();
+    let about = About { name: "standing".into(), model: model.name.clone(), ..About::default() };
+    let layout = marathon_motion::Layout::of(&model);
+    Clip::new(Path::new("standing"), about, layout, 0.1, None, &vec![model.qpos0; 11]).expect("a clip")
+}
+
+fn follow(options: &Options, agents: usize, isa: Option<Isa>) -> VecEnv {
+    let options = VecEnvOptions {
+        agents,
+        seed: 3,
+        threads: 1,
+        isa,
+        autoreset: Autoreset::Disabled,
+        options: options.clone(),
+        ..VecEnvOptions::default()
+    };
+    VecEnv::new("MarathonMan-v0", &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// What the clip shows in the decisions from a state on, which is that of a start; and how many decisions into it that is.
+fn moments(clip: &Clip, state: &AgentState) -> (usize, Vec<Value>) {
+    // as the environment, with laps of a whole number of decisions
+    let decisions = clip.duration() / 0.025;
+    let cycles = (1..=64).find(|n| ((*n as f64 * decisions).round() - *n as f64 * decisions).abs() < 0.011);
+    let cycles = cycles.expect("clips of 60 frames a second fit") as f64;
+    let rows = (cycles * decisions).round();
+    let step = if clip.cycle().is_some() { cycles * clip.duration() / rows } else { 0.025 };
+    let at = |row: usize| {
+        let (time, mut qpos, mut qvel) = (row as f64 * step, vec![0.0; 28], vec![0.0; 27]);
+        clip.qpos(time.min(clip.end()), &mut qpos);
+        clip.qvel(time.min(clip.end()), &mut qvel);
+        qvel.iter_mut().for_each(|v| *v *= step / 0.025);
+        let yaw = clip.cycle().map_or(0.0, |cycle| cycle.yaw);
+        let facing = yaw * time / clip.duration();
+        json!({ "qpos": qpos, "qvel": qvel, "phase": clip.phase(time), "facing": facing })
+    };
+    // the noise of a start is smaller than the distance of two decisions, at any but a standstill
+    let away = |row: usize| {
+        let moment = at(row);
+        let there = moment["qpos"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap());
+        there.zip(&state.qpos).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+    };
+    let start = (0..rows as usize).min_by(|a, b| away(*a).total_cmp(&away(*b))).unwrap();
+    assert!(away(start) < 21.0 * 0.01_f64.powi(2) + 1e-9, "the start is in the clip");
+    (start, (start..start + DECISIONS + 2).map(at).collect())
+}
+
+/// Length of a clip, or none: where its time ends.
+trait End {
+    fn end(&self) -> f64;
+}
+impl End for Clip {
+    fn end(&self) -> f64 {
+        if self.cycle().is_some() { f64::INFINITY } else { self.duration() }
+    }
+}
+
+#[test]
+fn observations_rewards_and_terminations_agree_with_mujoco() {
+    clips::add("circling", circling());
+    let mut request = Vec::new();
+    let mut ours = Vec::new();
+    for (clip, control, reward) in [
+        ("walk", "pd", "deepmimic"),
+        ("walk", "torque", "paper"),
+        ("circling", "pd", "paper"),
+        ("circling", "pd_range", "deepmimic"),
+        ("backflip", "pd", "deepmimic"),
+        ("run", "servo", "paper"),
+    ] {
+        let options = Options::new().with("clip", clip).with("control", control).with("reward", reward);
+        let agent = marathon_envs::registry::Registry::default().agent_with("MarathonMan-v0", &options).unwrap();
+        let facts = agent.facts();
+        let mut env = follow(&options, EPISODES, Some(Isa::F64));
+        let mut out = env.buffers();
+        env.reset(Some(5), &mut out.obs).unwrap();
+        let act = env.spec().act;
+        let mut episodes = Vec::new();
+        for agent in 0..EPISODES {
+            let state = env.state(agent).unwrap();
+            let mut actions = vec![vec![0.0; act]; DECISIONS];
+            for (t, row) in actions.iter_mut().enumerate() {
+                action(agent, t, SCALES[agent], row);
+            }
+            let (_, moments) = moments(&shipped(clip), &state);
+            episodes.push(json!({ "qpos": state.qpos, "qvel": state.qvel, "actions": actions, "clip": moments }));
+        }
+        let mut steps = Vec::new();
+        let mut row = vec![0.0; EPISODES * act];
+        for t in 0..DECISIONS {
+            for (agent, row) in row.chunks_exact_mut(act).enumerate() {
+                action(agent, t, SCALES[agent], row);
+            }
+            env.step(&row, &mut out.as_mut()).unwrap();
+            steps.push(out.clone());
+        }
+        request.push(json!({
+            "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "reach": 0.5,
+            "reward": reward, "distance": 0.5, "episodes": episodes,
+        }));
+        ours.push((format!("{clip}, {control}, {reward}"), env.spec().clone(), steps));
+    }
+    let answer = oracle("imitation.py", &json!({ "cases": request }));
+
+    let (mut touches, mut far, mut decisions) = (0, 0, 0);
+    for (case, (name, spec, steps)) in ours.iter().enumerate() {
+        for agent in 0..EPISODES {
+            let theirs = answer[case][agent].as_array().expect("an episode");
+            assert!(!theirs.is_empty());
+            for (t, theirs) in theirs.iter().enumerate() {
+                let place = format!("{name}, episode {agent}, decision {t}");
+                let step = &steps[t];
+                for (what, all, n) in [
+                    ("obs", &step.obs, spec.obs),
+                    ("terms", &step.terms, spec.reward_terms.len()),
+                    ("info", &step.info, spec.info.len()),
+                ] {
+                    let expected = theirs[what].as_array().expect("numbers");
+                    assert_eq!(expected.len(), n, "{place}: {what}");
+                    for (i, (x, y)) in all[agent * n..][..n].iter().zip(expected).enumerate() {
+                        let (x, y) = (f64::from(*x), y.as_f64().expect("a number"));
+                        assert!((x - y).abs() <= TOLERANCE * (1.0 + y.abs()), "{place}: {what} {i}: {x}, MuJoCo {y}");
+                    }
+                }
+                let ended = [&theirs["far"], &theirs["fallen"]].map(|x| x.as_bool().unwrap());
+                assert_eq!(step.terminated[agent], ended[0] || ended[1], "{place}: terminated");
+                far += usize::from(ended[0]);
+                touches += step.obs[agent * spec.obs + 59..][..6].iter().filter(|x| **x == 1.0).count();
+                decisions += 1;
+            }
+        }
+    }
+    // the comparison means something only if these happened
+    assert!(touches > 100 && far > 3 && decisions > 300, "{touches} touches, {far} too far, {decisions} decisions");
+}
+
+#[test]
+fn episodes_start_all_over_the_clip() {
+    let clip = shipped("walk");
+    let mut env = follow(&Options::new(), 200, None);
+    let mut obs = vec![0.0; 200 * env.spec().obs];
+    env.reset(Some(1), &mut obs).unwrap();
+    let starts: Vec<usize> = (0..200).map(|agent| moments(&clip, &env.state(agent).unwrap()).0).collect();
+    let mut different = starts.clone();
+    different.sort_unstable();
+    different.dedup();
+    assert!(different.len() > 30 && *different.last().unwrap() > 120, "{} starts", different.len());
+
+    let mut env = follow(&Options::new().with("start", "first"), 20, None);
+    env.reset(Some(1), &mut obs[..20 * env.spec().obs]).unwrap();
+    assert!((0..20).all(|agent| moments(&clip, &env.state(agent).unwrap()).0 == 0));
+}
+
+#[test]
+fn standing_beside_a_standing_clip_earns_everything_until_it_is_over() {
+    clips::add("standing", standing());
+    let mut env = follow(&Options::new().with("clip", "standing").with("start", "first"), 3, None);
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).unwrap();
+    for t in 1..=40 {
+        env.step(&[0.0; 3 * 21], &mut out.as_mut()).unwrap();
+        assert!(out.reward.iter().all(|r| (0.97..=1.0).contains(r)), "decision {t}: {:?}", out.reward);
+        assert!(out.terminated.iter().all(|over| *over == (t == 40)), "a clip of one second has 40 decisions");
+    }
+}
+
+/// Nobody shares a place in the clip; lanes begin and end alone.
+#[test]
+fn agents_are_where_they_are_in_the_clip_whoever_runs_beside_them() {
+    let phases = |agents: usize| {
+        let mut env = make("MarathonManWalk-v0", agents, 1, None, Autoreset::SameStep);
+        let (info, mut phases) = (env.spec().info.len(), Vec::new());
+        play(&mut env, 80, 0.4, |_, step| phases.push(step.info[..3 * info].to_vec()));
+        phases
+    };
+    let few = phases(3);
+    assert_eq!(few, phases(21));
+    assert!(few.iter().all(|row| row[2] != row[5]), "agents are in different places");
+}
+
+#[test]
+fn an_unknown_clip_is_refused() {
+    let options = Options::new().with("clip", "wlak");
+    let error = marathon_envs::registry::Registry::default().agent_with("MarathonMan-v0", &options).err().unwrap();
+    let expected = "'MarathonMan-v0' has no clip 'wlak'";
+    assert!(error.to_string().contains("wlak"), "{error}, expected {expected}");
+    let foreign = Clip::new(
+        Path::new("foreign"),
+        About { name: "foreign".into(), ..About::default() },
+        marathon_motion::Layout::new([("hip".into(), marathon_motion::JointKind::Hinge)]),
+        0.1,
+        None,
+        &[vec![0.0], vec![0.1]],
+    );
+    clips::add("foreign", foreign.unwrap());
+    let options = VecEnvOptions { options: Options::new().with("clip", "foreign"), ..VecEnvOptions::default() };
+    let error = VecEnv::new("MarathonMan-v0", &options).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("foreign") && error.contains("joint"), "{error}");
+}
