@@ -33,8 +33,12 @@ const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../a
 /// For dm_control's suite.
 const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../../assets/configs/dm_control-fast.yaml"));
 
+/// For Marathon Man and his clips.
+const MARATHON_MAN: (&str, &str) =
+    ("marathon_man-fast.yaml", include_str!("../../../assets/configs/marathon_man-fast.yaml"));
+
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 18] = [
+const FAST: [(&str, (&str, &str)); 35] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -53,6 +57,23 @@ const FAST: [(&str, (&str, &str)); 18] = [
     ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../assets/configs/walker2d-fast.yaml"))),
     ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../assets/configs/humanoid-fast.yaml"))),
     ("Ant", ("ant-fast.yaml", include_str!("../../../assets/configs/ant-fast.yaml"))),
+    ("MarathonMan", MARATHON_MAN),
+    ("MarathonManWalk", MARATHON_MAN),
+    ("MarathonManWalkLeft", MARATHON_MAN),
+    ("MarathonManWalkRight", MARATHON_MAN),
+    ("MarathonManRun", MARATHON_MAN),
+    ("MarathonManBackflip", MARATHON_MAN),
+    ("MarathonManSpinKick", MARATHON_MAN),
+    ("MarathonManSpin", MARATHON_MAN),
+    ("MarathonManCartwheel", MARATHON_MAN),
+    ("MarathonManRoll", MARATHON_MAN),
+    ("MarathonManJump", MARATHON_MAN),
+    ("MarathonManKick", MARATHON_MAN),
+    ("MarathonManPunch", MARATHON_MAN),
+    ("MarathonManDance", MARATHON_MAN),
+    ("MarathonManCrawl", MARATHON_MAN),
+    ("MarathonManGetUpFaceDown", MARATHON_MAN),
+    ("MarathonManGetUpFaceUp", MARATHON_MAN),
 ];
 
 /// What a file says about the training of an agent.

@@ -138,7 +138,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             steps.push(out.clone());
         }
         request.push(json!({
-            "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "reach": 0.5,
+            "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "reach": 1.0,
             "reward": reward, "distance": 0.5, "episodes": episodes,
         }));
         ours.push((format!("{clip}, {control}, {reward}"), env.spec().clone(), steps));
@@ -223,10 +223,13 @@ fn agents_are_where_they_are_in_the_clip_whoever_runs_beside_them() {
 
 #[test]
 fn an_unknown_clip_is_refused() {
-    let options = Options::new().with("clip", "wlak");
-    let error = marathon_envs::registry::Registry::default().agent_with("MarathonMan-v0", &options).err().unwrap();
-    let expected = "'MarathonMan-v0' has no clip 'wlak'";
-    assert!(error.to_string().contains("wlak"), "{error}, expected {expected}");
+    let refused = |clip: &str| {
+        let options = VecEnvOptions { options: Options::new().with("clip", clip), ..VecEnvOptions::default() };
+        VecEnv::new("MarathonMan-v0", &options).map(|_| ()).unwrap_err().to_string()
+    };
+    let error = refused("wlak");
+    let expected = "option clip is 'wlak', expected a clip that is known; did you mean 'walk'? known: walk, walk_left";
+    assert!(error.contains(expected), "{error}");
     let foreign = Clip::new(
         Path::new("foreign"),
         About { name: "foreign".into(), ..About::default() },
@@ -236,7 +239,6 @@ fn an_unknown_clip_is_refused() {
         &[vec![0.0], vec![0.1]],
     );
     clips::add("foreign", foreign.unwrap());
-    let options = VecEnvOptions { options: Options::new().with("clip", "foreign"), ..VecEnvOptions::default() };
-    let error = VecEnv::new("MarathonMan-v0", &options).map(|_| ()).unwrap_err().to_string();
+    let error = refused("foreign");
     assert!(error.contains("foreign") && error.contains("joint"), "{error}");
 }

@@ -65,6 +65,12 @@ fn ant() {
     check("Ant-v0");
 }
 
+/// Every agent has its own place in the clip that it follows.
+#[test]
+fn marathon_man() {
+    check("MarathonManWalkLeft-v0");
+}
+
 /// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
 #[test]
 fn gymnasiums_ant() {

@@ -146,7 +146,7 @@ pub fn model(control: Control) -> String {
     let (head, rest) = without_drive.split_once("<actuator>").expect("the model has actuators");
     let (_, tail) = rest.split_once("</actuator>").expect("the section ends");
     let mut text = format!("{head}<actuator>\n");
-    let compiled = Model::from_xml_str(MODEL, "marathon_man").expect("the model is valid");
+    let ranges = (control == Control::PdRange).then(middles_and_halves);
     for i in ACTIONS {
         let Joint { name, stiffness, strength, original, .. } = &JOINTS[i];
         let damping = DAMPING_TIME * stiffness;
@@ -157,11 +157,7 @@ pub fn model(control: Control) -> String {
                 format!(r#"gainprm="{original}" biasprm="0 -1 -1" forcerange="-{bound} {bound}""#)
             }
             _ => {
-                let [low, high] = compiled.joints[1 + i].range;
-                let (middle, reach) = match control {
-                    Control::PdRange => (0.5 * (low + high), 0.5 * (high - low)),
-                    _ => (0.0, 1.0),
-                };
+                let [middle, reach] = ranges.as_ref().map_or([0.0, 1.0], |ranges| ranges[i]);
                 let (gain, bias) = (stiffness * reach, stiffness * middle);
                 format!(
                     r#"gainprm="{gain}" biasprm="{bias} -{stiffness} -{damping}" forcerange="-{strength} {strength}""#
@@ -171,6 +167,15 @@ pub fn model(control: Control) -> String {
         text += &format!("    <general name=\"{name}\" joint=\"{name}\" biastype=\"affine\" {law}/>\n");
     }
     text + "  </actuator>" + tail
+}
+
+/// Middle of each joint's range and half of its width, rad.
+fn middles_and_halves() -> [[f64; 2]; 21] {
+    let model = Model::from_xml_str(MODEL, "marathon_man").expect("the model is valid");
+    std::array::from_fn(|i| {
+        let [low, high] = model.joints[1 + i].range;
+        [0.5 * (low + high), 0.5 * (high - low)]
+    })
 }
 
 #[cfg(test)]

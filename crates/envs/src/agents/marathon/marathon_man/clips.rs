@@ -7,6 +7,7 @@ use marathon_motion::Clip;
 
 use crate::agent::Value;
 use crate::agent::options::OptionValue;
+use crate::error::nearest;
 
 /// A clip that comes with the crate.
 struct Shipped {
@@ -27,7 +28,24 @@ macro_rules! shipped {
     };
 }
 
-static SHIPPED: [Shipped; 3] = shipped!["walk", "run", "backflip"];
+static SHIPPED: [Shipped; 16] = shipped![
+    "walk",
+    "walk_left",
+    "walk_right",
+    "run",
+    "backflip",
+    "spinkick",
+    "spin",
+    "cartwheel",
+    "roll",
+    "jump",
+    "kick",
+    "punch",
+    "dance",
+    "crawl",
+    "getup_facedown",
+    "getup_faceup",
+];
 
 /// Clips of callers.
 static ADDED: RwLock<Vec<(String, Arc<Clip>)>> = RwLock::new(Vec::new());
@@ -46,9 +64,11 @@ pub fn find(name: &str) -> Option<Arc<Clip>> {
     of_callers.or_else(|| SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| (*shipped.clip).clone()))
 }
 
-/// Names of the clips that come with the crate.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    SHIPPED.iter().map(|shipped| shipped.name)
+/// Names of all clips that are known, those that come with the crate first.
+pub fn all_names() -> Vec<String> {
+    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
+    let of_callers = added.iter().map(|(name, _)| name.clone());
+    SHIPPED.iter().map(|shipped| shipped.name.to_string()).chain(of_callers).collect()
 }
 
 /// A clip as an argument: its name.
@@ -56,14 +76,30 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub struct ClipName(pub String);
 
 impl OptionValue for ClipName {
-    const EXPECTED: &'static str = "the name of a clip that is known";
+    const EXPECTED: &'static str = "the name of a clip";
     fn value(&self) -> Value {
         Value::Text(self.0.clone())
     }
     fn read(value: &Value) -> Option<Self> {
         match value {
-            Value::Text(name) if find(name).is_some() => Some(ClipName(name.clone())),
+            Value::Text(name) => Some(ClipName(name.clone())),
             _ => None,
         }
+    }
+}
+
+impl ClipName {
+    /// Whether there is such a clip.
+    ///
+    /// # Errors
+    /// If there is not; the text names the nearest.
+    pub fn check(&self) -> Result<(), String> {
+        if find(&self.0).is_some() {
+            return Ok(());
+        }
+        let names = all_names();
+        let near = nearest(&self.0, names.iter().map(String::as_str));
+        let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+        Err(format!("option clip is '{}', expected a clip that is known{near} known: {}", self.0, names.join(", ")))
     }
 }

@@ -82,7 +82,7 @@ crate::options! {
         /// its first five terms below 0.334 ends it instead.
         distance: Scale = Scale(0.5),
         /// Most that an action of `pd` moves a target, rad.
-        reach: Scale = Scale(0.5),
+        reach: Scale = Scale(1.0),
     }
 }
 
@@ -96,25 +96,35 @@ pub struct MarathonMan {
     arguments: Arguments,
 }
 
-/// Marathon Man with each clip that comes with the crate, and with any.
+/// Tasks with a clip of their own: id, clip, and what the figure is to do.
+const TASKS: [(&str, &str, &str); 16] = [
+    ("MarathonManWalk-v0", "walk", "a figure of 21 motors: walk as a person does"),
+    ("MarathonManWalkLeft-v0", "walk_left", "a figure of 21 motors: walk on a circle to the left"),
+    ("MarathonManWalkRight-v0", "walk_right", "a figure of 21 motors: walk on a circle to the right"),
+    ("MarathonManRun-v0", "run", "a figure of 21 motors: run as a person does"),
+    ("MarathonManBackflip-v0", "backflip", "a figure of 21 motors: one backflip after another"),
+    ("MarathonManSpinKick-v0", "spinkick", "a figure of 21 motors: kick out of a turn in the air"),
+    ("MarathonManSpin-v0", "spin", "a figure of 21 motors: turn in the air"),
+    ("MarathonManCartwheel-v0", "cartwheel", "a figure of 21 motors: one cartwheel after another"),
+    ("MarathonManRoll-v0", "roll", "a figure of 21 motors: roll forward and get up"),
+    ("MarathonManJump-v0", "jump", "a figure of 21 motors: jump forward"),
+    ("MarathonManKick-v0", "kick", "a figure of 21 motors: kick"),
+    ("MarathonManPunch-v0", "punch", "a figure of 21 motors: punch"),
+    ("MarathonManDance-v0", "dance", "a figure of 21 motors: dance"),
+    ("MarathonManCrawl-v0", "crawl", "a figure of 21 motors: crawl on hands and knees"),
+    ("MarathonManGetUpFaceDown-v0", "getup_facedown", "a figure of 21 motors: get up, lying on the belly"),
+    ("MarathonManGetUpFaceUp-v0", "getup_faceup", "a figure of 21 motors: get up, lying on the back"),
+];
+
+/// Marathon Man with any clip, and with each that comes with the crate.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
-    const TASKS: [(&str, &str, &str); 3] = [
-        ("MarathonManWalk-v0", "walk", "a figure of 21 motors: walk as a person does"),
-        ("MarathonManRun-v0", "run", "a figure of 21 motors: run as a person does"),
-        ("MarathonManBackflip-v0", "backflip", "a figure of 21 motors: one backflip after another"),
-    ];
-    let any = MarathonMan {
-        id: "MarathonMan-v0",
-        summary: "a figure of 21 motors: move as a motion clip does",
-        any_clip: true,
-        arguments: Arguments::default(),
-    };
-    let mut out: Vec<Arc<dyn AnyAgent>> = vec![Arc::new(any)];
-    for (id, clip, summary) in TASKS {
+    let any = ("MarathonMan-v0", "walk", "a figure of 21 motors: move as a motion clip does");
+    let tasks = [any].into_iter().chain(TASKS).enumerate();
+    let agent = |(i, (id, clip, summary)): (usize, (&'static str, &str, &'static str))| {
         let arguments = Arguments { clip: ClipName(clip.into()), ..Arguments::default() };
-        out.push(Arc::new(MarathonMan { id, summary, any_clip: false, arguments }));
-    }
-    out
+        Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
+    };
+    tasks.map(agent).collect()
 }
 
 impl MarathonMan {
@@ -179,6 +189,7 @@ impl Agent for MarathonMan {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
+        self.arguments.clip.check()?;
         let expected = JOINTS.each_ref().map(|joint| joint.name);
         let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
         if found == expected {
