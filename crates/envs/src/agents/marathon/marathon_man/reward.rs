@@ -167,7 +167,7 @@ fn paper_worths<T: Real>(s: &Senses<T>) -> [T; 4] {
         let near = clamp(d.neg_mul_add(T::lit(1.0 / f64::from(most)), T::lit(1.0)), 0.0, 1.0);
         *d = T::lit(1.0);
         for _ in 0..most {
-            *d = *d * near;
+            *d *= near;
         }
     }
     worths
