@@ -592,6 +592,21 @@ class Simulation:
 
         Force, N, and torque, N m, are in world axes, at the body's center of mass.
         """
+    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
+        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
+
+        The first row has the smallest y. The ground lasts over resets, until changed, and belongs to snapshots.
+        """
+    def ground_height(self, x: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Heights of the ground at places of the world, m, ``(num_agents, n)``.
+
+        It is the ground of planes and of height fields that lie level, with ground of each agent's own. Beyond all of
+        it, the height is that of the nearest place; 0 if the model has no ground.
+
+        Args:
+            x: places along x, m, ``(num_agents, n)``.
+            y: places along y, m, ``(num_agents, n)``.
+        """
     def save(self) -> bytes:
         """Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits."""
     def load(self, snapshot: bytes) -> None:

@@ -248,6 +248,13 @@ class AgentVecEnv:
             self.due[due] = steps[due] + np.maximum(np.asarray(holds, np.int64), 1)
         return np.where(self.commanded[:, None], self.given, self.scheduled)
 
+    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
+        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
+
+        The first row has the smallest y. The ground lasts over resets, until changed.
+        """
+        self.agent.sim.set_ground(agent, field, elevations)
+
     def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
         """Tell agents what to do, or give them back to their schedule with None, as `VecEnv.set_command`."""
         chosen, ranges = self._mask(mask), self.agent.commands

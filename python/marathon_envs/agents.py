@@ -256,6 +256,41 @@ class MarathonAgent:
         """Velocity of the joint that each motor drives: half turns per second for hinges, m/s for slides, `(N, nu)`."""
         return self.sim.qvel[:, self._motor_dofs] * self._motor_scale
 
+    def ground_height(self, x: FloatArray | float, y: FloatArray | float) -> FloatArray:
+        """Height of the ground at places of the world, m: of planes, and of height fields that lie level.
+
+        `x` and `y`, m, are `(N,)` or `(N, k)`, or numbers, and so is the result: `(N,)`, or `(N, k)`. Every agent has
+        its own ground. Beyond all of it, the height is that of the nearest place; 0 if the model has none.
+        """
+        x, y = np.broadcast_arrays(x, y)
+        shape = x.shape or (self.num_agents,)
+        rows = shape if len(shape) == 2 else (self.num_agents, 1)
+        x, y = (np.broadcast_to(places, shape).reshape(rows) for places in (x, y))
+        return self.sim.ground_height(x, y).reshape(shape)
+
+    def heading(self, part: str) -> FloatArray:
+        """Which way a part's forward axis points along the ground, `(N, 2)`: cosine and sine of the angle from +x.
+
+        Of an axis that points straight up or down, that of +x.
+        """
+        x, y, _ = self.forward(part).T
+        length = np.hypot(x, y)
+        level = length > 1e-6
+        scale = np.where(level, length, 1.0)
+        return np.stack([np.where(level, x / scale, 1.0), np.where(level, y / scale, 0.0)], 1)
+
+    def height_scan(self, part: str, points: Sequence[tuple[float, float]] | FloatArray) -> FloatArray:
+        """How far the ground is above a part's center, m, mostly negative, `(N, len(points))`.
+
+        The points are `(ahead, left)` of the center, m, by the part's `heading`.
+        """
+        ahead, left = np.reshape(np.asarray(points, float), (-1, 2)).T
+        center, heading = self.position(part), self.heading(part)
+        cosine, sine = heading[:, :1], heading[:, 1:]
+        x = center[:, :1] + cosine * ahead - sine * left
+        y = center[:, 1:2] + sine * ahead + cosine * left
+        return self.ground_height(x, y) - center[:, 2:]
+
     # -------------------------------------------------------------------------------------------------- helper library
 
     def velocity(self, part: str) -> FloatArray:

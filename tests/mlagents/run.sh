@@ -19,12 +19,12 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   touch .venv-mlagents/complete
 fi
 # `--workspace` and a test among the targets keep the features of dependencies, and with them what ./test.sh has built
-targets=(--bin marathon-player --bin marathon --test errors_say_what_to_do)
+targets=(--bin marathon-player --bin own_player --bin marathon --test errors_say_what_to_do)
 . tests/packages.sh
 if [ -n "${MARATHON_TEST_GAME:-}" ]; then
   targets+=(--bin marathon-game)
 fi
 cargo build --release "${packages[@]}" "${targets[@]}"
 bin="$(cargo metadata --format-version 1 --no-deps | "$python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/release"
-export MARATHON_PLAYER="$bin/marathon-player" MARATHON="$bin/marathon" MARATHON_GAME="$bin/marathon-game"
+export MARATHON_PLAYER="$bin/marathon-player" OWN_PLAYER="$bin/own_player" MARATHON="$bin/marathon" MARATHON_GAME="$bin/marathon-game"
 exec "$python" -m pytest --quiet -c tests/mlagents/pytest.ini tests/mlagents "$@"

@@ -20,13 +20,15 @@ use thiserror::Error;
 /// Seconds that a prefab is simulated for at a time, about.
 const PREFAB_DT: f64 = 0.01;
 
-/// Why a character cannot be simulated.
+/// Why a character cannot be simulated, or told what to do.
 #[derive(Debug, Error)]
 pub(crate) enum HerdError {
     #[error(transparent)]
     Env(#[from] EnvError),
     #[error(transparent)]
     Sim(#[from] marathon_physics::SimError),
+    #[error("a body without a task takes no command")]
+    Command,
 }
 
 /// All ragdolls of one kind.
@@ -129,6 +131,8 @@ pub(crate) struct Resident {
     pub number: u64,
     pub policy: Option<Arc<Policy>>,
     pub controls: Option<Controls>,
+    /// What it is told in place of its own schedule.
+    pub command: Option<Vec<f64>>,
     pub restart: Restart,
     pub episode: Episode,
     /// States that frames are drawn from, oldest first.
@@ -177,6 +181,7 @@ impl Resident {
             restart,
             policy: None,
             controls: None,
+            command: None,
             episode: Episode::default(),
             trail: VecDeque::new(),
             events: Vec::new(),
@@ -271,6 +276,10 @@ impl Pen {
     pub fn dismiss(&mut self, lane: usize) {
         self.lanes[lane] = None;
         self.vary(lane, &Variation::none(&self.model.clone()));
+        if let Engine::Env(env) = self.engine.get() {
+            // any agent can be given back to its schedule
+            let _ = env.set_command(lane, None);
+        }
         self.reset(lane);
     }
 
@@ -280,6 +289,19 @@ impl Pen {
             Engine::Env(env) => drop(env.vary(lane, variation)),
             Engine::Free(batch, _) => batch.vary(lane, variation),
         }
+    }
+
+    /// Tells a ragdoll what to do, or gives it back to its own schedule. A body without a task can be told nothing.
+    pub fn command(&mut self, lane: usize, command: Option<Vec<f64>>) -> Result<(), HerdError> {
+        let told = match self.engine.get() {
+            Engine::Env(env) => env.set_command(lane, command.as_deref()).map_err(HerdError::from),
+            Engine::Free(..) if command.is_some() => Err(HerdError::Command),
+            Engine::Free(..) => Ok(()),
+        };
+        if let Some(resident) = &mut self.lanes[lane] {
+            resident.command = command;
+        }
+        told
     }
 
     /// Puts a ragdoll into a state.
@@ -316,13 +338,17 @@ impl Pen {
         }
     }
 
-    /// Appends the state of a lane to its trail.
+    /// Appends the state of a lane to its trail, and notes what it is told.
     fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
-        let (qpos, qvel) = match self.engine.get() {
-            Engine::Env(env) => env.state(lane).map(|s| (s.qpos, s.qvel)).unwrap_or_default(),
-            Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane)),
+        let (qpos, qvel, command) = match self.engine.get() {
+            Engine::Env(env) => {
+                let command = env.context(lane).map(|context| context.command()).unwrap_or_default();
+                env.state(lane).map(|s| (s.qpos, s.qvel, command)).unwrap_or_default()
+            }
+            Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new()),
         };
         if let Some(resident) = &mut self.lanes[lane] {
+            resident.episode.command = command;
             resident.trail.push_back(Still { time, qpos, qvel, fresh });
         }
     }

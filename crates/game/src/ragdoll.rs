@@ -72,6 +72,13 @@ pub struct Policy(pub Handle<PolicyAsset>);
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct Controls(pub Vec<f32>);
 
+/// What a [`Ragdoll`] is told to do, if its agent takes commands ([`Spec::command`]): a number for each, within its range.
+/// Without it, and with `None`, the agent follows its own schedule.
+///
+/// The agent observes it at the end of its next decision, or at the start of its next episode.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct AgentCommand(pub Option<Vec<f64>>);
+
 /// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`] tells of the
 /// arrival.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
@@ -124,6 +131,8 @@ pub struct Episode {
     pub speed: f32,
     /// Actions of the last decision.
     pub action: Vec<f32>,
+    /// What it is told to do, in the order of [`Spec::command`]: by an [`AgentCommand`], or by its own schedule.
+    pub command: Vec<f64>,
     /// Feet on the ground in the last decision: a bit each, in the order of [`Anatomy::feet`].
     pub feet: u32,
     /// It has fallen and lies limp, see [`Restart`].

@@ -6,8 +6,8 @@ use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
-    Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Part, Physique, Policy, Push, Ragdoll,
-    Restart, RestartNow, Target, TargetReached, Unfit,
+    AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Part, Physique, Policy, Push,
+    Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
 };
 use crate::stage;
 use bevy::ecs::lifecycle::Remove;
@@ -185,10 +185,24 @@ pub(crate) fn dismiss(left: On<Remove, Seat>, seats: Query<&Seat>, mut marathon:
 pub(crate) fn take_in(
     mut marathon: ResMut<Marathon>,
     policies: Res<Assets<PolicyAsset>>,
-    ragdolls: Query<(&Seat, &Anatomy, Option<&Policy>, Option<Ref<Controls>>, Ref<Restart>, Option<Ref<Physique>>)>,
+    ragdolls: Query<(
+        &Seat,
+        &Anatomy,
+        Option<&Policy>,
+        Option<Ref<Controls>>,
+        Option<&AgentCommand>,
+        Ref<Restart>,
+        Option<Ref<Physique>>,
+    )>,
 ) {
-    for (seat, anatomy, policy, controls, restart, physique) in &ragdolls {
+    for (seat, anatomy, policy, controls, command, restart, physique) in &ragdolls {
         let Some(pen) = marathon.pen(*seat) else { continue };
+        let wanted = command.and_then(|command| command.0.as_ref());
+        if pen.lanes[seat.lane].as_ref().is_some_and(|resident| resident.command.as_ref() != wanted)
+            && let Err(error) = pen.command(seat.lane, wanted.cloned())
+        {
+            error!("an AgentCommand cannot be followed: {error}");
+        }
         if let Some(physique) = physique.filter(|p| p.is_changed()) {
             let (v, model) = (&physique.0, &anatomy.model);
             if v.mass.len() == model.bodies.len() && v.strength.len() == model.nu {

@@ -70,6 +70,8 @@ pub struct Behavior {
     resets: u64,
     /// Whether any agent has ever been varied.
     varied: bool,
+    /// Whether parameters have ever told an agent what to do.
+    commanded: bool,
 }
 
 impl Behavior {
@@ -90,7 +92,7 @@ impl Behavior {
         let env = VecEnv::new(&options.env, &made)?;
         let spec = env.spec().clone();
         let model = Arc::new(registry::agent(&spec.id)?.model()?);
-        let names = Names::new(&model, &spec.action_names, &spec.options);
+        let names = Names::new(&model, &spec.action_names, &spec.command, &spec.options);
         let n = env.agents();
         Ok(Behavior {
             name: format!("{}?team=0", options.name.as_ref().unwrap_or(&spec.id)),
@@ -103,6 +105,7 @@ impl Behavior {
             info: AgentInfo { observations: vec![observation(&vec![0.0; spec.obs])], ..Default::default() },
             resets: 0,
             varied: false,
+            commanded: false,
             spec,
             env,
             made,
@@ -172,11 +175,19 @@ impl Behavior {
         configured.and(varied)
     }
 
-    /// Takes in what parameters say of all agents alike, also in the middle of episodes.
+    /// Takes in parameters that hold in the middle of episodes, too: what agents are told, and what they say of all agents
+    /// alike.
     ///
     /// # Errors
-    /// If an argument makes no sense, or would change the observations or actions; the old ones stay.
-    pub fn configure(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
+    /// If a command is out of its range; an argument makes no sense, or would change the observations or actions. The old
+    /// ones stay.
+    pub fn change(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
+        let configured = self.configure(parameters);
+        (0..self.ended.len()).map(|i| self.command(i, parameters)).fold(configured, Result::and)
+    }
+
+    /// Takes in what parameters say of all agents alike.
+    fn configure(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
         let mut wanted = self.made.clone();
         parameters.configure(&self.names, self.resets, &mut wanted);
         if wanted.options == self.made.options && wanted.max_episode_steps == self.made.max_episode_steps {
@@ -259,8 +270,19 @@ impl Behavior {
                 // the others must not suffer from one impossible draw
                 result = result.and(self.env.vary(i, &own).map_err(PlayerError::from));
             }
+            result = result.and(self.command(i, parameters));
         }
         result
+    }
+
+    /// Tells an agent what parameters say, or gives it back to its schedule if they no longer say anything.
+    fn command(&mut self, agent: usize, parameters: &Parameters) -> Result<(), PlayerError> {
+        let command = parameters.command(&self.names, &self.spec.command, agent as u64, self.begun[agent]);
+        if command.is_some() || self.commanded {
+            self.commanded = true;
+            self.env.set_command(agent, command.as_deref())?;
+        }
+        Ok(())
     }
 
     /// Forgets which episodes ended, and what they amounted to.
@@ -390,7 +412,7 @@ mod tests {
         }
         let mut longer = Parameters::default();
         longer.set("max_episode_steps".into(), Sampler::Constant(200.0));
-        changed.configure(&longer).unwrap();
+        changed.change(&longer).unwrap();
         for _ in 0..5 {
             plain.step(None, &none).unwrap();
             changed.step(None, &longer).unwrap();

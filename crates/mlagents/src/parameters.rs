@@ -4,7 +4,7 @@
 //! parameter's name, the agent and its episode alone, so a training run is the same whenever it is repeated.
 
 use crate::channels::Sampler;
-use marathon_envs::VecEnvOptions;
+use marathon_envs::{CommandRange, VecEnvOptions};
 use marathon_physics::{Model, Variation};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -25,6 +25,8 @@ enum Target {
     MotorStrength(usize),
     /// Gravity, m/s^2, in the model's own direction.
     Gravity,
+    /// A number of what the agents are told.
+    Command(usize),
     /// Decisions after which an episode is truncated.
     MaxEpisodeSteps,
     /// A named argument of the agent.
@@ -37,8 +39,13 @@ pub struct Names {
 }
 
 impl Names {
-    /// Those of an agent with this model and these named arguments, of which only the numbers count.
-    pub fn new(model: &Model, actuators: &[String], options: &marathon_envs::Options) -> Self {
+    /// Those of an agent with this model, this command and these named arguments, of which only the numbers count.
+    pub fn new(
+        model: &Model,
+        actuators: &[String],
+        command: &[CommandRange],
+        options: &marathon_envs::Options,
+    ) -> Self {
         let plain = [
             ("mass", Target::Mass),
             ("friction", Target::Friction),
@@ -52,6 +59,8 @@ impl Names {
         known.extend(bodies.map(|(i, body)| (format!("mass.{}", body.name), Target::BodyMass(i))));
         let motors = actuators.iter().enumerate();
         known.extend(motors.map(|(i, name)| (format!("strength.{name}"), Target::MotorStrength(i))));
+        let told = command.iter().enumerate();
+        known.extend(told.map(|(i, range)| (format!("command.{}", range.name), Target::Command(i))));
         let numbers = options.iter().filter(|(_, value)| matches!(value, marathon_envs::Value::Number(_)));
         known.extend(numbers.map(|(name, _)| (name.to_string(), Target::Option(name.to_string()))));
         Names { known }
@@ -91,7 +100,7 @@ impl Parameters {
         let mut parts = Vec::new();
         for (name, sampler) in &self.samplers {
             let Some(target) = names.find(name) else { continue };
-            if matches!(target, Target::MaxEpisodeSteps | Target::Option(_)) {
+            if matches!(target, Target::Command(_) | Target::MaxEpisodeSteps | Target::Option(_)) {
                 continue;
             }
             let x = f64::from(draw(sampler, name, agent, episode));
@@ -114,6 +123,25 @@ impl Parameters {
             }
         }
         own
+    }
+
+    /// What an agent is told in an episode of its own, in place of its schedule; `None` if no parameter speaks of that. NaN
+    /// takes a parameter back, and numbers that none speaks of are at [rest](CommandRange::rest).
+    pub fn command(&self, names: &Names, ranges: &[CommandRange], agent: u64, episode: u64) -> Option<Vec<f64>> {
+        let mut told: Option<Vec<f64>> = None;
+        for (name, sampler) in &self.samplers {
+            let Some(Target::Command(i)) = names.find(name) else { continue };
+            let x = draw(sampler, name, agent, episode);
+            if x.is_nan() {
+                continue;
+            }
+            let (CommandRange { low, high, .. }, wide) = (&ranges[*i], f64::from(x));
+            // the end of a range may lie between two numbers of single precision
+            let ends = *low as f32..=*high as f32;
+            let x = if ends.contains(&x) { wide.max(*low).min(*high) } else { wide };
+            told.get_or_insert_with(|| ranges.iter().map(CommandRange::rest).collect())[*i] = x;
+        }
+        told
     }
 
     /// Writes into `options` what holds for all agents of an environment alike: the length of episodes and named arguments,
@@ -188,7 +216,7 @@ mod tests {
         let model = agent("Hopper-v5").unwrap().model().unwrap();
         let actuators: Vec<_> = model.actuators.iter().map(|a| a.name.clone()).collect();
         let options = Options::new().with("ctrl_cost_weight", 0.001).with("xml_file", "hopper.xml");
-        (Names::new(&model, &actuators, &options), Variation::none(&model))
+        (Names::new(&model, &actuators, &[], &options), Variation::none(&model))
     }
 
     #[test]
@@ -210,6 +238,33 @@ mod tests {
         assert_eq!(options.options, Options::new().with("ctrl_cost_weight", 0.25));
         // an argument that is no number is no parameter
         assert!(!names.iter().any(|name| name == "xml_file"));
+    }
+
+    #[test]
+    fn commands_are_drawn_for_each_agent_and_episode_and_taken_back() {
+        let (model, options) = (agent("Hopper-v5").unwrap().model().unwrap(), Options::new());
+        let ranges = [CommandRange::new("speed", 0.5..=3.1, "m/s"), CommandRange::new("turn", -1.0..=1.0, "rad/s")];
+        let names = Names::new(&model, &[], &ranges, &options);
+        let mut parameters = Parameters::default();
+        let command = |parameters: &Parameters, agent| parameters.command(&names, &ranges, agent, 1);
+        parameters.set("mass".into(), Sampler::Constant(2.0));
+        assert_eq!(command(&parameters, 0), None);
+        parameters.set("command.turn".into(), Sampler::Uniform { seed: 1, min: -1.0, max: 1.0 });
+        let drawn: Vec<_> = (0..2).map(|agent| command(&parameters, agent).unwrap()).collect();
+        assert!(drawn[0][0] == 0.5 && drawn[0][1] != drawn[1][1] && drawn[0][1].abs() <= 1.0);
+        assert_ne!(parameters.command(&names, &ranges, 0, 2).unwrap(), drawn[0]);
+        // 3.1 in single precision is more than 3.1
+        parameters.set("command.speed".into(), Sampler::Constant(3.1));
+        assert_eq!(command(&parameters, 0).unwrap(), [3.1, drawn[0][1]]);
+        // what is out of range is refused where it is set
+        parameters.set("command.speed".into(), Sampler::Constant(4.0));
+        assert_eq!(command(&parameters, 0).unwrap()[0], 4.0);
+        for name in ["command.speed", "command.turn"] {
+            parameters.set(name.into(), Sampler::Constant(f32::NAN));
+        }
+        assert_eq!(command(&parameters, 0), None);
+        // a command is no variation
+        assert_eq!(parameters.variation(&names, &Variation::none(&model), 0, 1).unwrap().mass[1], 2.0);
     }
 
     #[test]

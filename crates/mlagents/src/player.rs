@@ -171,9 +171,9 @@ impl Player {
         for behavior in &mut self.behaviors {
             let done = match turn {
                 Turn::Step => {
-                    let configured = if changed { behavior.configure(&self.parameters) } else { Ok(()) };
+                    let changed = if changed { behavior.change(&self.parameters) } else { Ok(()) };
                     let actions = order.agent_actions.get(behavior.name());
-                    behavior.step(actions, &self.parameters).and(configured)
+                    behavior.step(actions, &self.parameters).and(changed)
                 }
                 _ => behavior.reset(seed, &self.parameters),
             };

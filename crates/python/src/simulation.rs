@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::{error, number};
 use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity};
 use numpy::ndarray::Ix2;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::basic::CompareOp;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -148,6 +148,55 @@ impl Simulation {
         self.read.clear();
         self.batch().push(agent, body, force, torque);
         Ok(())
+    }
+
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
+    /// first of which has the smallest y. It lasts over resets, until changed, and belongs to snapshots.
+    fn set_ground(
+        &mut self,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+        #[pyo3(from_py_with = number::field)] field: usize,
+        elevations: Vec<f32>,
+    ) -> PyResult<()> {
+        let model = &self.model.get().inner;
+        for (what, found, n) in [("agent", agent, self.num_agents), ("field", field, model.hfields.len())] {
+            if found >= n {
+                return Err(error::value(format!("{what} is {found}, expected less than {n}")));
+            }
+        }
+        let (rows, columns) = (model.hfields[field].nrow, model.hfields[field].ncol);
+        if elevations.len() != rows * columns {
+            let found = elevations.len();
+            return Err(error::value(format!("elevations has length {found}, expected {rows} * {columns}")));
+        }
+        if let Some(x) = elevations.iter().find(|x| !x.is_finite()) {
+            return Err(error::value(format!("elevations has a number that is {x}, expected finite ones")));
+        }
+        self.read.clear();
+        self.batch().set_ground(agent, field, &elevations);
+        Ok(())
+    }
+
+    /// Heights of the ground at places of the world, m, `(num_agents, n)`: of planes and of height fields that lie level,
+    /// with ground of each agent's own. `x` and `y`, m, are `(num_agents, n)`. Beyond all ground, the height is that of the
+    /// nearest place; 0 if the model has no ground.
+    fn ground_height<'py>(
+        &mut self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        y: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let shape: Vec<usize> = py.import("numpy")?.call_method1("shape", (x,))?.extract()?;
+        let n = if shape.len() == 2 { shape[1] } else { 1 };
+        let x = of_shape::<f64, Ix2, 2>("x has", x, [self.num_agents, n])?;
+        let y = of_shape::<f64, Ix2, 2>("y has", y, [self.num_agents, n])?;
+        let places: Vec<[f64; 2]> = rows(&x).iter().zip(rows(&y).iter()).map(|(x, y)| [*x, *y]).collect();
+        let heights = PyArray2::<f64>::zeros(py, [self.num_agents, n], false);
+        let mut writer = heights.try_readwrite().map_err(|e| error::array("heights", e))?;
+        let (rows, batch) = (writer.as_slice_mut()?, self.batch());
+        py.detach(|| batch.ground_height(&places, rows));
+        drop(writer);
+        Ok(heights)
     }
 
     /// Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits.

@@ -1,7 +1,7 @@
 //! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
 
 use marathon_physics::lanes::Real;
-use marathon_physics::model::{Actuator, Geom, GeomType, JointType, Model};
+use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
 
 use super::{Facts, ModelSource};
@@ -174,14 +174,7 @@ impl<T: Real> Bindings<T> {
         let moves = |g: usize| model.bodies[model.geoms[g].body].weld_id != 0;
         let not_feet = (0..model.geoms.len()).filter(|g| moves(*g) && !feet.contains(g)).collect();
 
-        let still = |kind: GeomType| {
-            let ground = move |g: &usize| {
-                let Geom { kind: own, contype, conaffinity, .. } = &model.geoms[*g];
-                *own == kind && !moves(*g) && (*contype != 0 || *conaffinity != 0)
-            };
-            (0..model.geoms.len()).filter(ground)
-        };
-        let grounds = still(GeomType::Plane).chain(still(GeomType::Hfield)).collect();
+        let grounds = model.grounds();
 
         let mut driven: Vec<usize> = Vec::new();
         let mut motors = Vec::new();

@@ -24,6 +24,11 @@ impl CommandRange {
     pub fn new(name: &str, range: RangeInclusive<f64>, unit: &str) -> Self {
         CommandRange { name: name.into(), low: *range.start(), high: *range.end(), unit: unit.into() }
     }
+
+    /// The value nearest to zero: what an agent is told before anybody tells it anything.
+    pub fn rest(&self) -> f64 {
+        0.0_f64.max(self.low).min(self.high)
+    }
 }
 
 /// Where an agent turns its action into the controls of its actuators, see [`Agent::ctrl`](crate::Agent::ctrl).

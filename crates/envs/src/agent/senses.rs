@@ -155,12 +155,7 @@ impl<T: Real> Senses<'_, T> {
     /// agent's own. Beyond all of it, that of the nearest place; 0 if the model has none.
     #[inline(always)]
     pub fn ground_height(&self, x: T, y: T) -> T {
-        let mut height = T::zero();
-        for (i, geom) in self.bindings.grounds.iter().enumerate() {
-            let (own, on) = self.readings.elevation(*geom, x, y);
-            height = if i == 0 { own } else { T::select(on, height.max(own), height) };
-        }
-        height
+        self.readings.ground_height(&self.bindings.grounds, x, y)
     }
 
     /// Height of the ground `ahead` of a part's center and to its `left`, m, by its [heading](Senses::heading).

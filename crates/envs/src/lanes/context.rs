@@ -108,9 +108,9 @@ impl<T: Real> Commands<T> {
     }
 }
 
-/// The command before any schedule: the values nearest to zero.
+/// The command before any schedule.
 fn idle(ranges: &[CommandRange]) -> Vec<f64> {
-    ranges.iter().map(|range| 0.0_f64.max(range.low).min(range.high)).collect()
+    ranges.iter().map(CommandRange::rest).collect()
 }
 
 impl SavedCommand {

@@ -6,6 +6,7 @@ use crate::app::keys::{Deed, Do};
 use crate::app::menu::Menu;
 use crate::app::notes::Notes;
 use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name, shipped_agents};
+use crate::app::steer::Steering;
 use crate::look::FollowCamera;
 use crate::ragdoll::RestartNow;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
@@ -102,7 +103,8 @@ pub fn stage(
     }
 }
 
-/// Turns the camera: right or middle mouse button, wheel, right stick.
+/// Turns the camera: right or middle mouse button, wheel, right stick; the left one, if nobody is steered with it.
+#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 pub fn look(
     time: Res<Time<Real>>,
     buttons: Res<ButtonInput<MouseButton>>,
@@ -110,6 +112,7 @@ pub fn look(
     scroll: Res<AccumulatedMouseScroll>,
     wants: Option<Res<EguiWantsInput>>,
     pads: Query<&Gamepad>,
+    steering: Res<Steering>,
     mut cameras: Query<&mut FollowCamera>,
 ) {
     let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
@@ -125,7 +128,9 @@ pub fn look(
         let axis = |axis| pad.get(axis).filter(|x: &f32| x.abs() > 0.12).unwrap_or(0.0);
         yaw -= axis(GamepadAxis::RightStickX) * TURN[1] * time.delta_secs();
         pitch += axis(GamepadAxis::RightStickY) * TURN[1] * time.delta_secs();
-        zoom *= (-axis(GamepadAxis::LeftStickY) * time.delta_secs()).exp();
+        if !steering.0 {
+            zoom *= (-axis(GamepadAxis::LeftStickY) * time.delta_secs()).exp();
+        }
     }
     if yaw == 0.0 && pitch == 0.0 && zoom == 1.0 {
         return;

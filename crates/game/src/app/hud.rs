@@ -6,8 +6,9 @@ use crate::app::learn::Lesson;
 use crate::app::notes::Notes;
 use crate::app::replay::Recorder;
 use crate::app::show::{Actor, Focus, Show};
+use crate::app::steer::Steering;
 use crate::look::FollowCamera;
-use crate::ragdoll::{Anatomy, Episode};
+use crate::ragdoll::{AgentCommand, Anatomy, Episode};
 use crate::simulate::Marathon;
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
@@ -148,7 +149,8 @@ pub fn draw(
     time: Res<Time<Virtual>>,
     frames: Res<Time<Real>>,
     mut smooth: Local<f32>,
-    actors: Query<(&Actor, &Anatomy, &Episode)>,
+    steering: Res<Steering>,
+    actors: Query<(&Actor, &Anatomy, &Episode, Option<&AgentCommand>)>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?.clone();
     say(&ctx, &notes);
@@ -159,7 +161,7 @@ pub fn draw(
     *smooth = if *smooth > 0.0 { *smooth + 0.05 * (delta - *smooth) } else { delta };
     let actor = actors.iter().find(|(a, ..)| a.0 == focus.0);
     let room = ctx.content_rect().size();
-    if let Some((_, anatomy, episode)) = actor {
+    if let Some((_, anatomy, episode, command)) = actor {
         Area::new(Id::new("who")).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
             card().show(ui, |ui| {
                 let of = if show.agents > 1 { format!("  {} of {}", focus.0 + 1, show.agents) } else { String::new() };
@@ -184,6 +186,14 @@ pub fn draw(
                     let Episode { number, seconds, total, .. } = episode;
                     let run = format!("episode {number}   {seconds:.1} s   return {total:.0}{state}");
                     line(ui, text(13.0, if episode.down { BAD } else { FAINT }, run));
+                }
+                if let Some(spec) = &anatomy.spec {
+                    for (range, x) in spec.command.iter().zip(&episode.command) {
+                        let by = if command.is_some() { "you" } else { "its schedule" };
+                        let told =
+                            format!("{}: {} {}   by {by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
+                        line(ui, text(13.0, if command.is_some() { ACCENT } else { FAINT }, told));
+                    }
                 }
                 let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
                 let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
@@ -217,7 +227,7 @@ pub fn draw(
         learning(&ctx, &lesson);
     }
     if room.x > ROOM[0] || hud.help {
-        keys(&ctx, &bindings, hud.help, show.mode);
+        keys(&ctx, &bindings, hud.help, show.mode, *steering);
     }
     Ok(())
 }
@@ -325,7 +335,7 @@ fn learning(ctx: &egui::Context, lesson: &Lesson) {
 }
 
 /// The keys: the most useful ones in a line, or all of them.
-fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
+fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steering: Steering) {
     if all {
         Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -44.0]).interactable(false).show(ctx, |ui| {
             card().show(ui, |ui| {
@@ -338,6 +348,13 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
                     }
                 });
                 ui.label(text(12.0, FAINT, "right mouse button or right stick: turn the camera   wheel: closer"));
+                if steering.0 {
+                    ui.label(text(
+                        12.0,
+                        FAINT,
+                        "left stick or arrow keys, which do nothing else here: tell it what to do",
+                    ));
+                }
             });
         });
     }
@@ -356,9 +373,17 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode) {
             ui,
             |ui| {
                 ui.horizontal(|ui| {
-                    for (_, name, key, _) in
-                        bindings.rows().filter(|row| useful.contains(&row.0) || row.0 == Deed::Help)
-                    {
+                    if steering.0 {
+                        ui.label(text(12.0, ACCENT, "arrows").strong());
+                        ui.label(text(12.0, TEXT, "steer"));
+                        ui.add_space(4.0);
+                    }
+                    let shown = |deed: Deed| match deed {
+                        Deed::Help => true,
+                        Deed::Release => steering.0,
+                        _ => useful.contains(&deed),
+                    };
+                    for (_, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {
                         ui.label(text(12.0, ACCENT, key).strong());
                         ui.label(text(12.0, TEXT, name));
                         ui.add_space(4.0);

@@ -1,5 +1,6 @@
 //! Keys and buttons: what they do, what they are called, and how they are changed and kept.
 
+use crate::app::steer::{ARROWS, Steering};
 use bevy::input::gamepad::{Gamepad, GamepadButton};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
@@ -50,6 +51,8 @@ pub enum Deed {
     Back,
     /// Half a second on in a replay.
     Ahead,
+    /// Give the character that one has steered back to its own schedule.
+    Release,
     /// A picture of the screen.
     Picture,
     /// Leave.
@@ -59,7 +62,7 @@ pub enum Deed {
 /// A deed, its name on the screen, its key and its button.
 type Row = (Deed, &'static str, KeyCode, Option<GamepadButton>);
 
-const DEFAULTS: [Row; 22] = [
+const DEFAULTS: [Row; 23] = [
     (Deed::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
     (Deed::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
     (Deed::Step, "one step", KeyCode::Period, None),
@@ -80,6 +83,7 @@ const DEFAULTS: [Row; 22] = [
     (Deed::Record, "record", KeyCode::KeyR, Some(GamepadButton::RightThumb)),
     (Deed::Back, "back", KeyCode::ArrowLeft, Some(GamepadButton::DPadLeft)),
     (Deed::Ahead, "ahead", KeyCode::ArrowRight, Some(GamepadButton::DPadRight)),
+    (Deed::Release, "let go", KeyCode::KeyG, Some(GamepadButton::LeftThumb)),
     (Deed::Picture, "picture", KeyCode::F12, None),
     (Deed::Quit, "quit", KeyCode::KeyQ, None),
 ];
@@ -252,6 +256,7 @@ fn button_name(button: GamepadButton) -> &'static str {
         GamepadButton::Select => "Back",
         GamepadButton::LeftTrigger => "LB",
         GamepadButton::RightTrigger => "RB",
+        GamepadButton::LeftThumb => "L3",
         GamepadButton::RightThumb => "R3",
         GamepadButton::DPadUp => "D-pad up",
         GamepadButton::DPadDown => "D-pad down",
@@ -262,18 +267,21 @@ fn button_name(button: GamepadButton) -> &'static str {
 }
 
 /// Turns keys and buttons into deeds.
-fn read(
+pub(super) fn read(
     keys: Res<ButtonInput<KeyCode>>,
     pads: Query<&Gamepad>,
     bindings: Res<Bindings>,
     rebinding: Res<Rebinding>,
     wants: Option<Res<EguiWantsInput>>,
+    steering: Option<Res<Steering>>,
     mut deeds: MessageWriter<Do>,
 ) {
     // a text field has the keyboard, or the next key is to be bound
     let typing = wants.is_some_and(|w| w.wants_keyboard_input()) || rebinding.0.is_some();
+    let steering = steering.is_some_and(|s| s.0);
     for (deed, _, key, button) in &bindings.rows {
-        let key = !typing && keys.just_pressed(*key);
+        let taken = typing || steering && ARROWS.contains(key);
+        let key = !taken && keys.just_pressed(*key);
         let button = button.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
         if key || button {
             deeds.write(Do(*deed));

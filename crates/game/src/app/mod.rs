@@ -15,6 +15,7 @@ mod notes;
 mod puppets;
 mod replay;
 mod show;
+mod steer;
 mod stream;
 mod weather;
 
@@ -27,6 +28,7 @@ pub use keys::{Bindings, Deed, Do, KeysPlugin};
 pub use learn::{Lesson, Teaching};
 pub use replay::{Playback, Recorder, Recording};
 pub use show::{Actor, Focus, Show, Source};
+pub use steer::Steering;
 pub use weather::{Ball, Weather, WeatherPlugin};
 
 use crate::look::{FollowCamera, FollowCameraPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin};
@@ -204,11 +206,12 @@ impl Plugin for GamePlugin {
         .insert_resource(Cues::new(args.press.clone()))
         .init_resource::<Focus>()
         .init_resource::<show::Script>()
+        .init_resource::<Steering>()
         .init_resource::<notes::Notes>()
         .init_resource::<menu::Menu>()
         .init_resource::<hud::Monitor>()
         .add_systems(Startup, open)
-        .add_systems(PreUpdate, cues::perform)
+        .add_systems(PreUpdate, (cues::perform, steer::steer.after(bevy::input::InputSystems).before(keys::read)))
         .add_systems(
             Update,
             (

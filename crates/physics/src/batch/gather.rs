@@ -75,6 +75,21 @@ impl Batch {
         }
         self.inner.gather(wanted);
     }
+
+    /// Writes the heights of the ground at places of the world, m, `[agents][n]`, as
+    /// [`Readings::ground_height`](crate::Readings::ground_height) has them: at `[x, y]`, m, `[agents][n]`. Every agent has
+    /// its own ground.
+    ///
+    /// # Panics
+    /// If there are not as many heights as places, or they are no rows of agents.
+    pub fn ground_height(&mut self, places: &[[f64; 2]], heights: &mut [f64]) {
+        assert_eq!(places.len(), heights.len(), "a height for each place");
+        assert_eq!(places.len() % self.agents, 0, "as many places for each agent");
+        let each = places.len() / self.agents;
+        if each > 0 {
+            self.inner.ground_height(&self.model.grounds(), places, each, heights);
+        }
+    }
 }
 
 /// Contacts of a group in the last call of [`Batch::step`], by geom.
@@ -148,6 +163,44 @@ impl<T: Real> LaneBatch<T> {
                 scope.spawn(move || read(groups, felt, work, own));
             }
         });
+    }
+}
+
+impl<T: Real> LaneBatch<T> {
+    /// Writes the heights of the ground at `each` places of every agent.
+    pub(super) fn ground_rows(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]) {
+        let LaneBatch { sim, groups, works, .. } = self;
+        // the ground does not move: its frames are the same in all groups
+        sim.refresh(&mut works[0], &groups[0]);
+        let rows = places.chunks(T::LANES * each).zip(heights.chunks_mut(T::LANES * each));
+        for (group, (places, heights)) in groups.iter().zip(rows) {
+            let readings = Readings::new(sim, group, &works[0]);
+            T::enter(Ground { readings, grounds, places, rows: AgentRows { rows: heights, width: each } });
+        }
+    }
+}
+
+/// Heights of the ground at places of the agents of one group.
+struct Ground<'a, T: Real> {
+    readings: Readings<'a, T>,
+    grounds: &'a [usize],
+    places: &'a [[f64; 2]],
+    rows: AgentRows<'a>,
+}
+
+impl<T: Real> Kernel<T> for Ground<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Ground { readings, grounds, places, mut rows } = self;
+        for column in 0..rows.width {
+            let (mut x, mut y) = (T::zero(), T::zero());
+            for (lane, places) in places.chunks_exact(rows.width).enumerate() {
+                x.set(lane, T::scalar(places[column][0]));
+                y.set(lane, T::scalar(places[column][1]));
+            }
+            rows.put(column, readings.ground_height(grounds, x, y));
+        }
     }
 }
 

@@ -19,6 +19,7 @@ pub(super) trait Lanes: Send {
     fn bodies(&mut self, agent: usize) -> Vec<BodyReading>;
     fn sensors(&mut self, agent: usize) -> Vec<f64>;
     fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]);
+    fn ground_height(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]);
     fn save(&self, agent: usize) -> AgentState;
     fn load(&mut self, agent: usize, state: &AgentState);
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
@@ -138,6 +139,10 @@ impl<T: Real> Lanes for LaneBatch<T> {
 
     fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {
         self.gather_rows(wanted);
+    }
+
+    fn ground_height(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]) {
+        self.ground_rows(grounds, places, each, heights);
     }
 
     fn save(&self, agent: usize) -> AgentState {

@@ -2,6 +2,21 @@
 
 use super::Readings;
 use crate::lanes::Real;
+use crate::model::{Geom, GeomType, Model};
+
+impl Model {
+    /// Geoms that do not move and that one may stand on: planes, then height fields.
+    pub fn grounds(&self) -> Vec<usize> {
+        let still = |kind: GeomType| {
+            let ground = move |g: &usize| {
+                let Geom { kind: own, contype, conaffinity, body, .. } = self.geoms[*g];
+                own == kind && self.bodies[body].weld_id == 0 && (contype != 0 || conaffinity != 0)
+            };
+            (0..self.geoms.len()).filter(ground)
+        };
+        still(GeomType::Plane).chain(still(GeomType::Hfield)).collect()
+    }
+}
 
 impl<T: Real> Readings<'_, T> {
     /// Height at (x, y) of a plane, or of a height field that lies level, m, and the lanes in which the geom covers that
@@ -26,5 +41,17 @@ impl<T: Real> Readings<'_, T> {
             covered |= T::Scalar::bits(own.covers(at)) << lane;
         }
         (height + center[2], T::from_bits(covered))
+    }
+
+    /// Height of the ground at (x, y), m, of the model's [`grounds`](Model::grounds): the highest of those that cover the
+    /// place. Beyond all of them, that of the nearest place of the first; 0 if there are none.
+    #[inline(always)]
+    pub fn ground_height(&self, grounds: &[usize], x: T, y: T) -> T {
+        let mut height = T::zero();
+        for (i, geom) in grounds.iter().enumerate() {
+            let (own, on) = self.elevation(*geom, x, y);
+            height = if i == 0 { own } else { T::select(on, height.max(own), height) };
+        }
+        height
     }
 }

@@ -1,0 +1,216 @@
+//! A player tells an agent what to do: with the component [`AgentCommand`] in any app, with stick and arrow keys in
+//! `marathon-game`. The rover of `examples/rover.rs` takes a velocity; the trained one of the example `steer` drives at it.
+#![cfg(feature = "render")]
+
+mod common;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/steer.rs"]
+mod steer;
+
+use bevy::input::ButtonState;
+use bevy::input::InputPlugin;
+use bevy::input::gamepad::{
+    GamepadAxis, GamepadButton, GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent,
+    RawGamepadButtonChangedEvent, RawGamepadEvent,
+};
+use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::settings::WgpuSettings;
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use clap::Parser;
+use marathon_game::app::{Actor, Args, Bindings, Deed, GamePlugin, Steering};
+use marathon_game::prelude::*;
+use std::sync::LazyLock;
+use std::time::Duration;
+
+/// Twenty milliseconds, the rover's decision.
+const FRAME: Duration = Duration::from_millis(20);
+
+/// The rover, registered once, and its policy.
+static ROVER: LazyLock<marathon_learn::Policy> = LazyLock::new(|| steer::learn().expect("the rover learns"));
+
+fn frames(app: &mut App, n: usize) {
+    (0..n).for_each(|_| app.update());
+}
+
+/// The game, without a window.
+fn game(words: &[&str]) -> App {
+    LazyLock::force(&ROVER);
+    let args = Args::parse_from([&["marathon-game", "rover"], words].concat());
+    let mut app = App::new();
+    let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
+    let plugins = DefaultPlugins.set(window).set(render).disable::<WinitPlugin>().disable::<bevy::log::LogPlugin>();
+    app.add_plugins(plugins).add_plugins(GamePlugin::new(&args).expect("the command line makes sense"));
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
+    app.finish();
+    app.cleanup();
+    app.update();
+    app.insert_resource(Bindings::default());
+    frames(&mut app, 3);
+    app
+}
+
+/// A gamepad, as its driver tells of it.
+fn pad(app: &mut App) -> Entity {
+    let pad = app.world_mut().spawn_empty().id();
+    let connection = GamepadConnection::Connected { name: "test pad".into(), vendor_id: None, product_id: None };
+    let event = GamepadConnectionEvent { gamepad: pad, connection };
+    app.world_mut().write_message(event.clone());
+    app.world_mut().write_message(RawGamepadEvent::Connection(event));
+    app.update();
+    pad
+}
+
+fn push(app: &mut App, pad: Entity, axis: GamepadAxis, value: f32) {
+    let event = RawGamepadAxisChangedEvent { gamepad: pad, axis, value };
+    app.world_mut().write_message(RawGamepadEvent::Axis(event));
+    app.update();
+}
+
+fn press(app: &mut App, pad: Entity, button: GamepadButton) {
+    for value in [1.0, 0.0] {
+        let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
+        app.world_mut().write_message(RawGamepadEvent::Button(event));
+        app.update();
+    }
+}
+
+fn key(app: &mut App, key_code: KeyCode, state: ButtonState) {
+    let (logical_key, window) = (Key::Character("key".into()), Entity::PLACEHOLDER);
+    app.world_mut().write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window });
+    app.update();
+}
+
+/// What the actors are told, in their order.
+fn commands(app: &mut App) -> Vec<(f64, bool)> {
+    let mut query = app.world_mut().query::<(&Actor, &Episode, Has<AgentCommand>)>();
+    let mut all: Vec<_> = query.iter(app.world()).map(|(a, e, by_me)| (a.0, (e.command[0], by_me))).collect();
+    all.sort_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, told)| told).collect()
+}
+
+/// What a component tells is observed at the end of the next decision, `None` is the schedule, and what cannot be told
+/// changes nothing.
+#[test]
+fn a_component_tells_an_agent_what_to_do() {
+    LazyLock::force(&ROVER);
+    let mut app = common::app(FRAME);
+    let mut spawn = |command: Option<AgentCommand>| {
+        let rover = app.world_mut().spawn(Ragdoll::agent("rover")).id();
+        if let Some(command) = command {
+            app.world_mut().entity_mut(rover).insert(command);
+        }
+        rover
+    };
+    let [told, own] = [Some(AgentCommand(Some(vec![1.5]))), None].map(&mut spawn);
+    let command = |app: &App, rover| app.world().get::<Episode>(rover).expect("it is there").command[0];
+    frames(&mut app, 3);
+    assert_eq!(command(&app, told), 1.5);
+    assert!(command(&app, own) != 1.5 && command(&app, own).abs() <= 2.0);
+    for wrong in [vec![2.5], vec![f64::NAN], vec![1.0, 1.0], vec![]] {
+        app.world_mut().entity_mut(told).insert(AgentCommand(Some(wrong)));
+        frames(&mut app, 3);
+        assert_eq!(command(&app, told), 1.5);
+    }
+    // twins of one seed and number have one schedule
+    app.world_mut().entity_mut(told).insert(AgentCommand(None));
+    frames(&mut app, 3);
+    assert_eq!(command(&app, told), command(&app, own));
+    app.world_mut().entity_mut(told).insert(AgentCommand(Some(vec![-2.0])));
+    frames(&mut app, 3);
+    assert_eq!(command(&app, told), -2.0);
+    app.world_mut().entity_mut(told).remove::<AgentCommand>();
+    frames(&mut app, 3);
+    assert_eq!(command(&app, told), command(&app, own));
+    // a lane that somebody else had is nobody's
+    app.world_mut().entity_mut(told).insert(AgentCommand(Some(vec![-2.0])));
+    frames(&mut app, 3);
+    assert!(app.world_mut().despawn(told));
+    frames(&mut app, 3);
+    let next = app.world_mut().spawn(Ragdoll::agent("rover")).id();
+    frames(&mut app, 3);
+    assert!(command(&app, next) != -2.0, "{}", command(&app, next));
+}
+
+#[test]
+fn the_example_drives_as_the_stick_says() {
+    let mut app = common::app(FRAME);
+    app.add_plugins((InputPlugin, steer::Driving(ROVER.clone())));
+    frames(&mut app, 3);
+    let pad = pad(&mut app);
+    let mut rover = app.world_mut().query::<(&RagdollState, &Episode)>();
+    let mut velocity = |app: &mut App| {
+        frames(app, 150);
+        let (state, episode) = rover.single(app.world()).expect("one rover");
+        let qvel = app.world().resource::<Marathon>().state(state).expect("it is simulated").qvel;
+        (episode.command[0], qvel[0])
+    };
+    for (stick, expected) in [(1.0, 2.0), (-1.0, -2.0), (0.0, 0.0)] {
+        push(&mut app, pad, GamepadAxis::LeftStickY, stick);
+        let (command, velocity) = velocity(&mut app);
+        assert_eq!(command, expected);
+        assert!((velocity - expected).abs() < 0.4, "told {expected} m/s, it drives at {velocity} m/s");
+    }
+    press(&mut app, pad, GamepadButton::South);
+    assert_ne!(velocity(&mut app).0, 0.0, "its own schedule");
+}
+
+#[test]
+fn stick_and_arrow_keys_steer_the_character_in_focus() {
+    let mut app = game(&["--agents", "2"]);
+    let pad = pad(&mut app);
+    assert_eq!(*app.world().resource::<Steering>(), Steering(true));
+    let own = commands(&mut app);
+    assert!(own.iter().all(|(x, mine)| x.abs() <= 2.0 && !mine) && own[0] != own[1], "{own:?}");
+    // beyond the dead zone of 0.12 it begins at 0, and its end is the range's
+    for (stick, expected) in [(0.56, 1.0), (-0.56, -1.0), (1.0, 2.0), (0.1, 0.0)] {
+        push(&mut app, pad, GamepadAxis::LeftStickY, stick);
+        frames(&mut app, 3);
+        let told = commands(&mut app);
+        assert!((told[0].0 - expected).abs() < 1e-6 && told[0].1 && !told[1].1, "{stick}: {told:?}");
+    }
+    push(&mut app, pad, GamepadAxis::LeftStickY, 0.0);
+    // the right stick is the camera's
+    push(&mut app, pad, GamepadAxis::RightStickY, 1.0);
+    frames(&mut app, 3);
+    assert_eq!(commands(&mut app)[0], (0.0, true));
+    push(&mut app, pad, GamepadAxis::RightStickY, 0.0);
+    // the arrow keys do nothing else meanwhile
+    key(&mut app, KeyCode::ArrowUp, ButtonState::Pressed);
+    frames(&mut app, 3);
+    assert_eq!(commands(&mut app)[0], (2.0, true));
+    assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 1.0);
+    key(&mut app, KeyCode::ArrowUp, ButtonState::Released);
+    frames(&mut app, 3);
+    assert_eq!(commands(&mut app)[0], (0.0, true));
+    // let go
+    assert_eq!(app.world().resource::<Bindings>().key(Deed::Release), "G");
+    press(&mut app, pad, GamepadButton::LeftThumb);
+    frames(&mut app, 3);
+    let told = commands(&mut app);
+    assert!(!told[0].1 && told[0].0 != 0.0, "{told:?}");
+    // another in focus: the stick goes with it
+    push(&mut app, pad, GamepadAxis::LeftStickY, 1.0);
+    key(&mut app, KeyCode::Tab, ButtonState::Pressed);
+    frames(&mut app, 4);
+    let told = commands(&mut app);
+    assert!(!told[0].1 && told[0].0 != 2.0 && told[1] == (2.0, true), "{told:?}");
+}
+
+#[test]
+fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
+    LazyLock::force(&ROVER);
+    let mut app = game(&[]);
+    let mut show = app.world_mut().resource_mut::<marathon_game::app::Show>();
+    show.agent = "Hopper-v0".into();
+    show.again();
+    frames(&mut app, 5);
+    assert_eq!(*app.world().resource::<Steering>(), Steering(false));
+    key(&mut app, KeyCode::ArrowUp, ButtonState::Pressed);
+    frames(&mut app, 2);
+    assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 2.0);
+}

@@ -1,0 +1,130 @@
+"""Agents written in Python see the ground where MuJoCo's rays hit it, each its own, by the heading of their parts."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from marathon_envs import MarathonAgent, Model, Simulation
+
+ROWS, COLUMNS = 5, 7
+MODEL = f"""
+<mujoco>
+  <asset><hfield name="hills" nrow="{ROWS}" ncol="{COLUMNS}" size="3 2 1 0.5"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 1" pos="0 0 -0.25" contype="0" conaffinity="1"/>
+    <geom name="hills" type="hfield" hfield="hills" pos="0.5 -0.25 0.125" euler="0 0 30" contype="0" conaffinity="1"/>
+    <body pos="0 0 6">
+      <freejoint/>
+      <geom name="eye" size="0.1" contype="1" conaffinity="0"/>
+      <body><joint name="tail"/><geom size="0.05" pos="-0.3 0 0" contype="0" conaffinity="0"/></body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="tail"/></actuator>
+</mujoco>"""
+POINTS = [(0.0, 0.0), (0.5, 0.0), (0.25, -0.75)]
+AGENTS = 20
+
+
+class Eye(MarathonAgent):
+    """An eye over hills."""
+
+    mjcf = MODEL
+
+    def observations(self) -> list[np.ndarray]:
+        return [self.height_scan("eye", POINTS)]
+
+    def step_reward(self) -> dict[str, np.ndarray]:
+        x, y, _ = self.position("eye").T
+        return {"ground": self.ground_height(x, y)}
+
+
+def hills(agent: int) -> np.ndarray:
+    """Hills of an agent's own, single precision as the physics keeps them."""
+    return np.random.default_rng(agent).uniform(0.01, 1.0, ROWS * COLUMNS).astype(np.float32)
+
+
+def ray(agent: int, x: float, y: float) -> float:
+    """Height at which a ray from above meets the ground in MuJoCo."""
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    model.hfield_data[:] = hills(agent)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    down = np.array([0.0, 0.0, -1.0])
+    return 5.0 - mujoco.mj_ray(model, data, np.array([x, y, 5.0]), down, None, 1, 1, np.zeros(1, np.int32))
+
+
+def eyes() -> Eye:
+    agent = Eye(AGENTS)
+    for i in range(AGENTS):
+        agent.sim.set_ground(i, 0, hills(i))
+    return agent
+
+
+def test_the_ground_is_where_mujocos_rays_meet_it() -> None:
+    agent = eyes()
+    x, y = np.random.default_rng(1).uniform(-4, 4, (2, AGENTS, 3))
+    height = agent.ground_height(x, y)
+    expected = [[ray(i, x[i, k], y[i, k]) for k in range(3)] for i in range(AGENTS)]
+    np.testing.assert_allclose(height, expected, atol=1e-5)
+    # some places lie on the hills, some beyond them on the floor
+    assert (height > 0).sum() > 10
+    assert (height == -0.25).sum() > 5
+    # one place for each agent, and one for all
+    np.testing.assert_array_equal(agent.ground_height(x[:, 0], y[:, 0]), height[:, 0])
+    assert agent.ground_height(1.0, 0.5).shape == (AGENTS,)
+    np.testing.assert_array_equal(agent.ground_height(9.0, 9.0), np.full(AGENTS, -0.25))
+
+
+def test_a_scan_turns_with_the_heading() -> None:
+    agent = eyes()
+    random = np.random.default_rng(2)
+    x, y, yaw = random.uniform([-2, -1, -3], [2, 1, 3], (AGENTS, 3)).T
+    qpos = np.zeros((AGENTS, agent.model.nq))
+    qpos[:, 0], qpos[:, 1], qpos[:, 2], qpos[:, 3], qpos[:, 6] = x, y, 6, np.cos(yaw / 2), np.sin(yaw / 2)
+    agent.sim.reset(qpos, np.zeros((AGENTS, agent.model.nv)))
+    np.testing.assert_allclose(agent.heading("eye"), np.stack([np.cos(yaw), np.sin(yaw)], 1), atol=1e-6)
+    scan = agent.height_scan("eye", POINTS)
+    for k, (ahead, left) in enumerate(POINTS):
+        at_x, at_y = x + np.cos(yaw) * ahead - np.sin(yaw) * left, y + np.sin(yaw) * ahead + np.cos(yaw) * left
+        np.testing.assert_allclose(scan[:, k], [ray(i, at_x[i], at_y[i]) - 6 for i in range(AGENTS)], atol=1e-5)
+    # who looks straight up heads along +x
+    qpos[:, 3:7] = np.cos(np.pi / 4), 0, -np.sin(np.pi / 4), 0
+    agent.sim.reset(qpos, np.zeros((AGENTS, agent.model.nv)))
+    np.testing.assert_array_equal(agent.heading("eye"), np.tile([1.0, 0.0], (AGENTS, 1)))
+
+
+def test_ground_lasts_over_resets_and_snapshots_and_is_stood_upon() -> None:
+    env = Eye.vec_env(2, autoreset="disabled")
+    env.set_ground(1, 0, np.full(ROWS * COLUMNS, 0.875))
+    flat, raised = env.reset(seed=1)[:, 0]
+    assert raised - flat == pytest.approx(0.875, abs=0.05)
+    again = Simulation(Model.parse(MODEL), 2)
+    again.load(env.agent.sim.save())
+    np.testing.assert_array_equal(again.ground_height(np.zeros((2, 1)), np.zeros((2, 1)))[:, 0], [0.125, 1.0])
+    # it falls for a second and a half, onto its own ground
+    for _ in range(400):
+        env.step(np.zeros((2, 1)))
+    height = env.agent.height("eye")
+    np.testing.assert_allclose(height, [0.225, 1.1], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("agent", "field", "elevations", "message"),
+    [
+        (2, 0, np.zeros(35), "agent is 2, expected less than 2"),
+        (0, 1, np.zeros(35), "field is 1, expected less than 1"),
+        (0, 0, np.zeros(34), r"elevations has length 34, expected 5 \* 7"),
+        (0, 0, np.full(35, np.nan), "elevations has a number that is NaN"),
+    ],
+)
+def test_ground_that_does_not_fit_is_refused(agent: int, field: int, elevations: np.ndarray, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Simulation(Model.parse(MODEL), 2).set_ground(agent, field, elevations)
+
+
+def test_places_that_are_no_rows_of_agents_are_refused() -> None:
+    sim = Simulation(Model.parse(MODEL), 2)
+    with pytest.raises(ValueError, match=r"x has the shape \(3, 1\), expected \(2, 1\)"):
+        sim.ground_height(np.zeros((3, 1)), np.zeros((3, 1)))
+    with pytest.raises(ValueError, match=r"y has the shape \(2, 2\), expected \(2, 1\)"):
+        sim.ground_height(np.zeros((2, 1)), np.zeros((2, 2)))
