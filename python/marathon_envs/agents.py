@@ -264,7 +264,7 @@ class MarathonAgent:
         """
         x, y = np.broadcast_arrays(x, y)
         shape = x.shape or (self.num_agents,)
-        rows = shape if len(shape) == 2 else (self.num_agents, 1)
+        rows = shape if len(shape) == 2 else (shape[0], 1)
         x, y = (np.broadcast_to(places, shape).reshape(rows) for places in (x, y))
         return self.sim.ground_height(x, y).reshape(shape)
 

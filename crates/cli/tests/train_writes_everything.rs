@@ -160,3 +160,25 @@ fn another_number_of_agents_keeps_the_buffer() {
     assert_eq!((&config["run"]["agents"], &config["run"]["horizon"]), (&16.into(), &640.into()));
     assert_eq!(config["algorithm"]["ppo"]["minibatches"], 5);
 }
+
+/// Numbers that tell how well a task is done, by the names that the task gives them.
+#[test]
+fn metrics_have_columns_and_tags() {
+    let temp = tempfile::tempdir().unwrap();
+    let words = ["train", "walker-walk-v0", "--steps", "20k", "--agents", "16", "--out", "a"];
+    let output = run(temp.path(), &words);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = std::fs::read_to_string(temp.path().join("a/progress.csv")).unwrap();
+    let (head, row) = (text.lines().next().unwrap(), text.lines().next_back().unwrap());
+    // `forward` has a column of its own, the speed
+    let metrics: Vec<_> = head.split(',').zip(row.split(',')).filter(|(name, _)| name.starts_with("metric/")).collect();
+    let [("metric/speed", speed)] = metrics[..] else { panic!("{metrics:?}") };
+    let speed: f64 = speed.parse().unwrap();
+    assert!(speed != 0.0 && speed.abs() < 5.0, "{speed} m/s");
+    let events = std::fs::read_dir(temp.path().join("a")).unwrap().filter_map(|entry| {
+        let path = entry.unwrap().path();
+        path.file_name().unwrap().to_str().unwrap().contains("tfevents").then(|| std::fs::read(path).unwrap())
+    });
+    let tag = b"Metric/speed";
+    assert!(events.into_iter().any(|bytes| bytes.windows(tag.len()).any(|part| part == tag)));
+}

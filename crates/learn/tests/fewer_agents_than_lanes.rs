@@ -8,7 +8,7 @@ use marathon_envs::{BLOCK, BlockStep, EnvError, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Control, IterationStats, Ratio, Snapshot, TrainConfig, evaluate, train};
 use marathon_physics::lanes::Isa;
 
-/// Every agent's reward is its number, every agent's first observation too.
+/// Every agent's reward is its number, every agent's first observation and its metric too.
 struct Numbered(PuckTask);
 struct NumberedShard(Box<dyn Shard>, usize);
 
@@ -44,6 +44,7 @@ impl Shard for NumberedShard {
         self.mark(block, obs);
         self.mark(block, &mut out.reward);
         self.mark(block, &mut out.terms);
+        self.mark(block, &mut out.info[BLOCK..]);
     }
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         self.0.save(block, bytes);
@@ -65,6 +66,7 @@ fn what_is_reported_is_theirs_alone() {
         });
         let mut seen = Vec::new();
         let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+            assert_eq!(stats.metrics, [("near".into(), stats.learned.reward_terms[0])]);
             seen.push((stats.steps, stats.episodes, stats.learned.return_mean, stats.learned.reward_terms[0]));
             Control::Continue
         };

@@ -80,6 +80,11 @@ pub enum MetricSource {
 }
 
 impl Spec {
+    /// The metrics but for the distance along +x, which reports have in any case.
+    pub fn own_metrics(&self) -> impl Iterator<Item = &Metric> {
+        self.metrics.iter().filter(|metric| metric.source != MetricSource::Forward)
+    }
+
     /// Bounds of an actuator's actions for a policy that acts within bounds: [-1, 1] for an actuator that has none.
     #[inline(always)]
     pub fn action_range(&self, i: usize) -> [f32; 2] {

@@ -24,7 +24,7 @@ pub fn rows<S: Copy>(rows: &mut [S], agents: usize) {
 
 /// Repeats what a decision led to.
 pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
-    for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms] {
+    for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms, &mut out.info] {
         rows(row, agents);
     }
     let BlockStep { terminated, truncated, diverged, decides, .. } = out;

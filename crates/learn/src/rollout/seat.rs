@@ -10,7 +10,7 @@ use crate::lanes::noise::Noise;
 use crate::nets::acting::ActingSpace;
 use crate::nets::mlp::{CHUNK, Tape};
 use crate::rewards::{Judge, Step};
-use marathon_envs::{BlockStep, Role};
+use marathon_envs::{BlockStep, Metric, Role};
 use marathon_physics::lanes::{Isa, Real};
 
 /// What a role plays with.
@@ -21,6 +21,8 @@ pub struct SeatPlan<'a> {
     pub seed: u64,
     /// Agents of a block.
     pub lanes: usize,
+    /// Numbers that tell how well the task is done.
+    pub metrics: Vec<Metric>,
     /// Networks like those.
     pub with: Collecting<'a>,
 }
@@ -29,6 +31,7 @@ pub struct SeatPlan<'a> {
 pub struct Seat {
     /// The role.
     pub role: Role,
+    metrics: Vec<Metric>,
     /// Its number.
     number: usize,
     /// Random streams, one per block.
@@ -49,11 +52,12 @@ pub struct Seat {
 impl Seat {
     /// Of role `number` at so many blocks from `first_block`.
     pub fn new(number: usize, plan: SeatPlan<'_>, (first_block, blocks): (usize, usize)) -> Self {
-        let SeatPlan { role, seed, lanes, with } = plan;
+        let SeatPlan { role, seed, lanes, metrics, with } = plan;
         let n = role.obs.len() * BLOCK;
         let noise = |b| Noise::new(seed, first_block + b).mirrored(lanes);
         Self {
             number,
+            metrics,
             noise: (0..blocks).map(noise).collect(),
             obs: Aligned::new(blocks * n),
             tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
@@ -89,7 +93,8 @@ impl Seat {
     pub fn begin(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
         let rewards = vec![0.0; with.streams.len() - 1];
         let terms = vec![0.0; self.role.terms.len()];
-        rollout.sums = vec![BlockSums { terms, rewards, ..Default::default() }; self.blocks()];
+        let metrics = vec![0.0; self.metrics.len()];
+        rollout.sums = vec![BlockSums { terms, rewards, metrics, ..Default::default() }; self.blocks()];
         rollout.cut.clear();
         rollout.cut_obs.clear();
         self.obs_sums.iter_mut().for_each(|s| s.fill(0.0));
@@ -149,6 +154,9 @@ impl Seat {
         let terms = &out.terms[self.role.terms.start * BLOCK..self.role.terms.end * BLOCK];
         for (sum, term) in sums.terms.iter_mut().zip(terms.chunks_exact(BLOCK)) {
             *sum += term.iter().map(|x| *x as f64).sum::<f64>();
+        }
+        for (sum, metric) in sums.metrics.iter_mut().zip(&self.metrics) {
+            *sum += out.metric(metric).iter().map(|x| *x as f64).sum::<f64>();
         }
 
         let obs = &self.obs[b * obs_row..(b + 1) * obs_row];

@@ -34,6 +34,8 @@ pub struct BlockSums {
     pub errors: (f64, f64),
     /// Sum of each reward over the rollout, but for the task's.
     pub rewards: Vec<f64>,
+    /// Sum of each metric of the task's own over the rollout.
+    pub metrics: Vec<f64>,
 }
 
 impl BlockSums {
@@ -60,15 +62,17 @@ impl BlockSums {
         pair(&mut self.errors, &other.errors);
         self.rewards.resize(other.rewards.len(), 0.0);
         self.rewards.iter_mut().zip(&other.rewards).for_each(|(a, b)| *a += b);
+        self.metrics.resize(other.metrics.len(), 0.0);
+        self.metrics.iter_mut().zip(&other.metrics).for_each(|(a, b)| *a += b);
     }
 
     /// Multiplies all by a factor.
     pub fn scale(&mut self, factor: f64) {
         let Self { episodes, returns, lengths, speeds, falls, diverged, decisions, terms, .. } = self;
-        let Self { discounted, observations, advantages, targets, errors, rewards, .. } = self;
+        let Self { discounted, observations, advantages, targets, errors, rewards, metrics, .. } = self;
         let scalars = [episodes, returns, lengths, speeds, falls, diverged, decisions].into_iter();
         let pairs = observations.iter_mut().chain([discounted, advantages, targets, errors]);
-        let all = scalars.chain(terms).chain(rewards).chain(pairs.flat_map(|(a, b)| [a, b]));
+        let all = scalars.chain(terms).chain(rewards).chain(metrics).chain(pairs.flat_map(|(a, b)| [a, b]));
         all.for_each(|x| *x *= factor);
     }
 }

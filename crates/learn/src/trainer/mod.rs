@@ -388,6 +388,7 @@ impl Trainer {
         };
         let played = &sums[0].totals.sums;
         let per_episode = |x: f64| (played.episodes > 0.0).then(|| x / played.episodes);
+        let names = shared.spec.own_metrics().map(|metric| metric.name.clone());
         let worked = (seconds.collect + seconds.update).max(1e-12);
         Ok(IterationStats {
             iteration: progress.iteration,
@@ -401,6 +402,7 @@ impl Trainer {
             speed_mean: per_episode(played.speeds / shared.spec.dt),
             fall_fraction: per_episode(played.falls),
             diverged: played.diverged as u64,
+            metrics: names.zip(&played.metrics).map(|(name, x)| (name, x / sums[0].totals.samples)).collect(),
             learned: learned(0),
             others: (1..roles.len()).map(|i| (shared.roles[i].role.name.clone(), learned(i))).collect(),
         })

@@ -25,8 +25,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::Path;
 
-/// Since version 2, sums have the number of decisions.
-const VERSION: u32 = 2;
+/// Since version 2, sums have the number of decisions; since version 3, the task's metrics.
+const VERSION: u32 = 3;
 
 /// What a message says of itself.
 #[derive(Serialize, Deserialize)]
@@ -279,7 +279,7 @@ impl Answer {
     }
 }
 
-/// Numbers of a block's sums, except for its observations, reward terms and rewards.
+/// Numbers of a block's sums, except for its observations, reward terms, rewards and metrics.
 const SUMS: usize = 15;
 
 /// What a learner needs of a rollout.
@@ -290,7 +290,7 @@ fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
     let sums = rollout.sums.iter().flat_map(|s| {
         let scalars = [s.episodes, s.returns, s.lengths, s.speeds, s.falls, s.diverged, s.decisions];
         let pairs = [s.discounted, s.advantages, s.targets, s.errors].into_iter().chain(s.observations.iter().copied());
-        let rest = s.terms.iter().chain(&s.rewards).copied();
+        let rest = s.terms.iter().chain(&s.rewards).chain(&s.metrics).copied();
         scalars.into_iter().chain(pairs.flat_map(|(a, b)| [a, b])).chain(rest).collect::<Vec<_>>()
     });
     file.list("sums", &sums.collect::<Vec<f64>>());
@@ -300,11 +300,12 @@ fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, rew
     for (name, rows) in rollout.rows_mut() {
         rows.copy_from_slice(&file.get::<f32>(name, &[rows.len()])?);
     }
-    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + rewards;
+    let row = SUMS + 2 * spec.obs + spec.reward_terms.len() + rewards + spec.own_metrics().count();
     let sums: Vec<f64> = file.get("sums", &[rollout.blocks() * row])?;
     let read = |row: &[f64]| {
         let (scalars, rest) = row.split_at(SUMS + 2 * spec.obs);
-        let (terms, rewards) = rest.split_at(spec.reward_terms.len());
+        let (terms, rest) = rest.split_at(spec.reward_terms.len());
+        let (rewards, metrics) = rest.split_at(rewards);
         let pair = |i: usize| (scalars[i], scalars[i + 1]);
         BlockSums {
             episodes: scalars[0],
@@ -321,6 +322,7 @@ fn read_rollout(rollout: &mut Rollout, file: &TensorReader<'_>, spec: &Spec, rew
             observations: (0..spec.obs).map(|i| pair(SUMS + 2 * i)).collect(),
             terms: terms.to_vec(),
             rewards: rewards.to_vec(),
+            metrics: metrics.to_vec(),
         }
     };
     rollout.sums = sums.chunks_exact(row).map(read).collect();

@@ -119,7 +119,8 @@ impl RoleReplica {
     /// What it plays with.
     pub fn seat(&self, role: &RoleParts) -> SeatPlan<'_> {
         let (seed, lanes) = (role.config.run.seed, self.learner.shape().lanes);
-        SeatPlan { role: role.role.clone(), seed, lanes, with: self.learner.collecting(&self.statistics) }
+        let metrics = role.spec.own_metrics().cloned().collect();
+        SeatPlan { role: role.role.clone(), seed, lanes, metrics, with: self.learner.collecting(&self.statistics) }
     }
 
     /// Takes in the statistics of a rollout.

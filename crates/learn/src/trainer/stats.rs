@@ -28,6 +28,9 @@ pub struct IterationStats {
     pub fall_fraction: Option<f64>,
     /// Agents whose simulation stopped being finite in this iteration.
     pub diverged: u64,
+    /// Mean of each metric of the task per decision, by name, but for the distance along +x.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub metrics: Vec<(String, f64)>,
 
     /// What was learned: of a task with several roles, by the first.
     #[serde(flatten)]

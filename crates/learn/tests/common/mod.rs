@@ -4,7 +4,7 @@
 
 pub mod numbers;
 
-use marathon_envs::{BLOCK, BlockStep, EnvError, Options, Shard, ShardFactory, Spec};
+use marathon_envs::{BLOCK, BlockStep, EnvError, Metric, MetricSource, Options, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Ppo, Sac, TrainConfig};
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
@@ -40,7 +40,11 @@ impl PuckTask {
             frame_skip: 2,
             max_episode_steps: limit,
             reward_terms: vec!["near".into(), "effort".into()],
-            info: Vec::new(),
+            info: vec!["speed".into(), "near".into()],
+            metrics: vec![
+                Metric { name: "forward".into(), source: MetricSource::Forward },
+                Metric { name: "near".into(), source: MetricSource::Info(1) },
+            ],
             options: Options::new(),
             nq: 2,
             nv: 2,
@@ -111,6 +115,7 @@ impl Shard for PuckShard {
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep) {
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
         out.terms.resize(2 * BLOCK, 0.0);
+        out.info.resize(2 * BLOCK, 0.0);
         for lane in 0..BLOCK {
             let p = &mut self.pucks[block * BLOCK + lane];
             let (mut near, mut effort) = (0.0, 0.0);
@@ -126,6 +131,7 @@ impl Shard for PuckShard {
             let fell = p.pos.iter().any(|x| x.abs() > 2.0);
             out.terms[lane] = near;
             out.terms[BLOCK + lane] = effort;
+            (out.info[lane], out.info[BLOCK + lane]) = (p.vel[0], near);
             out.reward[lane] = near + effort;
             out.forward[lane] = p.pos[0] - x0;
             out.terminated |= (fell as u16) << lane;

@@ -46,6 +46,7 @@ pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     let all = [learned].into_iter().chain(others.iter().map(|(_, learned)| learned));
     let all = all.flat_map(|learned| &learned.reward_terms);
     row.extend(terms.iter().zip(all).map(|(term, x)| (format!("reward/{term}"), Some(*x))));
+    row.extend(stats.metrics.iter().map(|(metric, x)| (format!("metric/{metric}"), Some(*x))));
     row
 }
 
@@ -82,7 +83,7 @@ impl CsvLog {
         last.split(',').nth(column)?.parse().ok()
     }
 
-    /// Appends a row, and the head before the first.
+    /// Appends a row, and the head before the first. A file that was there goes on with the columns that it has.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -92,8 +93,14 @@ impl CsvLog {
             if head {
                 self.writer.write_record(row.iter().map(|(name, _)| name))?;
             }
-            let cells = row.iter().map(|(_, x)| x.map_or(String::new(), |x| x.to_string()));
-            self.writer.write_record(cells)?;
+            let cell = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+            match &self.before {
+                None => self.writer.write_record(row.iter().map(|(_, x)| cell(*x)))?,
+                Some((head, _)) => {
+                    let value = |name| cell(row.iter().find(|(own, _)| own == name).and_then(|(_, x)| *x));
+                    self.writer.write_record(head.split(',').map(value))?;
+                }
+            }
             self.writer.flush().map_err(csv::Error::from)
         };
         write().map_err(|e| failed(&self.path, "write", e))
@@ -171,9 +178,12 @@ mod tests {
         log.push(&row(4.0)).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n3,1.5\n4,2\n");
         std::fs::write(&path, "iteration,a\n1,\n2,").unwrap();
-        let log = CsvLog::open(&path, 9).unwrap();
+        let mut log = CsvLog::open(&path, 9).unwrap();
         assert_eq!((log.before(ITERATION), log.before("a")), (Some(1.0), None));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n");
         assert_eq!(History::read(&path).unwrap().column("a"), [None]);
+        // a file of an older version goes on with the columns that it has
+        log.push(&[("new".into(), Some(7.0)), ("a".into(), Some(1.0)), (ITERATION.into(), Some(2.0))]).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n");
     }
 }

@@ -19,6 +19,8 @@ pub struct Progress {
     rate: Rate,
     shown: Episodes,
     waiting: Episodes,
+    /// The task's metrics in the last iteration.
+    metrics: String,
 }
 
 /// Means over episodes.
@@ -65,13 +67,14 @@ impl Progress {
         let start = (Instant::now(), done);
         let rate = Rate { start, last: start, recent: None };
         let (shown, waiting) = Default::default();
-        Self { bar, total, every, due: done.saturating_add(every), rate, shown, waiting }
+        Self { bar, total, every, due: done.saturating_add(every), rate, shown, waiting, metrics: String::new() }
     }
 
     /// After an iteration.
     pub fn update(&mut self, stats: &IterationStats) {
         self.rate.update(stats.steps);
         self.waiting.add(stats);
+        self.metrics = stats.metrics.iter().map(|(name, x)| format!("  {name} {x:.2}")).collect();
         match &self.bar {
             Some(bar) => {
                 // enough episodes for a mean that does not flicker
@@ -105,7 +108,7 @@ impl Progress {
         } else {
             "no episode has ended yet".into()
         };
-        format!("{rate:>6} steps/s  {episodes}  ETA {:>6}", duration(left))
+        format!("{rate:>6} steps/s  {episodes}{}  ETA {:>6}", self.metrics, duration(left))
     }
 
     /// Takes the bar away.

@@ -49,7 +49,8 @@ pub fn scalars(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     let all = [learned].into_iter().chain(others.iter().map(|(_, learned)| learned));
     let all = all.flat_map(|learned| &learned.reward_terms);
     let terms = terms.iter().zip(all).map(|(term, x)| (format!("Reward/{term}"), *x));
-    of_learning(learned).into_iter().chain(of_run).chain(of_others).chain(terms).collect()
+    let metrics = stats.metrics.iter().map(|(metric, x)| (format!("Metric/{metric}"), *x));
+    of_learning(learned).into_iter().chain(of_run).chain(of_others).chain(terms).chain(metrics).collect()
 }
 
 /// What a role earned and learned.
