@@ -101,11 +101,18 @@ def test_ground_lasts_over_resets_and_snapshots_and_is_stood_upon() -> None:
     again = Simulation(Model.parse(MODEL), 2)
     again.load(env.agent.sim.save())
     np.testing.assert_array_equal(again.ground_height(np.zeros((2, 1)), np.zeros((2, 1)))[:, 0], [0.125, 1.0])
-    # it falls for a second and a half, onto its own ground
-    for _ in range(400):
+    # they fall onto their own ground: the lower is still on its way when the other has landed
+    landed = np.full(2, -1)
+    for decision in range(200):
         env.step(np.zeros((2, 1)))
-    height = env.agent.height("eye")
-    np.testing.assert_allclose(height, [0.225, 1.1], atol=0.02)
+        touching = env.agent.sim.touching[:, env.agent.model.geom("eye")]
+        landed[(landed < 0) & touching] = decision
+        if touching.any():
+            depth = env.agent.height("eye") - env.agent.ground_height(*env.agent.position("eye").T[:2])
+            np.testing.assert_allclose(depth[touching], 0.1, atol=0.1)
+    assert 0 < landed[1] < landed[0]
+    fall = np.sqrt(2 * (6 - np.array([0.225, 1.1])) / 9.81)
+    np.testing.assert_allclose((landed + 1) * env.spec.dt, fall, atol=0.02)
 
 
 @pytest.mark.parametrize(

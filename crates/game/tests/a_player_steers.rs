@@ -2,6 +2,7 @@
 //! `marathon-game`. The rover of `examples/rover.rs` takes a velocity; the trained one of the example `steer` drives at it.
 #![cfg(feature = "render")]
 
+#[allow(dead_code, reason = "a part of it is enough")]
 mod common;
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/steer.rs"]

@@ -53,7 +53,8 @@ pub struct Behavior {
     name: String,
     spec: Spec,
     env: VecEnv,
-    /// What the environment was made with.
+    /// What the environment is to be made with but for parameters, and what it was made with.
+    plain: VecEnvOptions,
     made: VecEnvOptions,
     names: Names,
     model: Arc<Model>,
@@ -108,6 +109,7 @@ impl Behavior {
             commanded: false,
             spec,
             env,
+            plain: made.clone(),
             made,
             names,
             model,
@@ -188,7 +190,7 @@ impl Behavior {
 
     /// Takes in what parameters say of all agents alike.
     fn configure(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
-        let mut wanted = self.made.clone();
+        let mut wanted = VecEnvOptions { seed: self.made.seed, ..self.plain.clone() };
         parameters.configure(&self.names, self.resets, &mut wanted);
         if wanted.options == self.made.options && wanted.max_episode_steps == self.made.max_episode_steps {
             return Ok(());
@@ -419,5 +421,8 @@ mod tests {
         }
         assert_eq!(plain.last().obs, changed.last().obs);
         assert_eq!(changed.env().spec().max_episode_steps, 200);
+        longer.set("max_episode_steps".into(), Sampler::Constant(f32::NAN));
+        changed.change(&longer).unwrap();
+        assert!(longer.is_empty() && changed.env().spec().max_episode_steps == 100);
     }
 }

@@ -146,6 +146,14 @@ impl<'a> Reader<'a> {
         if x.is_finite() { Ok(x) } else { Err(ChannelError { at, problem: "a number is not finite" }) }
     }
 
+    /// Takes a number if it is NaN.
+    fn nan(&mut self) -> bool {
+        let at = self.at;
+        let nan = self.array().map(f32::from_le_bytes).is_ok_and(f32::is_nan);
+        self.at = if nan { self.at } else { at };
+        nan
+    }
+
     /// As many items as a count in front of them says.
     fn counted(&mut self, size: usize) -> Result<&'a [u8], ChannelError> {
         let count = self.int()?;
@@ -177,6 +185,7 @@ impl<'a> Reader<'a> {
 
     fn sampler(&mut self) -> Result<Sampler, ChannelError> {
         match self.int()? {
+            0 if self.nan() => return Ok(Sampler::Constant(f32::NAN)),
             0 => return Ok(Sampler::Constant(self.float()?)),
             1 => {}
             _ => return self.fail("a parameter is neither a number (0) nor a sampler (1)"),

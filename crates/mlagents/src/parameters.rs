@@ -83,9 +83,12 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// Sets a parameter, until it is set again.
+    /// Sets a parameter, until it is set again; NaN takes it back.
     pub fn set(&mut self, name: String, sampler: Sampler) {
-        self.samplers.insert(name, sampler);
+        match sampler {
+            Sampler::Constant(x) if x.is_nan() => drop(self.samplers.remove(&name)),
+            sampler => drop(self.samplers.insert(name, sampler)),
+        }
     }
 
     /// Whether none is set.
@@ -125,16 +128,13 @@ impl Parameters {
         own
     }
 
-    /// What an agent is told in an episode of its own, in place of its schedule; `None` if no parameter speaks of that. NaN
-    /// takes a parameter back, and numbers that none speaks of are at [rest](CommandRange::rest).
+    /// What an agent is told in an episode of its own, in place of its schedule; `None` if no parameter speaks of that.
+    /// Numbers that none speaks of are at [rest](CommandRange::rest).
     pub fn command(&self, names: &Names, ranges: &[CommandRange], agent: u64, episode: u64) -> Option<Vec<f64>> {
         let mut told: Option<Vec<f64>> = None;
         for (name, sampler) in &self.samplers {
             let Some(Target::Command(i)) = names.find(name) else { continue };
             let x = draw(sampler, name, agent, episode);
-            if x.is_nan() {
-                continue;
-            }
             let (CommandRange { low, high, .. }, wide) = (&ranges[*i], f64::from(x));
             // the end of a range may lie between two numbers of single precision
             let ends = *low as f32..=*high as f32;
