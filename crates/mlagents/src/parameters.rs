@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn commands_are_drawn_for_each_agent_and_episode_and_taken_back() {
         let (model, options) = (agent("Hopper-v5").unwrap().model().unwrap(), Options::new());
-        let ranges = [CommandRange::new("speed", 0.5..=3.1, "m/s"), CommandRange::new("turn", -1.0..=1.0, "rad/s")];
+        let ranges = [CommandRange::new("speed", 0.05..=0.1, "m/s"), CommandRange::new("turn", -1.0..=1.0, "rad/s")];
         let names = Names::new(&model, &[], &ranges, &options);
         let mut parameters = Parameters::default();
         let command = |parameters: &Parameters, agent| parameters.command(&names, &ranges, agent, 1);
@@ -251,11 +251,11 @@ mod tests {
         assert_eq!(command(&parameters, 0), None);
         parameters.set("command.turn".into(), Sampler::Uniform { seed: 1, min: -1.0, max: 1.0 });
         let drawn: Vec<_> = (0..2).map(|agent| command(&parameters, agent).unwrap()).collect();
-        assert!(drawn[0][0] == 0.5 && drawn[0][1] != drawn[1][1] && drawn[0][1].abs() <= 1.0);
+        assert!(drawn[0][0] == 0.05 && drawn[0][1] != drawn[1][1] && drawn[0][1].abs() <= 1.0);
         assert_ne!(parameters.command(&names, &ranges, 0, 2).unwrap(), drawn[0]);
-        // 3.1 in single precision is more than 3.1
-        parameters.set("command.speed".into(), Sampler::Constant(3.1));
-        assert_eq!(command(&parameters, 0).unwrap(), [3.1, drawn[0][1]]);
+        // 0.1 in single precision is more than 0.1
+        parameters.set("command.speed".into(), Sampler::Constant(0.1));
+        assert_eq!(command(&parameters, 0).unwrap(), [0.1, drawn[0][1]]);
         // what is out of range is refused where it is set
         parameters.set("command.speed".into(), Sampler::Constant(4.0));
         assert_eq!(command(&parameters, 0).unwrap()[0], 4.0);
