@@ -388,7 +388,7 @@ impl Pen {
                 continue;
             }
             // all of a pen at once: most often they share one policy
-            BlockPolicy::new(&policy, Isa::best()).act_rows(&self.obs, None, &mut self.scratch);
+            BlockPolicy::new(&*policy, Isa::best()).act_rows(&self.obs, None, &mut self.scratch);
             for lane in first..BLOCK {
                 let same = |r: &Resident| r.policy.as_ref().is_some_and(|p| Arc::ptr_eq(p, &policy));
                 if self.lanes[lane].as_ref().is_some_and(same) {
