@@ -17,12 +17,12 @@ mod error;
 mod features;
 mod legacy;
 mod names;
-mod roles;
+mod parse;
 mod section;
 mod settings;
 
 pub use error::ConfigError;
-pub use roles::parse_roles;
+pub use parse::{parse, parse_roles};
 
 use marathon_learn::TrainConfig;
 use std::path::Path;
@@ -106,21 +106,6 @@ impl Default for Loaded {
             notes: Vec::new(),
         }
     }
-}
-
-/// Reads what the bytes of a file say about an agent, which may go by any of its names; the path is for messages.
-///
-/// # Errors
-/// If the file is no configuration, says nothing about the agent, or asks for what there is not. Messages name file, line and
-/// key, what was found and what was expected.
-pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigError> {
-    let map = document::parse(path, bytes)?;
-    let agent = names::id(agent);
-    let behavior = match map.keys().any(|key| current::TOP.contains(&key)) {
-        true => current::read(path, &map, &agent)?,
-        false => legacy::read(path, &map, &agent)?,
-    };
-    convert::convert(path, behavior)
 }
 
 /// The settings that an algorithm starts from, by its name.

@@ -121,6 +121,8 @@ pub(crate) struct Pen {
     obs: Vec<f32>,
     action: Vec<f32>,
     scratch: Vec<f32>,
+    /// The policies of those who live here, at work.
+    pilots: Vec<BlockPolicy<Arc<Policy>>>,
     out: Step,
 }
 
@@ -252,6 +254,7 @@ impl Pen {
             obs: vec![0.0; n_obs * BLOCK],
             action: vec![0.0; herd.model.nu * BLOCK],
             scratch: vec![0.0; herd.model.nu * BLOCK],
+            pilots: Vec::new(),
             out,
         })
     }
@@ -381,21 +384,22 @@ impl Pen {
     fn choose(&mut self) {
         self.action.fill(0.0);
         let n = self.n_act;
-        let mut served = [false; BLOCK];
-        for first in 0..BLOCK {
-            let Some(policy) = self.lanes[first].as_ref().and_then(|r| r.policy.clone()) else { continue };
-            if served[first] {
-                continue;
+        let Pen { lanes, pilots, obs, action, scratch, .. } = self;
+        let has = |lane: &Option<Resident>, policy: &Arc<Policy>| {
+            lane.as_ref().and_then(|r| r.policy.as_ref()).is_some_and(|own| Arc::ptr_eq(own, policy))
+        };
+        pilots.retain(|pilot| lanes.iter().any(|lane| has(lane, pilot.policy())));
+        for policy in lanes.iter().flatten().filter_map(|resident| resident.policy.as_ref()) {
+            if !pilots.iter().any(|pilot| Arc::ptr_eq(pilot.policy(), policy)) {
+                pilots.push(BlockPolicy::new(policy.clone(), Isa::best()));
             }
+        }
+        for pilot in pilots {
             // all of a pen at once: most often they share one policy
-            BlockPolicy::new(&*policy, Isa::best()).act_rows(&self.obs, None, &mut self.scratch);
-            for lane in first..BLOCK {
-                let same = |r: &Resident| r.policy.as_ref().is_some_and(|p| Arc::ptr_eq(p, &policy));
-                if self.lanes[lane].as_ref().is_some_and(same) {
-                    served[lane] = true;
-                    let row = lane * n..(lane + 1) * n;
-                    self.action[row.clone()].copy_from_slice(&self.scratch[row]);
-                }
+            pilot.act_rows(obs, None, scratch);
+            for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], pilot.policy())) {
+                let row = lane * n..(lane + 1) * n;
+                action[row.clone()].copy_from_slice(&scratch[row]);
             }
         }
         for (row, resident) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
