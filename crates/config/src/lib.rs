@@ -25,7 +25,6 @@ pub use error::ConfigError;
 pub use parse::{parse, parse_roles};
 
 use marathon_learn::TrainConfig;
-use std::path::Path;
 
 /// For Gymnasium's own tasks.
 const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../assets/configs/gymnasium-fast.yaml"));
