@@ -165,7 +165,7 @@ class AgentVecEnv:
             raise ValueError(f"{self._id}: its reward has no terms, expected at least 1")
         self._numbers("reward", agent.step_reward(), self._rewarded)
         self._numbers("info", agent.info(), self._reported)
-        self._failed()
+        self._ends()
 
     # ---------------------------------------------------------------------------------- what the agents say, checked
 
@@ -211,13 +211,14 @@ class AgentVecEnv:
             raise ValueError(f"{self._id}: ctrl returns the shape {ctrl.shape}, expected {self.agent.action.shape}")
         return ctrl
 
-    def _failed(self) -> BoolArray:
-        """Agents that have failed, `(N,)`."""
-        failed = np.asarray(self.agent.terminate())
-        if failed.shape != (self.num_envs,) or failed.dtype != np.bool_:
-            found = f"{failed.dtype} {failed.shape}"
-            raise ValueError(f"{self._id}: terminate returns {found}, expected bool ({self.num_envs},)")
-        return failed
+    def _ends(self) -> tuple[BoolArray, BoolArray]:
+        """Agents that have failed, and those whose episode is over all the same, `(N,)` each."""
+        ends = np.asarray(self.agent.terminate()), np.asarray(self.agent.truncate())
+        for name, end in zip(("terminate", "truncate"), ends, strict=True):
+            if end.shape != (self.num_envs,) or end.dtype != np.bool_:
+                found = f"{end.dtype} {end.shape}"
+                raise ValueError(f"{self._id}: {name} returns {found}, expected bool ({self.num_envs},)")
+        return ends
 
     # ------------------------------------------------------------------------------------------------------- episodes
 
@@ -333,8 +334,8 @@ class AgentVecEnv:
         self._begin(chosen)
         return self._show(chosen)
 
-    def _perceive(self) -> tuple[FloatArray, BoolArray, FloatArray, FloatArray]:
-        """Observations, failures, terms and infos of the decision just made.
+    def _perceive(self) -> tuple[FloatArray, BoolArray, BoolArray, FloatArray, FloatArray]:
+        """Observations, failures, other ends, terms and infos of the decision just made.
 
         Observed is what to do from now on; rewarded is what the decision was made under.
         """
@@ -343,11 +344,11 @@ class AgentVecEnv:
         agent.command = following
         obs = self._observe()
         agent.command = present
-        failed = self._failed()
+        failed, over = self._ends()
         terms = self._numbers("reward", agent.step_reward(), self._rewarded)
         reported = self._numbers("info", agent.info(), self._reported)
         present[:] = following
-        return obs, failed, terms, reported
+        return obs, failed, over, terms, reported
 
     def step(
         self, actions: npt.ArrayLike
@@ -364,7 +365,7 @@ class AgentVecEnv:
         before, begun = agent.x_position(), self.pending.copy()
         broken = agent.sim.step(self._ctrl(), agent.frame_skip)
         agent.remember()
-        obs, failed, terms, reported = self._perceive()
+        obs, failed, over, terms, reported = self._perceive()
 
         # quarantine: nothing that is not a sane number leaves its row
         sound = ~broken & finite.all(1)
@@ -372,7 +373,7 @@ class AgentVecEnv:
             sound &= (np.abs(values) < LARGEST).all(1)
         self.steps += 1
         terminated = (failed | ~sound) & ~begun
-        truncated = (self.steps >= self.spec.max_episode_steps) & ~terminated & ~begun
+        truncated = ((self.steps >= self.spec.max_episode_steps) | over) & ~terminated & ~begun
         self.diverged = ~sound & ~begun
         after = agent.x_position()
         moved = np.zeros(self.num_envs) if before is None or after is None else after - before

@@ -206,6 +206,10 @@ class MarathonAgent:
         """Return which agents have failed, `(N,)`. This one: none."""
         return self.terminate_never()
 
+    def truncate(self) -> BoolArray:
+        """Return whose episode is over before the time limit without failure, `(N,)`. This one: nobody's."""
+        return self.terminate_never()
+
     def info(self) -> Mapping[str, FloatArray]:
         """Return numbers that are neither observed nor rewarded by name, `(N,)` each: for logs. This one: none."""
         return {}

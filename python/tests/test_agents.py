@@ -209,6 +209,27 @@ def test_the_remaining_helpers() -> None:
     np.testing.assert_allclose(means, windows)
 
 
+def test_an_episode_may_be_over_although_nothing_has_failed() -> None:
+    class Brief(Hopper):
+        memory_size = 1
+
+        def remember(self) -> None:
+            self.memory += 1
+
+        def terminate(self) -> np.ndarray:
+            return self.terminate_never()
+
+        def truncate(self) -> np.ndarray:
+            return self.memory[:, 0] >= 5
+
+    env = Brief.vec_env(3, autoreset="same_step")
+    env.reset(1)
+    for step in range(1, 11):
+        _, _, terminated, truncated = env.step(np.zeros((3, 4), np.float32))[:4]
+        assert not terminated.any()
+        assert (truncated == (step % 5 == 0)).all()
+
+
 def test_autoreset_modes_tell_the_same_story_as_the_native_ones() -> None:
     n, limit = 20, 25
     envs = {mode: Hopper.vec_env(n, autoreset=mode, max_episode_steps=limit) for mode in ("SAME_STEP", "NextStep")}

@@ -62,7 +62,7 @@ fn file_says_what_it_is() {
     let meta = loaded.meta();
     assert_eq!((meta.agent.as_str(), meta.obs, meta.act, &meta.hidden[..]), ("Puck-v0", 6, 2, &[37, 19][..]));
     assert_eq!((meta.control_dt, meta.physics_dt, meta.frame_skip), (0.05, 0.025, 2));
-    assert_eq!(meta.evaluation.unwrap().episodes, 20);
+    assert_eq!(meta.evaluation.as_ref().unwrap().episodes, 20);
     assert_eq!(meta.training.as_ref().unwrap().steps, 5760);
     // the same policy is the same file, byte for byte
     let again = dir.path().join("again.safetensors");

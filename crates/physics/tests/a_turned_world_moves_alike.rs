@@ -9,10 +9,14 @@ mod common;
 
 use common::numbers::distance;
 use marathon_physics::lanes::Real;
+use marathon_physics::model::Cone;
 use marathon_physics::model::JointType;
 use marathon_physics::{Group, Model, Sim, SimOptions, Work};
 
 const STEPS: usize = 100;
+/// Models whose parts touch each other within these steps. MuJoCo chooses the axes of such a friction pyramid by those of the
+/// world, so only a cone without axes turns with it.
+const TOUCH_THEMSELVES: [&str; 1] = ["marathon_man"];
 /// Where a floating model is put, m.
 const AWAY: [f64; 2] = [3.0, -2.0];
 
@@ -93,7 +97,10 @@ fn a_turned_world_moves_alike() {
     let mut failures = Vec::new();
     let (mut touched, mut models) = (0, 0);
     for path in common::shipped() {
-        let model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+        let mut model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+        if path.file_stem().is_some_and(|name| TOUCH_THEMSELVES.iter().any(|known| name == *known)) {
+            model.opt.cone = Cone::Elliptic;
+        }
         let (double, contacts) = difference::<f64>(&model, STEPS);
         // rounding grows with every contact; a few steps of single precision tell whether anything is missing
         let (single, _) = difference::<f32>(&model, 5);
@@ -105,5 +112,5 @@ fn a_turned_world_moves_alike() {
         touched += usize::from(contacts > 0);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert!(models == 17 && touched >= 10, "{touched} of {models} models touched the floor");
+    assert!(models == 18 && touched >= 11, "{touched} of {models} models touched the floor");
 }

@@ -213,11 +213,11 @@ impl Session {
             let all: Vec<&Policy> = [&policy].into_iter().chain(others.iter().map(|(_, policy)| policy)).collect();
             let evaluations = evaluate_roles(&*factory, Isa::best(), &all, &options)?;
             let policies = [&mut policy].into_iter().chain(others.iter_mut().map(|(_, policy)| policy));
-            policies.zip(&evaluations).for_each(|(policy, evaluation)| policy.set_evaluation(*evaluation));
-            evaluation = Some(evaluations[0]);
+            policies.zip(&evaluations).for_each(|(policy, evaluation)| policy.set_evaluation(evaluation.clone()));
+            evaluation = evaluations.into_iter().next();
         }
         let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
-        let summary = Summary::new(path, &checkpoint, &history, evaluation);
+        let summary = Summary::new(path, &checkpoint, &history, evaluation.clone());
         if let Some(folder) = &folder {
             save_policies(folder, &policy, &others)?;
             write_json(&folder.summary(), &summary)?;

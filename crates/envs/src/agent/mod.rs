@@ -50,6 +50,14 @@ pub trait Agent: Send + Sync + 'static {
     /// Lanes whose agent has failed.
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask;
 
+    /// Lanes whose episode is over although nothing has failed, besides those at the time limit: at the end of a clip, or of a
+    /// course.
+    #[inline(always)]
+    fn truncated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let _ = s;
+        T::none()
+    }
+
     /// Puts the agent where an episode starts. It finds itself in the spawn pose with the spawn velocity; what it adds of
     /// chance comes from [`Start::random`]. It is a function of these alone, and may be called before the episode is due.
     fn reset(&self, start: &mut Start) {

@@ -51,6 +51,8 @@ pub(crate) struct Perceived {
     pub reported: usize,
     /// Lanes that failed, a bit each.
     pub failed: u32,
+    /// Lanes whose episode is over all the same.
+    pub over: u32,
 }
 
 impl<T: Real, A: Agent> AgentKernel<T> for A {
@@ -154,6 +156,11 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         for (role, lanes) in decides.iter_mut().enumerate() {
             *lanes = T::bits(agent.decides(&s, role));
         }
-        Perceived { observed: obs.len(), reported: info.len(), failed: T::bits(agent.terminated(&s)) }
+        Perceived {
+            observed: obs.len(),
+            reported: info.len(),
+            failed: T::bits(agent.terminated(&s)),
+            over: T::bits(agent.truncated(&s)),
+        }
     }
 }

@@ -49,6 +49,7 @@ pub(crate) struct Rehearsal {
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Ended {
     pub terminated: u32,
+    pub truncated: u32,
     pub diverged: u32,
 }
 
@@ -192,7 +193,7 @@ impl<T: Real> LaneGroup<T> {
         T::enter(CompleteForward { group: self, along_x });
         let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
         self.commands.advance();
-        let ended = Ended { terminated: perceived.failed, diverged: unsound };
+        let ended = Ended { terminated: perceived.failed, truncated: perceived.over, diverged: unsound };
         let (termination_reward, of_first) = (task.facts.termination_reward, task.terms_of_first());
         T::enter(SumReward { group: self, termination_reward, of_first, ended })
     }
@@ -346,7 +347,7 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
         for term in &terms[..of_first] {
             *reward += *term;
         }
-        Ended { terminated: T::bits(T::or(failed, T::not(ok))), diverged: T::bits(T::not(ok)) }
+        Ended { terminated: T::bits(T::or(failed, T::not(ok))), diverged: T::bits(T::not(ok)), ..ended }
     }
 }
 

@@ -150,6 +150,7 @@ impl<T: Real> Shard for LaneShard<T> {
             let ended = group.decide(task, &mut self.work, action, first);
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
+            out.truncated |= (ended.truncated << first) as u16;
             out.diverged |= (ended.diverged << first) as u16;
             for (all, lanes) in out.decides.iter_mut().zip(&group.decides) {
                 *all |= (lanes << first) as u16;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Results over whole episodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Number of episodes.
     pub episodes: u64,
@@ -25,4 +25,7 @@ pub struct Evaluation {
     pub falls: u64,
     /// Episodes whose simulation stopped being finite (they are falls too).
     pub diverged: u64,
+    /// Mean of each metric of the task per decision, by name, but for the distance along +x.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub metrics: Vec<(String, f64)>,
 }

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::policy::evaluation::Evaluation;
 use crate::policy::{Cast, Policy};
-use marathon_envs::{BlockStep, Role, ShardFactory};
+use marathon_envs::{BlockStep, Metric, Role, ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 
 /// Most agents that play side by side.
@@ -27,8 +27,10 @@ impl Default for EvalOptions {
     }
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 struct Episode {
+    /// Sums of the task's own metrics.
+    metrics: Vec<f64>,
     total: f64,
     length: f64,
     distance: f64,
@@ -96,7 +98,7 @@ pub fn evaluate_roles(
         }
         all
     });
-    Ok(episodes.iter().map(|episodes| summarize(episodes, factory.spec().dt)).collect())
+    Ok(episodes.iter().map(|episodes| summarize(episodes, factory.spec())).collect())
 }
 
 /// Plays the episodes of consecutive blocks; returns them for each role, in the order of the agents.
@@ -117,7 +119,9 @@ fn play(
     for (b, obs) in obs.chunks_exact_mut(obs_row).enumerate() {
         shard.reset(b, !0, obs);
     }
-    let mut current = vec![vec![Episode::default(); quotas.len()]; roles.len()];
+    let metrics: Vec<Metric> = spec.own_metrics().cloned().collect();
+    let fresh = Episode { metrics: vec![0.0; metrics.len()], ..Episode::default() };
+    let mut current = vec![vec![fresh.clone(); quotas.len()]; roles.len()];
     let room = || quotas.iter().map(|q| Vec::with_capacity(*q)).collect();
     let mut done: Vec<Vec<Vec<Episode>>> = roles.iter().map(|_| room()).collect();
     let mut out = BlockStep::default();
@@ -142,13 +146,16 @@ fn play(
                     episode.total += reward[lane] as f64;
                     episode.length += 1.0;
                     episode.distance += out.forward[lane] as f64;
+                    for (sum, metric) in episode.metrics.iter_mut().zip(&metrics) {
+                        *sum += out.metric(metric)[lane] as f64;
+                    }
                     if ended >> lane & 1 == 1 {
                         episode.diverged = out.diverged >> lane & 1 == 1;
                         episode.fell = episode.diverged || out.terminated >> lane & 1 == 1;
+                        let whole = std::mem::replace(episode, fresh.clone());
                         if done.len() < quotas[agent] {
-                            done.push(*episode);
+                            done.push(whole);
                         }
-                        *episode = Episode::default();
                     }
                 }
             }
@@ -161,8 +168,10 @@ fn play(
     done.into_iter().map(|done| done.into_iter().flatten().collect()).collect()
 }
 
-fn summarize(episodes: &[Episode], dt: f64) -> Evaluation {
-    let n = episodes.len() as f64;
+fn summarize(episodes: &[Episode], spec: &Spec) -> Evaluation {
+    let (n, dt) = (episodes.len() as f64, spec.dt);
+    let decisions: f64 = episodes.iter().map(|e| e.length).sum();
+    let mean_of = |i: usize| episodes.iter().map(|e| e.metrics[i]).sum::<f64>() / decisions;
     let mean = |f: &dyn Fn(&Episode) -> f64| episodes.iter().map(f).sum::<f64>() / n;
     let return_mean = mean(&|e| e.total);
     Evaluation {
@@ -176,5 +185,6 @@ fn summarize(episodes: &[Episode], dt: f64) -> Evaluation {
         speed_mean: mean(&|e| e.distance / (e.length * dt)),
         falls: episodes.iter().filter(|e| e.fell).count() as u64,
         diverged: episodes.iter().filter(|e| e.diverged).count() as u64,
+        metrics: spec.own_metrics().enumerate().map(|(i, metric)| (metric.name.clone(), mean_of(i))).collect(),
     }
 }

@@ -175,7 +175,7 @@ pub enum Integrator {
 pub enum Cone {
     /// Four edges for `condim` 3.
     Pyramidal,
-    /// Exact cone; parsed and refused by the simulator for now.
+    /// Exact cone.
     Elliptic,
 }
 

@@ -78,12 +78,13 @@ pub fn evaluation_table(e: &Evaluation, limit: usize, dt: f64) -> String {
         0 => String::new(),
         n => format!(" ({n} of them because the simulation broke down)"),
     };
+    let metrics: String = e.metrics.iter().map(|(name, x)| format!("\n  {name:8}  {x:.4}")).collect();
     format!(
         "  distance  {:.1} m in {seconds:.1} s\n\
          \x20 speed     {:.2} m/s\n\
          \x20 return    {:.1} ± {:.1}, from {:.1} to {:.1}\n\
          \x20 length    {:.0} of {limit} decisions\n\
-         \x20 falls     {} of {} episodes{broken}",
+         \x20 falls     {} of {} episodes{broken}{metrics}",
         unsigned_zero(e.distance_mean, 1),
         unsigned_zero(e.speed_mean, 2),
         e.return_mean,

@@ -12,8 +12,8 @@
 //! | 68..89 | how far the clip's next angles are from the agent's own, rad |
 //!
 //! Vectors are in the clip's [direction of travel](crate::Frame::facing). Rewards: [`reward`]; what an action does:
-//! [`Control`]. The episode ends when the trunk touches the ground, unless the clip has it there; when the agent is too far
-//! from the clip; when a clip that does not loop is over.
+//! [`Control`]. The agent fails when its trunk touches the ground, unless the clip has it there, and when it is too far
+//! from the clip. The end of a clip that does not loop truncates the episode.
 
 mod body;
 pub mod clips;
@@ -280,7 +280,12 @@ impl Agent for MarathonMan {
             Reward::DeepMimic => T::lit(self.arguments.distance.0).lt(Self::distance(s, false)),
             Reward::Paper => reward::too_far(s),
         };
-        T::or(T::or(far, Self::fallen(s)), s.clip_over())
+        T::or(far, Self::fallen(s))
+    }
+
+    #[inline(always)]
+    fn truncated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        s.clip_over()
     }
 
     #[inline(always)]
