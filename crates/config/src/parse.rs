@@ -5,6 +5,7 @@ use super::Loaded;
 use super::error::ConfigError;
 use super::section::Section;
 use super::{convert, current, document, legacy, names};
+use marathon_envs::shard::role_id;
 use marathon_learn::RoleConfig;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -38,9 +39,9 @@ pub fn parse_roles(
     let map = document::parse(path, bytes)?;
     let root = Section::root(path, &map);
     let behaviors = if map.keys().any(|key| current::TOP.contains(&key)) { root.section("behaviors")? } else { root };
-    let ids: Vec<String> = roles.iter().map(|role| format!("{task}/{role}")).collect();
+    let ids: Vec<String> = roles.iter().map(|role| role_id(task, role)).collect();
     let mut found = BTreeMap::new();
-    for entry in behaviors.entries().filter(|entry| entry.key.starts_with(&format!("{task}/"))) {
+    for entry in behaviors.entries().filter(|entry| entry.key.starts_with(&role_id(task, ""))) {
         let Some(i) = ids.iter().position(|id| id == entry.key) else {
             let known: Vec<&str> = ids.iter().map(String::as_str).collect();
             return Err(ConfigError::unknown(entry.place, entry.key, &known));

@@ -13,7 +13,7 @@ mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
-pub use role::Role;
+pub use role::{Role, role_id};
 pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
 use crate::error::EnvError;

@@ -19,6 +19,11 @@ pub struct Role {
     pub intermittent: bool,
 }
 
+/// The id of a task as its role of that name knows it.
+pub fn role_id(task: &str, role: &str) -> String {
+    format!("{task}/{role}")
+}
+
 impl Spec {
     /// All who decide in the task: [`Spec::roles`], or one who has it all.
     pub fn deciders(&self) -> Vec<Role> {
@@ -41,7 +46,7 @@ impl Spec {
             group
         });
         Spec {
-            id: self.id_of_role(name),
+            id: role_id(&self.id, name),
             obs: obs.len(),
             act: act.len(),
             action_names: self.action_names[act.clone()].to_vec(),
@@ -52,11 +57,6 @@ impl Spec {
             roles: Vec::new(),
             ..self.clone()
         }
-    }
-
-    /// The id of the task as a role of that name knows it.
-    pub fn id_of_role(&self, name: &str) -> String {
-        format!("{}/{name}", self.id)
     }
 }
 
