@@ -89,6 +89,11 @@ def play(case, model, episode):
         for v in [me.axes("butt")[:, 0], me.axes("butt")[:, 2], speed, spin]:
             obs += list(level.apply(v))
         obs += [*me.q, *me.v, *felt.astype(float), *level.apply(now.at("butt") - me.at("butt")), *(after.q - me.q)]
+        for ahead in case["future"]:
+            later = clip[t + 1 + ahead]
+            axes = later.axes("butt")
+            obs += [*level.apply(later.at("butt") - me.at("butt")), *level.apply(axes[:, 0]), *level.apply(axes[:, 2])]
+            obs += [*(later.q - me.q)]
 
         gap = me.at("butt") - now.at("butt")
         apart = {p: me.at(p) - now.at(p) for p in PARTS}

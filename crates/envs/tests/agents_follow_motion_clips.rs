@@ -6,6 +6,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,6 +23,8 @@ const EPISODES: usize = 4;
 const DECISIONS: usize = 25;
 /// Observations are stored in single precision.
 const TOLERANCE: f64 = 5e-5;
+/// Decisions that observations look ahead.
+const AHEAD: usize = 16;
 /// Size of the actions: none, gentle, middling and wild, which is clipped.
 const SCALES: [f32; EPISODES] = [0.0, 0.1, 0.5, 1.3];
 
@@ -60,42 +63,63 @@ fn follow(options: &Options, agents: usize, isa: Option<Isa>) -> VecEnv {
     VecEnv::new("MarathonMan-v0", &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// What the clip shows in the decisions from a state on, which is that of a start; and how many decisions into it that is.
-fn moments(clip: &Clip, state: &AgentState) -> (usize, Vec<Value>) {
-    // as the environment, with laps of a whole number of decisions
-    let decisions = clip.duration() / 0.025;
-    let cycles = (1..=64).find(|n| ((*n as f64 * decisions).round() - *n as f64 * decisions).abs() < 0.011);
-    let cycles = cycles.expect("clips of 60 frames a second fit") as f64;
-    let rows = (cycles * decisions).round();
-    let step = if clip.cycle().is_some() { cycles * clip.duration() / rows } else { 0.025 };
-    let at = |row: usize| {
+/// A clip cut into decisions.
+struct Cut<'a> {
+    clip: &'a Clip,
+    rows: usize,
+    step: f64,
+}
+
+impl Cut<'_> {
+    /// As the environment, with laps of a whole number of decisions.
+    fn new(clip: &Clip) -> Cut<'_> {
+        let decisions = clip.duration() / 0.025;
+        if clip.cycle().is_none() {
+            return Cut { clip, rows: (decisions + 1e-9).floor() as usize + 1, step: 0.025 };
+        }
+        let cycles = (1..=64).find(|n| ((*n as f64 * decisions).round() - *n as f64 * decisions).abs() < 0.011);
+        let cycles = cycles.expect("clips of 60 frames a second fit") as f64;
+        let rows = (cycles * decisions).round();
+        Cut { clip, rows: rows as usize, step: cycles * clip.duration() / rows }
+    }
+
+    fn at(&self, row: usize) -> Value {
+        let Cut { clip, step, .. } = *self;
+        // a clip that does not loop stays at its last decision
+        let row = if clip.cycle().is_some() { row } else { row.min(self.rows - 1) };
         let (time, mut qpos, mut qvel) = (row as f64 * step, vec![0.0; 28], vec![0.0; 27]);
-        clip.qpos(time.min(clip.end()), &mut qpos);
-        clip.qvel(time.min(clip.end()), &mut qvel);
+        clip.qpos(time, &mut qpos);
+        clip.qvel(time, &mut qvel);
         qvel.iter_mut().for_each(|v| *v *= step / 0.025);
         let yaw = clip.cycle().map_or(0.0, |cycle| cycle.yaw);
         let facing = yaw * time / clip.duration();
         json!({ "qpos": qpos, "qvel": qvel, "phase": clip.phase(time), "facing": facing })
-    };
-    // the noise of a start is smaller than the distance of two decisions, at any but a standstill
-    let away = |row: usize| {
-        let moment = at(row);
-        let there = moment["qpos"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap());
-        there.zip(&state.qpos).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
-    };
-    let start = (0..rows as usize).min_by(|a, b| away(*a).total_cmp(&away(*b))).unwrap();
-    assert!(away(start) < 21.0 * 0.01_f64.powi(2) + 1e-9, "the start is in the clip");
-    (start, (start..start + DECISIONS + 2).map(at).collect())
+    }
+
+    /// The row that is nearest to a state, and how far away it is: the noise of a start is smaller than the distance of two
+    /// decisions, at any but a standstill.
+    fn nearest(&self, state: &AgentState) -> (usize, f64) {
+        let away = |row: usize| {
+            let moment = self.at(row);
+            let there = moment["qpos"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap());
+            there.zip(&state.qpos).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+        };
+        let all = (0..self.rows).map(|row| (row, away(row)));
+        all.min_by(|(_, a), (_, b)| a.total_cmp(b)).expect("a clip has rows")
+    }
 }
 
-/// Length of a clip, or none: where its time ends.
-trait End {
-    fn end(&self) -> f64;
+/// How far a state is from a clip.
+fn gap(clip: &Clip, state: &AgentState) -> f64 {
+    Cut::new(clip).nearest(state).1
 }
-impl End for Clip {
-    fn end(&self) -> f64 {
-        if self.cycle().is_some() { f64::INFINITY } else { self.duration() }
-    }
+
+/// What the clip shows in the decisions from a state on, which is that of a start; and how many decisions into it that is.
+fn moments(clip: &Clip, state: &AgentState) -> (usize, Vec<Value>) {
+    let cut = Cut::new(clip);
+    let (start, away) = cut.nearest(state);
+    assert!(away < 21.0 * 0.01_f64.powi(2) + 1e-9, "the start is in the clip");
+    (start, (start..start + DECISIONS + AHEAD + 1).map(|row| cut.at(row)).collect())
 }
 
 #[test]
@@ -103,29 +127,37 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
     clips::add("circling", circling());
     let mut request = Vec::new();
     let mut ours = Vec::new();
-    for (clip, control, reward) in [
-        ("walk", "pd", "deepmimic"),
-        ("walk", "torque", "paper"),
-        ("circling", "pd", "paper"),
-        ("circling", "pd_range", "deepmimic"),
-        ("backflip", "pd", "deepmimic"),
-        ("run", "servo", "paper"),
+    let mut played = BTreeSet::new();
+    for (clip, control, reward, future) in [
+        ("walk", "pd", "deepmimic", 0),
+        ("walk", "torque", "paper", 0),
+        ("circling", "pd", "paper", 3),
+        ("circling", "pd_range", "deepmimic", 0),
+        ("backflip", "pd", "deepmimic", 0),
+        ("run", "servo", "paper", 0),
+        ("backflip,circling,kick", "pd", "deepmimic", 2),
     ] {
         let options = Options::new().with("clip", clip).with("control", control).with("reward", reward);
+        let options = options.with("future", future as f64);
         let agent = marathon_envs::registry::Registry::default().agent_with("MarathonMan-v0", &options).unwrap();
         let facts = agent.facts();
         let mut env = follow(&options, EPISODES, Some(Isa::F64));
         let mut out = env.buffers();
         env.reset(Some(5), &mut out.obs).unwrap();
         let act = env.spec().act;
-        let mut episodes = Vec::new();
+        let (mut episodes, several) = (Vec::new(), clip.contains(','));
         for agent in 0..EPISODES {
             let state = env.state(agent).unwrap();
             let mut actions = vec![vec![0.0; act]; DECISIONS];
             for (t, row) in actions.iter_mut().enumerate() {
                 action(agent, t, SCALES[agent], row);
             }
-            let (_, moments) = moments(&shipped(clip), &state);
+            let clips = clip.split(',').map(|name| (name, shipped(name)));
+            let (name, clip) = clips.min_by(|(_, a), (_, b)| gap(a, &state).total_cmp(&gap(b, &state))).unwrap();
+            if several {
+                played.insert(name);
+            }
+            let (_, moments) = moments(&clip, &state);
             episodes.push(json!({ "qpos": state.qpos, "qvel": state.qvel, "actions": actions, "clip": moments }));
         }
         let mut steps = Vec::new();
@@ -137,9 +169,10 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             env.step(&row, &mut out.as_mut()).unwrap();
             steps.push(out.clone());
         }
+        let ahead = &[4, 8, 16][..future as usize];
         request.push(json!({
             "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "reach": 1.0,
-            "reward": reward, "distance": 0.5, "episodes": episodes,
+            "reward": reward, "distance": 0.5, "future": ahead, "episodes": episodes,
         }));
         ours.push((format!("{clip}, {control}, {reward}"), env.spec().clone(), steps));
     }
@@ -174,6 +207,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
         }
     }
     // the comparison means something only if these happened
+    assert!(played.len() > 1, "one clip only: {played:?}");
     assert!(touches > 100 && far > 3 && decisions > 300, "{touches} touches, {far} too far, {decisions} decisions");
 }
 
@@ -192,6 +226,38 @@ fn episodes_start_all_over_the_clip() {
     let mut env = follow(&Options::new().with("start", "first"), 20, None);
     env.reset(Some(1), &mut obs[..20 * env.spec().obs]).unwrap();
     assert!((0..20).all(|agent| moments(&clip, &env.state(agent).unwrap()).0 == 0));
+}
+
+/// Half of the adaptive starts after a failure are in the second before it; the same seed starts alike, whatever has been.
+#[test]
+fn adaptive_starts_are_where_the_agent_has_failed() {
+    let clip = shipped("backflip");
+    let agents = 64;
+    let options = Options::new().with("clip", "backflip").with("start", "adaptive");
+    let mut env = follow(&options, agents, None);
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).unwrap();
+    let (first, rows) = (out.obs.clone(), Cut::new(&clip).rows);
+    let (mut failures, mut near) = (0, 0);
+    for _ in 0..120 {
+        env.step(&vec![0.0; agents * 21], &mut out.as_mut()).unwrap();
+        let failed: Vec<usize> = (0..agents).filter(|agent| out.terminated[*agent]).collect();
+        let phases: Vec<f32> = failed.iter().map(|agent| out.info[agent * 3 + 2]).collect();
+        let ended: Vec<bool> = (0..agents).map(|agent| out.terminated[agent] || out.truncated[agent]).collect();
+        env.reset_agents(&ended, &mut out.obs).unwrap();
+        for (agent, phase) in failed.into_iter().zip(phases) {
+            let (start, failure) =
+                (moments(&clip, &env.state(agent).unwrap()).0, (phase * rows as f32).round() as usize);
+            failures += 1;
+            near += usize::from((failure + rows - start) % rows <= 41);
+        }
+    }
+    // of the random ones, those of a second are near by chance
+    let expected = 0.5 + 0.5 * 41.0 / rows as f64;
+    let share = near as f64 / failures as f64;
+    assert!(failures > 200 && (share - expected).abs() < 0.1, "{near} of {failures}, expected {expected}");
+    env.reset(Some(1), &mut out.obs).unwrap();
+    assert_eq!(first, out.obs);
 }
 
 #[test]

@@ -59,6 +59,6 @@ impl<T: Real> Ctrl<'_, T> {
     /// If its facts name no clip, or it is asked for more.
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
-        self.reference.expect("the facts name a clip").frame(self.memory, ahead)
+        self.reference.expect("the facts name clips").frame(self.memory, ahead)
     }
 }

@@ -51,9 +51,9 @@ pub struct Facts {
     pub command: Vec<CommandRange>,
     /// Who decides in the task, if more than one does; empty: one who has it all.
     pub roles: Vec<RoleFacts>,
-    /// The motion that the agent follows, of the model's joints; then the first [`Following::SLOTS`](crate::Following::SLOTS)
-    /// of its memory tell where it is in the clip.
-    pub clip: Option<Arc<Clip>>,
+    /// Motions of the model's joints, one of which an agent follows. If there are any, the first
+    /// [`Following::SLOTS`](crate::Following::SLOTS) of its memory tell where it is in which.
+    pub clips: Vec<Arc<Clip>>,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
     /// What it sees of the physics.
@@ -83,7 +83,7 @@ impl Default for Facts {
             touch_sites: Vec::new(),
             command: Vec::new(),
             roles: Vec::new(),
-            clip: None,
+            clips: Vec::new(),
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),

@@ -1,11 +1,13 @@
-//! The motion that an agent follows: a clip as a constant table with a row per decision.
+//! The motions that agents follow: clips as a constant table with a row per decision.
 //!
-//! The table is made once, with the physics' own kinematics. Each agent has its own row in it and its own place in the
-//! world where the clip has begun: the first [`Following::SLOTS`] slots of its memory, which zeros make the clip's first
-//! frame at the world's origin. A looping clip goes on from there for as long as one likes.
+//! The table is made once, with the physics' own kinematics. Each agent has its own row in it, which tells its clip, and its
+//! own place in the world where the clip has begun: the first [`Following::SLOTS`] slots of its memory, which zeros make
+//! the first clip's first frame at the world's origin. A looping clip goes on from there for as long as one likes.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use marathon_motion::{Clip, Cycle};
 use marathon_physics::lanes::{MAX_LANES, Real};
@@ -23,35 +25,52 @@ const MOST_CYCLES: usize = 64;
 /// Height above the ground up to which a foot of a clip counts as set down, m. Motion capture is not more precise.
 const CONTACT_MARGIN: f64 = 0.01;
 
-/// Where an agent is in the clip that it follows: the first slots of its memory.
+/// Where an agent is in the clips that it follows: the first slots of its memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Following;
 
 impl Following {
-    /// Slots it needs: the row, and where the clip's present lap has begun.
+    /// Slots it needs: the row among those of all clips, and where the clip's present lap has begun.
     pub const SLOTS: usize = 4;
-    pub(crate) const ROW: usize = 0;
+    /// Slot of the row.
+    pub const ROW: usize = 0;
     const X: usize = 1;
     const Y: usize = 2;
     const YAW: usize = 3;
 }
 
-/// A clip at the pace of decisions, in double precision: where episodes start.
+/// Clips at the pace of decisions, in double precision: where episodes start.
+#[derive(Default)]
 pub(crate) struct Timeline {
     pub qpos: Vec<Vec<f64>>,
     pub qvel: Vec<Vec<f64>>,
     /// Share of the clip, or of its cycle, that is over, by row.
     pub phase: Vec<f64>,
-    /// What all rows together get to, if the clip loops.
-    pub lap: Option<Cycle>,
+    /// The rows of each clip.
+    pub clips: Vec<Lap>,
+}
+
+/// A clip's rows, one after another.
+pub(crate) struct Lap {
+    pub rows: Range<usize>,
+    /// What all of them together get to, if the clip loops.
+    pub cycle: Option<Cycle>,
 }
 
 impl Timeline {
+    fn new(clips: &[Arc<Clip>], dt: f64) -> Timeline {
+        let mut out = Timeline::default();
+        for clip in clips {
+            out.add(clip, dt);
+        }
+        out
+    }
+
     /// A looping clip is cut into whole laps of as many cycles as it takes for their length to be a whole number of
     /// decisions; what remains is less than a hundredth of a decision for clips of 30 or 60 frames a second, and is spread.
-    fn new(clip: &Clip, dt: f64) -> Timeline {
+    fn add(&mut self, clip: &Clip, dt: f64) {
         let decisions = clip.duration() / dt;
-        let (rows, step, lap) = match clip.cycle() {
+        let (rows, step, cycle) = match clip.cycle() {
             None => ((decisions + 1e-9).floor() as usize + 1, dt, None),
             Some(cycle) => {
                 let cycles = fitting_cycles(decisions);
@@ -60,17 +79,23 @@ impl Timeline {
             }
         };
         let (nq, nv) = (clip.layout().nq(), clip.layout().nv());
-        let mut out = Timeline { qpos: Vec::new(), qvel: Vec::new(), phase: Vec::new(), lap };
+        let first = self.phase.len();
+        self.clips.push(Lap { rows: first..first + rows, cycle });
         for row in 0..rows {
             let (time, mut qpos, mut qvel) = (row as f64 * step, vec![0.0; nq], vec![0.0; nv]);
             clip.qpos(time, &mut qpos);
             clip.qvel(time, &mut qvel);
             qvel.iter_mut().for_each(|v| *v *= step / dt);
-            out.phase.push(clip.phase(time));
-            out.qpos.push(qpos);
-            out.qvel.push(qvel);
+            self.phase.push(clip.phase(time));
+            self.qpos.push(qpos);
+            self.qvel.push(qvel);
         }
-        out
+    }
+
+    /// The clip that a row belongs to.
+    pub fn clip_of(&self, row: usize) -> &Lap {
+        let after = self.clips.partition_point(|lap| lap.rows.end <= row);
+        &self.clips[after.min(self.clips.len() - 1)]
     }
 }
 
@@ -116,74 +141,54 @@ struct Columns {
     phase: usize,
     /// Yaw of the direction of travel.
     facing: usize,
+    /// Of the row's clip: the row after its last one, and how many it has if it loops, else 0.
+    end: usize,
+    /// Of the row's clip: what a lap gets to, x, y and yaw; zeros without one.
+    lap: usize,
+    /// Of the row's clip: lowest place of each part's center, m.
+    lowest: usize,
     width: usize,
 }
 
-/// What agents follow: a clip as a table in lane precision.
+/// What agents follow: clips as a table in lane precision.
 pub(crate) struct Reference<T: Real> {
     pub timeline: Timeline,
     columns: Columns,
     /// `[row][column]`.
     table: Vec<T::Scalar>,
-    /// Lowest place of each part's center in the clip, m.
-    lowest: Vec<f64>,
 }
 
 impl<T: Real> Reference<T> {
-    /// The table of a clip for an agent that decides every `dt` seconds.
+    /// The table of clips for an agent that decides every `dt` seconds.
     ///
     /// # Errors
-    /// If the clip is of another model.
-    pub fn new(clip: &Clip, dt: f64, blueprint: &Blueprint, bindings: &Bindings<T>) -> Result<Self, String> {
+    /// If a clip is of another model.
+    pub fn new(clips: &[Arc<Clip>], dt: f64, blueprint: &Blueprint, bindings: &Bindings<T>) -> Result<Self, String> {
         let model = &blueprint.model;
-        clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
-        let timeline = Timeline::new(clip, dt);
-        let qvel = model.nq;
-        let parts = qvel + model.nv;
-        let bodies = parts + 6 * bindings.parts.len();
-        let center = bodies + 12 * bindings.parts.len();
-        let touch = center + 6;
-        let phase = touch + bindings.measure.touch_sites.len();
-        let facing = phase + 5;
-        let columns = Columns { qpos: 0, qvel, parts, bodies, center, touch, phase, facing, width: facing + 1 };
-
-        let sim = Sim::<f64>::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
-        let (mut group, mut work) = (Group::new(&sim), Work::new(&sim));
-        let shares: Vec<(usize, f64)> = bindings.mass_shares.iter().map(|(b, x)| (*b, T::widen(*x))).collect();
-        let mut rows = Vec::new();
-        let mut lowest = vec![f64::INFINITY; bindings.parts.len()];
-        for (i, (qpos, qvel)) in timeline.qpos.iter().zip(&timeline.qvel).enumerate() {
-            group.reset_lane(&sim, 0, qpos, qvel);
-            sim.refresh(&mut work, &group);
-            let r = Readings::new(&sim, &group, &work);
-            rows.extend(qpos);
-            rows.extend(qvel);
-            for (part, low) in bindings.parts.iter().zip(&mut lowest) {
-                let position = r.geom_pos(part.geom);
-                *low = low.min(position[2]);
-                rows.extend(position);
-                rows.extend(r.geom_velocity(part.geom));
-            }
-            for part in &bindings.parts {
-                rows.extend(r.body_axes(part.body).as_flattened());
-                rows.extend(r.body_angular_velocity(part.body));
-            }
-            let [position, velocity] = center_of_mass(&r, &shares);
-            rows.extend(position);
-            rows.extend(velocity);
-            for site in &bindings.measure.touch_sites {
-                rows.push(f64::from(u8::from(set_down(model, &r, *site))));
-            }
-            let angle = TAU * timeline.phase[i];
-            for angle in [angle, 2.0 * angle] {
-                rows.extend([libm::sin(angle), libm::cos(angle)]);
-            }
-            rows.push(timeline.phase[i]);
-            // the turn of a lap is spread evenly
-            rows.push(timeline.lap.map_or(0.0, |lap| lap.yaw * i as f64 / timeline.qpos.len() as f64));
+        for clip in clips {
+            clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
         }
-        let table = rows.into_iter().map(T::scalar).collect();
-        Ok(Reference { timeline, columns, table, lowest })
+        let timeline = Timeline::new(clips, dt);
+        let columns = Columns::new(model, bindings);
+        let mut table = Vec::new();
+        for lap in &timeline.clips {
+            let mut rows = shown(lap, &timeline, blueprint, bindings)?;
+            let mut low = vec![f64::INFINITY; bindings.parts.len()];
+            for row in &rows {
+                for (i, low) in low.iter_mut().enumerate() {
+                    *low = low.min(row[columns.parts + 6 * i + 2]);
+                }
+            }
+            let count = lap.rows.len() as f64;
+            let (length, [x, y], yaw) = lap.cycle.map_or((0.0, [0.0; 2], 0.0), |lap| (count, lap.pos, lap.yaw));
+            for row in &mut rows {
+                row.extend([lap.rows.end as f64, length, x, y, yaw]);
+                row.extend(&low);
+                assert_eq!(row.len(), columns.width);
+                table.extend(row.iter().map(|x| T::scalar(*x)));
+            }
+        }
+        Ok(Reference { timeline, columns, table })
     }
 
     /// Rows of the table.
@@ -196,12 +201,7 @@ impl<T: Real> Reference<T> {
     pub fn frame(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
         assert!(ahead <= MOST_AHEAD, "a clip is shown for {MOST_AHEAD} decisions ahead");
         let at = self.place(memory, ahead);
-        let mut rows: [&[T::Scalar]; MAX_LANES] = [&[]; MAX_LANES];
-        for (lane, row) in rows[..T::LANES].iter_mut().enumerate() {
-            // whatever a snapshot may have held
-            let i = (T::widen(at[Following::ROW].get(lane)) as usize).min(self.rows() - 1);
-            *row = &self.table[i * self.columns.width..][..self.columns.width];
-        }
+        let rows = self.rows_of(at[Following::ROW]);
         let (sin, cos) = at[Following::YAW].sin_cos();
         Frame { columns: &self.columns, rows, origin: [at[Following::X], at[Following::Y]], turn: [cos, sin] }
     }
@@ -210,19 +210,32 @@ impl<T: Real> Reference<T> {
     #[inline(always)]
     fn place(&self, memory: &[T], ahead: usize) -> [T; Following::SLOTS] {
         let [row, x, y, yaw] = [0, 1, 2, 3].map(|i| memory[i]);
-        let (count, row) = (T::lit(self.rows() as f64), row + T::lit(ahead as f64));
-        let Some(lap) = self.timeline.lap else {
-            return [row.min(count - T::lit(1.0)), x, y, yaw];
-        };
+        let rows = self.rows_of(row);
+        let of_clip = |i: usize| column::<T>(&rows, i);
+        let Columns { end, lap, .. } = self.columns;
+        let ([end, length], [dx, dy, turn]) = ([end, end + 1].map(of_clip), [lap, lap + 1, lap + 2].map(of_clip));
+        let next = row + T::lit(ahead as f64);
+        let (past, loops) = (T::not(next.lt(end)), T::zero().lt(length));
+        let around = T::and(past, loops);
         let (sin, cos) = yaw.sin_cos();
-        let [dx, dy] = lap.pos.map(T::lit);
-        let around = T::not(row.lt(count));
         [
-            row - T::masked(around, count),
+            T::select(T::and(past, T::not(loops)), end - T::lit(1.0), next - T::masked(around, length)),
             x + T::masked(around, sin.neg_mul_add(dy, cos * dx)),
             y + T::masked(around, sin.mul_add(dx, cos * dy)),
-            yaw + T::masked(around, T::lit(lap.yaw)),
+            yaw + T::masked(around, turn),
         ]
+    }
+
+    /// The table's rows of a number for each agent.
+    #[inline(always)]
+    fn rows_of(&self, at: T) -> [&[T::Scalar]; MAX_LANES] {
+        let mut rows: [&[T::Scalar]; MAX_LANES] = [&[]; MAX_LANES];
+        for (lane, row) in rows[..T::LANES].iter_mut().enumerate() {
+            // whatever a snapshot may have held
+            let i = (T::widen(at.get(lane)) as usize).min(self.rows() - 1);
+            *row = &self.table[i * self.columns.width..][..self.columns.width];
+        }
+        rows
     }
 
     /// A decision has been made.
@@ -235,16 +248,95 @@ impl<T: Real> Reference<T> {
     /// Lanes in which a clip that does not loop has come to its end.
     #[inline(always)]
     pub fn over(&self, memory: &[T]) -> T::Mask {
-        if self.timeline.lap.is_some() {
-            return T::none();
-        }
-        T::not(memory[Following::ROW].lt(T::lit(self.rows() as f64 - 1.0)))
+        let rows = self.rows_of(memory[Following::ROW]);
+        let [end, length] = [0, 1].map(|i| column::<T>(&rows, self.columns.end + i));
+        let last = T::not(memory[Following::ROW].lt(end - T::lit(1.0)));
+        T::and(last, T::not(T::zero().lt(length)))
     }
+}
 
-    /// Lowest place of a part's center in the clip, m.
-    pub fn lowest(&self, part: Part) -> f64 {
-        self.lowest[part.0]
+impl Columns {
+    fn new<T: Real>(model: &Model, bindings: &Bindings<T>) -> Columns {
+        let qvel = model.nq;
+        let parts = qvel + model.nv;
+        let bodies = parts + 6 * bindings.parts.len();
+        let center = bodies + 12 * bindings.parts.len();
+        let touch = center + 6;
+        let phase = touch + bindings.measure.touch_sites.len();
+        let facing = phase + 5;
+        let end = facing + 1;
+        let lap = end + 2;
+        let lowest = lap + 3;
+        Columns {
+            qpos: 0,
+            qvel,
+            parts,
+            bodies,
+            center,
+            touch,
+            phase,
+            facing,
+            end,
+            lap,
+            lowest,
+            width: lowest + bindings.parts.len(),
+        }
     }
+}
+
+/// What the rows of a clip show, as far as each row tells it alone.
+fn shown<T: Real>(
+    lap: &Lap,
+    timeline: &Timeline,
+    blueprint: &Blueprint,
+    bindings: &Bindings<T>,
+) -> Result<Vec<Vec<f64>>, String> {
+    let model = &blueprint.model;
+    let sim = Sim::<f64>::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
+    let (mut group, mut work) = (Group::new(&sim), Work::new(&sim));
+    let shares: Vec<(usize, f64)> = bindings.mass_shares.iter().map(|(b, x)| (*b, T::widen(*x))).collect();
+    let mut rows = Vec::new();
+    for i in lap.rows.clone() {
+        let (qpos, qvel, phase) = (&timeline.qpos[i], &timeline.qvel[i], timeline.phase[i]);
+        group.reset_lane(&sim, 0, qpos, qvel);
+        sim.refresh(&mut work, &group);
+        let r = Readings::new(&sim, &group, &work);
+        let mut row = [qpos.as_slice(), qvel].concat();
+        for part in &bindings.parts {
+            row.extend(r.geom_pos(part.geom));
+            row.extend(r.geom_velocity(part.geom));
+        }
+        for part in &bindings.parts {
+            row.extend(r.body_axes(part.body).as_flattened());
+            row.extend(r.body_angular_velocity(part.body));
+        }
+        let [position, velocity] = center_of_mass(&r, &shares);
+        row.extend(position);
+        row.extend(velocity);
+        for site in &bindings.measure.touch_sites {
+            row.push(f64::from(u8::from(set_down(model, &r, *site))));
+        }
+        let angle = TAU * phase;
+        for angle in [angle, 2.0 * angle] {
+            row.extend([libm::sin(angle), libm::cos(angle)]);
+        }
+        row.push(phase);
+        // the turn of a lap is spread evenly
+        let done = (i - lap.rows.start) as f64;
+        row.push(lap.cycle.map_or(0.0, |cycle| cycle.yaw * done / lap.rows.len() as f64));
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// A number of each agent's row.
+#[inline(always)]
+fn column<T: Real>(rows: &[&[T::Scalar]; MAX_LANES], column: usize) -> T {
+    let mut lanes = [T::Scalar::default(); MAX_LANES];
+    for (x, row) in lanes.iter_mut().zip(&rows[..T::LANES]) {
+        *x = row[column];
+    }
+    T::load(&lanes[..T::LANES])
 }
 
 /// Whether a touch site of a clip is on the ground, which is level.
@@ -278,14 +370,9 @@ pub struct Frame<'a, T: Real> {
 }
 
 impl<T: Real> Frame<'_, T> {
-    /// A number of each agent's row.
     #[inline(always)]
-    fn column(&self, column: usize) -> T {
-        let mut lanes = [T::Scalar::default(); MAX_LANES];
-        for (x, row) in lanes.iter_mut().zip(&self.rows[..T::LANES]) {
-            *x = row[column];
-        }
-        T::load(&lanes[..T::LANES])
+    fn column(&self, i: usize) -> T {
+        column::<T>(&self.rows, i)
     }
 
     /// A vector of the row, in world axes.
@@ -354,6 +441,12 @@ impl<T: Real> Frame<'_, T> {
     #[inline(always)]
     pub fn touch(&self, i: usize) -> T::Mask {
         T::lit(0.5).lt(self.column(self.columns.touch + i))
+    }
+
+    /// Lowest place that the clip has anywhere for a part's center, m.
+    #[inline(always)]
+    pub fn lowest(&self, part: Part) -> T {
+        self.column(self.columns.lowest + part.0)
     }
 
     /// Share of the clip, or of its cycle, that is over: 0 to 1.

@@ -194,7 +194,7 @@ impl<T: Real> Senses<'_, T> {
     /// [`MOST_AHEAD`](super::reference::MOST_AHEAD); 0 is where the agent should be now.
     ///
     /// # Panics
-    /// If its facts name no clip, or it is asked for more.
+    /// If its facts name no clips, or it is asked for more.
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
         self.followed().frame(self.memory, ahead)
@@ -212,15 +212,9 @@ impl<T: Real> Senses<'_, T> {
         self.followed().over(self.memory)
     }
 
-    /// Lowest place that the clip has for a part's center, m.
-    #[inline(always)]
-    pub fn lowest_in_clip(&self, part: Part) -> f64 {
-        self.followed().lowest(part)
-    }
-
     #[inline(always)]
     fn followed(&self) -> &Reference<T> {
-        self.reference.expect("the facts name a clip")
+        self.reference.expect("the facts name clips")
     }
 
     /// Index of a body, for the [readings](Senses::readings).

@@ -1,5 +1,7 @@
 //! Where an episode starts: what [`Agent::reset`](crate::Agent::reset) writes to.
 
+use std::ops::Range;
+
 use marathon_physics::Model;
 
 use super::ResetNoise;
@@ -26,6 +28,8 @@ pub struct Start<'a> {
     /// [`Agent::begin`](crate::Agent::begin) is called. For what is drawn here and has to be known later, such as the phase of
     /// a motion.
     pub memory: &'a mut [f64],
+    /// The agent's own variables at the end of its last episode, zeros if there has been none since it was given its seed.
+    pub previous: &'a [f64],
     pub(crate) grounds: &'a mut Vec<(usize, Vec<f32>)>,
     pub(crate) timeline: Option<&'a Timeline>,
     pub(crate) blueprint: &'a Blueprint,
@@ -37,17 +41,32 @@ impl Start<'_> {
         &self.blueprint.model
     }
 
-    /// Number of rows of the clip that the agent follows: its decisions, several cycles of a clip that loops. 0 without one.
-    pub fn clip_rows(&self) -> usize {
-        self.timeline.map_or(0, |timeline| timeline.qpos.len())
+    /// The rows of each clip among those of all: decisions, several cycles of a clip that loops. None without clips.
+    pub fn clips(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
+        self.timeline.map_or(&[][..], |timeline| &timeline.clips).iter().map(|lap| lap.rows.clone())
     }
 
-    /// Puts the agent into a row of the clip that it follows, with its velocities.
+    /// The row that is some decisions before another one: in the same clip, and no earlier than its beginning, unless it
+    /// loops.
+    ///
+    /// # Panics
+    /// If the facts name no clips.
+    pub fn row_before(&self, row: usize, decisions: usize) -> usize {
+        let lap = self.timeline.expect("the facts name clips").clip_of(row);
+        let (at, count) = (row.min(lap.rows.end - 1) - lap.rows.start, lap.rows.len());
+        let earlier = match lap.cycle {
+            Some(_) => (at + count - decisions % count) % count,
+            None => at.saturating_sub(decisions),
+        };
+        lap.rows.start + earlier
+    }
+
+    /// Puts the agent into a row of the clips, with its velocities.
     ///
     /// # Panics
     /// If there is no such row.
     pub fn start_in_clip(&mut self, row: usize) {
-        let timeline = self.timeline.expect("the facts name a clip");
+        let timeline = self.timeline.expect("the facts name clips");
         self.qpos.copy_from_slice(&timeline.qpos[row]);
         self.qvel.copy_from_slice(&timeline.qvel[row]);
         self.memory[..Following::SLOTS].fill(0.0);

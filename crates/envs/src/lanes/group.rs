@@ -102,6 +102,11 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
+    /// An agent's memory.
+    pub fn memory_of(&self, lane: usize) -> Vec<f64> {
+        self.memory.iter().map(|x| T::widen(x.get(lane))).collect()
+    }
+
     /// Feet of an agent that touched the ground during its last decision, a bit each.
     pub fn feet(&self, lane: usize) -> u32 {
         self.feet.iter().take(32).enumerate().fold(0, |bits, (i, lanes)| bits | (lanes >> lane & 1) << i)

@@ -100,7 +100,8 @@ impl<T: Real> LaneShard<T> {
         let (group, lane, number) = (&mut groups[agent / T::LANES], agent % T::LANES, block * BLOCK + agent);
         let id = lives[agent].next();
         if starts.get(number, id).is_none() {
-            task.draw_start(start, &mut EpisodeRng::new(id));
+            let previous = if id.episode <= 1 { vec![0.0; task.facts.memory] } else { group.memory_of(lane) };
+            task.draw_start(start, &mut EpisodeRng::new(id), &previous);
             if start.takes_physics() {
                 let ids: Vec<EpisodeId> = lives[agent - lane..][..T::LANES].iter().map(Life::next).collect();
                 starts.make(task, work, number - lane, &ids);

@@ -80,11 +80,13 @@ fn draw<T: Real>(
     let mut randoms: Vec<EpisodeRng> = ids.iter().map(|id| EpisodeRng::new(*id)).collect();
     let mut drawn = vec![EpisodeStart::new(); T::LANES];
     let mut missing = due.to_vec();
+    // a start that is made in advance cannot know how the episode before it ends
+    let no_past = vec![0.0; task.facts.memory];
     for _ in 0..DRAWS {
         let mut doubtful = Vec::new();
         for lane in missing {
             let start = &mut drawn[lane];
-            task.draw_start(start, &mut randoms[lane]);
+            task.draw_start(start, &mut randoms[lane], &no_past);
             group.reset_lane(&task.sim, lane, &start.state.qpos, &start.state.qvel);
             for (field, elevations) in &start.grounds {
                 group.set_ground(&task.sim, lane, *field, elevations);

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use marathon_motion::Clip;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::Actuator;
 use marathon_physics::{Model, Sim, Work};
@@ -74,9 +73,13 @@ impl<T: Real> AgentFactory<T> {
             nv: blueprint.model.nv,
             options,
         };
-        let table = |clip: &Arc<Clip>| Reference::new(clip, spec.dt, &blueprint, &bindings);
-        let reference = facts.clip.as_ref().map(table).transpose();
-        let reference = reference.map_err(|problem| EnvError::Agent { id: id(), problem })?;
+        let reference = match facts.clips.as_slice() {
+            [] => None,
+            clips => {
+                let table = Reference::new(clips, spec.dt, &blueprint, &bindings);
+                Some(table.map_err(|problem| EnvError::Agent { id: id(), problem })?)
+            }
+        };
         let mut task = Task { agent, facts, spec, blueprint, bindings, sim, reference };
         task.spec.observations = task.rehearse()?;
         task.spec.obs = task.spec.observations.last().map_or(0, |group| group.range.end);
@@ -162,7 +165,7 @@ impl<T: Real> Task<T> {
         let facts = &self.facts;
         let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
         let (mut start, id) = (EpisodeStart::new(), EpisodeId { seed: 0, agent: 0, episode: 0 });
-        self.draw_start(&mut start, &mut EpisodeRng::new(id));
+        self.draw_start(&mut start, &mut EpisodeRng::new(id), &vec![0.0; facts.memory]);
         if let Some(x) = start.state.qpos.iter().chain(&start.state.qvel).find(|x| !x.is_finite()) {
             return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
         }
@@ -193,7 +196,8 @@ impl<T: Real> Task<T> {
     }
 
     /// Lets the agent draw the start of an episode into `out`.
-    pub fn draw_start(&self, out: &mut EpisodeStart, random: &mut EpisodeRng) {
+    /// The agent's last episode has left `previous` as its memory.
+    pub fn draw_start(&self, out: &mut EpisodeStart, random: &mut EpisodeRng, previous: &[f64]) {
         let blueprint = &self.blueprint;
         let EpisodeStart { state: AgentState { qpos, qvel }, memory, grounds, .. } = out;
         qpos.clone_from(&blueprint.spawn);
@@ -209,6 +213,7 @@ impl<T: Real> Task<T> {
             free_of_contacts: false,
             settle: 0,
             memory,
+            previous,
             grounds,
             timeline: self.reference.as_ref().map(|reference| &reference.timeline),
             blueprint,

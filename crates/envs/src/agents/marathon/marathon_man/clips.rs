@@ -71,35 +71,49 @@ pub fn all_names() -> Vec<String> {
     SHIPPED.iter().map(|shipped| shipped.name.to_string()).chain(of_callers).collect()
 }
 
-/// A clip as an argument: its name.
+/// Clips as an argument: their names with commas between them, or [`ALL`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct ClipName(pub String);
+pub struct ClipNames(pub String);
 
-impl OptionValue for ClipName {
-    const EXPECTED: &'static str = "the name of a clip";
+/// What stands for all clips that come with the crate.
+pub const ALL: &str = "all";
+
+impl OptionValue for ClipNames {
+    const EXPECTED: &'static str = "the name of a clip, several with commas between them, or all";
     fn value(&self) -> Value {
         Value::Text(self.0.clone())
     }
     fn read(value: &Value) -> Option<Self> {
         match value {
-            Value::Text(name) => Some(ClipName(name.clone())),
+            Value::Text(name) => Some(ClipNames(name.clone())),
             _ => None,
         }
     }
 }
 
-impl ClipName {
-    /// Whether there is such a clip.
+impl ClipNames {
+    /// Each name.
+    pub fn names(&self) -> Vec<&str> {
+        match self.0.as_str() {
+            ALL => SHIPPED.iter().map(|shipped| shipped.name).collect(),
+            names => names.split(',').map(str::trim).collect(),
+        }
+    }
+
+    /// The clips, as far as they are known.
+    pub fn find(&self) -> Vec<Arc<Clip>> {
+        self.names().into_iter().filter_map(find).collect()
+    }
+
+    /// Whether there are such clips.
     ///
     /// # Errors
-    /// If there is not; the text names the nearest.
+    /// If one is missing; the text names the nearest.
     pub fn check(&self) -> Result<(), String> {
-        if find(&self.0).is_some() {
-            return Ok(());
-        }
+        let Some(missing) = self.names().into_iter().find(|name| find(name).is_none()) else { return Ok(()) };
         let names = all_names();
-        let near = nearest(&self.0, names.iter().map(String::as_str));
+        let near = nearest(missing, names.iter().map(String::as_str));
         let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-        Err(format!("option clip is '{}', expected a clip that is known{near} known: {}", self.0, names.join(", ")))
+        Err(format!("option clip is '{missing}', expected a clip that is known{near} known: {}", names.join(", ")))
     }
 }

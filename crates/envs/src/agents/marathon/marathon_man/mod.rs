@@ -10,6 +10,7 @@
 //! | 59..65 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
 //! | 65..68 | how far the clip's butt is from the agent's own, m |
 //! | 68..89 | how far the clip's next angles are from the agent's own, rad |
+//! | 30 each | later frames: the clip's butt as seen from the agent's, m, its forward and up axis, angles less the agent's own |
 //!
 //! Vectors are in the clip's [direction of travel](crate::Frame::facing). Rewards: [`reward`]; what an action does:
 //! [`Control`]. The agent fails when its trunk touches the ground, unless the clip has it there, and when it is too far
@@ -33,7 +34,7 @@ use crate::any_agent::AnyAgent;
 
 pub use body::Control;
 use body::{ACTIONS, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model, parts};
-use clips::ClipName;
+use clips::ClipNames;
 pub use reward::Reward;
 
 /// Physics steps per decision: 200 Hz physics, 40 Hz control.
@@ -42,6 +43,14 @@ const FRAME_SKIP: usize = 5;
 const MAX_EPISODE_STEPS: usize = 800;
 /// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
 const LYING: f64 = 0.15;
+/// How far ahead later frames of the clip are, decisions, and what their observations are called.
+const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
+/// Numbers of such a frame.
+const FUTURE_FRAME: usize = 9 + JOINTS.len();
+/// Slot of the memory that counts the episode's decisions.
+const MADE: usize = Following::SLOTS;
+/// Decisions of a second.
+const SECOND: usize = 40;
 
 /// Where an episode starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,39 +59,45 @@ pub enum StartAt {
     Random,
     /// At its beginning.
     First,
+    /// Where it fails most: half of the episodes that follow a failure start in the second before that, the others at
+    /// random.
+    Adaptive,
 }
 
+const STARTS: [(StartAt, &str); 3] =
+    [(StartAt::Random, "random"), (StartAt::First, "first"), (StartAt::Adaptive, "adaptive")];
+
 impl OptionValue for StartAt {
-    const EXPECTED: &'static str = "random or first";
+    const EXPECTED: &'static str = "random, first or adaptive";
     fn value(&self) -> Value {
-        match self {
-            StartAt::Random => "random".into(),
-            StartAt::First => "first".into(),
-        }
+        let known = STARTS.into_iter().find(|(start, _)| start == self);
+        known.map_or("random", |(_, name)| name).into()
     }
     fn read(value: &Value) -> Option<Self> {
-        [StartAt::Random, StartAt::First].into_iter().find(|start| start.value() == *value)
+        STARTS.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(start, _)| start)
     }
 }
 
 crate::options! {
     /// Arguments of Marathon Man.
     pub struct Arguments {
-        /// Motion to follow: a clip's name.
-        clip: ClipName = ClipName("walk".into()),
+        /// Motion to follow: a clip's name; several, with commas between them, or `all` that are shipped: an episode has one.
+        clip: ClipNames = ClipNames("walk".into()),
         /// Reward: `deepmimic` (Peng et al., 2018), or `paper` (Booth and Booth, 2019).
         reward: Reward = Reward::DeepMimic,
         /// What an action does: `pd` moves the target of a servo away from the clip's next pose, `pd_range` is the target
         /// within the joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's
         /// drive.
         control: Control = Control::Pd,
-        /// Where an episode starts: at `random` decisions of the clip, or at the `first`.
+        /// Where an episode starts: at `random` decisions of the clip, at its `first`, or more often where it fails: `adaptive`.
         start: StartAt = StartAt::Random,
         /// Mean distance of the parts from where the clip has them that ends an episode, m. With the reward `paper`, a sum of
         /// its first five terms below 0.334 ends it instead.
         distance: Scale = Scale(0.5),
         /// Most that an action of `pd` moves a target, rad.
         reach: Scale = Scale(1.0),
+        /// How many later frames of the clip are observed: up to three, 4, 8 and 16 decisions ahead.
+        future: usize = 0,
     }
 }
 
@@ -116,12 +131,20 @@ const TASKS: [(&str, &str, &str); 16] = [
     ("MarathonManGetUpFaceUp-v0", "getup_faceup", "a figure of 21 motors: get up, lying on the back"),
 ];
 
+/// The row where the last episode failed, in half of the episodes that follow a failure.
+fn failed_at(start: &mut Start) -> Option<usize> {
+    let (row, made) = (start.previous[Following::ROW] as usize, start.previous[MADE] as usize);
+    let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
+    let failed = made > 0 && made < MAX_EPISODE_STEPS && !at_its_end;
+    (failed && start.random.whole(0, 1) == 1).then_some(row)
+}
+
 /// Marathon Man with any clip, and with each that comes with the crate.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let any = ("MarathonMan-v0", "walk", "a figure of 21 motors: move as a motion clip does");
     let tasks = [any].into_iter().chain(TASKS).enumerate();
     let agent = |(i, (id, clip, summary)): (usize, (&'static str, &str, &'static str))| {
-        let arguments = Arguments { clip: ClipName(clip.into()), ..Arguments::default() };
+        let arguments = Arguments { clip: ClipNames(clip.into()), ..Arguments::default() };
         Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
     };
     tasks.map(agent).collect()
@@ -146,11 +169,10 @@ impl MarathonMan {
     /// Lanes in which a part of the trunk touched the ground although the clip does not have it there.
     #[inline(always)]
     fn fallen<T: Real>(s: &Senses<T>) -> T::Mask {
-        let mut fallen = T::none();
+        let (mut fallen, clip) = (T::none(), s.reference(0));
         for part in TRUNK {
-            if s.lowest_in_clip(part) > LYING {
-                fallen = T::or(fallen, s.touched_ground(part));
-            }
+            let upright = T::lit(LYING).lt(clip.lowest(part));
+            fallen = T::or(fallen, T::and(upright, s.touched_ground(part)));
         }
         fallen
     }
@@ -158,22 +180,22 @@ impl MarathonMan {
 
 impl Agent for MarathonMan {
     fn facts(&self) -> Facts {
-        let Arguments { clip, reward, control, .. } = &self.arguments;
+        let Arguments { clip, reward, control, future, .. } = &self.arguments;
         Facts {
             id: self.id.into(),
             summary: self.summary.into(),
             model: model(*control).into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
-            observation: Some(89),
+            observation: Some(89 + FUTURE_FRAME * future),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
             reward_terms: names(reward.terms()),
             info: names(["joint_error", "position_error", "phase"]),
             metrics: names(["forward", "joint_error", "position_error"]),
             parts: names(PARTS),
             touch_sites: names(TOUCH),
-            clip: clips::find(&clip.0),
-            memory: Following::SLOTS,
+            clips: clip.find(),
+            memory: Following::SLOTS + 1,
             termination_reward: None,
             ..Facts::default()
         }
@@ -190,6 +212,10 @@ impl Agent for MarathonMan {
 
     fn fits(&self, model: &Model) -> Result<(), String> {
         self.arguments.clip.check()?;
+        let most = FUTURE.len();
+        if self.arguments.future > most {
+            return Err(format!("option future is {}, expected 0 to {most}", self.arguments.future));
+        }
         let expected = JOINTS.each_ref().map(|joint| joint.name);
         let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
         if found == expected {
@@ -200,9 +226,21 @@ impl Agent for MarathonMan {
     }
 
     fn reset(&self, start: &mut Start) {
-        let row = match self.arguments.start {
-            StartAt::Random => start.random.whole(0, start.clip_rows() - 1),
-            StartAt::First => 0,
+        let failure = (self.arguments.start == StartAt::Adaptive).then(|| failed_at(start)).flatten();
+        let row = match failure {
+            Some(row) => {
+                let before = start.random.whole(0, SECOND);
+                start.row_before(row, before)
+            }
+            None => {
+                let clips: Vec<_> = start.clips().collect();
+                let clip = if clips.len() == 1 { 0 } else { start.random.whole(0, clips.len() - 1) };
+                let rows = clips[clip].clone();
+                match self.arguments.start {
+                    StartAt::First => rows.start,
+                    _ => start.random.whole(rows.start, rows.end - 1),
+                }
+            }
         };
         start.start_in_clip(row);
         start.add_noise(ResetNoise::MARATHON);
@@ -228,6 +266,7 @@ impl Agent for MarathonMan {
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         s.follow(memory);
+        memory[MADE] += T::lit(1.0);
     }
 
     #[inline(always)]
@@ -266,6 +305,17 @@ impl Agent for MarathonMan {
         out.group("next_pose");
         for i in 0..JOINTS.len() {
             out.scalar(next.qpos(FIRST_QPOS + i) - r.qpos(FIRST_QPOS + i));
+        }
+        for (ahead, name) in FUTURE.into_iter().take(self.arguments.future) {
+            let later = s.reference(ahead);
+            let [forward, _, up] = later.axes(BUTT);
+            out.group(name);
+            out.vector(turned(sub(later.position(BUTT), s.position(BUTT))));
+            out.vector(turned(forward));
+            out.vector(turned(up));
+            for i in 0..JOINTS.len() {
+                out.scalar(later.qpos(FIRST_QPOS + i) - r.qpos(FIRST_QPOS + i));
+            }
         }
     }
 
