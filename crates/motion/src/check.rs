@@ -65,7 +65,7 @@ mod bound {
 }
 
 impl Worst {
-    fn meet(&mut self, value: f64, frame: usize, name: impl FnOnce() -> String) {
+    pub(crate) fn meet(&mut self, value: f64, frame: usize, name: impl FnOnce() -> String) {
         if value > self.value {
             *self = Worst { value, frame, name: name() };
         }

@@ -49,5 +49,5 @@ pub use check::{Report, Worst, check};
 pub use clip::{About, Clip, Cycle};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
-pub use retarget::{Mapping, retarget, soles};
+pub use retarget::{Fit, Mapping, fit, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};

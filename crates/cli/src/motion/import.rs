@@ -7,10 +7,12 @@ use marathon_learn::write_atomic;
 use marathon_motion::{About, Animation, Mapping, import as read};
 use marathon_physics::Model;
 use marathon_runs::text::path_word;
+use serde_json::json;
 use std::path::Path;
 
 /// A recording as a clip.
 pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
+    check_edits(&args.edits)?;
     let model = model::load(&args.model)?;
     let path = &args.recording;
     let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
@@ -20,14 +22,15 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
 
 /// A clip of one model as a clip of another.
 pub fn retarget(args: &RetargetArgs, json: bool) -> Result<(), CliError> {
+    check_edits(&args.edits)?;
     let clip = model::clip(&args.clip)?;
     let from = model::of_clip(&args.clip, &clip, args.from.as_deref())?;
     let animation = Animation::of_clip(&args.clip, &from, &clip)?;
     write(&args.clip, animation, &model::load(&args.model)?, &args.edits, json)
 }
 
-/// Edits, retargets, writes and checks.
-fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: bool) -> Result<(), CliError> {
+/// What can be told to be wrong before anything is read.
+fn check_edits(edits: &Edits) -> Result<(), CliError> {
     if edits.out.extension().is_none_or(|extension| extension != "motion") {
         let found = path_word(&edits.out);
         return Err(CliError::Usage(format!("--out is {found}, expected a name that ends with .motion")));
@@ -35,6 +38,19 @@ fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: 
     if !(1.0..=1000.0).contains(&edits.fps) {
         return Err(CliError::Usage(format!("--fps is {}, expected 1 to 1000", edits.fps)));
     }
+    if !(0.0..=10.0).contains(&edits.smooth) {
+        return Err(CliError::Usage(format!("--smooth is {}, expected 0 to 10 seconds", edits.smooth)));
+    }
+    if let Some(&[from, to]) = edits.trim.as_deref()
+        && !(from >= 0.0 && to > from)
+    {
+        return Err(CliError::Usage(format!("--trim is {from} {to}, expected two times, the later one second")));
+    }
+    Ok(())
+}
+
+/// Edits, retargets, writes and checks.
+fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: bool) -> Result<(), CliError> {
     let mut recording = animation.clip().clone();
     if let Some(&[from, to]) = edits.trim.as_deref() {
         recording = recording.trim(path, from, to)?;
@@ -59,6 +75,7 @@ fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: 
         None => Mapping::built_in(path, animation.skeleton(), model)?,
     };
     let mut clip = marathon_motion::retarget(path, &animation, model, &mapping)?;
+    let fit = marathon_motion::fit(path, &animation, model, &mapping, &clip)?;
     if edits.mirror {
         clip = clip.mirror(path, model)?;
     }
@@ -81,9 +98,12 @@ fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: 
 
     let report = marathon_motion::check(&edits.out, &clip, model, mapping.soles())?;
     if json {
-        print_json(&show::document(&edits.out, &report));
+        let mut document = show::document(&edits.out, &report);
+        document["fit"] = json!(fit);
+        print_json(&document);
     } else {
         say(format!("wrote {}: {}", path_word(&edits.out), show::line(&report)));
+        say(format!("  {}", show::fit_line(&fit)));
         report.warnings().iter().for_each(|warning| say(format!("  {warning}")));
     }
     Ok(())

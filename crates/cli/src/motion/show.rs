@@ -4,7 +4,7 @@ use super::{CheckArgs, RenderArgs, model};
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::interrupt;
-use marathon_motion::{Report, soles};
+use marathon_motion::{Fit, Report, soles};
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene};
 use marathon_runs::text::path_word;
 use serde_json::{Value, json};
@@ -50,6 +50,18 @@ pub fn line(report: &Report) -> String {
         1e2 * report.slide.value,
         1e2 * report.slide_speed,
         report.speed.value
+    )
+}
+
+/// What retargeting has left of a recording, in a line.
+pub fn fit_line(fit: &Fit) -> String {
+    format!(
+        "its parts are {:.1} cm and {:.0} degrees from the recording's in the mean; {} is {:.0} cm away in frame {}",
+        1e2 * fit.position,
+        fit.rotation.to_degrees(),
+        fit.furthest.name,
+        1e2 * fit.furthest.value,
+        fit.furthest.frame
     )
 }
 

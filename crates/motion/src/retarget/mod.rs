@@ -5,10 +5,12 @@
 //! above the ground and smoothly. What stands on the ground in that solution is held there in the next one.
 
 mod band;
+mod fit;
 mod mapping;
 mod problem;
 mod target;
 
+pub use fit::{Fit, fit};
 pub use mapping::{Mapping, soles};
 
 use crate::apart::Couple;
