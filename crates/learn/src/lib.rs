@@ -78,6 +78,7 @@ pub use nets::init::Init;
 pub use nets::normalize::Normalizer;
 pub use policy::evaluation::Evaluation;
 pub use policy::{BlockPolicy, Cast, Policy, PolicyMeta, Training};
+pub use rewards::discriminator::{Form, Imitation};
 pub use rewards::{Novelty, RewardConfig, RewardKind};
 pub use rollout::statistics::StatisticsConfig;
 pub use trainer::checkpoint::Checkpoint;

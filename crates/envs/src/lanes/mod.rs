@@ -2,6 +2,7 @@
 
 mod agent_kernel;
 mod context;
+mod demonstrations;
 mod group;
 mod roles;
 mod saved;

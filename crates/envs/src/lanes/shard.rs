@@ -9,13 +9,16 @@ use marathon_physics::lanes::Real;
 use marathon_physics::{Variation, Work};
 
 use super::context::LaneContext;
+use super::demonstrations::demonstrations;
 use super::group::LaneGroup;
 use super::saved;
 use super::start_cache::StartCache;
 use super::task::{AgentFactory, EpisodeStart, Task};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
-use crate::shard::{AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Shard, ShardFactory, Spec};
+use crate::shard::{
+    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Demonstrations, Shard, ShardFactory, Spec,
+};
 
 impl<T: Real> ShardFactory for AgentFactory<T> {
     fn spec(&self) -> &Spec {
@@ -24,6 +27,10 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
 
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
         Box::new(LaneShard::new(self.task.clone(), first, blocks, seed))
+    }
+
+    fn demonstrations(&self) -> Option<Demonstrations> {
+        demonstrations(&self.task)
     }
 }
 

@@ -8,11 +8,13 @@
 
 mod agent_shard;
 mod context;
+mod demonstrations;
 mod role;
 mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
+pub use demonstrations::Demonstrations;
 pub use role::{Role, role_id};
 pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
@@ -89,6 +91,10 @@ pub trait ShardFactory: Send + Sync {
     /// Number of agents, if they can only be stepped all at once, as [`Lockstep`](crate::Lockstep)'s: then the shards in use
     /// must have all of their blocks together. None for a task with as many agents as one likes.
     fn lockstep(&self) -> Option<usize> {
+        None
+    }
+    /// How the task is done well, if it knows: of an agent with clips, what it would observe if it moved exactly like them.
+    fn demonstrations(&self) -> Option<Demonstrations> {
         None
     }
 }

@@ -17,9 +17,9 @@ use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
 use crate::optim::sum;
 use crate::policy::{Policy, PolicyMeta};
-use crate::rewards::{Judge, Stream};
+use crate::rewards::{Judge, Lesson, Stream};
 use crate::rollout::collect::{Collecting, Values};
-use crate::rollout::data::{Experience, Rollout, Samples, Shape};
+use crate::rollout::data::{Experience, Samples, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 use marathon_physics::lanes::{Isa, Real};
@@ -120,7 +120,7 @@ impl Layout {
         let mut places = Places::default();
         let of_actor = places.add(actor.len() + act);
         let critic_start = places.add(critic.len()).start;
-        let streams = Stream::all(setup.common.rewards, (obs, act), setup.common.seed, |count| places.add(count));
+        let streams = Stream::all(setup.common.rewards, setup.purpose(), |count| places.add(count));
         let shape = Shape {
             obs,
             act,
@@ -219,36 +219,34 @@ impl ActorCritic {
         experience: &Experience<'_>,
         items: &[u32],
         objective: Objective,
-        kfac: Option<&Kfac>,
+        (kfac, lesson): (Option<&Kfac>, Lesson<'_>),
         space: &mut Space,
     ) -> LossSums {
         let gaussian = self.gaussian();
         workers.share_out(items.len(), &mut |group, partial| {
-            let mut chunks = items[group].chunks(CHUNK).map(|chunk| chunk.iter().map(|item| experience.item(*item)));
-            self.gradient_of_group(&gaussian, objective, &mut chunks, kfac, space, partial);
+            let lesson = Lesson { items: &items[group], ..lesson };
+            self.gradient_of_group(&gaussian, objective, experience, (kfac, lesson), space, partial);
         })
     }
 
     /// Gradient of the objective summed over a group of items, a chunk at a time.
-    fn gradient_of_group<'r, C>(
+    fn gradient_of_group(
         &self,
         gaussian: &Gaussian<f32>,
         objective: Objective,
-        chunks: &mut dyn Iterator<Item = C>,
-        kfac: Option<&Kfac>,
+        experience: &Experience<'_>,
+        (kfac, lesson): (Option<&Kfac>, Lesson<'_>),
         space: &mut Space,
         partial: &mut Partial,
-    ) where
-        C: Iterator<Item = (&'r Rollout, usize)>,
-    {
+    ) {
         let (layout, isa) = (&self.layout, self.isa);
         let (actor, critic) = (self.actor_params(), self.critic_params());
         partial.sums = LossSums::default();
-        for (i, chunk) in chunks.enumerate() {
+        for (i, chunk) in lesson.items.chunks(CHUNK).enumerate() {
             let mut samples =
                 [Samples { decided: 0, action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
             let (mut n, mut steps) = (0, Vec::new());
-            for (rollout, item) in chunk {
+            for (rollout, item) in chunk.iter().map(|item| experience.item(*item)) {
                 space.input.block_mut(n).copy_from_slice(rollout.obs(item));
                 samples[n] = rollout.samples(item);
                 n += 1;
@@ -261,7 +259,8 @@ impl ActorCritic {
             let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
             for (networks, judge) in networks.zip(&mut space.judges) {
                 let place = networks.place.clone();
-                judge.gradient(isa, &self.params[place.clone()], &steps, &mut gradient[place]);
+                let lesson = Lesson { items: chunk, ..lesson };
+                judge.gradient(isa, &self.params[place.clone()], &steps, &lesson, &mut gradient[place]);
             }
             let (of_actor, of_critic) = gradient.split_at_mut(layout.critic_start);
             let (of_net, of_std) = of_actor.split_at_mut(layout.actor.len());

@@ -22,14 +22,14 @@ use crate::nets::NetworkConfig;
 use crate::nets::mlp::CHUNK;
 use crate::nets::normalize::Normalizer;
 use crate::policy::{Policy, PolicyMeta};
-use crate::rewards::{RewardConfig, RewardKind};
+use crate::rewards::{Purpose, RewardConfig, RewardKind};
 use crate::rollout::collect::Collecting;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::{Statistics, StatisticsConfig};
 use crate::rollout::sums::Totals;
 use actor_critic::Deviations;
 use loss::LossSums;
-use marathon_envs::Spec;
+use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
 use parameters::Places;
 pub use saved::{Numbers, Saved};
@@ -67,6 +67,15 @@ pub struct Setup<'a> {
     pub isa: Isa,
     /// Settings.
     pub common: Common<'a>,
+    /// What is to be imitated, if it is known here.
+    pub demonstrations: Option<&'a Demonstrations>,
+}
+
+impl<'a> Setup<'a> {
+    /// What the rewards are for.
+    pub fn purpose(&self) -> Purpose<'a> {
+        Purpose { spec: self.spec, seed: self.common.seed, demonstrations: self.demonstrations }
+    }
 }
 
 /// The settings of a run that are not the algorithm's own, but that it sees.

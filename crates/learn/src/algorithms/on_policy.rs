@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
 use crate::policy::{Policy, PolicyMeta};
+use crate::rewards::Lesson;
 use crate::rollout::collect::Collecting;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::Statistics;
@@ -26,6 +27,10 @@ pub struct Student {
     moments: usize,
     /// Where gradients are computed, once there are any.
     pub space: Option<Box<Space>>,
+    /// What observations of the present rollout were normalized with.
+    normalizer: Normalizer,
+    /// Gradients computed.
+    batches: u64,
 }
 
 impl Student {
@@ -38,9 +43,11 @@ impl Student {
         objective: Objective,
         kfac: Option<&Kfac>,
     ) -> LossSums {
-        let Self { nets, moments, space, .. } = self;
+        let Self { nets, moments, space, normalizer, batches, .. } = self;
         let space = space.get_or_insert_with(|| Box::new(Space::new(&nets.layout, *moments)));
-        nets.gradient(workers, experience, items, objective, kfac, space)
+        let lesson = Lesson { normalizer, batch: *batches, items };
+        *batches += 1;
+        nets.gradient(workers, experience, items, objective, (kfac, lesson), space)
     }
 }
 
@@ -69,7 +76,8 @@ pub struct OnPolicy<R> {
 impl<R: Rule> OnPolicy<R> {
     /// At the start of a run; each group of samples contributes so many `moments` beside its gradient.
     pub fn new(nets: ActorCritic, lr: f64, moments: usize, rule: R) -> Self {
-        Self { student: Student { nets, lr, skipped: 0, moments, space: None }, rule }
+        let normalizer = Normalizer::identity(0, 1.0);
+        Self { student: Student { nets, lr, skipped: 0, moments, space: None, normalizer, batches: 0 }, rule }
     }
 }
 
@@ -77,12 +85,17 @@ impl<R: Rule> Learner for OnPolicy<R> {
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
         // the first rollout only fills the statistics
         if now.progress.iteration > 0 {
+            // counted from the rollout's number, a run that goes on draws as one that never stopped
+            self.student.batches = now.progress.iteration << 32;
+            self.student.normalizer = now.statistics.normalizer();
             *sums += self.rule.learn(&mut self.student, workers, experience, now.progress);
         }
     }
     fn replica(&self) -> Box<dyn Learner> {
-        let Student { nets, lr, skipped, moments, .. } = &self.student;
-        let student = Student { nets: nets.clone(), lr: *lr, skipped: *skipped, moments: *moments, space: None };
+        let Student { nets, lr, skipped, moments, normalizer, batches, .. } = &self.student;
+        let (nets, normalizer) = (nets.clone(), normalizer.clone());
+        let (lr, skipped, moments, batches) = (*lr, *skipped, *moments, *batches);
+        let student = Student { nets, lr, skipped, moments, space: None, normalizer, batches };
         Box::new(Self { student, rule: self.rule.clone() })
     }
     fn places(&self) -> &Places {

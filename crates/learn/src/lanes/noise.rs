@@ -18,6 +18,8 @@ pub const PARAMETERS: u64 = 3 << 61;
 pub const SAMPLES: u64 = 1 << 61;
 /// Initial parameters of reward signals; two streams for each.
 pub const SIGNALS: u64 = PARAMETERS + 1;
+/// Demonstrations beside an update's samples.
+const DEMONSTRATIONS: u64 = 7 << 60;
 
 /// Seeds of roles but the first.
 const ROLES: u64 = 5 << 60;
@@ -25,6 +27,11 @@ const ROLES: u64 = 5 << 60;
 /// Seed of everything random about role number `i` of a run: that of the run for the first.
 pub fn seed_of_role(seed: u64, i: usize) -> u64 {
     if i == 0 { seed } else { SplitMix::new(seed, ROLES | i as u64).word() }
+}
+
+/// Seed of the draws of demonstrations for minibatch number `batch` of a run.
+pub fn seed_of_demonstrations(seed: u64, batch: u64) -> u64 {
+    SplitMix::new(SplitMix::new(seed, DEMONSTRATIONS).word(), batch).word()
 }
 
 /// SplitMix64: a stream of well-mixed words from any seed.

@@ -23,16 +23,16 @@ pub const CHUNK: usize = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
     sizes: Vec<usize>,
-    activation: Activation,
-    layers: Vec<Layer>,
+    pub(super) activation: Activation,
+    pub(super) layers: Vec<Layer>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Layer {
+pub(super) struct Layer {
     inputs: usize,
-    outputs: usize,
-    weights: Range<usize>,
-    biases: Range<usize>,
+    pub outputs: usize,
+    pub weights: Range<usize>,
+    pub biases: Range<usize>,
 }
 
 /// A layer and its places in what [`Mlp::second_moments`] fills.
@@ -360,13 +360,13 @@ impl<T: Real> Kernel<T> for Forward<'_, T> {
 }
 
 /// Gradient of a layer's parameters.
-struct Outer<'a, T: Real> {
-    x: &'a Blocks<T::Scalar>,
-    dy: &'a Blocks<T::Scalar>,
-    dw: &'a mut [T::Scalar],
-    db: &'a mut [T::Scalar],
-    blocks: usize,
-    lanes: PhantomData<T>,
+pub(super) struct Outer<'a, T: Real> {
+    pub x: &'a Blocks<T::Scalar>,
+    pub dy: &'a Blocks<T::Scalar>,
+    pub dw: &'a mut [T::Scalar],
+    pub db: &'a mut [T::Scalar],
+    pub blocks: usize,
+    pub lanes: PhantomData<T>,
 }
 
 impl<T: Real> Kernel<T> for Outer<'_, T> {
@@ -384,11 +384,11 @@ impl<T: Real> Kernel<T> for Outer<'_, T> {
 }
 
 /// Gradient of a layer's input.
-struct Transposed<'a, T: Real> {
-    w: &'a [T::Scalar],
-    dy: &'a Blocks<T::Scalar>,
-    dx: &'a mut Blocks<T::Scalar>,
-    blocks: usize,
+pub(super) struct Transposed<'a, T: Real> {
+    pub w: &'a [T::Scalar],
+    pub dy: &'a Blocks<T::Scalar>,
+    pub dx: &'a mut Blocks<T::Scalar>,
+    pub blocks: usize,
 }
 
 impl<T: Real> Kernel<T> for Transposed<'_, T> {

@@ -6,6 +6,7 @@ pub mod gaussian;
 pub mod init;
 pub mod mlp;
 pub mod normalize;
+pub mod penalty;
 pub mod squash;
 
 use crate::error::Error;

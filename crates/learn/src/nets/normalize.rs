@@ -88,6 +88,11 @@ impl Normalizer {
     pub fn clip(&self) -> f32 {
         self.clip
     }
+    /// Number `i` of an observation, with the bits of the lanes.
+    #[inline(always)]
+    pub fn number(&self, i: usize, raw: f32) -> f32 {
+        Real::min(Real::max((raw - self.mean[i]) * self.inv_std[i], -self.clip), self.clip)
+    }
     /// One observation, with the bits of the lanes.
     pub fn row(&self, raw: &[f32]) -> Vec<f32> {
         let scales = self.mean.iter().zip(&self.inv_std);

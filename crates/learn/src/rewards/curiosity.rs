@@ -11,7 +11,7 @@
 //! All three learn from the whole loss (ML-Agents' weights). Actions are bounded to [-1, 1], as the environment takes them.
 
 use super::kernels::{Distance, Gather, place};
-use super::{Judge, Reward, Step};
+use super::{Judge, Lesson, Reward, Step};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::f32_lanes;
@@ -83,7 +83,14 @@ impl Judge for CuriosityJudge {
         f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
         self.nets.reward(&self.space, steps.len(), out);
     }
-    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]) {
+    fn gradient(
+        &mut self,
+        isa: Isa,
+        params: &[f32],
+        steps: &[Step<'_, f32>],
+        _: &Lesson<'_>,
+        gradient: &mut [f32],
+    ) {
         f32_lanes!(isa, T => {
             self.nets.losses::<T>(params, steps, &mut self.space);
             self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);

@@ -3,15 +3,20 @@
 //!
 //! Rewards for novelty, [curiosity] and [random network distillation](rnd), have networks of their own. They judge each step
 //! of a rollout ([`Judge::reward`]), and learn from the same minibatches as policy and value function
-//! ([`Judge::gradient`]): where they have learned, the reward fades. A new kind of reward implements [`Reward`].
+//! ([`Judge::gradient`]): where they have learned, the reward fades. A reward for [imitation](discriminator) learns to tell the
+//! agent's decisions from demonstrated ones. A new kind of reward implements [`Reward`].
 
 pub mod curiosity;
+pub mod discriminator;
 mod kernels;
 pub mod rnd;
 
 use crate::error::Error;
 use crate::lanes::noise::{SIGNALS, SplitMix};
+use crate::nets::normalize::Normalizer;
 use curiosity::Curiosity;
+use discriminator::{Discriminator, Form, Imitation};
+use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
 use rnd::Rnd;
 use serde::{Deserialize, Serialize};
@@ -30,6 +35,8 @@ pub enum RewardKind {
     /// The error of a network that learns what another one with random parameters makes of the observation (Burda et al.,
     /// "Exploration by random network distillation", 2018).
     Rnd(Novelty),
+    /// How well the agent deceives a network that tells its decisions from demonstrated ones.
+    Imitation(Imitation),
 }
 
 impl RewardKind {
@@ -39,13 +46,25 @@ impl RewardKind {
             RewardKind::Task => "task",
             RewardKind::Curiosity(_) => "curiosity",
             RewardKind::Rnd(_) => "rnd",
+            RewardKind::Imitation(Imitation { form: Form::Amp, .. }) => "amp",
+            RewardKind::Imitation(Imitation { form: Form::Gail, .. }) => "gail",
         }
     }
-    /// Its networks, if it has any.
-    pub fn networks(&self) -> Option<&Novelty> {
+    /// Widths of the hidden layers of its networks and their learning rate, if it has any.
+    pub fn networks(&self) -> Option<(&[usize], f64)> {
         match self {
             RewardKind::Task => None,
-            RewardKind::Curiosity(networks) | RewardKind::Rnd(networks) => Some(networks),
+            RewardKind::Curiosity(Novelty { hidden, lr }) | RewardKind::Rnd(Novelty { hidden, lr }) => {
+                Some((hidden, *lr))
+            }
+            RewardKind::Imitation(Imitation { hidden, lr, .. }) => Some((hidden, *lr)),
+        }
+    }
+    /// Imitation, if it is that.
+    pub fn imitation(&self) -> Option<&Imitation> {
+        match self {
+            RewardKind::Imitation(settings) => Some(settings),
+            _ => None,
         }
     }
 }
@@ -98,12 +117,12 @@ impl RewardConfig {
         if !(0.0..=1.0).contains(&self.gamma) {
             return Err(Error::config("rewards: gamma", self.gamma, "a number between 0 and 1"));
         }
-        let Some(Novelty { hidden, lr }) = self.kind.networks() else { return Ok(()) };
-        positive("rewards: lr", *lr)?;
+        let Some((hidden, lr)) = self.kind.networks() else { return Ok(()) };
+        positive("rewards: lr", lr)?;
         if hidden.is_empty() || hidden.len() > 64 || hidden.iter().any(|w| !(1..=4096).contains(w)) {
             return Err(Error::config("rewards: hidden", format!("{hidden:?}"), "1 to 64 widths between 1 and 4096"));
         }
-        Ok(())
+        self.kind.imitation().map_or(Ok(()), Imitation::validate)
     }
 }
 
@@ -141,7 +160,36 @@ pub trait Judge: Send {
     /// Rewards of at most [`CHUNK`](crate::nets::mlp::CHUNK) blocks of steps, a row of sixteen each.
     fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]);
     /// Overwrites `gradient` with that of the networks' loss, summed over the steps.
-    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]);
+    fn gradient(
+        &mut self,
+        isa: Isa,
+        params: &[f32],
+        steps: &[Step<'_, f32>],
+        lesson: &Lesson<'_>,
+        gradient: &mut [f32],
+    );
+}
+
+/// What a [`Judge`] is told about the steps that it learns from.
+#[derive(Clone, Copy)]
+pub struct Lesson<'a> {
+    /// What their observations were normalized with.
+    pub normalizer: &'a Normalizer,
+    /// Number of the minibatch in the run.
+    pub batch: u64,
+    /// Numbers of the steps in the rollout.
+    pub items: &'a [u32],
+}
+
+/// What the rewards of a run are for.
+#[derive(Clone, Copy)]
+pub struct Purpose<'a> {
+    /// The task.
+    pub spec: &'a Spec,
+    /// Seed of the run.
+    pub seed: u64,
+    /// What is to be imitated, if it is known here.
+    pub demonstrations: Option<&'a Demonstrations>,
 }
 
 /// A stream of rewards with its properties.
@@ -173,19 +221,23 @@ impl Stream {
     /// come from the seed.
     pub fn all(
         rewards: &[RewardConfig],
-        (obs, act): (usize, usize),
-        seed: u64,
+        Purpose { spec, seed, demonstrations }: Purpose<'_>,
         mut place: impl FnMut(usize) -> Range<usize>,
     ) -> Vec<Self> {
         let mut random = streams_of_random_numbers(seed);
+        let (obs, act) = (spec.obs, spec.act);
         let stream = |config: &RewardConfig| {
-            let networks = config.kind.networks().map(|Novelty { hidden, lr }| {
+            let networks = config.kind.networks().map(|(hidden, lr)| {
                 let [fixed, _] = &mut random.next().expect("there is no last one");
                 let reward: Arc<dyn Reward> = match &config.kind {
                     RewardKind::Rnd(_) => Arc::new(Rnd::new(obs, hidden, fixed)),
+                    RewardKind::Imitation(settings) => {
+                        let sees = settings.sees(spec).unwrap_or_else(|_| (0..obs).collect());
+                        Arc::new(Discriminator::new(settings, sees, act, seed, demonstrations))
+                    }
                     _ => Arc::new(Curiosity::new(obs, act, hidden)),
                 };
-                Networks { place: place(reward.count()), reward, lr: *lr }
+                Networks { place: place(reward.count()), reward, lr }
             });
             let ignores_done = networks.as_ref().is_some_and(|nets| nets.reward.ignores_done());
             Stream { strength: config.strength, gamma: config.gamma, ignores_done, networks }

@@ -2,7 +2,7 @@
 //! of an observation. Where observations are new, it errs, and the squared error is the reward.
 
 use super::kernels::{Distance, place};
-use super::{Judge, Reward, Step};
+use super::{Judge, Lesson, Reward, Step};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::f32_lanes;
@@ -54,7 +54,14 @@ impl Judge for RndJudge {
         f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
         self.nets.reward(&self.space, steps.len(), out);
     }
-    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], gradient: &mut [f32]) {
+    fn gradient(
+        &mut self,
+        isa: Isa,
+        params: &[f32],
+        steps: &[Step<'_, f32>],
+        _: &Lesson<'_>,
+        gradient: &mut [f32],
+    ) {
         f32_lanes!(isa, T => {
             self.nets.losses::<T>(params, steps, &mut self.space);
             self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);

@@ -130,7 +130,7 @@ struct StateFile {
 /// The rewards of a configuration, as far as a run cannot change them on its way.
 fn rewards(config: &TrainConfig) -> String {
     let of = |reward: &RewardConfig| match reward.kind.networks() {
-        Some(networks) => format!("{} {:?}", reward.kind.name(), networks.hidden),
+        Some((hidden, _)) => format!("{} {hidden:?}", reward.kind.name()),
         None => reward.kind.name().into(),
     };
     config.rewards.iter().map(of).collect::<Vec<_>>().join(", ")

@@ -11,7 +11,7 @@ use crate::nets::NetworkConfig;
 use crate::nets::activation::Activation;
 use crate::rewards::{RewardConfig, RewardKind};
 use crate::rollout::statistics::StatisticsConfig;
-use marathon_envs::Spec;
+use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -245,8 +245,13 @@ impl RunConfig {
 
 impl TrainConfig {
     /// What the algorithm sees of a run on a task.
-    pub(crate) fn setup<'a>(&'a self, spec: &'a Spec, isa: Isa) -> Setup<'a> {
-        Setup { spec, isa, common: self.common() }
+    pub(crate) fn setup<'a>(
+        &'a self,
+        spec: &'a Spec,
+        isa: Isa,
+        demonstrations: Option<&'a Demonstrations>,
+    ) -> Setup<'a> {
+        Setup { spec, isa, common: self.common(), demonstrations }
     }
 
     fn common(&self) -> Common<'_> {

@@ -232,7 +232,8 @@ impl Trainer {
             return Err(Error::Isa(isa.name(), Isa::best().name()));
         }
         let spec = factory.spec().clone();
-        let roles = RoleParts::all(config, &spec)?;
+        let mut roles = RoleParts::all(config, &spec)?;
+        roles.iter_mut().try_for_each(|role| role.learn_from(factory))?;
         memory::check(&roles, isa, config)?;
         let (workers, blocks) = (config.run.worker_count(), config.run.blocks());
         let shares: Vec<_> = (0..workers).map(|id| share(blocks, workers, id)).collect();

@@ -11,7 +11,7 @@ use crate::policy::{Policy, PolicyMeta, Training};
 use crate::rollout::seat::SeatPlan;
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
-use marathon_envs::{Role, Spec};
+use marathon_envs::{Demonstrations, Role, ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
 
 /// A role with its settings.
@@ -22,6 +22,8 @@ pub struct RoleParts {
     pub spec: Spec,
     /// Its settings, with a seed of its own.
     pub config: TrainConfig,
+    /// What it is to imitate, if it learns to.
+    demonstrations: Option<Demonstrations>,
 }
 
 impl RoleParts {
@@ -45,14 +47,27 @@ impl RoleParts {
                 let expected = "ppo or a2c with the task's reward alone: the role does not decide every time";
                 return Err(Error::config("algorithm", found, expected));
             }
-            Ok(Self { spec: spec.of_role(&role), config, role })
+            Ok(Self { spec: spec.of_role(&role), config, role, demonstrations: None })
         };
         roles.into_iter().enumerate().map(parts).collect()
     }
 
+    /// Gets what is to be imitated from a task.
+    ///
+    /// # Errors
+    /// If a reward asks for what is not there, or does not fit.
+    pub fn learn_from(&mut self, task: &dyn ShardFactory) -> Result<(), Error> {
+        let mut imitations = self.config.rewards.iter().filter_map(|reward| reward.kind.imitation()).peekable();
+        if imitations.peek().is_none() {
+            return Ok(());
+        }
+        self.demonstrations = task.demonstrations().map(|all| all.of_role(&self.role, task.spec()));
+        imitations.try_for_each(|imitation| imitation.check(&self.spec, self.demonstrations.as_ref()))
+    }
+
     /// What its algorithm is to learn.
     pub fn setup(&self, isa: Isa) -> Setup<'_> {
-        self.config.setup(&self.spec, isa)
+        self.config.setup(&self.spec, isa, self.demonstrations.as_ref())
     }
 
     /// Its policy in a run that has this configuration.

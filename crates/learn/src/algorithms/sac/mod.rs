@@ -171,7 +171,7 @@ impl SacLearner {
             lanes: setup.common.lanes(),
             blocks: setup.common.blocks(),
             rollout_steps: (setup.common.agents * setup.common.horizon) as u64,
-            streams: Stream::all(setup.common.rewards, (setup.spec.obs, setup.spec.act), setup.common.seed, |n| 0..n),
+            streams: Stream::all(setup.common.rewards, setup.purpose(), |n| 0..n),
             adam: Adam::new(nets.params.len(), settings.adam_epsilon),
             nets,
             lr: settings.lr,

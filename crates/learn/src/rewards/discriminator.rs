@@ -1,0 +1,434 @@
+//! Imitation by a discriminator: a network learns to tell the agent's decisions from demonstrated ones, and the reward is how
+//! well the agent deceives it.
+//!
+//! [`Form::Amp`] is "AMP: Adversarial motion priors" (Peng et al., 2021): the network `d` sees two observations in a row.
+//! [`Form::Gail`] is "Generative adversarial imitation learning" (Ho and Ermon, 2016) with ML-Agents' reward: it sees one.
+//!
+//! ```text
+//! amp    loss: (d(demonstrated) - 1)^2 + (d(own) + 1)^2        reward: max(0, 1 - (d - 1)^2 / 4)
+//! gail   loss: -ln D(demonstrated) - ln(1 - D(own))            reward: -ln(1 - D)         D = sigmoid(d)
+//! both   loss: + gradient_penalty / 2 |grad d(demonstrated)|^2 + logit_decay |weights of the last layer|^2
+//! ```
+//!
+//! With each decision of a minibatch goes a demonstrated one, drawn by the number of the minibatch and of the decision. It is
+//! normalized as the agent's observations are at that time.
+
+use super::kernels::place;
+use super::{Judge, Lesson, Reward, Step};
+use crate::error::Error;
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::f32_lanes;
+use crate::lanes::noise::{SplitMix, seed_of_demonstrations};
+use crate::nets::activation::Activation;
+use crate::nets::init;
+use crate::nets::mlp::{CHUNK, Mlp, Tape};
+use crate::nets::penalty::PenaltySpace;
+use crate::optim::sum::Add;
+use marathon_envs::{Demonstrations, Spec, nearest};
+use marathon_physics::lanes::{Isa, Kernel, Real};
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What a discriminator sees, and what its verdict is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// Two observations in a row; least squares.
+    Amp,
+    /// One observation; logistic.
+    Gail,
+}
+
+/// Settings of imitation; the defaults are those of AMP for a character with clips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Imitation {
+    /// What it sees, and what its verdict is worth.
+    pub form: Form,
+    /// Widths of the discriminator's hidden layers.
+    pub hidden: Vec<usize>,
+    /// Their activation.
+    pub activation: Activation,
+    /// Learning rate.
+    pub lr: f64,
+    /// Named parts of the observation that it sees; none: all of it. Commands and phases are no matter of style.
+    pub observations: Vec<String>,
+    /// Whether it sees the action, too.
+    pub actions: bool,
+    /// Weight of the penalty on the slope at demonstrations.
+    pub gradient_penalty: f64,
+    /// Weight of the squared weights of the last layer.
+    pub logit_decay: f64,
+    /// Part of each minibatch that it learns from: it needs fewer samples than the policy.
+    pub share: f64,
+    /// File of demonstrations; without one, they are the task's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub demonstrations: Option<String>,
+}
+
+impl Default for Imitation {
+    fn default() -> Self {
+        Self {
+            form: Form::Amp,
+            hidden: vec![128, 64],
+            activation: Activation::Relu,
+            lr: 3e-4,
+            observations: Vec::new(),
+            actions: false,
+            gradient_penalty: 10.0,
+            logit_decay: 0.05,
+            share: 0.25,
+            demonstrations: None,
+        }
+    }
+}
+
+impl Imitation {
+    /// Checks every field of its own.
+    ///
+    /// # Errors
+    /// Names the field, its value and the values that are valid.
+    pub fn validate(&self) -> Result<(), Error> {
+        for (field, x) in
+            [("rewards: gradient_penalty", self.gradient_penalty), ("rewards: logit_decay", self.logit_decay)]
+        {
+            if !((x as f32).is_finite() && x >= 0.0) {
+                return Err(Error::config(field, x, "a number not below 0"));
+            }
+        }
+        match self.share > 0.0 && self.share <= 1.0 {
+            true => Ok(()),
+            false => Err(Error::config("rewards: share", self.share, "a number above 0 and at most 1")),
+        }
+    }
+
+    /// Which numbers of a task's observation it sees.
+    ///
+    /// # Errors
+    /// If the observation has no part of a name.
+    pub fn sees(&self, spec: &Spec) -> Result<Vec<usize>, Error> {
+        if self.observations.is_empty() {
+            return Ok((0..spec.obs).collect());
+        }
+        let mut sees = Vec::new();
+        for name in &self.observations {
+            let Some(group) = spec.observations.iter().find(|group| group.name == *name) else {
+                let names = || spec.observations.iter().map(|group| group.name.as_str());
+                let near = nearest(name, names()).map(|near| format!("'{near}', or another of ")).unwrap_or_default();
+                let expected = format!("parts of {}'s observation: {near}{}", spec.id, names().collect::<Vec<_>>().join(", "));
+                return Err(Error::config("rewards: observations", format!("'{name}'"), expected));
+            };
+            sees.extend(group.range.clone());
+        }
+        sees.sort_unstable();
+        sees.dedup();
+        Ok(sees)
+    }
+
+    /// Refuses demonstrations that do not fit a task, or are none.
+    ///
+    /// # Errors
+    /// Says what was found and what would do.
+    pub fn check(&self, spec: &Spec, demonstrations: Option<&Demonstrations>) -> Result<(), Error> {
+        self.sees(spec)?;
+        let what = |found: String, expected: String| Err(Error::Mismatch { what: "imitation".into(), found, expected });
+        let Some(all) = demonstrations.filter(|all| !all.is_empty()) else {
+            let expected = "an agent that follows motion clips, or a file of demonstrations (demo_path)".into();
+            return what(format!("{}, which knows of no demonstrations", spec.id), expected);
+        };
+        if all.obs_len != spec.obs {
+            return what(format!("demonstrations of {} observed numbers", all.obs_len), format!("{} as {} has", spec.obs, spec.id));
+        }
+        if self.actions && all.act_len != spec.act {
+            let found = if all.act_len == 0 { "clips, which tell no actions".into() } else { format!("demonstrations of {} actions", all.act_len) };
+            return what(found, format!("{} actions as {} has, or use_actions: false", spec.act, spec.id));
+        }
+        Ok(())
+    }
+}
+
+/// Decisions to be imitated, as far as the discriminator sees them.
+struct Expert {
+    /// `[row][feature]`, raw.
+    rows: Vec<f32>,
+    decisions: Vec<[usize; 2]>,
+    /// `[decision][act]`.
+    actions: Vec<f32>,
+}
+
+/// The network with what it is to learn.
+#[derive(Clone)]
+pub struct Discriminator {
+    net: Mlp,
+    settings: Imitation,
+    /// Numbers of the observation that it sees.
+    sees: Vec<usize>,
+    /// Length of the action, as far as it sees it.
+    act: usize,
+    seed: u64,
+    expert: Option<Arc<Expert>>,
+}
+
+/// Work space.
+pub struct DiscriminatorSpace<S> {
+    own: Blocks<S>,
+    expert: Blocks<S>,
+    tape: Tape<S>,
+    penalty: PenaltySpace<S>,
+    gradient: Vec<S>,
+}
+
+impl<S: Copy + Default> DiscriminatorSpace<S> {
+    /// The agent's decisions, and the demonstrated ones.
+    pub fn inputs(&mut self) -> [&mut Blocks<S>; 2] {
+        [&mut self.own, &mut self.expert]
+    }
+}
+
+impl Discriminator {
+    /// For an observation of which it sees these numbers, and an action of a length. Without demonstrations it can judge, but
+    /// not learn.
+    pub fn new(
+        settings: &Imitation,
+        sees: Vec<usize>,
+        act: usize,
+        seed: u64,
+        demonstrations: Option<&Demonstrations>,
+    ) -> Self {
+        let act = if settings.actions { act } else { 0 };
+        let states = if settings.form == Form::Amp { 2 } else { 1 };
+        let inputs = states * sees.len() + act;
+        let net = Mlp::new(&[&[inputs], &settings.hidden[..], &[1]].concat(), settings.activation);
+        let expert = demonstrations.map(|all| {
+            let rows = all.obs.chunks_exact(all.obs_len.max(1)).flat_map(|row| sees.iter().map(|i| row[*i])).collect();
+            Arc::new(Expert { rows, decisions: all.decisions.clone(), actions: all.actions.clone() })
+        });
+        Self { net, settings: settings.clone(), sees, act, seed, expert }
+    }
+    /// Number of parameters.
+    pub fn count(&self) -> usize {
+        self.net.len()
+    }
+    /// Work space.
+    pub fn space<S: Copy + Default>(&self) -> DiscriminatorSpace<S> {
+        DiscriminatorSpace {
+            own: self.net.input(),
+            expert: self.net.input(),
+            tape: self.net.tape(),
+            penalty: self.net.penalty_space(),
+            gradient: vec![S::default(); self.net.len()],
+        }
+    }
+
+    /// Puts what it sees of a step into a block of its input.
+    fn see<S: Copy + Default>(&self, step: &Step<'_, S>, block: &mut [S]) {
+        let mut at = 0;
+        let mut copy = |rows: &[S], range: Range<usize>| {
+            place(block, at, &rows[range.start * BLOCK..range.end * BLOCK]);
+            at += range.len();
+        };
+        let states: &[&[S]] = if self.settings.form == Form::Amp { &[step.obs, step.next] } else { &[step.obs] };
+        for obs in states {
+            self.sees.iter().for_each(|i| copy(obs, *i..i + 1));
+        }
+        copy(step.action, 0..self.act);
+    }
+
+    /// Draws sixteen demonstrated decisions into a block of its input.
+    fn draw(&self, expert: &Expert, lesson: &Lesson<'_>, random: &mut SplitMix, block: &mut [f32]) {
+        let n = self.sees.len();
+        for lane in 0..BLOCK {
+            let decision = random.below(expert.decisions.len());
+            let states = if self.settings.form == Form::Amp { 2 } else { 1 };
+            for (k, row) in expert.decisions[decision][..states].iter().enumerate() {
+                let row = &expert.rows[row * n..(row + 1) * n];
+                for (i, (from, x)) in self.sees.iter().zip(row).enumerate() {
+                    block[(k * n + i) * BLOCK + lane] = lesson.normalizer.number(*from, *x);
+                }
+            }
+            let action = &expert.actions[decision * self.act..(decision + 1) * self.act];
+            for (i, a) in action.iter().enumerate() {
+                block[(states * n + i) * BLOCK + lane] = *a;
+            }
+        }
+    }
+
+    /// Overwrites `gradient` with that of the loss, summed over the first blocks of the [inputs](DiscriminatorSpace::inputs);
+    /// the tape keeps what [`Discriminator::loss`] reads.
+    pub fn learn<T: Real>(
+        &self,
+        params: &[T::Scalar],
+        blocks: usize,
+        space: &mut DiscriminatorSpace<T::Scalar>,
+        gradient: &mut [T::Scalar],
+    ) {
+        let Imitation { form, gradient_penalty, logit_decay, .. } = self.settings;
+        let DiscriminatorSpace { own, expert, tape, penalty, gradient: more } = space;
+        self.net.forward_on::<T>(params, own, tape, blocks);
+        let (d, delta) = tape.output_and_delta();
+        T::enter(Verdict::<T> { form, target: -1.0, d, delta, blocks, lanes: PhantomData });
+        self.net.backward_on::<T>(params, own, tape, gradient, blocks);
+        self.net.penalty_forward::<T>(params, expert, penalty, blocks);
+        let (d, delta) = penalty.output_and_delta();
+        T::enter(Verdict::<T> { form, target: 1.0, d, delta, blocks, lanes: PhantomData });
+        self.net.penalty_backward::<T>(params, expert, (penalty, gradient_penalty), more, blocks);
+        let (weights, _) = self.net.layers().last().expect("a network has layers");
+        let decay = 2.0 * logit_decay * (blocks * BLOCK) as f64;
+        T::enter(Add::<T> { sum: gradient, x: more });
+        for (sum, w) in gradient[weights.clone()].iter_mut().zip(&params[weights]) {
+            *sum = T::scalar(T::widen(*sum) + decay * T::widen(*w));
+        }
+    }
+
+    /// Loss of a row after [`Discriminator::learn`], for tests.
+    pub fn loss(&self, params: &[f64], space: &DiscriminatorSpace<f64>, block: usize, lane: usize) -> f64 {
+        let Imitation { form, gradient_penalty, logit_decay, .. } = self.settings;
+        let (own, expert) = (space.tape.output().block(block)[lane], space.penalty.output().block(block)[lane]);
+        let verdict = match form {
+            Form::Amp => (own + 1.0) * (own + 1.0) + (expert - 1.0) * (expert - 1.0),
+            Form::Gail => libm::log1p(libm::exp(own)) + libm::log1p(libm::exp(-expert)),
+        };
+        let slope = space.penalty.slope().block(block).iter().skip(lane).step_by(BLOCK).map(|x| x * x).sum::<f64>();
+        let (weights, _) = self.net.layers().last().expect("a network has layers");
+        let weight: f64 = params[weights].iter().map(|w| w * w).sum();
+        verdict + 0.5 * gradient_penalty * slope + logit_decay * weight
+    }
+
+    /// What verdicts on the space's own input are worth.
+    fn reward<T: Real<Scalar = f32>>(
+        &self,
+        params: &[f32],
+        blocks: usize,
+        space: &mut DiscriminatorSpace<f32>,
+        out: &mut [f32],
+    ) {
+        self.net.forward_on::<T>(params, &space.own, &mut space.tape, blocks);
+        T::enter(Worth::<T> { form: self.settings.form, d: space.tape.output(), out, blocks, lanes: PhantomData });
+    }
+}
+
+impl Reward for Discriminator {
+    fn count(&self) -> usize {
+        self.count()
+    }
+    fn init(&self, params: &mut [f32], random: &mut SplitMix) {
+        init::orthogonal(&self.net, params, 1.0, random);
+    }
+    fn judge(&self) -> Box<dyn Judge> {
+        Box::new(DiscriminatorJudge { nets: self.clone(), space: self.space() })
+    }
+    fn ignores_done(&self) -> bool {
+        false
+    }
+    fn bound(&self) -> f64 {
+        f64::INFINITY
+    }
+}
+
+/// The network at work.
+struct DiscriminatorJudge {
+    nets: Discriminator,
+    space: DiscriminatorSpace<f32>,
+}
+
+impl Judge for DiscriminatorJudge {
+    fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]) {
+        for (b, step) in steps.iter().enumerate() {
+            self.nets.see(step, self.space.own.block_mut(b));
+        }
+        f32_lanes!(isa, T => self.nets.reward::<T>(params, steps.len(), &mut self.space, out));
+    }
+
+    fn gradient(
+        &mut self,
+        isa: Isa,
+        params: &[f32],
+        steps: &[Step<'_, f32>],
+        lesson: &Lesson<'_>,
+        gradient: &mut [f32],
+    ) {
+        let Self { nets, space } = self;
+        let expert = nets.expert.clone().expect("a run without demonstrations does not begin");
+        let seed = seed_of_demonstrations(nets.seed, lesson.batch);
+        let used = ((steps.len() as f64 * nets.settings.share).ceil() as usize).clamp(1, steps.len());
+        for (b, (step, item)) in steps[..used].iter().zip(lesson.items).enumerate() {
+            nets.see(step, space.own.block_mut(b));
+            let mut random = SplitMix::new(seed, u64::from(*item));
+            nets.draw(&expert, lesson, &mut random, space.expert.block_mut(b));
+        }
+        f32_lanes!(isa, T => nets.learn::<T>(params, used, space, gradient));
+        // as much as if it had learned from all
+        let part = (steps.len() as f64 / used as f64) as f32;
+        if part != 1.0 {
+            gradient.iter_mut().for_each(|g| *g *= part);
+        }
+    }
+}
+
+/// Derivative of the loss with respect to verdicts `d` that should be the target, 1 or -1.
+struct Verdict<'a, T: Real> {
+    form: Form,
+    target: f64,
+    d: &'a Blocks<T::Scalar>,
+    delta: &'a mut Blocks<T::Scalar>,
+    blocks: usize,
+    lanes: PhantomData<T>,
+}
+
+impl<T: Real> Kernel<T> for Verdict<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Verdict { form, target, d, delta, blocks, .. } = self;
+        let (one, target) = (T::lit(1.0), T::lit(target));
+        for b in 0..blocks.min(CHUNK) {
+            let verdicts = d.block(b).chunks_exact(T::LANES);
+            for (d, delta) in verdicts.zip(delta.block_mut(b).chunks_exact_mut(T::LANES)) {
+                let d = T::load(d);
+                let slope = match form {
+                    Form::Amp => (d - target) * T::lit(2.0),
+                    // -target sigmoid(-target d)
+                    Form::Gail => -target * (one + (target * d).min(T::lit(30.0)).exp()).recip(),
+                };
+                slope.store(delta);
+            }
+        }
+    }
+}
+
+/// What verdicts are worth, a row of sixteen per block.
+struct Worth<'a, T: Real<Scalar = f32>> {
+    form: Form,
+    d: &'a Blocks<f32>,
+    out: &'a mut [f32],
+    blocks: usize,
+    lanes: PhantomData<T>,
+}
+
+impl<T: Real<Scalar = f32>> Kernel<T> for Worth<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (zero, one) = (T::zero(), T::lit(1.0));
+        for b in 0..self.blocks.min(CHUNK) {
+            let verdicts = self.d.block(b).chunks_exact(T::LANES);
+            for (d, out) in verdicts.zip(self.out[b * BLOCK..].chunks_exact_mut(T::LANES)) {
+                let d = T::load(d);
+                let worth = match self.form {
+                    Form::Amp => (d - one).neg_mul_add((d - one) * T::lit(0.25), one).max(zero),
+                    // ln(1 + e^d); ML-Agents holds D below 1 - 1e-7
+                    Form::Gail => {
+                        let d = d.min(T::lit(16.0));
+                        d.max(zero) + (one + (-d.abs()).exp()).ln()
+                    }
+                };
+                worth.store(out);
+            }
+        }
+    }
+}
