@@ -5,7 +5,7 @@ use super::behavior::Notes;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
 use marathon_learn::{
-    Activation, Algorithm, Deviations, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig, RewardKind, Sac,
+    Activation, Algorithm, Deviations, Form, Imitation, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig, RewardKind, Sac,
     Schedule, StatisticsConfig, TrainConfig,
 };
 
@@ -208,7 +208,7 @@ pub fn threaded(top: &Section<'_>, notes: &mut Notes) -> Result<(), ConfigError>
     Ok(())
 }
 
-/// The rewards: returns the section of the task's own, and the signals for novelty; refuses imitation.
+/// The rewards: returns the section of the task's own, and the others.
 ///
 /// # Errors
 /// If there are others, or the task's own is missing or has no strength.
@@ -218,10 +218,10 @@ pub fn reward_signals<'a>(
     notes: &mut Notes,
 ) -> Result<(Section<'a>, Vec<RewardConfig>), ConfigError> {
     let signals = top.section("reward_signals")?;
-    let mut novelty = Vec::new();
-    let Some(whole) = top.set("reward_signals") else { return Ok((signals, novelty)) };
-    signals.only(&["extrinsic", "curiosity", "rnd", "gail"])?;
-    for name in ["curiosity", "rnd", "gail"] {
+    let mut others = Vec::new();
+    let Some(whole) = top.set("reward_signals") else { return Ok((signals, others)) };
+    signals.only(&["extrinsic", "curiosity", "rnd", "gail", "amp"])?;
+    for name in ["curiosity", "rnd", "gail", "amp"] {
         let Some(entry) = signals.set(name) else { continue };
         // a reward of strength zero is switched off
         let section = signals.section(name)?;
@@ -229,10 +229,11 @@ pub fn reward_signals<'a>(
             continue;
         }
         match name {
-            "gail" => without.feature(name, &entry, "strength 0 or no such section", notes)?,
             _ if without.leaves_out(name, &entry, notes) => {}
-            "curiosity" => novelty.push(novelty_of(RewardKind::Curiosity, &section, notes)?),
-            _ => novelty.push(novelty_of(RewardKind::Rnd, &section, notes)?),
+            "curiosity" => others.push(novelty_of(RewardKind::Curiosity, &section, notes)?),
+            "rnd" => others.push(novelty_of(RewardKind::Rnd, &section, notes)?),
+            "gail" => others.push(imitation_of(Form::Gail, &section, notes)?),
+            _ => others.push(imitation_of(Form::Amp, &section, notes)?),
         }
     }
     if signals.get("extrinsic").is_none() {
@@ -246,13 +247,13 @@ pub fn reward_signals<'a>(
     let extrinsic = signals.section("extrinsic")?;
     extrinsic.only(&["gamma", "strength", "network_settings"])?;
     let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
-    if let Some(entry) = extrinsic.get("strength").filter(|_| strength != 1.0 && novelty.is_empty()) {
+    if let Some(entry) = extrinsic.get("strength").filter(|_| strength != 1.0 && others.is_empty()) {
         notes.ignored(&entry, "with one reward, its scale does not change the policy's gradient; it is taken as 1");
     }
     if let Some(entry) = extrinsic.set("network_settings") {
         notes.ignored(&entry, "the task's own reward needs no network");
     }
-    Ok((extrinsic, novelty))
+    Ok((extrinsic, others))
 }
 
 /// A reward for novelty.
@@ -263,10 +264,64 @@ fn novelty_of(
 ) -> Result<RewardConfig, ConfigError> {
     section.only(&["gamma", "strength", "network_settings", "learning_rate", "encoding_size"])?;
     let defaults = Novelty::default();
-    let network = section.section("network_settings")?;
-    network.only(&NETWORK)?;
     // the name that the width had before version 0.18
     let width = section.count("encoding_size", 1..=4096, 128)?;
+    let networks = Novelty {
+        hidden: hidden(section, width, notes)?,
+        lr: section.number("learning_rate", Range::Positive, defaults.lr)?,
+    };
+    reward(kind(networks), section)
+}
+
+/// A reward for imitation: ML-Agents' keys, and those of [`Imitation`].
+fn imitation_of(form: Form, section: &Section<'_>, notes: &mut Notes) -> Result<RewardConfig, ConfigError> {
+    const KEYS: [&str; 10] = [
+        "gamma",
+        "strength",
+        "network_settings",
+        "learning_rate",
+        "demo_path",
+        "use_actions",
+        "observations",
+        "gradient_penalty",
+        "logit_decay",
+        "share",
+    ];
+    let mut keys = KEYS.to_vec();
+    let mut defaults = Imitation { form, ..Imitation::default() };
+    if form == Form::Gail {
+        keys.extend(["use_vail", "encoding_size"]);
+        // as ML-Agents has them
+        (defaults.activation, defaults.share) = (Activation::Swish, 1.0);
+    }
+    section.only(&keys)?;
+    off(section, "use_vail", "a variational bottleneck of the discriminator")?;
+    let width = section.count("encoding_size", 1..=4096, 128)?;
+    let names = match section.set("observations") {
+        None => Vec::new(),
+        Some(entry) => {
+            let items = entry.items("a list of names of an observation's parts")?;
+            items.iter().map(|item| item.word_of_any_kind("a name")).collect::<Result<_, _>>()?
+        }
+    };
+    let settings = Imitation {
+        hidden: hidden(section, width, notes)?,
+        lr: section.number("learning_rate", Range::Positive, defaults.lr)?,
+        observations: names,
+        actions: section.flag("use_actions", false)?,
+        gradient_penalty: section.number("gradient_penalty", Range::NotNegative, defaults.gradient_penalty)?,
+        logit_decay: section.number("logit_decay", Range::NotNegative, defaults.logit_decay)?,
+        share: section.number("share", Range::Fraction, defaults.share)?,
+        demonstrations: section.set("demo_path").map(|entry| entry.word_of_any_kind("the path of a .demo file")).transpose()?,
+        ..defaults
+    };
+    reward(RewardKind::Imitation(settings), section)
+}
+
+/// Widths of the hidden layers of a reward's network.
+fn hidden(section: &Section<'_>, width: u64, notes: &mut Notes) -> Result<Vec<usize>, ConfigError> {
+    let network = section.section("network_settings")?;
+    network.only(&NETWORK)?;
     let width = network.count("hidden_units", 1..=4096, width)? as usize;
     let layers = network.count("num_layers", 1..=64, 2)? as usize;
     visual(&network, notes)?;
@@ -275,9 +330,12 @@ fn novelty_of(
             notes.ignored(&entry, "the network of a signal sees what the policy sees, and is a plain one");
         }
     }
-    let networks =
-        Novelty { hidden: vec![width; layers], lr: section.number("learning_rate", Range::Positive, defaults.lr)? };
-    let defaults = RewardConfig::new(kind(networks));
+    Ok(vec![width; layers])
+}
+
+/// A reward with the strength and the discount of its section.
+fn reward(kind: RewardKind, section: &Section<'_>) -> Result<RewardConfig, ConfigError> {
+    let defaults = RewardConfig::new(kind);
     Ok(RewardConfig {
         strength: section.number("strength", Range::Positive, defaults.strength)?,
         gamma: section.number("gamma", Range::Fraction, defaults.gamma)?,

@@ -36,8 +36,12 @@ const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../..
 const MARATHON_MAN: (&str, &str) =
     ("marathon_man-fast.yaml", include_str!("../../../assets/configs/marathon_man-fast.yaml"));
 
+/// For Marathon Man told where to go.
+const MARATHON_MAN_STEER: (&str, &str) =
+    ("marathon_man_steer-fast.yaml", include_str!("../../../assets/configs/marathon_man_steer-fast.yaml"));
+
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 35] = [
+const FAST: [(&str, (&str, &str)); 36] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -73,6 +77,7 @@ const FAST: [(&str, (&str, &str)); 35] = [
     ("MarathonManCrawl", MARATHON_MAN),
     ("MarathonManGetUpFaceDown", MARATHON_MAN),
     ("MarathonManGetUpFaceUp", MARATHON_MAN),
+    ("MarathonManSteer", MARATHON_MAN_STEER),
 ];
 
 /// What a file says about the training of an agent.

@@ -201,6 +201,11 @@ impl<'a> Entry<'a> {
         found.map_or_else(|| self.wrong(format!("one of {}", words.join(", "))), Ok)
     }
 
+    /// A text that is not nothing.
+    pub fn word_of_any_kind(&self, expected: &str) -> Result<String, ConfigError> {
+        self.text().filter(|text| !text.is_empty()).map_or_else(|| self.wrong(expected), |text| Ok(text.to_string()))
+    }
+
     /// The entries of a list.
     pub fn items(&self, expected: &str) -> Result<Vec<Entry<'a>>, ConfigError> {
         match &self.node.value {

@@ -3,6 +3,7 @@
 mod common;
 
 use common::numbers::noise_f32 as noise;
+use common::oracle::ask_torch;
 use marathon_learn::algorithms::loss::{Loss, LossSums, Objective};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::gaussian::Gaussian;
@@ -13,35 +14,10 @@ use marathon_physics::lanes::{F32x4, Real};
 #[cfg(target_arch = "x86_64")]
 use marathon_physics::lanes::{F32x8, F32x16};
 use serde_json::{Value, json};
-use std::io::Write;
 use std::marker::PhantomData;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
 const BLOCKS: usize = 5;
 const ACT: usize = 4;
-
-fn ask_torch(request: &Value) -> Value {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let python = match std::env::var_os("MARATHON_PYTHON") {
-        Some(python) => PathBuf::from(python),
-        None => root.join(".venv/bin/python"),
-    };
-    let advice = "run ./test.sh, which sets up .venv with PyTorch, or set MARATHON_PYTHON";
-    let mut child = Command::new(&python)
-        .arg(root.join("tests/oracle/torch_ppo.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap_or_else(|e| panic!("{}: {e}; {advice}", python.display()));
-    let mut stdin = child.stdin.take().expect("stdin is piped");
-    // a script that fails at once closes the pipe; its status tells below
-    let _ = stdin.write_all(request.to_string().as_bytes());
-    drop(stdin);
-    let output = child.wait_with_output().expect("the oracle ends");
-    assert!(output.status.success(), "torch_ppo.py failed with {}; {advice}", python.display());
-    serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
-}
 
 struct Case {
     actor: Mlp,
@@ -184,7 +160,7 @@ fn networks_losses_and_gradients_agree_with_pytorch() {
     let cases: Vec<Case> =
         Activation::ALL.into_iter().flat_map(|a| losses.map(|(ratio, clip)| Case::new(a, ratio, clip))).collect();
     let request: Vec<Value> = cases.iter().map(Case::request).collect();
-    let answers = ask_torch(&request.into());
+    let answers = ask_torch("torch_ppo.py", &request.into());
     for (case, want) in cases.iter().zip(answers.as_array().expect("a list")) {
         case.check::<f32>(want);
         case.check::<F32x4>(want);

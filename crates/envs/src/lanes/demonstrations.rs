@@ -32,7 +32,12 @@ pub(super) fn demonstrations<T: Real>(task: &Task<T>) -> Option<Demonstrations> 
             out.obs.extend(group.obs.iter().map(|x| T::widen(x.get(lane)) as f32));
         }
     }
-    let last = timeline.lap.map(|_| [rows - 1, 0]);
-    out.decisions = (1..rows).map(|row| [row - 1, row]).chain(last).collect();
+    for clip in &timeline.clips {
+        let back = clip.cycle.map(|_| [clip.rows.end - 1, clip.rows.start]);
+        let steps = clip.rows.clone().skip(1).map(|row| [row - 1, row]);
+        let first = out.decisions.len();
+        out.decisions.extend(steps.chain(back));
+        out.motions.push(first..out.decisions.len());
+    }
     Some(out)
 }

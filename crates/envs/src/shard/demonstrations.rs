@@ -1,5 +1,7 @@
 //! Demonstrations: what an expert observed and did, decision by decision.
 
+use std::ops::Range;
+
 use super::{Role, Spec};
 
 /// Decisions of an expert, as the environment observes them.
@@ -13,6 +15,8 @@ pub struct Demonstrations {
     pub obs: Vec<f32>,
     /// Per decision, the row that was observed and the one that was observed next.
     pub decisions: Vec<[usize; 2]>,
+    /// Runs of decisions, one for each motion, that are as important as each other however long they are.
+    pub motions: Vec<Range<usize>>,
     /// Actions in [-1, 1], `[decision][act]`.
     pub actions: Vec<f32>,
 }
@@ -37,7 +41,7 @@ impl Demonstrations {
 
     /// As far as a role of the task knows it.
     pub fn of_role(self, role: &Role, spec: &Spec) -> Self {
-        let cut = |rows: &[f32], len: usize, own: &std::ops::Range<usize>| -> Vec<f32> {
+        let cut = |rows: &[f32], len: usize, own: &Range<usize>| -> Vec<f32> {
             rows.chunks_exact(len.max(1)).flat_map(|row| row[own.clone()].iter().copied()).collect()
         };
         if self.obs_len != spec.obs || role.obs.len() == spec.obs {

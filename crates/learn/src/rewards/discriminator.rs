@@ -135,7 +135,7 @@ impl Imitation {
     pub fn check(&self, spec: &Spec, demonstrations: Option<&Demonstrations>) -> Result<(), Error> {
         self.sees(spec)?;
         let what = |found: String, expected: String| Err(Error::Mismatch { what: "imitation".into(), found, expected });
-        let Some(all) = demonstrations.filter(|all| !all.is_empty()) else {
+        let Some(all) = demonstrations.filter(|all| all.motions.iter().any(|motion| !motion.is_empty())) else {
             let expected = "an agent that follows motion clips, or a file of demonstrations (demo_path)".into();
             return what(format!("{}, which knows of no demonstrations", spec.id), expected);
         };
@@ -155,6 +155,7 @@ struct Expert {
     /// `[row][feature]`, raw.
     rows: Vec<f32>,
     decisions: Vec<[usize; 2]>,
+    motions: Vec<Range<usize>>,
     /// `[decision][act]`.
     actions: Vec<f32>,
 }
@@ -204,7 +205,10 @@ impl Discriminator {
         let net = Mlp::new(&[&[inputs], &settings.hidden[..], &[1]].concat(), settings.activation);
         let expert = demonstrations.map(|all| {
             let rows = all.obs.chunks_exact(all.obs_len.max(1)).flat_map(|row| sees.iter().map(|i| row[*i])).collect();
-            Arc::new(Expert { rows, decisions: all.decisions.clone(), actions: all.actions.clone() })
+            let Demonstrations { decisions, motions, actions, .. } = all.clone();
+            // a run without decisions has nothing to draw
+            let motions = motions.into_iter().filter(|motion| !motion.is_empty()).collect();
+            Arc::new(Expert { rows, decisions, motions, actions })
         });
         Self { net, settings: settings.clone(), sees, act, seed, expert }
     }
@@ -241,7 +245,8 @@ impl Discriminator {
     fn draw(&self, expert: &Expert, lesson: &Lesson<'_>, random: &mut SplitMix, block: &mut [f32]) {
         let n = self.sees.len();
         for lane in 0..BLOCK {
-            let decision = random.below(expert.decisions.len());
+            let motion = &expert.motions[random.below(expert.motions.len())];
+            let decision = motion.start + random.below(motion.len());
             let states = if self.settings.form == Form::Amp { 2 } else { 1 };
             for (k, row) in expert.decisions[decision][..states].iter().enumerate() {
                 let row = &expert.rows[row * n..(row + 1) * n];

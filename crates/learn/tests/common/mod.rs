@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "every test file uses a part")]
 
 pub mod numbers;
+pub mod oracle;
 
 use marathon_envs::{BLOCK, BlockStep, EnvError, Metric, MetricSource, Options, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Ppo, Sac, TrainConfig};
@@ -19,7 +20,7 @@ struct Puck {
 
 /// The task; `limit` decisions per episode.
 pub struct PuckTask {
-    spec: Spec,
+    pub spec: Spec,
     /// Makes one agent's observation NaN at a decision, to see what the trainer does.
     pub poison: Option<(usize, u32)>,
 }

@@ -28,7 +28,7 @@ macro_rules! shipped {
     };
 }
 
-static SHIPPED: [Shipped; 16] = shipped![
+static SHIPPED: [Shipped; 17] = shipped![
     "walk",
     "walk_left",
     "walk_right",
@@ -45,6 +45,7 @@ static SHIPPED: [Shipped; 16] = shipped![
     "crawl",
     "getup_facedown",
     "getup_faceup",
+    "stand",
 ];
 
 /// Clips of callers.
@@ -75,8 +76,11 @@ pub fn all_names() -> Vec<String> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClipNames(pub String);
 
-/// What stands for all clips that come with the crate.
+/// What stands for all clips that come with the crate, but for the one that does not move.
 pub const ALL: &str = "all";
+
+/// The clip that does not move.
+pub const STAND: &str = "stand";
 
 impl OptionValue for ClipNames {
     const EXPECTED: &'static str = "the name of a clip, several with commas between them, or all";
@@ -95,7 +99,7 @@ impl ClipNames {
     /// Each name.
     pub fn names(&self) -> Vec<&str> {
         match self.0.as_str() {
-            ALL => SHIPPED.iter().map(|shipped| shipped.name).collect(),
+            ALL => SHIPPED.iter().map(|shipped| shipped.name).filter(|name| *name != STAND).collect(),
             names => names.split(',').map(str::trim).collect(),
         }
     }

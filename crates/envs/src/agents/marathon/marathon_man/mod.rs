@@ -19,6 +19,7 @@
 mod body;
 pub mod clips;
 pub mod reward;
+pub mod steer;
 
 use std::sync::Arc;
 
@@ -147,7 +148,17 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         let arguments = Arguments { clip: ClipNames(clip.into()), ..Arguments::default() };
         Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
     };
-    tasks.map(agent).collect()
+    tasks.map(agent).chain([Arc::new(steer::Steer::default()) as Arc<dyn AnyAgent>]).collect()
+}
+
+/// Whether a model has the figure's joints.
+fn has_joints(model: &Model) -> Result<(), String> {
+    let expected = JOINTS.each_ref().map(|joint| joint.name);
+    let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
+    match found == expected {
+        true => Ok(()),
+        false => Err(format!("its model has the joints {found:?}, expected {expected:?}")),
+    }
 }
 
 impl MarathonMan {
@@ -216,13 +227,7 @@ impl Agent for MarathonMan {
         if self.arguments.future > most {
             return Err(format!("option future is {}, expected 0 to {most}", self.arguments.future));
         }
-        let expected = JOINTS.each_ref().map(|joint| joint.name);
-        let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
-        if found == expected {
-            Ok(())
-        } else {
-            Err(format!("its model has the joints {found:?}, expected {expected:?}"))
-        }
+        has_joints(model)
     }
 
     fn reset(&self, start: &mut Start) {

@@ -1,0 +1,265 @@
+//! Marathon Man told where to go: he walks, runs, turns and stands at a commanded speed and turn, in the style of clips.
+//!
+//! | observation | content |
+//! |---|---|
+//! | 0..2 | commanded speed, m/s, and turn, rad/s |
+//! | 2..4 | sine and cosine of the angle from his heading to the commanded direction |
+//! | 4 | height of the butt, m |
+//! | 5..11 | forward and up axis of the butt |
+//! | 11..17 | velocity of the butt, m/s, and its angular velocity, rad/s |
+//! | 17..38, 38..59 | angles of the 21 joints, rad, and their velocities, rad/s |
+//! | 59..71 | feet and hands as seen from the butt, m |
+//! | 71..77 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
+//!
+//! Vectors are in his heading, the direction along the ground in which the butt faces. The commanded direction turns as the
+//! command says; where he cannot follow, it stays within [`MOST_BEHIND`] of his heading.
+//!
+//! The task's reward is for velocity and heading alone. The style comes from a discriminator that learns from his clips
+//! ([`STYLE`]): the task's [demonstrations](crate::ShardFactory::demonstrations) are what he would observe in them.
+
+use std::f64::consts::FRAC_PI_2;
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+use super::body::{ACTIONS, BUTT, Control, END_EFFECTORS, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model, parts};
+use super::clips::{self, STAND};
+use super::{FRAME_SKIP, MAX_EPISODE_STEPS, sub};
+use crate::agent::senses::clamp;
+use crate::agent::{
+    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Senses, Start,
+    Terms, names,
+};
+use crate::episode_rng::EpisodeRng;
+
+/// Parts of the observation that tell style.
+pub const STYLE: [&str; 7] =
+    ["height", "orientation", "velocity", "angular_velocity", "joint_positions", "joint_velocities", "ends"];
+/// What he moves like.
+const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
+/// Fastest that he is told to go, m/s.
+const FASTEST: f64 = 3.0;
+/// Sharpest that he is told to turn, rad/s.
+const SHARPEST: f64 = FRAC_PI_2;
+/// Most that the commanded direction is off his heading, rad.
+pub const MOST_BEHIND: f64 = 1.0;
+/// How long a command holds, decisions.
+const HOLDS: [usize; 2] = [40, 240];
+/// Share of commands that are to stand, and of those that are to go straight on.
+const STANDING: f64 = 0.15;
+const STRAIGHT: f64 = 0.4;
+
+/// Slots of the memory: cosine and sine of the commanded direction.
+const DIRECTION: usize = Following::SLOTS;
+
+/// Parts that may touch the ground.
+const FEET: [Part; 2] = [Part::named(&PARTS, "right_right_foot"), Part::named(&PARTS, "left_left_foot")];
+
+/// Target of a joint's servo without action, and how far an action moves it, rad. The damping of a servo, a tenth of its
+/// stiffness, takes 0.1 s of the joint's velocity away, so targets reach farther than poses.
+const TARGETS: [[f64; 2]; 21] = [
+    [0.0, 0.6],
+    [-0.05, 0.6],
+    [0.0, 0.5],
+    [0.25, 1.6],
+    [0.0, 0.5],
+    [-0.1, 0.7],
+    [-0.35, 1.9],
+    [0.1, 1.0],
+    [0.05, 0.6],
+    [0.25, 1.6],
+    [0.0, 0.5],
+    [-0.1, 0.7],
+    [-0.35, 1.9],
+    [0.1, 1.0],
+    [0.05, 0.6],
+    [0.0, 1.3],
+    [0.15, 0.8],
+    [0.3, 1.6],
+    [0.0, 1.3],
+    [0.15, 0.8],
+    [0.3, 1.6],
+];
+
+crate::options! {
+    /// Arguments of Marathon Man told where to go.
+    pub struct SteerArguments {
+        /// What an action does: `pd` moves the target of a servo away from a standing pose, `pd_range` is the target within the
+        /// joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's drive.
+        control: Control = Control::Pd,
+    }
+}
+
+/// Marathon Man told where to go.
+#[derive(Clone, Debug, Default)]
+pub struct Steer {
+    arguments: SteerArguments,
+}
+
+impl Steer {
+    /// Angle from his heading to a direction, rad.
+    #[inline(always)]
+    fn off<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
+        let [c, d] = s.heading(BUTT);
+        c.mul_add(y, -(d * x)).atan2(c.mul_add(x, d * y))
+    }
+
+    /// Commanded direction.
+    #[inline(always)]
+    fn direction<T: Real>(s: &Senses<T>) -> [T; 2] {
+        [s.memory(DIRECTION), s.memory(DIRECTION + 1)]
+    }
+
+    /// How far the velocity of the center of mass along the ground is from the commanded one, m/s.
+    #[inline(always)]
+    fn slip<T: Real>(s: &Senses<T>) -> T {
+        let ([vx, vy, _], [x, y], speed) = (s.center_of_mass_velocity(), Self::direction(s), s.command(0));
+        let (dx, dy) = (speed.neg_mul_add(x, vx), speed.neg_mul_add(y, vy));
+        dx.mul_add(dx, dy * dy).sqrt()
+    }
+}
+
+impl Agent for Steer {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: "MarathonManSteer-v0".into(),
+            summary: "a figure of 21 motors: walk, run, turn and stand as told, in the style of clips".into(),
+            model: model(self.arguments.control).into(),
+            frame_skip: FRAME_SKIP,
+            max_episode_steps: MAX_EPISODE_STEPS,
+            observation: Some(77),
+            actions: names(ACTIONS.map(|i| JOINTS[i].name)),
+            reward_terms: names(["velocity", "pace", "heading"]),
+            info: names(["velocity_error", "heading_error"]),
+            metrics: names(["forward", "velocity_error", "heading_error"]),
+            parts: names(PARTS),
+            touch_sites: names(TOUCH),
+            command: vec![
+                CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
+                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+            ],
+            clips: CLIPS.into_iter().filter_map(clips::find).collect(),
+            memory: DIRECTION + 2,
+            termination_reward: None,
+            ..Facts::default()
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.arguments.infos()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(Steer { arguments: self.arguments.with(options) })
+    }
+
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        super::has_joints(model)
+    }
+
+    fn reset(&self, start: &mut Start) {
+        let clips: Vec<_> = start.clips().collect();
+        let rows = clips[start.random.whole(0, clips.len() - 1)].clone();
+        let row = start.random.whole(rows.start, rows.end - 1);
+        start.start_in_clip(row);
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
+        out[0] = if random.uniform(0.0, 1.0) < STANDING { 0.0 } else { random.uniform(0.0, FASTEST) };
+        out[1] = if random.uniform(0.0, 1.0) < STRAIGHT { 0.0 } else { random.around_zero(SHARPEST) };
+        random.whole(HOLDS[0], HOLDS[1])
+    }
+
+    #[inline(always)]
+    fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
+        match self.arguments.control {
+            Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
+            Control::Pd => {
+                for (i, joint) in ACTIONS.into_iter().enumerate() {
+                    let [middle, reach] = TARGETS[joint].map(T::lit);
+                    c.ctrl[i] = c.action[i].mul_add(reach, middle);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        memory[DIRECTION..DIRECTION + 2].copy_from_slice(&s.heading(BUTT));
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let angle = Self::off(s, [memory[DIRECTION], memory[DIRECTION + 1]]);
+        let turned = clamp(s.command(1).mul_add(T::lit(s.dt()), angle), -MOST_BEHIND, MOST_BEHIND);
+        let ((sin, cos), [c, d]) = (turned.sin_cos(), s.heading(BUTT));
+        memory[DIRECTION] = d.neg_mul_add(sin, c * cos);
+        memory[DIRECTION + 1] = d.mul_add(cos, c * sin);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let [cos, sin] = s.heading(BUTT);
+        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z];
+        let [x, y] = Self::direction(s);
+        let r = s.readings();
+        out.group("command");
+        out.scalar(s.command(0));
+        out.scalar(s.command(1));
+        out.scalar(cos.mul_add(y, -(sin * x)));
+        out.scalar(cos.mul_add(x, sin * y));
+        out.group("height");
+        out.scalar(s.height(BUTT));
+        out.group("orientation");
+        out.vector(turned(s.forward(BUTT)));
+        out.vector(turned(s.up(BUTT)));
+        out.group("velocity");
+        out.vector(turned(s.linear_velocity(BUTT)));
+        out.group("angular_velocity");
+        out.vector(turned(s.angular_velocity(BUTT)));
+        out.group("joint_positions");
+        for i in 0..JOINTS.len() {
+            out.scalar(r.qpos(FIRST_QPOS + i));
+        }
+        out.group("joint_velocities");
+        for i in 0..JOINTS.len() {
+            out.scalar(r.qvel(FIRST_QVEL + i));
+        }
+        out.group("ends");
+        for part in END_EFFECTORS {
+            out.vector(turned(sub(s.position(part), s.position(BUTT))));
+        }
+        out.group("touch");
+        for i in 0..TOUCH.len() {
+            out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
+        }
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let slip = Self::slip(s);
+        let angle = Self::off(s, Self::direction(s));
+        terms.add("velocity", 0.4, (slip * slip * T::lit(-5.0)).exp());
+        terms.add("pace", 0.3, (slip * slip * T::lit(-0.5)).exp());
+        terms.add("heading", 0.3, (angle * angle * T::lit(-4.0)).exp());
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let mut fallen = T::none();
+        for part in parts() {
+            if part != FEET[0] && part != FEET[1] {
+                fallen = T::or(fallen, s.touched_ground(part));
+            }
+        }
+        fallen
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.scalar(Self::slip(s));
+        let angle = Self::off(s, Self::direction(s));
+        out.scalar(angle.abs());
+    }
+}
