@@ -19,6 +19,8 @@ for clip in walk run backflip cartwheel roll spin jump crawl kick punch getup_fa
 done
 make marathon_man spinkick humanoid3d_spinkick --loop none
 make marathon_man dance humanoid3d_dance_b
+# the end of getting up: he stands
+make marathon_man stand humanoid3d_getup_facedown --trim 2.9 3.03 --loop wrap --forward
 make marathon_man walk_left walker/turn_left1
 make marathon_man walk_right walker/turn_right1
 for character in humanoid walker2d; do

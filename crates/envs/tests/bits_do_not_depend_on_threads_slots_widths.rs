@@ -71,6 +71,12 @@ fn marathon_man() {
     check("MarathonManWalkLeft-v0");
 }
 
+/// His commands and the direction that he remembers are his own.
+#[test]
+fn marathon_man_steered() {
+    check("MarathonManSteer-v0");
+}
+
 /// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
 #[test]
 fn gymnasiums_ant() {

@@ -8,6 +8,7 @@ use common::oracle::ask_torch;
 use common::{PuckTask, learning_config, silent, small_config};
 use marathon_envs::{BlockStep, Demonstrations, EnvError, ObsGroup, Shard, ShardFactory, Spec};
 use marathon_learn::lanes::buffer::Blocks;
+use marathon_learn::rewards::Purpose;
 use marathon_learn::rewards::discriminator::Discriminator;
 use marathon_learn::{
     Activation, BLOCK, Checkpoint, Control, Form, Imitation, IterationStats, RewardConfig, RewardKind, Snapshot,
@@ -22,7 +23,9 @@ const SEES: usize = 5;
 
 fn discriminator(form: Form, activation: Activation) -> Discriminator {
     let settings = Imitation { form, activation, hidden: vec![9, 7, 6], ..Imitation::default() };
-    Discriminator::new(&settings, (0..SEES).collect(), 3, 1, None)
+    let spec = Spec { obs: SEES, act: 3, ..Spec::default() };
+    let purpose = Purpose { spec: &spec, seed: 1, action_scale: 1.0, demonstrations: None };
+    Discriminator::new(&settings, (0..SEES).collect(), purpose)
 }
 
 fn inputs(form: Form) -> usize {
@@ -248,8 +251,8 @@ fn what_cannot_be_imitated_is_refused() {
     refused(&whole, |i| i.gradient_penalty = -1.0, "rewards: gradient_penalty is -1, expected a number not below 0");
     refused(
         &whole,
-        |i| i.observations = vec!["velocities".into()],
-        "rewards: observations is 'velocities', expected parts of Puck-v0's observation: 'velocity', or another of position",
+        |i| i.observations = vec!["velocty".into()],
+        "rewards: observations is 'velocty', expected parts of Puck-v0's observation: 'velocity', or another of position",
     );
     let with = |change: fn(&mut Demonstrations)| {
         let mut task = Unrewarded::new(20);
@@ -258,6 +261,11 @@ fn what_cannot_be_imitated_is_refused() {
     };
     let none = Unrewarded { demonstrations: None, ..Unrewarded::new(20) };
     refused(&none, |_| {}, "imitation is for Puck-v0, which knows of no demonstrations, expected an agent that follows");
+    refused(
+        &whole,
+        |i| i.demonstrations = Some("puck.demo".into()),
+        "imitation is for those of the task's own, expected those of 'puck.demo'",
+    );
     refused(&with(|d| d.motions.clear()), |_| {}, "which knows of no demonstrations");
     refused(&with(|d| d.act_len = 0), |i| i.actions = true, "clips, which tell no actions, expected 2 actions");
     refused(&with(|d| d.obs_len = 3), |_| {}, "demonstrations of 3 observed numbers, expected 6");

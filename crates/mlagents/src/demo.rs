@@ -6,8 +6,10 @@
 
 use crate::behavior::observation;
 use crate::wire::{ActionSpec, AgentInfo, AgentInfoActionPair, BrainParameters, DemonstrationMeta, RecordedAction};
-use marathon_envs::Spec;
+use marathon_envs::{Demonstrations, Spec};
 use prost::Message;
+use prost::bytes::Buf;
+use std::path::{Path, PathBuf};
 
 /// Bytes in front of the behavior's description.
 const HEAD: usize = 33;
@@ -116,6 +118,77 @@ impl Demonstration {
     }
 }
 
+/// What is wrong with a demonstration file.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {place}: found {found}, expected {expected}", path.display())]
+pub struct DemoError {
+    /// The file.
+    pub path: PathBuf,
+    /// Where in it.
+    pub place: String,
+    /// What is there.
+    pub found: String,
+    /// What should be there.
+    pub expected: String,
+}
+
+/// Reads the decisions of a demonstration file of a task: of ours, or of Unity's recorder.
+///
+/// # Errors
+/// If it is none, or of a task that observes or does something else.
+pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Demonstrations, DemoError> {
+    let wrong = |place: &str, found: String, expected: &str| DemoError {
+        path: path.into(),
+        place: place.into(),
+        found,
+        expected: expected.into(),
+    };
+    let meta = DemonstrationMeta::decode_length_delimited(bytes)
+        .map_err(|error| wrong("head", error.to_string(), "a demonstration file (.demo)"))?;
+    if meta.api_version != API_VERSION {
+        return Err(wrong("api_version", meta.api_version.to_string(), &API_VERSION.to_string()));
+    }
+    let mut rest = bytes.get(HEAD..).ok_or_else(|| wrong("length", format!("{} bytes", bytes.len()), "a head of 33"))?;
+    BrainParameters::decode_length_delimited(&mut rest)
+        .map_err(|error| wrong("behavior", error.to_string(), "a behavior's description"))?;
+    let source = Some(path.to_string_lossy().into_owned());
+    let mut out = Demonstrations { obs_len: spec.obs, act_len: spec.act, source, ..Demonstrations::default() };
+    // the action of the decision that the next entry is the outcome of
+    let mut before: Option<Vec<f32>> = None;
+    let mut entry = 0;
+    while rest.has_remaining() {
+        let place = format!("entry {entry}");
+        let pair = AgentInfoActionPair::decode_length_delimited(&mut rest)
+            .map_err(|error| wrong(&place, error.to_string(), "an observation with an action"))?;
+        let (info, action) = (pair.agent_info.unwrap_or_default(), pair.action_info.unwrap_or_default());
+        let obs: Vec<f32> = info.observations.into_iter().flat_map(|o| o.float_data.unwrap_or_default().data).collect();
+        let RecordedAction { vector_actions, continuous_actions } = action;
+        let action = if continuous_actions.is_empty() { vector_actions } else { continuous_actions };
+        for (what, found, expected) in [("observed numbers", obs.len(), spec.obs), ("actions", action.len(), spec.act)] {
+            if found != expected {
+                let of = format!("{expected}, as {} has", spec.id);
+                return Err(wrong(&place, format!("{found} {what}"), &of));
+            }
+        }
+        if let Some(x) = obs.iter().chain(&action).find(|x| !x.is_finite()) {
+            return Err(wrong(&place, x.to_string(), "finite numbers"));
+        }
+        if let Some(action) = before.take() {
+            out.decisions.push([entry - 1, entry]);
+            out.actions.extend(action);
+        }
+        out.obs.extend(obs);
+        // the last entry of an episode has an action that nobody took
+        before = (!info.done).then_some(action);
+        entry += 1;
+    }
+    if out.decisions.is_empty() {
+        return Err(wrong("entries", format!("{entry}, no two of one episode"), "decisions with their outcomes"));
+    }
+    out.motions = vec![0..out.decisions.len()];
+    Ok(out)
+}
+
 /// The action in [-1, 1] that one in an actuator's own units stands for.
 fn nominal([low, high]: [f32; 2], action: f32) -> f32 {
     // the same bits where there is nothing to map
@@ -160,6 +233,36 @@ mod tests {
         let once = [(0.0, false, false), (1.0, false, false), (2.0, true, true)];
         assert_eq!(pairs.iter().map(facts).collect::<Vec<_>>(), [once, once].concat());
         assert_eq!(pairs[0].action_info.as_ref().unwrap().continuous_actions, [0.5; 3]);
+    }
+
+    #[test]
+    fn what_was_written_is_read() {
+        let spec = marathon_envs::factory("Hopper-v5", marathon_physics::lanes::Isa::best()).unwrap().spec().clone();
+        let mut demo = Demonstration::new("hop", &spec);
+        let obs: Vec<f32> = (0..3 * spec.obs).map(|i| i as f32).collect();
+        let actions: Vec<f32> = (0..2 * spec.act).map(|i| 0.1 * i as f32).collect();
+        let episode = Episode { obs: obs.clone(), actions: actions.clone(), rewards: vec![1.0, 2.0], truncated: true };
+        demo.push(&episode);
+        demo.push(&episode);
+        let bytes = demo.bytes();
+        let path = Path::new("hop.demo");
+        let read = read_demonstrations(path, &bytes, &spec).unwrap();
+        assert_eq!(read.obs, [&obs[..], &obs].concat());
+        assert_eq!(read.decisions, [[0, 1], [1, 2], [3, 4], [4, 5]]);
+        assert_eq!(read.actions, [&actions[..], &actions].concat());
+        assert_eq!((read.motions, read.source), (vec![0..4], Some("hop.demo".into())));
+        // whatever is cut off or changed, nothing panics
+        for n in 0..bytes.len() {
+            let _ = read_demonstrations(path, &bytes[..n], &spec);
+            let mut changed = bytes.clone();
+            changed[n] ^= 0x55;
+            let _ = read_demonstrations(path, &changed, &spec);
+        }
+        let error = read_demonstrations(path, b"behaviors:", &spec).unwrap_err().to_string();
+        assert!(error.starts_with("hop.demo: head: found") && error.ends_with("expected a demonstration file (.demo)"));
+        let other = Spec { obs: 7, ..spec.clone() };
+        let error = read_demonstrations(path, &bytes, &other).unwrap_err().to_string();
+        assert_eq!(error, "hop.demo: entry 0: found 11 observed numbers, expected 7, as Hopper-v5 has");
     }
 
     #[test]

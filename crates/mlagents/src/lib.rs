@@ -33,7 +33,7 @@ mod trainer;
 pub mod wire;
 
 pub use behavior::{Behavior, BehaviorOptions};
-pub use demo::{Demonstration, Episode};
+pub use demo::{DemoError, Demonstration, Episode, read_demonstrations};
 pub use error::PlayerError;
 pub use log::Log;
 pub use parameters::{Names, Parameters};

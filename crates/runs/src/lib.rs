@@ -6,6 +6,7 @@
 //! names of options; each front end spells them in its own way ([`Spelling`]).
 
 pub mod configuration;
+pub mod demonstrations;
 pub mod error;
 pub mod folder;
 pub mod options;

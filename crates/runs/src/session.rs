@@ -1,6 +1,7 @@
 //! A training run: begun or gone on with, carried out, written to its folder.
 
 use crate::configuration;
+use crate::demonstrations::with_demonstrations;
 use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder, write_json};
 use crate::options::RunOptions;
@@ -103,6 +104,7 @@ impl Session {
             let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
             loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
         }
+        let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let run = RunFile::new(&agent, &loaded);
@@ -145,7 +147,7 @@ impl Session {
             return Err(RunError::Complete { folder: path.into(), steps: done });
         }
         run.config.run.threads = learn.threads.unwrap_or(run.config.run.threads);
-        let factory = task.factory(run.config.run.agents)?;
+        let factory = with_demonstrations(task.factory(run.config.run.agents)?, &run.config)?;
         folder.write_run(&run)?;
         Ok(Session { folder: Some(folder), run, factory, checkpoint })
     }

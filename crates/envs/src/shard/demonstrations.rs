@@ -19,6 +19,8 @@ pub struct Demonstrations {
     pub motions: Vec<Range<usize>>,
     /// Actions in [-1, 1], `[decision][act]`.
     pub actions: Vec<f32>,
+    /// File that they come from; none if they are the task's own.
+    pub source: Option<String>,
 }
 
 impl Demonstrations {

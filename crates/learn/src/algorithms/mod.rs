@@ -67,6 +67,8 @@ pub struct Setup<'a> {
     pub isa: Isa,
     /// Settings.
     pub common: Common<'a>,
+    /// Bound of the actions drawn, which are then divided by it.
+    pub action_clip: f64,
     /// What is to be imitated, if it is known here.
     pub demonstrations: Option<&'a Demonstrations>,
 }
@@ -74,7 +76,8 @@ pub struct Setup<'a> {
 impl<'a> Setup<'a> {
     /// What the rewards are for.
     pub fn purpose(&self) -> Purpose<'a> {
-        Purpose { spec: self.spec, seed: self.common.seed, demonstrations: self.demonstrations }
+        let Self { spec, common, action_clip, demonstrations, .. } = *self;
+        Purpose { spec, seed: common.seed, action_scale: 1.0 / action_clip as f32, demonstrations }
     }
 }
 

@@ -14,7 +14,7 @@
 //! normalized as the agent's observations are at that time.
 
 use super::kernels::place;
-use super::{Judge, Lesson, Reward, Step};
+use super::{Judge, Lesson, Purpose, Reward, Step};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -139,6 +139,13 @@ impl Imitation {
             let expected = "an agent that follows motion clips, or a file of demonstrations (demo_path)".into();
             return what(format!("{}, which knows of no demonstrations", spec.id), expected);
         };
+        if all.source != self.demonstrations {
+            let name = |source: &Option<String>| match source {
+                Some(file) => format!("those of '{file}', which a front end reads"),
+                None => "those of the task's own".into(),
+            };
+            return what(name(&all.source), name(&self.demonstrations));
+        }
         if all.obs_len != spec.obs {
             return what(format!("demonstrations of {} observed numbers", all.obs_len), format!("{} as {} has", spec.obs, spec.id));
         }
@@ -169,6 +176,8 @@ pub struct Discriminator {
     sees: Vec<usize>,
     /// Length of the action, as far as it sees it.
     act: usize,
+    /// What makes an action drawn one in [-1, 1].
+    action_scale: f32,
     seed: u64,
     expert: Option<Arc<Expert>>,
 }
@@ -195,10 +204,10 @@ impl Discriminator {
     pub fn new(
         settings: &Imitation,
         sees: Vec<usize>,
-        act: usize,
-        seed: u64,
-        demonstrations: Option<&Demonstrations>,
+        purpose: Purpose<'_>,
     ) -> Self {
+        let Purpose { spec: Spec { act, .. }, seed, action_scale, demonstrations } = purpose;
+        let act = *act;
         let act = if settings.actions { act } else { 0 };
         let states = if settings.form == Form::Amp { 2 } else { 1 };
         let inputs = states * sees.len() + act;
@@ -210,7 +219,7 @@ impl Discriminator {
             let motions = motions.into_iter().filter(|motion| !motion.is_empty()).collect();
             Arc::new(Expert { rows, decisions, motions, actions })
         });
-        Self { net, settings: settings.clone(), sees, act, seed, expert }
+        Self { net, settings: settings.clone(), sees, act, action_scale, seed, expert }
     }
     /// Number of parameters.
     pub fn count(&self) -> usize {
@@ -228,17 +237,14 @@ impl Discriminator {
     }
 
     /// Puts what it sees of a step into a block of its input.
-    fn see<S: Copy + Default>(&self, step: &Step<'_, S>, block: &mut [S]) {
-        let mut at = 0;
-        let mut copy = |rows: &[S], range: Range<usize>| {
-            place(block, at, &rows[range.start * BLOCK..range.end * BLOCK]);
-            at += range.len();
-        };
-        let states: &[&[S]] = if self.settings.form == Form::Amp { &[step.obs, step.next] } else { &[step.obs] };
-        for obs in states {
-            self.sees.iter().for_each(|i| copy(obs, *i..i + 1));
+    fn see(&self, step: &Step<'_, f32>, block: &mut [f32]) {
+        let states: &[&[f32]] = if self.settings.form == Form::Amp { &[step.obs, step.next] } else { &[step.obs] };
+        let rows = states.iter().flat_map(|obs| self.sees.iter().map(|i| &obs[i * BLOCK..(i + 1) * BLOCK]));
+        rows.enumerate().for_each(|(at, row)| place(block, at, row));
+        let own = &mut block[states.len() * self.sees.len() * BLOCK..];
+        for (own, drawn) in own.iter_mut().zip(&step.action[..self.act * BLOCK]) {
+            *own = (drawn * self.action_scale).clamp(-1.0, 1.0);
         }
-        copy(step.action, 0..self.act);
     }
 
     /// Draws sixteen demonstrated decisions into a block of its input.

@@ -188,6 +188,8 @@ pub struct Purpose<'a> {
     pub spec: &'a Spec,
     /// Seed of the run.
     pub seed: u64,
+    /// What makes an action drawn one in [-1, 1], before it is clipped to that.
+    pub action_scale: f32,
     /// What is to be imitated, if it is known here.
     pub demonstrations: Option<&'a Demonstrations>,
 }
@@ -221,9 +223,10 @@ impl Stream {
     /// come from the seed.
     pub fn all(
         rewards: &[RewardConfig],
-        Purpose { spec, seed, demonstrations }: Purpose<'_>,
+        purpose: Purpose<'_>,
         mut place: impl FnMut(usize) -> Range<usize>,
     ) -> Vec<Self> {
+        let Purpose { spec, seed, .. } = purpose;
         let mut random = streams_of_random_numbers(seed);
         let (obs, act) = (spec.obs, spec.act);
         let stream = |config: &RewardConfig| {
@@ -233,7 +236,7 @@ impl Stream {
                     RewardKind::Rnd(_) => Arc::new(Rnd::new(obs, hidden, fixed)),
                     RewardKind::Imitation(settings) => {
                         let sees = settings.sees(spec).unwrap_or_else(|_| (0..obs).collect());
-                        Arc::new(Discriminator::new(settings, sees, act, seed, demonstrations))
+                        Arc::new(Discriminator::new(settings, sees, purpose))
                     }
                     _ => Arc::new(Curiosity::new(obs, act, hidden)),
                 };

@@ -251,7 +251,8 @@ impl TrainConfig {
         isa: Isa,
         demonstrations: Option<&'a Demonstrations>,
     ) -> Setup<'a> {
-        Setup { spec, isa, common: self.common(), demonstrations }
+        let action_clip = self.algorithm.clone().deviations_mut().map_or(1.0, |deviations| deviations.action_clip);
+        Setup { spec, isa, common: self.common(), action_clip, demonstrations }
     }
 
     fn common(&self) -> Common<'_> {

@@ -27,8 +27,8 @@ use super::clips::{self, STAND};
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS, sub};
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Senses, Start,
-    Terms, names,
+    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses,
+    Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
@@ -87,6 +87,8 @@ crate::options! {
         /// What an action does: `pd` moves the target of a servo away from a standing pose, `pd_range` is the target within the
         /// joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's drive.
         control: Control = Control::Pd,
+        /// How far an action of `pd` moves a target, as a share of what each joint has.
+        reach: Scale = Scale(1.0),
     }
 }
 
@@ -177,8 +179,8 @@ impl Agent for Steer {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    let [middle, reach] = TARGETS[joint].map(T::lit);
-                    c.ctrl[i] = c.action[i].mul_add(reach, middle);
+                    let [middle, reach] = TARGETS[joint];
+                    c.ctrl[i] = c.action[i].mul_add(T::lit(reach * self.arguments.reach.0), T::lit(middle));
                 }
             }
         }
