@@ -5,8 +5,8 @@ use super::behavior::Notes;
 use super::error::{ConfigError, Place};
 use super::section::{Entry, Range, Section};
 use marathon_learn::{
-    Activation, Algorithm, Deviations, Form, Imitation, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig, RewardKind, Sac,
-    Schedule, StatisticsConfig, TrainConfig,
+    Activation, Algorithm, Deviations, Form, Imitation, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig,
+    RewardKind, Sac, Schedule, StatisticsConfig, TrainConfig,
 };
 
 /// Keys of a network's section.
@@ -312,7 +312,10 @@ fn imitation_of(form: Form, section: &Section<'_>, notes: &mut Notes) -> Result<
         gradient_penalty: section.number("gradient_penalty", Range::NotNegative, defaults.gradient_penalty)?,
         logit_decay: section.number("logit_decay", Range::NotNegative, defaults.logit_decay)?,
         share: section.number("share", Range::Fraction, defaults.share)?,
-        demonstrations: section.set("demo_path").map(|entry| entry.word_of_any_kind("the path of a .demo file")).transpose()?,
+        demonstrations: section
+            .set("demo_path")
+            .map(|entry| entry.word_of_any_kind("the path of a .demo file"))
+            .transpose()?,
         ..defaults
     };
     reward(RewardKind::Imitation(settings), section)

@@ -187,7 +187,16 @@ fn features_that_are_not_here_are_refused() {
             "network_settings: {memory: {memory_size: 128}}",
             "network_settings.memory: recurrent memory is not supported",
         ),
-        ("reward_signals: {extrinsic: {}, gail: {demo_path: x}}", "imitation by GAIL is not supported"),
+        (
+            "reward_signals: {extrinsic: {}, gail: {use_vail: true}}",
+            "gail.use_vail: a variational bottleneck of the discriminator is not supported; found 'true', expected false",
+        ),
+        (
+            "reward_signals: {extrinsic: {}, amp: {observations: touch}}",
+            "amp.observations: found 'touch', expected a list of names of an observation's parts",
+        ),
+        ("reward_signals: {extrinsic: {}, amp: {use_vail: true}}", "amp.use_vail: unknown key"),
+        ("reward_signals: {extrinsic: {}, gail: {demo_path: [x]}}", "expected the path of a .demo file"),
         (
             "reward_signals: {curiosity: {strength: 0}}",
             "training without the task's own reward is not supported; found nothing",

@@ -2,7 +2,8 @@
 
 use marathon_config::{Loaded, default_for, parse};
 use marathon_learn::{
-    Acktr, Activation, Algorithm, Init, Moving, Novelty, Ratio, RewardConfig, RewardKind, Sac, Schedule, TrainConfig,
+    Acktr, Activation, Algorithm, Form, Imitation, Init, Moving, Novelty, Ratio, RewardConfig, RewardKind, Sac,
+    Schedule, TrainConfig,
 };
 use std::path::{Path, PathBuf};
 
@@ -506,6 +507,46 @@ behaviors:
     // the format of the paper calls it by another name
     let old = read("Hopper: {trainer: a2c, max_steps: 1e5}", "hopper").config;
     assert_eq!((old.algorithm.name(), old.run.total_steps, old.run.horizon), ("a2c", 1_600_000, 5));
+}
+
+#[test]
+fn rewards_for_imitation_have_ml_agents_keys_and_some_of_their_own() {
+    let text = "
+behaviors:
+  Hopper:
+    reward_signals:
+      extrinsic: {}
+      gail:
+        strength: 0.1
+        gamma: 0.9
+        learning_rate: 1e-3
+        demo_path: hopper.demo
+        use_actions: true
+        use_vail: false
+        network_settings: {hidden_units: 64, num_layers: 3}
+      amp: {observations: [touch, height], gradient_penalty: 5, logit_decay: 0, share: 0.5}
+";
+    let rewards = read(text, "hopper").config.rewards;
+    let gail = Imitation {
+        form: Form::Gail,
+        hidden: vec![64; 3],
+        activation: Activation::Swish,
+        lr: 1e-3,
+        actions: true,
+        share: 1.0,
+        demonstrations: Some("hopper.demo".into()),
+        ..Imitation::default()
+    };
+    let amp = Imitation {
+        hidden: vec![128; 2],
+        observations: vec!["touch".into(), "height".into()],
+        gradient_penalty: 5.0,
+        logit_decay: 0.0,
+        share: 0.5,
+        ..Imitation::default()
+    };
+    let gail = RewardConfig { kind: RewardKind::Imitation(gail), strength: 0.1, gamma: 0.9 };
+    assert_eq!(rewards[1..], [gail, RewardConfig::new(RewardKind::Imitation(amp))]);
 }
 
 #[test]

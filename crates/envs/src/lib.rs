@@ -47,7 +47,7 @@ pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
 pub use shard::{
-    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Demonstrations, Metric, MetricSource, ObsGroup, Role, Shard,
-    ShardFactory, Spec,
+    AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Demonstrations, Metric, MetricSource,
+    ObsGroup, Role, Shard, ShardFactory, Spec,
 };
 pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

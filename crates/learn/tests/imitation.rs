@@ -260,7 +260,11 @@ fn what_cannot_be_imitated_is_refused() {
         task
     };
     let none = Unrewarded { demonstrations: None, ..Unrewarded::new(20) };
-    refused(&none, |_| {}, "imitation is for Puck-v0, which knows of no demonstrations, expected an agent that follows");
+    refused(
+        &none,
+        |_| {},
+        "imitation is for Puck-v0, which knows of no demonstrations, expected an agent that follows",
+    );
     refused(
         &whole,
         |i| i.demonstrations = Some("puck.demo".into()),

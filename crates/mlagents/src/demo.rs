@@ -148,7 +148,8 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
     if meta.api_version != API_VERSION {
         return Err(wrong("api_version", meta.api_version.to_string(), &API_VERSION.to_string()));
     }
-    let mut rest = bytes.get(HEAD..).ok_or_else(|| wrong("length", format!("{} bytes", bytes.len()), "a head of 33"))?;
+    let mut rest =
+        bytes.get(HEAD..).ok_or_else(|| wrong("length", format!("{} bytes", bytes.len()), "a head of 33"))?;
     BrainParameters::decode_length_delimited(&mut rest)
         .map_err(|error| wrong("behavior", error.to_string(), "a behavior's description"))?;
     let source = Some(path.to_string_lossy().into_owned());
@@ -164,7 +165,8 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
         let obs: Vec<f32> = info.observations.into_iter().flat_map(|o| o.float_data.unwrap_or_default().data).collect();
         let RecordedAction { vector_actions, continuous_actions } = action;
         let action = if continuous_actions.is_empty() { vector_actions } else { continuous_actions };
-        for (what, found, expected) in [("observed numbers", obs.len(), spec.obs), ("actions", action.len(), spec.act)] {
+        for (what, found, expected) in [("observed numbers", obs.len(), spec.obs), ("actions", action.len(), spec.act)]
+        {
             if found != expected {
                 let of = format!("{expected}, as {} has", spec.id);
                 return Err(wrong(&place, format!("{found} {what}"), &of));

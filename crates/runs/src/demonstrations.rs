@@ -44,7 +44,8 @@ pub fn with_demonstrations(
         [] => return Ok(task),
         [file] => file,
         [first, second, ..] => {
-            let problem = format!("names demonstrations in '{first}' and '{second}', expected one file for all rewards");
+            let problem =
+                format!("names demonstrations in '{first}' and '{second}', expected one file for all rewards");
             return Err(RunError::option("config", problem));
         }
     };

@@ -83,14 +83,7 @@ impl Judge for CuriosityJudge {
         f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
         self.nets.reward(&self.space, steps.len(), out);
     }
-    fn gradient(
-        &mut self,
-        isa: Isa,
-        params: &[f32],
-        steps: &[Step<'_, f32>],
-        _: &Lesson<'_>,
-        gradient: &mut [f32],
-    ) {
+    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], _: &Lesson<'_>, gradient: &mut [f32]) {
         f32_lanes!(isa, T => {
             self.nets.losses::<T>(params, steps, &mut self.space);
             self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);

@@ -118,7 +118,8 @@ impl Imitation {
             let Some(group) = spec.observations.iter().find(|group| group.name == *name) else {
                 let names = || spec.observations.iter().map(|group| group.name.as_str());
                 let near = nearest(name, names()).map(|near| format!("'{near}', or another of ")).unwrap_or_default();
-                let expected = format!("parts of {}'s observation: {near}{}", spec.id, names().collect::<Vec<_>>().join(", "));
+                let expected =
+                    format!("parts of {}'s observation: {near}{}", spec.id, names().collect::<Vec<_>>().join(", "));
                 return Err(Error::config("rewards: observations", format!("'{name}'"), expected));
             };
             sees.extend(group.range.clone());
@@ -147,10 +148,17 @@ impl Imitation {
             return what(name(&all.source), name(&self.demonstrations));
         }
         if all.obs_len != spec.obs {
-            return what(format!("demonstrations of {} observed numbers", all.obs_len), format!("{} as {} has", spec.obs, spec.id));
+            return what(
+                format!("demonstrations of {} observed numbers", all.obs_len),
+                format!("{} as {} has", spec.obs, spec.id),
+            );
         }
         if self.actions && all.act_len != spec.act {
-            let found = if all.act_len == 0 { "clips, which tell no actions".into() } else { format!("demonstrations of {} actions", all.act_len) };
+            let found = if all.act_len == 0 {
+                "clips, which tell no actions".into()
+            } else {
+                format!("demonstrations of {} actions", all.act_len)
+            };
             return what(found, format!("{} actions as {} has, or use_actions: false", spec.act, spec.id));
         }
         Ok(())
@@ -201,11 +209,7 @@ impl<S: Copy + Default> DiscriminatorSpace<S> {
 impl Discriminator {
     /// For an observation of which it sees these numbers, and an action of a length. Without demonstrations it can judge, but
     /// not learn.
-    pub fn new(
-        settings: &Imitation,
-        sees: Vec<usize>,
-        purpose: Purpose<'_>,
-    ) -> Self {
+    pub fn new(settings: &Imitation, sees: Vec<usize>, purpose: Purpose<'_>) -> Self {
         let Purpose { spec: Spec { act, .. }, seed, action_scale, demonstrations } = purpose;
         let act = *act;
         let act = if settings.actions { act } else { 0 };

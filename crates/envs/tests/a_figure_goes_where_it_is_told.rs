@@ -1,0 +1,116 @@
+//! Marathon Man told where to go: the direction that he is to keep turns as commanded, his reward is its formula, and the
+//! demonstrations of his style are what he would observe in his clips.
+
+mod common;
+
+use std::f64::consts::FRAC_PI_2;
+
+use common::{action, isas, make};
+use marathon_envs::agents::marathon::marathon_man::clips;
+use marathon_envs::agents::marathon::marathon_man::steer::{MOST_BEHIND, STYLE};
+use marathon_envs::{AgentState, Autoreset, Demonstrations, factory};
+use marathon_physics::lanes::Isa;
+
+const ID: &str = "MarathonManSteer-v0";
+const AGENTS: usize = 16;
+
+fn demonstrations(id: &str, isa: Isa) -> Demonstrations {
+    factory(id, isa).unwrap().demonstrations().expect("an agent with clips has demonstrations")
+}
+
+#[test]
+fn demonstrations_are_what_he_observes_in_a_clip() {
+    let (id, all) = ("MarathonManSpinKick-v0", demonstrations("MarathonManSpinKick-v0", Isa::F64));
+    let clip = clips::find("spinkick").unwrap();
+    let mut env = make(id, 1, 1, Some(Isa::F64), Autoreset::Disabled);
+    let (obs_len, dt) = (env.spec().obs, env.spec().dt);
+    let rows = (clip.duration() / dt + 1e-9).floor() as usize + 1;
+    assert_eq!((all.obs_len, all.act_len, all.obs.len()), (obs_len, 0, rows * obs_len));
+    let pairs: Vec<[usize; 2]> = (1..rows).map(|row| [row - 1, row]).collect();
+    assert_eq!((all.decisions.as_slice(), all.motions.as_slice()), (&pairs[..], &[0..rows - 1][..]));
+    // all but the phase and what compares him with the clip, whose row only the start of an episode sets
+    let own = 4..65;
+    let mut obs = vec![0.0f32; obs_len];
+    env.reset(Some(1), &mut obs).unwrap();
+    for row in 0..rows {
+        let mut state = AgentState { qpos: vec![0.0; clip.layout().nq()], qvel: vec![0.0; clip.layout().nv()] };
+        clip.qpos(row as f64 * dt, &mut state.qpos);
+        clip.qvel(row as f64 * dt, &mut state.qvel);
+        env.set_state(0, &state).unwrap();
+        env.observe(&[true], &mut obs).unwrap();
+        assert_eq!(all.row(row)[own.clone()], obs[own.clone()], "row {row}");
+    }
+}
+
+#[test]
+fn demonstrations_of_loops_are_closed_and_as_fast_as_the_clips() {
+    let all = demonstrations(ID, Isa::best());
+    assert_eq!(all.motions.len(), 5);
+    // the component of the velocity along the heading; walks in circles are slower than their paths
+    for (motion, speed) in all.motions.iter().zip([0.88, 0.84, 0.78, 3.2, 0.0]) {
+        let first = all.decisions[motion.start][0];
+        assert_eq!(all.decisions[motion.end - 1], [first + motion.len() - 1, first]);
+        let sum: f32 = motion.clone().map(|i| all.row(all.decisions[i][0])[11]).sum();
+        let mean = f64::from(sum) / motion.len() as f64;
+        assert!((mean - speed).abs() < 0.1, "{mean} m/s, expected {speed}");
+    }
+}
+
+#[test]
+fn demonstrations_do_not_depend_on_the_vector_width() {
+    let want = demonstrations(ID, Isa::F32);
+    for isa in isas().filter(|isa| *isa != Isa::F64) {
+        assert!(demonstrations(ID, isa) == want, "{}", isa.name());
+    }
+}
+
+#[test]
+fn his_style_has_names() {
+    let spec = factory(ID, Isa::best()).unwrap().spec().clone();
+    let named: Vec<&str> = spec.observations.iter().map(|group| group.name.as_str()).collect();
+    assert!(STYLE.iter().all(|name| named.contains(name)), "{named:?}");
+    assert!(["command", "touch"].iter().all(|name| named.contains(name) && !STYLE.contains(name)));
+}
+
+#[test]
+fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
+    let mut env = make(ID, AGENTS, 1, Some(Isa::F64), Autoreset::Disabled);
+    let (n, dt) = (env.spec().obs, env.spec().dt);
+    let mut out = env.buffers();
+    for agent in 0..AGENTS {
+        let share = agent as f64 / (AGENTS - 1) as f64;
+        env.set_command(agent, Some(&[3.0 * share, FRAC_PI_2 * (2.0 * share - 1.0)])).unwrap();
+    }
+    env.reset(Some(5), &mut out.obs).unwrap();
+    let mut actions = vec![0.0; AGENTS * env.spec().act];
+    let (mut expected, mut over) = ([0.0f64; AGENTS], [false; AGENTS]);
+    let mut info = vec![0.0f32; AGENTS * 2];
+    let (mut checked, mut behind) = (0, 0.0f64);
+    for decision in 0..60 {
+        for (agent, row) in actions.chunks_exact_mut(21).enumerate() {
+            action(agent, decision, 0.1, row);
+        }
+        let before = out.obs.clone();
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.info(&mut info).unwrap();
+        for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
+            let row = |obs: &[f32]| obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
+            let (was, is) = (row(&before), row(&out.obs));
+            let angle = is[2].atan2(is[3]);
+            assert!((is[2].hypot(is[3]) - 1.0).abs() < 1e-5 && angle.abs() < MOST_BEHIND + 1e-5);
+            behind = behind.max(angle.abs());
+            if decision < 8 {
+                // his own turn is known from its speed before and after
+                expected[agent] += (was[1] - 0.5 * (was[16] + is[16])) * dt;
+                assert!((angle - expected[agent]).abs() < 0.03, "{agent}: {angle}, expected {}", expected[agent]);
+            }
+            let [e, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
+            assert!((a - angle.abs()).abs() < 1e-5);
+            let worth = 0.4 * (-5.0 * e * e).exp() + 0.3 * (-0.5 * e * e).exp() + 0.3 * (-4.0 * a * a).exp();
+            assert!((f64::from(out.reward[agent]) - worth).abs() < 1e-5, "{} {worth}", out.reward[agent]);
+            checked += 1;
+            over[agent] = out.terminated[agent] || out.truncated[agent];
+        }
+    }
+    assert!(checked > 20 * AGENTS && behind > 0.5, "{checked} {behind}");
+}
