@@ -218,10 +218,9 @@ impl Discriminator {
         let net = Mlp::new(&[&[inputs], &settings.hidden[..], &[1]].concat(), settings.activation);
         let expert = demonstrations.map(|all| {
             let rows = all.obs.chunks_exact(all.obs_len.max(1)).flat_map(|row| sees.iter().map(|i| row[*i])).collect();
-            let Demonstrations { decisions, motions, actions, .. } = all.clone();
-            // a run without decisions has nothing to draw
-            let motions = motions.into_iter().filter(|motion| !motion.is_empty()).collect();
-            Arc::new(Expert { rows, decisions, motions, actions })
+            // a motion without decisions has nothing to draw
+            let motions = all.motions.iter().filter(|motion| !motion.is_empty()).cloned().collect();
+            Arc::new(Expert { rows, decisions: all.decisions.clone(), motions, actions: all.actions.clone() })
         });
         Self { net, settings: settings.clone(), sees, act, action_scale, seed, expert }
     }
