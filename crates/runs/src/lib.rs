@@ -5,6 +5,7 @@
 //! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
 //! names of options; each front end spells them in its own way ([`Spelling`]).
 
+pub mod clips;
 pub mod configuration;
 pub mod error;
 pub mod folder;
@@ -14,14 +15,16 @@ pub mod policy_file;
 pub mod processes;
 pub mod report;
 pub mod session;
+pub mod setting;
 pub mod task;
 pub mod text;
 
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
-pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
+pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions, TaskOptions};
 pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;
 pub use session::{Outcome, Session};
+pub use setting::Setting;
 pub use task::Task;
