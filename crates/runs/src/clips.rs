@@ -1,7 +1,7 @@
 //! Motion clips in files, for agents that follow clips.
 
 use crate::error::RunError;
-use crate::folder::nearest;
+use crate::text::nearest_path;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
 use marathon_motion::{About, Clip, Mapping, MotionError, import, retarget};
 use marathon_physics::Model;
@@ -77,7 +77,7 @@ pub fn check_name(name: &str) -> Result<(), RunError> {
 fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError> {
     if !path.is_file() {
         let found = if path.is_dir() { "a folder" } else { "no such file" };
-        let near = nearest(path, |file| file.is_file() && is_file_name(file));
+        let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
         let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
         let names = known::all_names().join(", ");
         let endings = ENDINGS.join(", .");

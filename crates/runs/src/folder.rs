@@ -408,27 +408,7 @@ fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), RunError> {
 
 /// The folder of a run that is called almost like `path`, such as `runs/hopper-3`.
 fn nearest_run(path: &Path) -> Option<String> {
-    nearest(path, |entry| entry.join(RUN).is_file())
-}
-
-/// What is called almost like `path`, beside it or among the runs, and fits.
-pub(crate) fn nearest(path: &Path, fits: impl Fn(&Path) -> bool) -> Option<String> {
-    let asked = path.display().to_string();
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut near: Vec<(usize, String)> = Vec::new();
-    for folder in [parent, Path::new(RUNS)] {
-        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            let other = entry.path();
-            if fits(&other) {
-                let name = other.display().to_string();
-                let name = name.strip_prefix("./").unwrap_or(&name).to_string();
-                near.push((strsim::damerau_levenshtein(&asked, &name), name));
-            }
-        }
-    }
-    near.sort();
-    let close = near.into_iter().next().filter(|(distance, name)| *distance <= 3 || name.ends_with(&asked));
-    close.map(|(_, name)| name)
+    text::nearest_path(path, &[Path::new(RUNS)], |entry| entry.join(RUN).is_file())
 }
 
 /// The policy that a user means: the file, or the one in a run's folder.
@@ -445,7 +425,7 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
         let is_policy = entry.extension().is_some_and(|end| end == "safetensors" || end == "onnx");
         is_policy || entry.join(RUN).is_file()
     };
-    let near = nearest(given, fits).map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+    let near = text::nearest_path(given, &[Path::new(RUNS)], fits).map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
     let expected = format!("a policy file or the folder of a run{near}");
     Err(RunError::file(given, "policy", found, expected))
 }

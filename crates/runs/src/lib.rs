@@ -21,10 +21,10 @@ pub mod text;
 
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
-pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions, TaskOptions};
+pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
 pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;
 pub use session::{Outcome, Session};
-pub use setting::Setting;
+pub use setting::{Setting, TaskOptions};
 pub use task::Task;

@@ -3,27 +3,11 @@
 
 use crate::error::RunError;
 use crate::policy_file;
-use marathon_envs::options::Value;
-use marathon_envs::{Options, ShardFactory};
+use crate::setting::TaskOptions;
+use marathon_envs::ShardFactory;
 use marathon_learn::{Algorithm, Policy};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Arguments of a task.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
-pub struct TaskOptions {
-    /// Argument of the task, such as `clip=run`, `clip=my.bvh` or `start=first`; may be repeated. `marathon list AGENT` tells
-    /// which there are.
-    #[cfg_attr(feature = "clap", arg(long = "option", value_name = "NAME=VALUE", value_parser = parse_option))]
-    pub given: Vec<(String, Value)>,
-}
-
-impl From<Options> for TaskOptions {
-    fn from(options: Options) -> Self {
-        TaskOptions { given: options.iter().map(|(name, value)| (name.into(), value.clone())).collect() }
-    }
-}
 
 /// How a policy is learned.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -179,18 +163,6 @@ impl FilmOptions {
                 Err(RunError::option("start", problem))
             }
         }
-    }
-}
-
-/// An argument of a task.
-#[cfg(feature = "clap")]
-fn parse_option(text: &str) -> Result<(String, Value), String> {
-    match text.split_once('=') {
-        Some((name, value)) if !name.trim().is_empty() => {
-            let value: Value = value.parse().unwrap_or_else(|never| match never {});
-            Ok((name.trim().into(), value))
-        }
-        _ => Err("expected NAME=VALUE, such as clip=run".into()),
     }
 }
 

@@ -2,8 +2,7 @@
 
 use crate::error::RunError;
 use crate::folder::policy_path;
-use crate::options::TaskOptions;
-use crate::setting::Setting;
+use crate::setting::{Setting, TaskOptions};
 use marathon_envs::{ShardFactory, Spec};
 use marathon_learn::{Policy, PolicyMeta, write_atomic};
 use std::path::Path;

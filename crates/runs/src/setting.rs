@@ -2,7 +2,6 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
-use crate::options::TaskOptions;
 use marathon_envs::options::Value;
 use marathon_envs::{Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
@@ -16,6 +15,22 @@ const CLIP: &str = "clip";
 
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
 static NAMING: Mutex<()> = Mutex::new(());
+
+/// Arguments of a task.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct TaskOptions {
+    /// Argument of the task, such as `clip=run`, `clip=my.bvh` or `start=first`; may be repeated. `marathon list AGENT` tells
+    /// which there are.
+    #[cfg_attr(feature = "clap", arg(long = "option", value_name = "NAME=VALUE", value_parser = parse_option))]
+    pub given: Vec<(String, Value)>,
+}
+
+impl From<Options> for TaskOptions {
+    fn from(options: Options) -> Self {
+        TaskOptions { given: options.iter().map(|(name, value)| (name.into(), value.clone())).collect() }
+    }
+}
 
 /// A task of the registry with its arguments.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,7 +68,7 @@ impl Setting {
         for (name, value) in &options.given {
             let value = match value {
                 Value::Text(text) if name == CLIP && agent.options().iter().any(|known| known.name == CLIP) => {
-                    clips::read_all(text, &self.agent, &agent.model()?, &mut self.clips)?.into()
+                    Value::Text(clips::read_all(text, &self.agent, &agent.model()?, &mut self.clips)?)
                 }
                 other => other.clone(),
             };
@@ -94,5 +109,17 @@ impl Setting {
         let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
         clips::name(&self.clips)?;
         make()
+    }
+}
+
+/// An argument of a task.
+#[cfg(feature = "clap")]
+fn parse_option(text: &str) -> Result<(String, Value), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => {
+            let value: Value = value.parse().unwrap_or_else(|never| match never {});
+            Ok((name.trim().into(), value))
+        }
+        _ => Err("expected NAME=VALUE, such as clip=run".into()),
     }
 }

@@ -1,8 +1,7 @@
 //! The task of a run: one of the registry, or one that a front end has made.
 
 use crate::error::RunError;
-use crate::options::TaskOptions;
-use crate::setting::Setting;
+use crate::setting::{Setting, TaskOptions};
 use marathon_envs::ShardFactory;
 use std::sync::Arc;
 
