@@ -310,7 +310,12 @@ impl RunFolder {
             let text = fs::read_to_string(&path).map_err(RunError::io(&path, "read"))?;
             let found = checksum(text.as_bytes());
             if found != *sum {
-                return Err(RunError::file(&path, "checksum", found, format!("{sum}, as in {RUN}; the clip has changed")));
+                return Err(RunError::file(
+                    &path,
+                    "checksum",
+                    found,
+                    format!("{sum}, as in {RUN}; the clip has changed"),
+                ));
             }
             setting.clips.insert(name.clone(), text);
         }
@@ -425,7 +430,9 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
         let is_policy = entry.extension().is_some_and(|end| end == "safetensors" || end == "onnx");
         is_policy || entry.join(RUN).is_file()
     };
-    let near = text::nearest_path(given, &[Path::new(RUNS)], fits).map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+    let near = text::nearest_path(given, &[Path::new(RUNS)], fits)
+        .map(|name| format!("; did you mean '{name}'?"))
+        .unwrap_or_default();
     let expected = format!("a policy file or the folder of a run{near}");
     Err(RunError::file(given, "policy", found, expected))
 }
