@@ -374,6 +374,7 @@ def train(
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
     players: Any = None,
+    options: dict[str, Any] | None = None,
 ) -> TrainResult:
     """Train a policy with the native trainer, without the GIL, and evaluate it.
 
@@ -393,6 +394,7 @@ def train(
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
+        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``.
     """
 
 @final
@@ -428,6 +430,7 @@ def evaluate(
     task: str | type[MarathonAgent] | MarathonAgent | None = None,
     seed: int = ...,
     threads: int = 0,
+    options: dict[str, Any] | None = None,
 ) -> dict[str, float]:
     """Play whole episodes with a policy's best actions.
 

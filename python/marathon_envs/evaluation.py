@@ -36,14 +36,15 @@ def evaluate(
         task: name of the task or a `MarathonAgent` class; without, it is the policy's own. A function has none.
         seed: seed of the environments.
         threads: number of threads; 0 means one per processor core. The result does not depend on it.
-        **options: arguments of the task, and `max_episode_steps`.
+        **options: arguments of the task, and `max_episode_steps`. The others are those that a policy was trained with.
 
     Returns:
         `return_mean`, `return_std`, `return_min`, `return_max`, `length_mean` (decisions), `distance_mean` (m),
         `speed_mean` (m/s), `falls`, `diverged` and `episodes`.
     """
-    if isinstance(policy, Policy) and not options:
-        return _native.evaluate(policy, episodes, task=task, seed=seed, threads=threads)
+    native = isinstance(task, str | None) and "max_episode_steps" not in options
+    if isinstance(policy, Policy) and (native or not options):
+        return _native.evaluate(policy, episodes, task=task, seed=seed, threads=threads, options=options)
     if not callable(policy):
         raise TypeError(f"policy is of type {type(policy).__name__}, expected a Policy or a function")
     if episodes < 1:
@@ -52,6 +53,7 @@ def evaluate(
         if not isinstance(policy, Policy):
             raise TypeError("task is missing: a function does not tell which task it is for")
         task = policy.task
+        options = {**policy.meta.get("options", {}), **options}
     agents = min(episodes, MOST_AGENTS)
     env = _tasks.vec_env(task, agents, threads=threads, autoreset="same_step", **options)
     # agent i plays episodes i, i + agents, ...

@@ -138,6 +138,7 @@ def train(
     threads: int | None = None,
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
+    options: dict[str, Any] | None = None,
 ) -> TrainResult:
     """Train as `marathon_envs.train` does, with rollouts played by Ray's workers; the policy has the same bits.
 
@@ -158,6 +159,7 @@ def train(
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a task and a configuration. It may have been begun
             without Ray, and may go on without.
+        options: arguments of the task.
     """
     players = workers if isinstance(workers, Workers) else Workers(workers)
     try:
@@ -171,6 +173,7 @@ def train(
             threads=threads,
             out=out,
             resume=resume,
+            options=options,
             players=players,
         )
     finally:

@@ -4,12 +4,13 @@ use crate::bench::BenchArgs;
 use crate::motion::MotionArgs;
 use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
-use marathon_runs::{FilmOptions, PolicySource, RunOptions};
+use marathon_runs::{FilmOptions, PolicySource, RunOptions, TaskOptions};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
   marathon train hopper                         learn to hop; results go to runs/hopper-1
+  marathon train MarathonMan --option clip=my.bvh   learn to move as in a recording
   marathon train hopper --algo acktr            the same by another algorithm: ppo, a2c, acktr
   marathon render runs/hopper-1 --out hop.gif   see it
   marathon eval runs/hopper-1 --episodes 1000   measure it
@@ -165,6 +166,8 @@ pub struct ImportArgs {
     /// Agent that it is for [default: the one that the file names, if Marathon has written it].
     #[arg(long, value_name = "AGENT")]
     pub agent: Option<String>,
+    #[command(flatten)]
+    pub task: TaskOptions,
     /// File to write [default: beside the network, .safetensors].
     #[arg(long, value_name = "F.safetensors")]
     pub out: Option<PathBuf>,

@@ -69,7 +69,7 @@ pub use algorithms::ppo::Ppo;
 pub use algorithms::sac::Sac;
 pub use algorithms::schedule::{Moving, Schedule};
 pub use error::Error;
-pub use files::{Upgrade, read_description, read_versions, write_atomic, write_description};
+pub use files::{Upgrade, checksum, read_description, read_versions, write_atomic, write_description};
 pub use lanes::BLOCK;
 pub use nets::NetworkConfig;
 pub use nets::activation::Activation;

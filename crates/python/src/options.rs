@@ -3,6 +3,7 @@
 use crate::error;
 use marathon_envs::options::Value;
 use marathon_envs::{EnvError, Options, registry};
+use marathon_runs::Setting;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,6 +22,12 @@ enum Given {
     Text(String),
     #[pyo3(transparent)]
     Path(PathBuf),
+}
+
+/// A task with its arguments; files of clips that they name are read.
+pub fn set(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<Setting> {
+    let options = read(task, given)?;
+    Setting::named(task).and_then(|setting| setting.with(&options.into())).map_err(error::run)
 }
 
 /// Arguments of a task by name.

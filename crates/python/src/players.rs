@@ -1,9 +1,9 @@
 //! Rollouts that other processes play: the learner's side, and that of those who play.
 
 use crate::error;
-use marathon_envs::registry;
 use marathon_learn::{Control, Deliver, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
+use marathon_runs::Setting;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -21,7 +21,11 @@ impl Player {
     #[new]
     fn new(py: Python<'_>, task: &str, config: &str, slice: usize, slices: usize) -> PyResult<Self> {
         let config: TrainConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
-        let factory = registry::factory(task, Isa::best()).map_err(error::env)?;
+        let task = match task.starts_with('{') {
+            true => serde_json::from_str(task).map_err(|e| error::value(format!("task: {e}")))?,
+            false => Setting::named(task).map_err(error::run)?,
+        };
+        let factory = task.factory().map_err(error::run)?;
         let make = || marathon_learn::Player::new(&*factory, Isa::best(), &config, (slice, slices));
         Ok(Player { player: Mutex::new(py.detach(make).map_err(error::learn)?) })
     }
@@ -50,8 +54,13 @@ pub struct PyPlayers {
 }
 
 impl PyPlayers {
-    /// Tells the object the task and the configuration of the run; it says how many slices it wants.
-    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &str, config: &TrainConfig) -> PyResult<Self> {
+    /// Tells the object the task and the configuration of the run; it says how many slices it wants. The task is its name, or
+    /// JSON if it has arguments.
+    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &Setting, config: &TrainConfig) -> PyResult<Self> {
+        let task = match task.options.is_empty() {
+            true => task.agent.clone(),
+            false => serde_json::to_string(task).map_err(error::any)?,
+        };
         let config = serde_json::to_string(config).map_err(error::any)?;
         let slices = object.bind(py).call_method1("begin", (task, config))?.extract()?;
         Ok(PyPlayers { object, slices, failure: None })

@@ -2,11 +2,11 @@
 
 use crate::arrays::tuple;
 use crate::task::{self, Task};
-use crate::{crowd, error, number};
-use marathon_envs::{BLOCK, registry};
+use crate::{crowd, error, number, options as arguments};
+use marathon_envs::BLOCK;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
-use marathon_runs::policy_file;
+use marathon_runs::{Setting, clips, policy_file};
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -96,7 +96,9 @@ impl Policy {
 /// A policy from the bytes of a file.
 #[pyfunction]
 pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
-    marathon_learn::Policy::from_bytes("policy".as_ref(), bytes).map(Policy).map_err(error::learn)
+    let policy = marathon_learn::Policy::from_bytes("policy".as_ref(), bytes).map_err(error::learn)?;
+    clips::name(&policy.meta().clips).map_err(error::run)?;
+    Ok(Policy(policy))
 }
 
 /// Reads a policy from a file, `.safetensors` or `.onnx`, or from the folder of a run. Without `task`, it is for the one that
@@ -106,14 +108,18 @@ pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
 #[pyo3(signature = (path, task = None))]
 pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResult<Policy> {
     let spec = task.map(|task| task.spec(py)).transpose()?;
-    Ok(Policy(policy_file::read(&path, spec.as_ref()).map_err(error::run)?))
+    let policy = policy_file::read(&path, spec.as_ref()).map_err(error::run)?;
+    // environments of this process can be told to follow them
+    clips::name(&policy.meta().clips).map_err(error::run)?;
+    Ok(Policy(policy))
 }
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,
 /// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`. `task` is needed
-/// for agents that are written in Python; without, it is the policy's own.
+/// for agents that are written in Python; without, it is the policy's own. `options`: arguments of a task with a name; the others
+/// are those that the policy was trained with.
 #[pyfunction]
-#[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0))]
+#[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0, options = None))]
 pub fn evaluate<'py>(
     py: Python<'py>,
     policy: &Policy,
@@ -121,7 +127,9 @@ pub fn evaluate<'py>(
     task: Option<Task>,
     #[pyo3(from_py_with = number::seed)] seed: u64,
     #[pyo3(from_py_with = number::threads)] threads: usize,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let given = options;
     let options = EvalOptions { episodes, seed, threads };
     let result = match &task {
         Some(Task::Agent(agent)) => {
@@ -131,7 +139,11 @@ pub fn evaluate<'py>(
         }
         other => {
             let name = if let Some(Task::Name(name)) = other { task::plain(name) } else { policy.task() };
-            let factory = registry::factory(name, Isa::best()).map_err(error::env)?;
+            let noted = Setting::of(policy.0.meta());
+            let asked = Setting::named(name).map_err(error::run)?;
+            let setting = if asked.agent == noted.agent { noted } else { asked };
+            let given = arguments::read(name, given)?.into();
+            let factory = setting.with(&given).and_then(|setting| setting.factory()).map_err(error::run)?;
             py.detach(|| play(&*factory, Isa::best(), &policy.0, &options))
         }
     };

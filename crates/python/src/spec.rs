@@ -159,8 +159,7 @@ pub fn ids() -> Vec<String> {
 #[pyo3(signature = (id, /, **options))]
 pub fn spec(id: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
     let id = task::plain(id);
-    let options = options::read(id, options)?;
-    Spec::of(registry::factory_with(id, &options, Isa::F32).map_err(error::env)?.spec())
+    Spec::of(options::set(id, options)?.factory_on(Isa::F32).map_err(error::run)?.spec())
 }
 
 impl CommandRange {

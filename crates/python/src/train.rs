@@ -2,8 +2,8 @@
 
 use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
-use crate::task::{Made, Task};
-use crate::{crowd, error, number};
+use crate::task::{self, Made, Task};
+use crate::{crowd, error, number, options as arguments};
 use marathon_learn::{Control, Players};
 use marathon_runs::report::csv::columns;
 use marathon_runs::{LearnOptions, RunError, RunOptions, Session};
@@ -78,7 +78,7 @@ impl TrainResult {
 /// 16) and `threads` change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv`
 /// holds; if it returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes;
 /// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
-/// for a class alone.
+/// for a class alone. `options`: arguments of a task with a name.
 /// `players`: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
@@ -86,7 +86,7 @@ impl TrainResult {
 #[pyfunction]
 #[pyo3(signature = (
     task = None, config = None, *, callback = None, seed = None, steps = None, agents = None, threads = None, out = None,
-    resume = None, players = None
+    resume = None, players = None, options = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
@@ -101,9 +101,15 @@ pub fn train(
     out: Option<PathBuf>,
     resume: Option<PathBuf>,
     players: Option<Py<PyAny>>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<TrainResult> {
+    let of_task = match &task {
+        Some(Task::Name(name)) => arguments::read(task::plain(name), options)?,
+        _ => arguments::read("", options)?,
+    };
     let mut options = RunOptions {
         learn: LearnOptions { config: None, algo: None, steps, seed, threads },
+        task: of_task.into(),
         agents,
         processes: 0,
         out,
@@ -136,7 +142,7 @@ pub fn train(
 
     let terms = session.factory.spec().reward_terms.clone();
     let run = &session.run;
-    let mut players = players.map(|object| PyPlayers::begin(py, object, &run.agent, &run.config)).transpose()?;
+    let mut players = players.map(|object| PyPlayers::begin(py, object, &session.setting, &run.config)).transpose()?;
     let mut failure: Option<PyErr> = None;
     let mut last = (session.steps(), 0.0);
     let result = crowd::run(py, made.crowd.as_deref(), || {

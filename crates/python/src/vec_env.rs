@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::number::{self, Seeds};
 use crate::spec::Spec;
 use crate::{error, options, task};
-use marathon_envs::{AgentState, Autoreset, VecEnvOptions, registry};
+use marathon_envs::{AgentState, Autoreset, Options, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
 use numpy::ndarray::{Ix1, Ix2};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -72,9 +72,10 @@ impl VecEnv {
         let double = parse_dtype(dtype)?;
         let (agents, made) = (num_envs, Made { seed, threads, isa });
         let id = task::plain(id);
-        let options = options::read(id, options)?;
+        let setting = options::set(id, options)?;
+        let options = Options::new();
         let options = VecEnvOptions { agents, seed, threads, isa, autoreset, max_episode_steps, options };
-        let env = py.detach(|| marathon_envs::VecEnv::new(id, &options)).map_err(error::env)?;
+        let env = py.detach(|| setting.vec_env(&options)).map_err(error::run)?;
         let arrays = Arrays::new(py, num_envs, env.spec(), double);
         let spec = Py::new(py, Spec::of(env.spec())?)?;
         Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None })

@@ -4,6 +4,7 @@ use crate::text::{path_word, thousands};
 use marathon_config::ConfigError;
 use marathon_envs::EnvError;
 use marathon_learn::Error;
+use marathon_motion::MotionError;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -93,6 +94,17 @@ pub enum RunError {
         /// Why.
         reason: String,
     },
+    /// Of a motion clip or a recording.
+    Motion(#[from] MotionError),
+    /// A recording does not become a clip by itself.
+    Recording {
+        /// Why.
+        error: MotionError,
+        /// The recording.
+        path: PathBuf,
+        /// Name of the agent that is to follow it.
+        agent: String,
+    },
     /// A process that plays has failed.
     Process(String),
     /// Training stopped because its results could no longer be written.
@@ -166,6 +178,12 @@ impl RunError {
                 spelling.with_value("steps", &thousands(steps.saturating_mul(2)))
             ),
             RunError::Draw { path, reason } => format!("{}: {reason}", path.display()),
+            RunError::Motion(error) => error.to_string(),
+            RunError::Recording { error, path, agent } => format!(
+                "{error}\n`marathon motion import {} --model {agent} --mapping F.json --out F.motion` makes a clip of it \
+                 with a mapping of your own",
+                path_word(path)
+            ),
             RunError::Process(text) => text.clone(),
             RunError::Stopped { cause, folder, steps, saved } => {
                 let (done, resume) = (thousands(*steps), spelling.resume(folder));

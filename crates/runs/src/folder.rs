@@ -1,11 +1,16 @@
 //! The folder of a run: what is in it, who may write to it, and how files get there whole.
 
+use crate::clips::{self, Clips};
 use crate::error::RunError;
+use crate::setting::Setting;
 use crate::text;
 use marathon_config::Loaded;
-use marathon_learn::{Checkpoint, RunConfig, TrainConfig, read_versions, write_atomic, write_description};
+use marathon_envs::Options;
+use marathon_learn::policy::options;
+use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_versions, write_atomic, write_description};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
@@ -32,6 +37,12 @@ pub struct RunFile {
     pub version: u32,
     /// Registry name of the agent.
     pub agent: String,
+    /// Arguments of its task; empty for a task without, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
+    pub options: Options,
+    /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clips: BTreeMap<String, String>,
     /// Steps between progress lines where there is no terminal.
     pub summary_freq: u64,
     /// Steps between checkpoints.
@@ -44,11 +55,13 @@ pub struct RunFile {
 
 impl RunFile {
     /// Of a new run.
-    pub fn new(agent: &str, loaded: &Loaded) -> Self {
+    pub fn new(task: &Setting, loaded: &Loaded) -> Self {
         Self {
             format: FORMAT.into(),
             version: VERSION,
-            agent: agent.into(),
+            agent: task.agent.clone(),
+            options: task.options.clone(),
+            clips: task.clips.iter().map(|(name, text)| (name.clone(), checksum(text.as_bytes()))).collect(),
             summary_freq: loaded.summary_freq,
             checkpoint_interval: loaded.checkpoint_interval,
             keep_checkpoints: loaded.keep_checkpoints,
@@ -60,6 +73,7 @@ impl RunFile {
     fn read(path: &Path) -> Result<Self, RunError> {
         let run: RunFile = read_versions(path, FORMAT, VERSION, Some(upgrade))?;
         run.config.validate_in(path, "config")?;
+        run.clips.keys().try_for_each(|name| clips::check_name(name))?;
         for (key, n) in [("summary_freq", run.summary_freq), ("checkpoint_interval", run.checkpoint_interval)] {
             if n == 0 {
                 return Err(RunError::file(path, key, n, "at least 1"));
@@ -208,6 +222,9 @@ impl RunFolder {
     fn clear(&self) {
         self.remove_leftovers();
         let _ = fs::remove_file(self.progress());
+        if let Ok(run) = RunFile::read(&self.path.join(RUN)) {
+            run.clips.keys().for_each(|name| _ = fs::remove_file(self.path.join(name)));
+        }
         for events in self.events().into_iter().flatten() {
             let _ = fs::remove_file(events);
         }
@@ -271,6 +288,40 @@ impl RunFolder {
         Ok(write_description(&self.path.join(RUN), run)?)
     }
 
+    /// Writes the clips that do not come with Marathon.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn write_clips(&self, clips: &Clips) -> Result<(), RunError> {
+        for (name, text) in clips {
+            write_atomic(&self.path.join(name), text.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// The task of a run, with its clips.
+    ///
+    /// # Errors
+    /// If a clip is not there, or has changed since the run began.
+    pub fn setting(&self, run: &RunFile) -> Result<Setting, RunError> {
+        let mut setting = Setting { agent: run.agent.clone(), options: run.options.clone(), clips: Clips::new() };
+        for (name, sum) in &run.clips {
+            let path = self.path.join(name);
+            let text = fs::read_to_string(&path).map_err(RunError::io(&path, "read"))?;
+            let found = checksum(text.as_bytes());
+            if found != *sum {
+                return Err(RunError::file(
+                    &path,
+                    "checksum",
+                    found,
+                    format!("{sum}, as in {RUN}; the clip has changed"),
+                ));
+            }
+            setting.clips.insert(name.clone(), text);
+        }
+        Ok(setting)
+    }
+
     /// Removes temporary files of a writer that was killed; failing to harms nobody.
     fn remove_leftovers(&self) {
         for folder in [self.path.clone(), self.checkpoint(), self.policies()] {
@@ -324,11 +375,13 @@ fn is_blank(folder: &Path) -> bool {
         let text = fs::read_to_string(folder.join(PROGRESS));
         text.map_or_else(|e| usize::from(e.kind() != ErrorKind::NotFound), |text| text.lines().skip(1).count())
     };
+    let run = RunFile::read(&folder.join(RUN));
     let ours = |name: &OsString| {
+        let is_clip = || run.as_ref().is_ok_and(|run| run.clips.keys().any(|clip| **name == **clip));
         let of_events = || name.to_str().is_some_and(|n| n.starts_with(EVENTS) && n.contains(".marathon."));
-        name == RUN || name == PROGRESS || is_leftover(name) || of_events()
+        name == RUN || name == PROGRESS || is_leftover(name) || of_events() || is_clip()
     };
-    names.iter().all(ours) && RunFile::read(&folder.join(RUN)).is_ok() && rows() == 0
+    names.iter().all(ours) && run.is_ok() && rows() == 0
 }
 
 /// Whether a file has a temporary name.
@@ -360,27 +413,7 @@ fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), RunError> {
 
 /// The folder of a run that is called almost like `path`, such as `runs/hopper-3`.
 fn nearest_run(path: &Path) -> Option<String> {
-    nearest(path, |entry| entry.join(RUN).is_file())
-}
-
-/// What is called almost like `path`, beside it or among the runs, and fits.
-fn nearest(path: &Path, fits: impl Fn(&Path) -> bool) -> Option<String> {
-    let asked = path.display().to_string();
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut near: Vec<(usize, String)> = Vec::new();
-    for folder in [parent, Path::new(RUNS)] {
-        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            let other = entry.path();
-            if fits(&other) {
-                let name = other.display().to_string();
-                let name = name.strip_prefix("./").unwrap_or(&name).to_string();
-                near.push((strsim::damerau_levenshtein(&asked, &name), name));
-            }
-        }
-    }
-    near.sort();
-    let close = near.into_iter().next().filter(|(distance, name)| *distance <= 3 || name.ends_with(&asked));
-    close.map(|(_, name)| name)
+    text::nearest_path(path, &[Path::new(RUNS)], |entry| entry.join(RUN).is_file())
 }
 
 /// The policy that a user means: the file, or the one in a run's folder.
@@ -397,7 +430,9 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
         let is_policy = entry.extension().is_some_and(|end| end == "safetensors" || end == "onnx");
         is_policy || entry.join(RUN).is_file()
     };
-    let near = nearest(given, fits).map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+    let near = text::nearest_path(given, &[Path::new(RUNS)], fits)
+        .map(|name| format!("; did you mean '{name}'?"))
+        .unwrap_or_default();
     let expected = format!("a policy file or the folder of a run{near}");
     Err(RunError::file(given, "policy", found, expected))
 }
@@ -422,7 +457,7 @@ mod tests {
     fn a_flipped_bit_of_a_description_is_refused_or_changes_nothing() {
         let temp = tempfile::tempdir().unwrap();
         let path = temp.path().join(RUN);
-        let run = RunFile::new("Hopper-v0", &marathon_config::default_for("Hopper-v0"));
+        let run = RunFile::new(&Setting::named("Hopper-v0").unwrap(), &marathon_config::default_for("Hopper-v0"));
         write_description(&path, &run).unwrap();
         assert_eq!(RunFile::read(&path).unwrap(), run);
         let bytes = fs::read(&path).unwrap();

@@ -5,6 +5,7 @@
 //! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
 //! names of options; each front end spells them in its own way ([`Spelling`]).
 
+pub mod clips;
 pub mod configuration;
 pub mod demonstrations;
 pub mod error;
@@ -15,6 +16,7 @@ pub mod policy_file;
 pub mod processes;
 pub mod report;
 pub mod session;
+pub mod setting;
 pub mod task;
 pub mod text;
 
@@ -25,4 +27,5 @@ pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;
 pub use session::{Outcome, Session};
+pub use setting::{Setting, TaskOptions};
 pub use task::Task;

@@ -3,6 +3,7 @@
 
 use crate::error::RunError;
 use crate::policy_file;
+use crate::setting::TaskOptions;
 use marathon_envs::ShardFactory;
 use marathon_learn::{Algorithm, Policy};
 use std::path::PathBuf;
@@ -37,6 +38,9 @@ pub struct RunOptions {
     /// How the policy is learned.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub learn: LearnOptions,
+    /// Arguments of the task.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub task: TaskOptions,
     /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     pub agents: Option<usize>,
@@ -84,6 +88,7 @@ impl RunOptions {
             ("algo", self.learn.algo.is_some()),
             ("seed", self.learn.seed.is_some()),
             ("agents", self.agents.is_some()),
+            ("option", !self.task.given.is_empty()),
             ("out", self.out.is_some()),
         ];
         match of_new_runs.into_iter().find(|(_, given)| *given && self.resume.is_some()) {
@@ -102,15 +107,18 @@ pub struct PolicySource {
     /// Agent that the policy must be for [default: the one it was trained for].
     #[cfg_attr(feature = "clap", arg(long, value_name = "AGENT"))]
     pub agent: Option<String>,
+    /// Arguments of the task; the others are those that the policy was trained with.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub task: TaskOptions,
 }
 
 impl PolicySource {
-    /// Reads the policy and makes its task.
+    /// Reads the policy and makes its task. The policy notes the arguments that the task has.
     ///
     /// # Errors
-    /// If there is no such file, it is no policy, or it is for another agent.
+    /// If there is no such file, it is no policy, it is for another agent, or the agent does not take the arguments.
     pub fn load(&self) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
-        policy_file::load(&self.policy, self.agent.as_deref())
+        policy_file::load(&self.policy, self.agent.as_deref(), &self.task)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A policy at play: agents side by side that it moves with its best actions.
 
 use crate::error::RunError;
+use crate::setting::Setting;
 use marathon_envs::{Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
@@ -15,13 +16,13 @@ pub struct Play<'a> {
 }
 
 impl<'a> Play<'a> {
-    /// Agents at the start of their first episodes.
+    /// Agents at the start of their first episodes, in the task that the policy notes.
     ///
     /// # Errors
     /// If the policy's task does not exist, or the options make no sense.
     pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
         let meta = policy.meta();
-        let mut env = VecEnv::new(&meta.agent, options)?;
+        let mut env = Setting::of(meta).vec_env(options)?;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
         Ok(Play {

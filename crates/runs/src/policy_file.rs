@@ -2,23 +2,46 @@
 
 use crate::error::RunError;
 use crate::folder::policy_path;
-use marathon_envs::{ShardFactory, Spec, registry};
-use marathon_learn::{Policy, write_atomic};
-use marathon_physics::lanes::Isa;
+use crate::setting::{Setting, TaskOptions};
+use marathon_envs::{ShardFactory, Spec};
+use marathon_learn::{Policy, PolicyMeta, write_atomic};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Reads a policy and its task: the file, `.safetensors` or `.onnx`, or the one in a run's folder. The task is the one that
-/// the user names, or the one that the file is for.
+/// the user names, or the one that the file is for; its arguments are those that the user gives, and else those of the file.
+/// The policy notes what the task has.
 ///
 /// # Errors
-/// If there is no such file, it is no policy, or it is for another agent.
-pub fn load(given: &Path, agent: Option<&str>) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
-    let factory = match agent {
-        Some(agent) => registry::factory(agent, Isa::best())?,
-        None => registry::factory(&read(given, None)?.meta().agent, Isa::best())?,
+/// If there is no such file, it is no policy, it is for another agent, or the agent does not take the arguments.
+pub fn load(
+    given: &Path,
+    agent: Option<&str>,
+    options: &TaskOptions,
+) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
+    let noted = noted(given)?.map(|meta| Setting::of(&meta));
+    let setting = match (agent.map(Setting::named).transpose()?, noted) {
+        (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
+        (Some(asked), _) => asked,
+        (None, Some(noted)) => noted,
+        // the message says what is missing
+        (None, None) => Setting::named(&read(given, None)?.meta().agent)?,
     };
-    Ok((read(given, Some(factory.spec()))?, factory))
+    let setting = setting.with(options)?;
+    let factory = setting.factory()?;
+    let mut policy = read(given, Some(factory.spec()))?;
+    policy.set_task(factory.spec().options.clone(), setting.clips);
+    Ok((policy, factory))
+}
+
+/// What a file says of its policy; nothing, if another program has written it.
+fn noted(given: &Path) -> Result<Option<PolicyMeta>, RunError> {
+    let path = policy_path(given)?;
+    if is_onnx(&path) {
+        let bytes = std::fs::read(&path).map_err(RunError::io(&path, "read"))?;
+        return Ok(Policy::meta_of_onnx(&bytes));
+    }
+    Ok(Some(Policy::load(&path)?.meta().clone()))
 }
 
 /// Reads a policy for a task, or, without one, for whatever task its file names: this program may not know that.

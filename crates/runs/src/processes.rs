@@ -6,7 +6,7 @@
 //! can be gone on with.
 
 use crate::error::RunError;
-use marathon_envs::registry;
+use crate::setting::Setting;
 use marathon_learn::{Algorithm, Control, Deliver, Player, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 /// What a process plays.
 #[derive(Serialize, Deserialize)]
 struct Part {
-    agent: String,
+    task: Setting,
     config: TrainConfig,
     slice: usize,
     slices: usize,
@@ -63,7 +63,7 @@ impl Processes {
     ///
     /// # Errors
     /// If one cannot be started.
-    pub fn start(program: &Path, agent: &str, config: &TrainConfig, count: usize) -> Result<Self, RunError> {
+    pub fn start(program: &Path, task: &Setting, config: &TrainConfig, count: usize) -> Result<Self, RunError> {
         Self::check(config, count)?;
         let slices = count.clamp(1, config.run.blocks());
         let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));
@@ -71,7 +71,7 @@ impl Processes {
         let mut all = Processes { workers: Vec::new(), error: None };
         for slice in 0..slices {
             let mut worker = Worker::start(Command::new(program).arg("rollout-worker")).map_err(|e| failed(&e))?;
-            let part = Part { agent: agent.into(), config: config.clone(), slice, slices };
+            let part = Part { task: task.clone(), config: config.clone(), slice, slices };
             let part = serde_json::to_string(&part).map_err(|e| failed(&e))?;
             let told = worker.pipes.as_mut().map_or(Ok(()), |(requests, _)| writeln!(requests, "{part}"));
             all.workers.push(worker);
@@ -160,7 +160,7 @@ pub fn serve() -> Result<(), RunError> {
     requests.read_line(&mut line).map_err(broken)?;
     let part: Part = serde_json::from_str(&line)
         .map_err(|e| RunError::Process(format!("stdin: {e}; expected what a run with processes sends")))?;
-    let factory = registry::factory(&part.agent, Isa::best())?;
+    let factory = part.task.factory()?;
     let mut player = Player::new(&*factory, Isa::best(), &part.config, (part.slice, part.slices))?;
     while let Some(orders) = receive(&mut requests).map_err(broken)? {
         let state = receive(&mut requests).map_err(broken)?.unwrap_or_default();

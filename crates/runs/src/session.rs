@@ -8,7 +8,8 @@ use crate::options::RunOptions;
 use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
-use crate::report::{Reporter, Watch, curve, save, save_policies};
+use crate::report::{Reporter, Watch, curve, note_clips, save, save_policies};
+use crate::setting::Setting;
 use crate::task::Task;
 use crate::text::thousands;
 use marathon_config::{Loaded, default_for, default_of};
@@ -29,6 +30,8 @@ pub struct Session {
     pub folder: Option<RunFolder>,
     /// Its task.
     pub factory: Arc<dyn ShardFactory>,
+    /// What makes that again, if it is one of the registry.
+    pub setting: Setting,
     /// Where it goes on from.
     pub checkpoint: Option<Checkpoint>,
 }
@@ -99,7 +102,7 @@ impl Session {
         run.threads = learn.threads.unwrap_or(run.threads);
         loaded.config.validate()?;
         Processes::check(&loaded.config, options.processes)?;
-        let factory = task.factory(loaded.config.run.agents)?;
+        let (factory, setting) = task.with(&options.task)?.factory(loaded.config.run.agents)?;
         if let (Some(path), [_, others @ ..]) = (&learn.config, &factory.spec().roles[..]) {
             let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
             loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
@@ -107,17 +110,17 @@ impl Session {
         let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
-        let run = RunFile::new(&agent, &loaded);
+        let run = RunFile::new(&setting, &loaded);
         let mut folder = None;
         if !dry {
             let made = RunFolder::create(options.out.as_deref(), &agent)?;
-            if let Err(error) = made.write_run(&run) {
+            if let Err(error) = made.write_run(&run).and_then(|()| made.write_clips(&setting.clips)) {
                 made.discard();
                 return Err(error);
             }
             folder = Some(made);
         }
-        Ok((Session { run, folder, factory, checkpoint: None }, loaded.notes))
+        Ok((Session { run, folder, factory, setting, checkpoint: None }, loaded.notes))
     }
 
     fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<Self, RunError> {
@@ -128,7 +131,7 @@ impl Session {
                 return Err(RunError::file(path, "agent", &run.agent, task.id()));
             }
             Some(task) => task,
-            None => Task::named(&run.agent)?,
+            None => Task::set(folder.setting(&run)?),
         };
         Processes::check(&run.config, options.processes)?;
         // a run that ended before its first checkpoint begins again, which gives the same bits
@@ -147,9 +150,10 @@ impl Session {
             return Err(RunError::Complete { folder: path.into(), steps: done });
         }
         run.config.run.threads = learn.threads.unwrap_or(run.config.run.threads);
-        let factory = with_demonstrations(task.factory(run.config.run.agents)?, &run.config)?;
+        let (factory, setting) = task.factory(run.config.run.agents)?;
+        let factory = with_demonstrations(factory, &run.config)?;
         folder.write_run(&run)?;
-        Ok(Session { folder: Some(folder), run, factory, checkpoint })
+        Ok(Session { folder: Some(folder), run, factory, setting, checkpoint })
     }
 
     /// Agent-steps done before.
@@ -219,7 +223,8 @@ impl Session {
             evaluation = evaluations.into_iter().next();
         }
         let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
-        let summary = Summary::new(path, &checkpoint, &history, evaluation.clone());
+        let mut summary = Summary::new(path, &checkpoint, &history, evaluation.clone());
+        summary.options = run.options.clone();
         if let Some(folder) = &folder {
             save_policies(folder, &policy, &others)?;
             write_json(&folder.summary(), &summary)?;
@@ -236,20 +241,23 @@ impl Session {
         show: bool,
         watch: &mut Watch,
     ) -> Result<TrainOutput, RunError> {
-        let Session { run, factory, .. } = self;
+        let Session { run, factory, setting, .. } = self;
         let train = |resume, observer: &mut dyn Observer| {
             train_with(players, &**factory, Isa::best(), &run.config, resume, observer)
         };
         let Some(folder) = &self.folder else {
             let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
-            return Ok(train(resume, &mut observer)?);
+            let mut output = train(resume, &mut observer)?;
+            note_clips(&mut output, &setting.clips);
+            return Ok(output);
         };
         let terms = &factory.spec().reward_terms;
-        let mut reporter = Reporter::new(folder, run, terms, resume.as_ref(), (show, watch))?;
+        let mut reporter = Reporter::new(folder, run, (terms, &setting.clips), resume.as_ref(), (show, watch))?;
         let result = train(resume, &mut reporter);
         reporter.finish();
         let (error, told) = (reporter.error.take(), reporter.told);
-        let output = result?;
+        let mut output = result?;
+        note_clips(&mut output, &setting.clips);
         let steps = output.checkpoint.steps();
         // what was learned is safe before anything else happens; an iteration that is not told of is to come again
         let saved = if told { save(folder, &output).map(|()| true) } else { Ok(false) };

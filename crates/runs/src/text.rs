@@ -95,6 +95,26 @@ pub fn word(text: &str) -> String {
     if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
+/// What is called almost like `path`, beside it or in one of these folders, and fits.
+pub fn nearest_path(path: &Path, folders: &[&Path], fits: impl Fn(&Path) -> bool) -> Option<String> {
+    let asked = path.display().to_string();
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut near: Vec<(usize, String)> = Vec::new();
+    for folder in [parent].iter().chain(folders) {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let other = entry.path();
+            if fits(&other) {
+                let name = other.display().to_string();
+                let name = name.strip_prefix("./").unwrap_or(&name).to_string();
+                near.push((strsim::damerau_levenshtein(&asked, &name), name));
+            }
+        }
+    }
+    near.sort();
+    let close = near.into_iter().next().filter(|(distance, name)| *distance <= 3 || name.ends_with(&asked));
+    close.map(|(_, name)| name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,8 +3,9 @@
 use super::options::{Common, Head, isas, seconds, supported};
 use super::row::{Figures, Row, Sample, Table, on_threads, thread_cpu};
 use crate::error::CliError;
-use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec, registry};
+use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
 use marathon_physics::lanes::Isa;
+use marathon_runs::{Setting, TaskOptions};
 use serde::Serialize;
 
 /// Blocks of each thread.
@@ -21,6 +22,8 @@ const STOCK: usize = 257;
 pub struct EnvArgs {
     #[command(flatten)]
     pub common: Common,
+    #[command(flatten)]
+    pub task: TaskOptions,
     /// Instruction set: f64, f32, baseline, avx2 or avx512; may be repeated [default: all that the processor has].
     #[arg(long, value_name = "ISA", value_parser = supported)]
     pub isa: Vec<Isa>,
@@ -60,7 +63,7 @@ pub fn run(args: &EnvArgs, json: bool) -> Result<(), CliError> {
     let mut table = Table::new(json, Head::new("env", threads), args.seconds, step);
     for id in &agents {
         for isa in isas(&args.isa) {
-            let factory = registry::factory(id, isa)?;
+            let factory = Setting::named(id)?.with(&args.task)?.factory_on(isa)?;
             table.push(measure(threads, args.seconds, &*factory, isa));
         }
     }

@@ -5,11 +5,11 @@ use super::row::{Figures, Row, Sample, Table};
 use crate::error::CliError;
 use crate::program;
 use marathon_config as config;
-use marathon_envs::registry;
 use marathon_learn::{Control, IterationStats, Players, Snapshot, train_with};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::text::short;
+use marathon_runs::{Setting, TaskOptions};
 use serde::Serialize;
 
 /// Repetitions of a row, each with a seed of its own.
@@ -22,6 +22,8 @@ const ITERATIONS: u64 = 2;
 pub struct TrainArgs {
     #[command(flatten)]
     pub common: Common,
+    #[command(flatten)]
+    pub task: TaskOptions,
     /// Instruction set: f32, baseline, avx2 or avx512; may be repeated [default: the best that the processor has].
     #[arg(long, value_name = "ISA", value_parser = for_networks)]
     pub isa: Vec<Isa>,
@@ -80,7 +82,8 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
 }
 
 fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<Train>, CliError> {
-    let factory = registry::factory(id, isa)?;
+    let task = Setting::named(id)?.with(&args.task)?;
+    let factory = task.factory_on(isa)?;
     let mut base = config::default_for(id).config;
     if let Some(width) = args.hidden.map(|width| width as usize) {
         (base.network.actor_hidden, base.network.critic_hidden) = (vec![width; 2], vec![width; 2]);
@@ -113,7 +116,7 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
         };
         let mut processes = match args.processes {
             0 => None,
-            n => Some(Processes::start(&program::file(), id, &config, n)?),
+            n => Some(Processes::start(&program::file(), &task, &config, n)?),
         };
         let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
         let last = train_with(players, &*factory, isa, &config, None, &mut observer)?.last;

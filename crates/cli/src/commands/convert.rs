@@ -4,8 +4,8 @@ use crate::args::{ExportArgs, ImportArgs};
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::Policy;
-use marathon_runs::policy_file;
 use marathon_runs::text::path_word;
+use marathon_runs::{TaskOptions, policy_file};
 use std::path::Path;
 
 /// Writes a policy as ONNX.
@@ -13,7 +13,7 @@ use std::path::Path;
 /// # Errors
 /// If there is no such policy, or the file cannot be written.
 pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
-    let (policy, _) = policy_file::load(&args.policy, None)?;
+    let (policy, _) = policy_file::load(&args.policy, None, &TaskOptions::default())?;
     let out = match &args.out {
         Some(out) => out.clone(),
         None if args.policy.is_dir() => args.policy.join("policy.onnx"),
@@ -36,7 +36,7 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
         let found = path_word(&args.network);
         return Err(CliError::Usage(format!("the network is {found}, expected a name that ends with .onnx")));
     }
-    let (policy, _) = policy_file::load(&args.network, args.agent.as_deref())?;
+    let (policy, _) = policy_file::load(&args.network, args.agent.as_deref(), &args.task)?;
     let out = args.out.clone().unwrap_or_else(|| args.network.with_extension("safetensors"));
     save(&policy, &args.network, &out)?;
     tell(&policy, &out, json);

@@ -8,6 +8,7 @@ use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_learn::{BLOCK, Players};
 use marathon_physics::lanes::Isa;
+use marathon_runs::Setting;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::chart::Chart;
 use std::time::Instant;
@@ -63,7 +64,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             match processes {
                 0 => train_on(&*factory, &config, None),
                 n => {
-                    let mut players = Processes::start(&program::file(), AGENT, &config, n)?;
+                    let mut players = Processes::start(&program::file(), &Setting::named(AGENT)?, &config, n)?;
                     let run = train_on(&*factory, &config, Some(&mut players as &mut dyn Players))?;
                     players.error.take().map_or(Ok(run), |error| Err(error.into()))
                 }

@@ -70,9 +70,15 @@ impl From<&str> for Value {
     }
 }
 
-/// Arguments by name, in the order in which they were given.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Arguments by name, in the order in which they were given. Equal ones may have been given in another order.
+#[derive(Clone, Debug, Default)]
 pub struct Options(Vec<(String, Value)>);
+
+impl PartialEq for Options {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.len() == other.0.len() && self.iter().all(|(name, value)| other.get(name) == Some(value))
+    }
+}
 
 impl Options {
     /// No arguments.

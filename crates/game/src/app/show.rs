@@ -123,7 +123,7 @@ impl Show {
         };
         if let Some(given) = given {
             let agent = Some(show.agent.clone()).filter(|agent| !agent.is_empty());
-            let (_, factory) = PolicySource { policy: given.clone(), agent }.load()?;
+            let (_, factory) = PolicySource { policy: given.clone(), agent, ..Default::default() }.load()?;
             show.agent = factory.spec().id.clone();
             show.source = Source::File(policy_path(&given)?);
         }

@@ -17,6 +17,7 @@ mod cast;
 pub mod evaluation;
 mod file;
 mod onnx;
+pub mod options;
 
 pub use block::BlockPolicy;
 pub use cast::Cast;
@@ -26,11 +27,12 @@ use crate::nets::activation::Activation;
 use crate::nets::mlp::Mlp;
 use crate::nets::normalize::Normalizer;
 use evaluation::Evaluation;
-use marathon_envs::Spec;
 use marathon_envs::shard::scale_action;
+use marathon_envs::{Options, Spec};
 use marathon_physics::lanes::Real;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 const FORMAT: &str = "marathon-policy";
 const VERSION: u32 = 1;
@@ -44,6 +46,13 @@ pub struct PolicyMeta {
     pub version: u32,
     /// Name of the agent and its task, such as `Hopper-v0`.
     pub agent: String,
+    /// Arguments of the task, with the values that the policy is for; empty for a task without, and in files of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
+    pub options: Options,
+    /// Motion clips that the arguments name and that do not come with Marathon: names, and texts of `.motion` files.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clips: BTreeMap<String, String>,
     /// Observation length.
     pub obs: usize,
     /// Action length.
@@ -81,6 +90,8 @@ impl PolicyMeta {
             format: FORMAT.into(),
             version: VERSION,
             agent: spec.id.clone(),
+            options: spec.options.clone(),
+            clips: BTreeMap::new(),
             obs: spec.obs,
             act: spec.act,
             control_dt: spec.dt,
@@ -172,6 +183,10 @@ impl Policy {
     /// Notes how the policy did.
     pub fn set_evaluation(&mut self, evaluation: Evaluation) {
         self.meta.evaluation = Some(evaluation);
+    }
+    /// Notes the arguments of the task that the policy is for, and the clips that they name.
+    pub fn set_task(&mut self, options: Options, clips: BTreeMap<String, String>) {
+        (self.meta.options, self.meta.clips) = (options, clips);
     }
     /// The network.
     pub fn net(&self) -> &Mlp {

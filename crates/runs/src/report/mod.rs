@@ -8,6 +8,7 @@ pub mod progress;
 pub mod summary;
 pub mod tensorboard;
 
+use crate::clips::Clips;
 use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder};
 use csv::CsvLog;
@@ -25,6 +26,7 @@ pub struct Reporter<'a> {
     folder: &'a RunFolder,
     run: &'a RunFile,
     terms: Vec<String>,
+    clips: Clips,
     progress: Option<Progress>,
     watch: &'a mut Watch<'a>,
     csv: CsvLog,
@@ -40,7 +42,7 @@ pub struct Reporter<'a> {
 }
 
 impl<'a> Reporter<'a> {
-    /// For a run that goes on from a checkpoint, or begins. What its files say of later iterations is cut. `show`: with
+    /// For a run that goes on from a checkpoint, or begins: names of its reward's terms, and clips of its own. What its files say of later iterations is cut. `show`: with
     /// progress on stderr; `watch` may end the run.
     ///
     /// # Errors
@@ -48,7 +50,7 @@ impl<'a> Reporter<'a> {
     pub fn new(
         folder: &'a RunFolder,
         run: &'a RunFile,
-        terms: &[String],
+        (terms, clips): (&[String], &Clips),
         resume: Option<&Checkpoint>,
         (show, watch): (bool, &'a mut Watch<'a>),
     ) -> Result<Self, RunError> {
@@ -60,6 +62,7 @@ impl<'a> Reporter<'a> {
             folder,
             run,
             terms: terms.to_vec(),
+            clips: clips.clone(),
             progress: show.then(|| Progress::new(run.config.run.total_steps, steps, run.summary_freq)),
             watch,
             csv,
@@ -95,7 +98,8 @@ impl<'a> Reporter<'a> {
         self.told = true;
         if stats.steps >= self.due {
             self.plan(stats.steps);
-            let output = snapshot.output();
+            let mut output = snapshot.output();
+            note_clips(&mut output, &self.clips);
             // a run that is killed in between comes by here again
             self.keep(&output.policy)?;
             save(self.folder, &output)?;
@@ -150,6 +154,13 @@ pub fn kept_policies(folder: &RunFolder) -> Vec<(u64, PathBuf)> {
         Some((steps, path))
     };
     entries.filter_map(|entry| of(entry.path())).collect()
+}
+
+/// Notes in policies the clips that their task needs.
+pub fn note_clips(output: &mut TrainOutput, clips: &Clips) {
+    for policy in [&mut output.policy].into_iter().chain(output.others.iter_mut().map(|(_, policy)| policy)) {
+        policy.set_task(policy.meta().options.clone(), clips.clone());
+    }
 }
 
 /// Writes the checkpoint, then the policies.

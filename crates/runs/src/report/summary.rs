@@ -2,6 +2,8 @@
 
 use super::csv::History;
 use crate::text::{duration, path_json, short, thousands, unsigned_zero};
+use marathon_envs::Options;
+use marathon_learn::policy::options;
 use marathon_learn::{Checkpoint, Evaluation};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -14,6 +16,9 @@ pub const EPISODES: usize = 100;
 pub struct Summary {
     /// Registry name of the agent.
     pub agent: String,
+    /// Arguments of its task.
+    #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
+    pub options: Options,
     /// Folder of the run.
     #[serde(serialize_with = "path_json")]
     pub folder: PathBuf,
@@ -45,6 +50,7 @@ impl Summary {
         let (steps, (wall_seconds, cpu_seconds)) = (checkpoint.steps(), checkpoint.seconds());
         Self {
             agent: checkpoint.agent().into(),
+            options: Options::new(),
             folder,
             seed: checkpoint.config().run.seed,
             steps,

@@ -7,7 +7,7 @@ use super::{API_VERSION, DETERMINISTIC, KEY, SAMPLED, chain};
 use crate::error::Error;
 use crate::policy::Policy;
 use crate::policy::PolicyMeta;
-use marathon_envs::{Options, Spec};
+use marathon_envs::Spec;
 use prost::Message;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -58,7 +58,7 @@ fn task(meta: &PolicyMeta) -> Spec {
         max_episode_steps: usize::MAX,
         reward_terms: Vec::new(),
         info: Vec::new(),
-        options: Options::new(),
+        options: meta.options.clone(),
         nq: 0,
         nv: 0,
         ..Spec::default()
@@ -138,6 +138,7 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     }
     if let Some(noted) = noted.filter(|noted| noted.agent == spec.id) {
         (meta.training, meta.evaluation) = (noted.training, noted.evaluation);
+        meta.clips = noted.clips;
     }
     let mut log_std = log_std(&values, spec.act);
     for (log_std, scale) in log_std.iter_mut().zip(&parts.spread) {

@@ -1,0 +1,176 @@
+//! A task's arguments are given once: the run, its policy in every format, its processes and its summary know them, and
+//! whoever evaluates or resumes plays the same task. A clip in a file is one of them, and goes with the run and the policy.
+
+mod common;
+
+use common::*;
+use serde_json::Value;
+use std::path::Path;
+
+/// A run of one iteration.
+const TRAIN: [&str; 9] = ["train", "MarathonMan", "--agents", "16", "--seed", "5", "--steps", "512", "--out"];
+const EVAL: [&str; 4] = ["--episodes", "16", "--json", "eval"];
+
+fn train(folder: &Path, out: &str, options: &[&str]) -> Vec<(String, Vec<usize>, Vec<u8>)> {
+    let options = options.iter().flat_map(|option| ["--option", option]);
+    let words: Vec<&str> = TRAIN.into_iter().chain([out]).chain(options).collect();
+    succeed(folder, &words);
+    tensors(&folder.join(out).join("policy.safetensors"))
+}
+
+fn eval(folder: &Path, words: &[&str]) -> Value {
+    let [episodes, n, json_flag, eval] = EVAL;
+    json(&succeed(folder, &[&[json_flag, eval], words, &[episodes, n]].concat()))
+}
+
+fn walk() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions/marathon_man/walk.motion");
+    std::fs::read_to_string(path).unwrap()
+}
+
+#[test]
+fn options_are_recorded_and_obeyed() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    train(path, "a", &["clip=run", "future=1"]);
+    for file in ["run.json", "summary.json"] {
+        let options = read_json(&path.join("a").join(file))["options"].clone();
+        let expected = ("run".into(), 1.0.into(), "random".into());
+        assert_eq!((&options["clip"], &options["future"], &options["start"]), (&expected.0, &expected.1, &expected.2));
+    }
+    // observations of another length would be refused
+    let own = eval(path, &["a"]);
+    assert_eq!(own, eval(path, &["a", "--option", "start=random", "--option", "clip=run"]));
+    assert_ne!(own, eval(path, &["a", "--option", "start=first"]));
+    assert_ne!(own, eval(path, &["a", "--option", "clip=walk"]));
+    let text = fail(path, 1, &["eval", "a", "--option", "future=0"]);
+    assert!(text.contains("observation length") && text.contains("119") && text.contains("89"), "{text}");
+
+    succeed(path, &["export", "a", "--out", "a.onnx"]);
+    let exported = eval(path, &["a.onnx"]);
+    assert_eq!((&exported["falls"], &exported["episodes"]), (&own["falls"], &own["episodes"]));
+    succeed(path, &["record-demo", "a", "--out", "a.demo", "--episodes", "1", "--option", "start=first"]);
+    succeed(path, &["render", "a", "--out", "a.png", "--frames", "2", "--seconds", "0.1", "--width", "40"]);
+}
+
+#[test]
+fn a_resumed_run_and_its_processes_play_the_same_task() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    let options = ["clip=run", "future=1"];
+    assert_eq!(train(path, "a", &options), train(path, "b", &options));
+    succeed(path, &["train", "--resume", "a", "--steps", "1536", "--processes", "1"]);
+    succeed(path, &["train", "--resume", "b", "--steps", "1536"]);
+    let policy = |run: &str| tensors(&path.join(run).join("policy.safetensors"));
+    assert_eq!(policy("a"), policy("b"));
+}
+
+#[test]
+fn a_run_without_options_still_loads() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    train(path, "a", &[]);
+    let own = eval(path, &["a"]);
+    let file = path.join("a/run.json");
+    let mut run = read_json(&file);
+    let keys = run.as_object_mut().unwrap();
+    keys.remove("options").expect("options");
+    keys.remove("checksum").expect("a checksum");
+    std::fs::write(&file, run.to_string()).unwrap();
+    succeed(path, &["train", "--resume", "a", "--steps", "1024"]);
+    assert_eq!(eval(path, &["a"])["episodes"], own["episodes"]);
+    assert_eq!(read_json(&file)["agent"], "MarathonMan-v0");
+}
+
+#[test]
+fn wrong_options_are_refused_by_name_with_the_nearest() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    std::fs::write(path.join("mine.motion"), walk()).unwrap();
+    let refused = |option: &str, code: i32, parts: &[&str]| {
+        let words = [&TRAIN[..], &["a", "--option", option]].concat();
+        let text = fail(path, code, &words);
+        parts.iter().for_each(|part| assert!(text.contains(part), "no '{part}' in: {text}"));
+        assert!(!path.join("a").exists(), "an error leaves no folder");
+    };
+    refused("clp=run", 1, &["clp", "'clip'", "future"]);
+    refused("start=frist", 1, &["start", "'frist'", "random, first or adaptive"]);
+    refused("reach=-1", 1, &["reach", "-1", "0 or more"]);
+    refused("clip=runn", 1, &["clip is 'runn'", "did you mean 'run'?", "backflip"]);
+    refused("clip", 2, &["--option", "NAME=VALUE"]);
+    refused("clip=mime.motion", 1, &["mime.motion", "no such file", "did you mean 'mine.motion'?", "backflip"]);
+    refused("clip=walk,dance.bvh", 1, &["dance.bvh", "no such file"]);
+
+    std::fs::write(path.join("bad.motion"), walk().replacen("\"marathon_man\"", "\"marathon_man", 1)).unwrap();
+    refused("clip=bad.motion", 1, &["bad.motion:"]);
+    let text = fail(path, 1, &["train", "hopper", "--option", "clip=mine.motion", "--out", "a"]);
+    assert!(text.contains("clip") && text.contains("none"), "{text}");
+    train(path, "b", &[]);
+    let text = fail(path, 2, &["train", "--resume", "b", "--option", "clip=run"]);
+    assert!(text.contains("--option") && text.contains("--resume"), "{text}");
+}
+
+/// The clip is one that comes with Marathon, under another name: the policies are the same.
+#[test]
+fn a_clip_of_a_file_goes_with_its_run_and_its_policy() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    std::fs::create_dir(path.join("clips")).unwrap();
+    std::fs::write(path.join("clips/mine.motion"), walk()).unwrap();
+    let own = train(path, "a", &["clip=clips/mine.motion"]);
+    assert_eq!(own, train(path, "shipped", &["clip=walk"]));
+    std::fs::remove_dir_all(path.join("clips")).unwrap();
+
+    let run = read_json(&path.join("a/run.json"));
+    assert_eq!(run["options"]["clip"], "mine.motion");
+    assert_eq!(std::fs::read_to_string(path.join("a/mine.motion")).unwrap(), walk());
+    let of_shipped = eval(path, &["shipped"]);
+    assert_eq!(eval(path, &["a"]), of_shipped);
+    // the policy alone, too, in both formats
+    std::fs::copy(path.join("a/policy.safetensors"), path.join("p.safetensors")).unwrap();
+    assert_eq!(eval(path, &["p.safetensors"]), of_shipped);
+    succeed(path, &["export", "p.safetensors", "--out", "p.onnx"]);
+    succeed(path, &["import", "p.onnx", "--out", "again.safetensors"]);
+    assert_eq!(eval(path, &["again.safetensors"])["falls"], of_shipped["falls"]);
+
+    // a clip that has changed is another one
+    let file = path.join("a/mine.motion");
+    std::fs::write(&file, walk().replacen("0.", "0.0", 1)).unwrap();
+    let text = fail(path, 1, &["train", "--resume", "a", "--steps", "1536"]);
+    assert!(text.contains("a/mine.motion: checksum") && text.contains("has changed"), "{text}");
+    std::fs::write(&file, walk()).unwrap();
+    succeed(path, &["train", "--resume", "a", "--steps", "1536", "--processes", "1"]);
+    succeed(path, &["train", "--resume", "shipped", "--steps", "1536"]);
+    let policy = |run: &str| tensors(&path.join(run).join("policy.safetensors"));
+    assert_eq!(policy("a"), policy("shipped"));
+    assert_no_leftovers(path);
+}
+
+/// A person in DeepMimic's format who stands, then bends the right elbow.
+fn recording() -> String {
+    let frame = |elbow: f64| {
+        let turns = |count: usize| ",1,0,0,0".repeat(count);
+        let [four, two, one] = [4, 2, 1].map(turns);
+        format!("[0.0333,0,0.88,0{four},0{two},{elbow}{one},0{two},0]")
+    };
+    let frames: Vec<String> = (0..20).map(|i| frame(0.05 * f64::from(i))).collect();
+    format!("{{\"Loop\": \"none\", \"Frames\": [{}]}}", frames.join(",\n"))
+}
+
+#[test]
+fn a_recording_becomes_the_clip_that_import_makes_of_it() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    std::fs::write(path.join("bend.txt"), recording()).unwrap();
+    succeed(path, &["motion", "import", "bend.txt", "--model", "MarathonMan", "--out", "bend.motion"]);
+    train(path, "a", &["clip=bend.txt"]);
+    let text = |file: &str| std::fs::read_to_string(path.join(file)).unwrap();
+    assert_eq!(text("a/bend.motion"), text("bend.motion"));
+
+    // joints that no mapping knows: what makes a clip of it
+    let strange = "HIERARCHY\nROOT blob\n{\n OFFSET 0 0 0\n CHANNELS 3 Xposition Yposition Zposition\n End Site\n {\n  \
+                   OFFSET 0 1.7 0\n }\n}\nMOTION\nFrames: 2\nFrame Time: 0.1\n0 0 0\n0 0 0\n";
+    std::fs::write(path.join("blob.bvh"), strange).unwrap();
+    let error = fail(path, 1, &[&TRAIN[..], &["b", "--option", "clip=blob.bvh"]].concat());
+    assert!(error.contains("marathon motion import blob.bvh --model MarathonMan-v0 --mapping"), "{error}");
+}

@@ -1,0 +1,140 @@
+//! Motion clips in files, for agents that follow clips.
+
+use crate::error::RunError;
+use crate::text::nearest_path;
+use marathon_envs::agents::marathon::marathon_man::clips as known;
+use marathon_motion::{About, Clip, Mapping, MotionError, import, retarget};
+use marathon_physics::Model;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Clips that do not come with Marathon: names, and texts of `.motion` files. A name ends in `.motion`, so that it is never
+/// one of those that come with Marathon.
+pub type Clips = BTreeMap<String, String>;
+
+/// Ending of a clip's file and of its name.
+const MOTION: &str = "motion";
+/// Endings of files that are read.
+const ENDINGS: [&str; 5] = [MOTION, "bvh", "glb", "json", "txt"];
+/// Frames per second of a clip that is made of a recording.
+const FPS: f64 = 60.0;
+
+/// Reads the clips that an argument names: names with commas between them, or files. Returns the argument with names in
+/// place of files, and adds what it read to `clips`.
+///
+/// # Errors
+/// If a file cannot be read, or is no clip for the model.
+pub fn read_all(argument: &str, agent: &str, model: &Model, clips: &mut Clips) -> Result<String, RunError> {
+    // a file's name may have commas
+    let items: Vec<&str> = match Path::new(argument).is_file() {
+        true => vec![argument],
+        false => argument.split(',').map(str::trim).collect(),
+    };
+    let mut names = Vec::new();
+    let mut read = Clips::new();
+    for item in items {
+        let path = Path::new(item);
+        let named = clips.contains_key(item) || known::find(item).is_some();
+        if !is_file_name(path) || (named && !path.is_file()) {
+            names.push(item.to_string());
+            continue;
+        }
+        let text = read_one(path, agent, model)?;
+        let name = free_name(path, &text, &read);
+        read.insert(name.clone(), text);
+        names.push(name);
+    }
+    clips.extend(read);
+    Ok(names.join(","))
+}
+
+/// Makes clips known under their names.
+///
+/// # Errors
+/// If a name is none for a clip of one's own, or a text is no clip.
+pub fn name(clips: &Clips) -> Result<(), RunError> {
+    for (name, text) in clips {
+        check_name(name)?;
+        known::add(name, Clip::parse(Path::new(name), text.as_bytes())?);
+    }
+    Ok(())
+}
+
+/// Refuses a name that would hide a clip that comes with Marathon, or lead out of a run's folder.
+///
+/// # Errors
+/// If it does.
+pub fn check_name(name: &str) -> Result<(), RunError> {
+    let path = Path::new(name);
+    let plain = path.file_name().is_some_and(|file| file == name) && !name.contains(['/', '\\', ',']);
+    match plain && ending(path) == MOTION {
+        true => Ok(()),
+        false => Err(RunError::file(path, "name of the clip", name, "a file's name that ends in .motion")),
+    }
+}
+
+/// A clip's text: of a `.motion` file as it is, of a recording what `marathon motion import` makes of it by default.
+fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError> {
+    if !path.is_file() {
+        let found = if path.is_dir() { "a folder" } else { "no such file" };
+        let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
+        let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+        let names = known::all_names().join(", ");
+        let endings = ENDINGS.join(", .");
+        let expected = format!("a file of a motion (.{endings}){near} or the name of a clip: {names}");
+        return Err(RunError::file(path, "clip", found, expected));
+    }
+    let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
+    let clip = match ending(path).as_str() {
+        MOTION => Clip::parse(path, &bytes)?,
+        _ => {
+            let failed = |error| RunError::Recording { error, path: path.into(), agent: agent.into() };
+            of_recording(path, &bytes, model).map_err(failed)?
+        }
+    };
+    clip.check_model(path, model)?;
+    let text = if ending(path) == MOTION { bytes } else { clip.to_bytes() };
+    String::from_utf8(text).map_err(|e| RunError::file(path, "text", e, "UTF-8"))
+}
+
+/// What a character makes of a recording, with the mapping that comes with Marathon.
+fn of_recording(path: &Path, bytes: &[u8], model: &Model) -> Result<Clip, MotionError> {
+    let mut animation = import::any(path, bytes)?;
+    if animation.wraps() && animation.cycle().is_none() {
+        animation = animation.looped();
+    }
+    let animation = animation.with_clip(animation.clip().resample(path, 1.0 / FPS)?);
+    let mapping = Mapping::built_in(path, animation.skeleton(), model)?;
+    let clip = retarget(path, &animation, model, &mapping)?;
+    let or_unknown = |text: &str| if text.is_empty() { "unknown".into() } else { text.to_string() };
+    let about = About {
+        name: stem(path),
+        model: model.name.clone(),
+        source: or_unknown(&clip.about().source),
+        license: or_unknown(&clip.about().license),
+    };
+    Ok(clip.with_about(about).rounded())
+}
+
+/// The file's name with the ending `.motion`; with a number, if another clip has it.
+fn free_name(path: &Path, text: &str, others: &Clips) -> String {
+    // commas stand between names
+    let stem = stem(path).replace(',', "_");
+    let numbered = (2..).map(|i| format!("{stem}-{i}.{MOTION}"));
+    let mut names = std::iter::once(format!("{stem}.{MOTION}")).chain(numbered);
+    let free = |name: &String| others.get(name).is_none_or(|other| other == text);
+    names.find(free).unwrap_or_default()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Whether a text looks like a file's name, which no name of a clip does.
+fn is_file_name(path: &Path) -> bool {
+    ENDINGS.contains(&ending(path).as_str()) || path.components().count() > 1
+}

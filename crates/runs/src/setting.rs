@@ -1,0 +1,125 @@
+//! A task of the registry with its arguments: what a run, a policy and a process need to make the same environments.
+
+use crate::clips::{self, Clips};
+use crate::error::RunError;
+use marathon_envs::options::Value;
+use marathon_envs::{Options, ShardFactory, VecEnv, VecEnvOptions, registry};
+use marathon_learn::PolicyMeta;
+use marathon_learn::policy::options;
+use marathon_physics::lanes::Isa;
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The argument that names motion clips.
+const CLIP: &str = "clip";
+
+/// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
+static NAMING: Mutex<()> = Mutex::new(());
+
+/// Arguments of a task.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct TaskOptions {
+    /// Argument of the task, such as `clip=run`, `clip=my.bvh` or `start=first`; may be repeated. `marathon list AGENT` tells
+    /// which there are.
+    #[cfg_attr(feature = "clap", arg(long = "option", value_name = "NAME=VALUE", value_parser = parse_option))]
+    pub given: Vec<(String, Value)>,
+}
+
+impl From<Options> for TaskOptions {
+    fn from(options: Options) -> Self {
+        TaskOptions { given: options.iter().map(|(name, value)| (name.into(), value.clone())).collect() }
+    }
+}
+
+/// A task of the registry with its arguments.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Registry name of the agent.
+    pub agent: String,
+    /// Its arguments; those that are not here have their defaults.
+    #[serde(default, with = "options")]
+    pub options: Options,
+    /// Clips that the arguments name and that do not come with Marathon.
+    #[serde(default)]
+    pub clips: Clips,
+}
+
+impl Setting {
+    /// A task with its defaults, by any of its names.
+    ///
+    /// # Errors
+    /// If there is none; the text names the nearest.
+    pub fn named(name: &str) -> Result<Self, RunError> {
+        Ok(Setting { agent: registry::agent(name)?.facts().id, ..Setting::default() })
+    }
+
+    /// The task that a policy is for.
+    pub fn of(policy: &PolicyMeta) -> Self {
+        Setting { agent: policy.agent.clone(), options: policy.options.clone(), clips: policy.clips.clone() }
+    }
+
+    /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds their names.
+    ///
+    /// # Errors
+    /// If the agent does not take an argument, or a file cannot be read or is no clip for the agent.
+    pub fn with(mut self, options: &TaskOptions) -> Result<Self, RunError> {
+        let agent = registry::agent(&self.agent)?;
+        for (name, value) in &options.given {
+            let value = match value {
+                Value::Text(text) if name == CLIP && agent.options().iter().any(|known| known.name == CLIP) => {
+                    Value::Text(clips::read_all(text, &self.agent, &agent.model()?, &mut self.clips)?)
+                }
+                other => other.clone(),
+            };
+            self.options.set(name, value);
+        }
+        if let Some(Value::Text(names)) = self.options.get(CLIP) {
+            self.clips.retain(|clip, _| names.split(',').any(|name| name.trim() == clip));
+        }
+        Ok(self)
+    }
+
+    /// Its environments.
+    ///
+    /// # Errors
+    /// If there is no such agent, it does not take the arguments, or a clip is damaged.
+    pub fn factory(&self) -> Result<Arc<dyn ShardFactory>, RunError> {
+        self.factory_on(Isa::best())
+    }
+
+    /// Its environments for an instruction set.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn factory_on(&self, isa: Isa) -> Result<Arc<dyn ShardFactory>, RunError> {
+        self.with_clips(|| Ok(registry::factory_with(&self.agent, &self.options, isa)?))
+    }
+
+    /// Agents of it, by the other options.
+    ///
+    /// # Errors
+    /// The same, or if the options make no sense.
+    pub fn vec_env(&self, options: &VecEnvOptions) -> Result<VecEnv, RunError> {
+        let options = VecEnvOptions { options: self.options.clone(), ..options.clone() };
+        self.with_clips(|| Ok(VecEnv::new(&self.agent, &options)?))
+    }
+
+    fn with_clips<T>(&self, make: impl FnOnce() -> Result<T, RunError>) -> Result<T, RunError> {
+        let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
+        clips::name(&self.clips)?;
+        make()
+    }
+}
+
+/// An argument of a task.
+#[cfg(feature = "clap")]
+fn parse_option(text: &str) -> Result<(String, Value), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => {
+            let value: Value = value.parse().unwrap_or_else(|never| match never {});
+            Ok((name.trim().into(), value))
+        }
+        _ => Err("expected NAME=VALUE, such as clip=run".into()),
+    }
+}

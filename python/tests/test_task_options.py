@@ -1,0 +1,52 @@
+"""Arguments of tasks: environments, runs and policies play the same task, and clips may be files."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import marathon_envs
+from marathon_envs import VecEnv, evaluate, load_policy, train
+
+WALK = Path(__file__).parents[2] / "assets" / "motions" / "marathon_man" / "walk.motion"
+SMALL = {"agents": 16, "seed": 5, "steps": 512, "threads": 1}
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """A shipped clip in a file of another name."""
+    path = tmp_path / "mine.motion"
+    path.write_bytes(WALK.read_bytes())
+    return path
+
+
+def test_an_environment_follows_a_file(mine: Path) -> None:
+    env, shipped = VecEnv("MarathonMan-v0", 3, clip=mine), VecEnv("MarathonMan-v0", 3, clip="walk")
+    np.testing.assert_array_equal(env.reset(seed=2), shipped.reset(seed=2))
+    assert env.spec.options["clip"] == "mine.motion"
+    with pytest.raises(ValueError, match=r"no such file.*did you mean '.*mine\.motion'"):
+        VecEnv("MarathonMan-v0", clip=mine.with_name("mime.motion"))
+
+
+def test_a_policy_plays_the_task_it_was_trained_for(mine: Path, tmp_path: Path) -> None:
+    result = train("MarathonMan-v0", options={"clip": mine, "future": 1}, out=tmp_path / "run", **SMALL)
+    shipped = train("MarathonMan-v0", options={"clip": "walk", "future": 1}, **SMALL)
+    mine.unlink()
+    assert result.summary["options"]["clip"] == "mine.motion"
+    policy = load_policy(tmp_path / "run")
+    assert policy.obs_size == 119
+    assert policy.meta["options"]["future"] == 1
+    own = evaluate(policy, 16)
+    assert own == evaluate(shipped.policy, 16) == evaluate(pickle.loads(pickle.dumps(policy)), 16)
+    assert own == evaluate(policy, 16, start="random")
+    assert own != evaluate(policy, 16, start="first")
+    longer = train(resume=tmp_path / "run", steps=1024)
+    assert longer.steps == 1024
+
+
+def test_wrong_arguments_are_refused_by_name() -> None:
+    with pytest.raises(TypeError, match="clip"):
+        train("MarathonMan-v0", options={"clp": "walk"}, **SMALL)
+    with pytest.raises(ValueError, match="did you mean 'run'"):
+        marathon_envs.spec("MarathonMan-v0", clip="runn")
