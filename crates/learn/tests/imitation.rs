@@ -134,7 +134,7 @@ fn shown(task: &PuckTask) -> Demonstrations {
         shard.step(0, &action, &mut obs, &mut out);
     }
     (0..BLOCK).for_each(|lane| all.obs.extend(obs.iter().skip(lane).step_by(BLOCK)));
-    all.motions = vec![0..all.len()];
+    all.motions.push(0..all.len());
     all
 }
 

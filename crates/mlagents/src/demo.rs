@@ -187,7 +187,7 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
     if out.decisions.is_empty() {
         return Err(wrong("entries", format!("{entry}, no two of one episode"), "decisions with their outcomes"));
     }
-    out.motions = vec![0..out.decisions.len()];
+    out.motions.push(0..out.decisions.len());
     Ok(out)
 }
 
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!(read.obs, [&obs[..], &obs].concat());
         assert_eq!(read.decisions, [[0, 1], [1, 2], [3, 4], [4, 5]]);
         assert_eq!(read.actions, [&actions[..], &actions].concat());
-        assert_eq!((read.motions, read.source), (vec![0..4], Some("hop.demo".into())));
+        assert_eq!((read.motions.len(), &read.motions[0], read.source), (1, &(0..4), Some("hop.demo".into())));
         // whatever is cut off or changed, nothing panics
         for n in 0..bytes.len() {
             let _ = read_demonstrations(path, &bytes[..n], &spec);
