@@ -32,7 +32,7 @@ fn a_recording_becomes_a_checked_clip() {
     let text = succeed(temp.path(), &import);
     assert!(text.starts_with("wrote bend.motion: 39 frames, 0.63 s; stands in 100 % of it"), "{text}");
     let fit = text.lines().nth(1).expect("a second line");
-    assert!(fit.starts_with("  its parts are 0.") && fit.contains("degrees from the recording's"), "{text}");
+    assert!(fit.starts_with("  its parts are 1.3 cm") && fit.contains("degrees from the recording's"), "{text}");
     assert_eq!(text.lines().count(), 2, "no warning: {text}");
     let file = std::fs::read_to_string(temp.path().join("bend.motion")).unwrap();
     for line in ["\"name\": \"bend\"", "\"model\": \"humanoid\"", "\"license\": \"CC0-1.0\"", "\"loop\": \"none\""] {
