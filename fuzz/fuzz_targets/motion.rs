@@ -13,6 +13,7 @@ const MOST_NUMBERS: usize = 20_000;
 
 fuzz_target!(|data: &[u8]| {
     let Some((kind, bytes)) = data.split_first() else { return };
+    let kind = chosen().unwrap_or(*kind);
     let read = |name: &str| import::any(name.as_ref(), bytes).map(|animation| animation.clip().clone());
     let clip = match kind % 5 {
         0 => Clip::parse("fuzzed.motion".as_ref(), bytes),
@@ -32,6 +33,12 @@ fuzz_target!(|data: &[u8]| {
         Err(error) => assert!(error.to_string().contains("fuzzed."), "an error names the file: {error}"),
     }
 });
+
+/// The reader that `MOTION_READER` names by its number, for who wants to fuzz one alone.
+fn chosen() -> Option<u8> {
+    static CHOSEN: OnceLock<Option<u8>> = OnceLock::new();
+    *CHOSEN.get_or_init(|| std::env::var("MOTION_READER").ok()?.parse().ok())
+}
 
 /// Samples, edits and writes a clip.
 fn used(clip: &Clip) {

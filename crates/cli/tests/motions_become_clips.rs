@@ -31,7 +31,9 @@ fn a_recording_becomes_a_checked_clip() {
         ["motion", "import", "bend.txt", "--model", "humanoid", "--out", "bend.motion", "--license", "CC0-1.0"];
     let text = succeed(temp.path(), &import);
     assert!(text.starts_with("wrote bend.motion: 39 frames, 0.63 s; stands in 100 % of it"), "{text}");
-    assert_eq!(text.lines().count(), 1, "no warning: {text}");
+    let fit = text.lines().nth(1).expect("a second line");
+    assert!(fit.starts_with("  its parts are 1.3 cm") && fit.contains("degrees from the recording's"), "{text}");
+    assert_eq!(text.lines().count(), 2, "no warning: {text}");
     let file = std::fs::read_to_string(temp.path().join("bend.motion")).unwrap();
     for line in ["\"name\": \"bend\"", "\"model\": \"humanoid\"", "\"license\": \"CC0-1.0\"", "\"loop\": \"none\""] {
         assert!(file.contains(line), "{line}");
@@ -102,6 +104,9 @@ fn errors_say_what_to_do() {
     assert!(text.contains("there is no mapping for it, only for marathon_man, humanoid, walker2d"), "{text}");
     let text = import("bend.txt", "humanoid", "a.json", 2);
     assert!(text.contains("--out is a.json, expected a name that ends with .motion"), "{text}");
+    // what is wrong with the options is told before a long file is read
+    let text = import("none.bvh", "humanoid", "a.json", 2);
+    assert!(text.contains("--out is a.json"), "{text}");
     let text = import("none.bvh", "humanoid", "a.motion", 1);
     assert!(text.contains("none.bvh"), "{text}");
     assert!(!temp.path().join("a.motion").exists());

@@ -3,25 +3,16 @@
 use crate::apart::Couple;
 use crate::clip::Clip;
 use crate::contact::{self, clearance};
+use crate::effort::{Efforts, efforts};
 use crate::error::MotionError;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
+use crate::worst::Worst;
 use glam::DVec3;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use serde::Serialize;
 use std::path::Path;
-
-/// Something measured over a clip where it is worst.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Worst {
-    /// How bad; the unit is that of the field of [`Report`].
-    pub value: f64,
-    /// The frame.
-    pub frame: usize,
-    /// The joint, body or bodies.
-    pub name: String,
-}
 
 /// A clip in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,6 +37,8 @@ pub struct Report {
     pub slide_speed: f64,
     /// Share of the frames in which a sole stands.
     pub standing: f64,
+    /// What the clip takes of motors and ground; none for models whose inverse dynamics is not known.
+    pub efforts: Option<Efforts>,
 }
 
 /// Bounds from which a value of [`Report`] is worth a warning.
@@ -62,14 +55,12 @@ mod bound {
     pub const JUMP: f64 = 25.0;
     /// m; a step's, as people notice it.
     pub const SLIDE: f64 = 0.03;
-}
-
-impl Worst {
-    pub(crate) fn meet(&mut self, value: f64, frame: usize, name: impl FnOnce() -> String) {
-        if value > self.value {
-            *self = Worst { value, frame, name: name() };
-        }
-    }
+    /// Share of the weight that nothing gives, and that what flies does not fall by.
+    pub const MISSING: f64 = 0.5;
+    /// Joints that are worth a note.
+    pub const HARDEST: usize = 3;
+    /// kg m^2/s.
+    pub const GAINED: f64 = 5.0;
 }
 
 /// Measures a clip of a model. Soles are the bodies that stand, by index. The path is for messages.
@@ -93,6 +84,7 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
         slide: Worst::default(),
         slide_speed: 0.0,
         standing: 0.0,
+        efforts: efforts(path, clip, model).ok(),
     };
     let body = |i: usize| model.bodies[i].name.clone();
     for (i, (frame, pose)) in frames.iter().zip(&poses).enumerate() {
@@ -170,6 +162,42 @@ impl Report {
         warn(speed, bound::SPEED, format!("{} turns at {:.0} rad/s", speed.name, speed.value));
         warn(jump, bound::JUMP, format!("{} jumps by {:.0} rad/s", jump.name, jump.value));
         warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
+        out
+    }
+
+    /// What physics says to the clip, one sentence each: what the motors could not do, and where nothing pushes the figure
+    /// as it moves. Motion capture is never free of it, so a clip can be sound nevertheless.
+    pub fn notes(&self) -> Vec<String> {
+        let Some(Efforts { joints, missing, flights }) = &self.efforts else { return Vec::new() };
+        let mut out = Vec::new();
+        for effort in joints.iter().filter(|effort| effort.beyond > 0.0).take(bound::HARDEST) {
+            out.push(format!(
+                "frame {}: {} takes {:.0} of {:.0} N m; its motor is too weak in {:.0} % of the frames",
+                effort.frame,
+                effort.joint,
+                effort.needed,
+                effort.strength,
+                1e2 * effort.beyond
+            ));
+        }
+        if missing.value > bound::MISSING {
+            let share = 1e2 * missing.value;
+            out.push(format!("frame {}: {share:.0} % of the weight is pushed by nothing", missing.frame));
+        }
+        for flight in flights {
+            let [x, y, z] = flight.acceleration;
+            let off = (DVec3::new(x, y, z + 9.81) / 9.81).length();
+            let gained = DVec3::from_array(flight.gained).length();
+            if off > bound::MISSING || gained > bound::GAINED {
+                out.push(format!(
+                    "frames {} to {}: the flight falls by {:.1} m/s^2 and gains {gained:.0} kg m^2/s of angular momentum, from {:.0}",
+                    flight.from,
+                    flight.to,
+                    -z,
+                    DVec3::from_array(flight.momentum).length()
+                ));
+            }
+        }
         out
     }
 }

@@ -1,10 +1,12 @@
 //! What touches the ground, and when.
 
 use crate::clip::Clip;
+use crate::error::MotionError;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use glam::DVec3;
 use marathon_physics::Model;
+use std::path::Path;
 
 /// Highest point of a sole that still counts as standing, m.
 const HEIGHT: f64 = 0.03;
@@ -12,6 +14,24 @@ const HEIGHT: f64 = 0.03;
 const SPEED: f64 = 0.6;
 /// Shortest contact, s.
 const SHORTEST: f64 = 0.05;
+
+/// Whether each of these bodies stands on the ground, frame by frame: a point of it is less than 3 cm above the ground and
+/// slower than 0.6 m/s along it, for 0.05 s or more. The path is for messages. The clip's phases are [`Clip::phase`]'s.
+///
+/// # Errors
+/// If the clip is another model's.
+pub fn contacts(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result<Vec<Vec<bool>>, MotionError> {
+    clip.check_model(path, model)?;
+    let touches = Touch::all(model);
+    // a loop's ends see each other
+    let beside = if clip.cycle().is_some() { clip.frames() as i64 } else { 0 };
+    let frames: Vec<Vec<f64>> = (-beside..clip.frames() as i64 + beside).map(|i| clip.frame_at(i)).collect();
+    let held = held(model, &touches, soles, &frames, clip.dt());
+    let stands =
+        |held: &Vec<bool>, sole: &usize| touches.iter().zip(held).any(|(touch, held)| *held && touch.body == *sole);
+    let within = held.iter().skip(beside as usize).take(clip.frames());
+    Ok(within.map(|held| soles.iter().map(|sole| stands(held, sole)).collect()).collect())
+}
 
 /// Per frame and touch: whether a sole stands on the ground there.
 pub(crate) fn held(model: &Model, touches: &[Touch], soles: &[usize], frames: &[Vec<f64>], dt: f64) -> Vec<Vec<bool>> {

@@ -24,6 +24,7 @@
 
 mod error;
 mod rotation;
+mod worst;
 
 mod layout;
 
@@ -31,10 +32,14 @@ mod clip;
 
 pub mod kinematics;
 
+pub mod dynamics;
+
 mod apart;
 mod ground;
 
 mod contact;
+
+mod effort;
 
 mod check;
 mod skeleton;
@@ -45,9 +50,12 @@ mod roles;
 
 mod retarget;
 
-pub use check::{Report, Worst, check};
+pub use check::{Report, check};
 pub use clip::{About, Clip, Cycle};
+pub use contact::contacts;
+pub use effort::{Effort, Efforts, Flight, efforts};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
 pub use retarget::{Fit, Mapping, fit, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};
+pub use worst::Worst;

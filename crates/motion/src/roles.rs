@@ -6,20 +6,42 @@ use crate::skeleton::Skeleton;
 /// without a prefix such as `mixamorig:`, without their side and without punctuation.
 ///
 /// Sources of the names: DeepMimic; Mixamo and Autodesk's HumanIK, whose names CMU's motions in BVH and LAFAN1 have; CMU's
-/// ASF; Unity's and VRM's humanoid; Blender's Rigify; Bandai Namco's motions; the bodies of Marathon's own models.
+/// ASF; Unity's and VRM's humanoid; Unreal's mannequin; Blender's Rigify and its deforming bones; 3ds Max's Biped; Poser and
+/// Daz; Bandai Namco's motions; the bodies of Marathon's own models.
 const ROLES: [(&str, &[&str]); 11] = [
-    ("root", &["root", "hips", "hip", "pelvis", "butt"]),
-    ("chest", &["chest", "spine2", "spine3", "upperchest", "thorax", "spine003", "spine1", "spine", "torso"]),
-    ("neck", &["neck", "neck1", "head"]),
+    ("root", &["root", "hips", "hip", "pelvis", "butt", "spine"]),
+    (
+        "chest",
+        &[
+            "chest",
+            "spine2",
+            "spine3",
+            "upperchest",
+            "thorax",
+            "spine003",
+            "spine05",
+            "spine04",
+            "spine03",
+            "spine02",
+            "spine1",
+            "spine01",
+            "spine",
+            "torso",
+        ],
+    ),
+    ("neck", &["neck", "neck1", "neck01", "spine004", "head"]),
     ("hip", &["hip", "upleg", "upperleg", "thigh", "femur"]),
     ("knee", &["knee", "leg", "lowerleg", "shin", "calf", "tibia"]),
     ("ankle", &["ankle", "foot"]),
-    ("toe", &["toe", "toebase", "toes"]),
-    ("shoulder", &["shoulder", "arm", "upperarm", "humerus"]),
+    ("toe", &["toe", "toebase", "toes", "toe0", "ball"]),
+    ("shoulder", &["shoulder", "arm", "upperarm", "shldr", "humerus"]),
     ("elbow", &["elbow", "forearm", "lowerarm", "radius", "larm"]),
     ("wrist", &["wrist", "hand"]),
-    ("head", &["head"]),
+    ("head", &["head", "spine006"]),
 ];
+
+/// What stands before all names of a skeleton: those of 3ds Max's Biped and of Rigify's deforming bones.
+const PREFIXES: [&str; 5] = ["bip001", "bip01", "def-", "def_", "org-"];
 
 /// Left or right of a figure.
 #[derive(Clone, Copy, PartialEq)]
@@ -48,6 +70,8 @@ pub(crate) fn find(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
 fn split(name: &str) -> (Option<Side>, String) {
     let name = name.rsplit(':').next().unwrap_or(name);
     let lower = name.to_ascii_lowercase();
+    let lower = PREFIXES.iter().find_map(|prefix| lower.strip_prefix(prefix)).unwrap_or(&lower);
+    let lower = lower.trim_start_matches(['_', '.', '-', ' ']);
     for (word, side) in [("left", Side::Left), ("right", Side::Right)] {
         if let Some(at) = lower.find(word) {
             return (Some(side), plain(&format!("{}{}", &lower[..at], &lower[at + word.len()..])));
@@ -63,6 +87,12 @@ fn split(name: &str) -> (Option<Side>, String) {
             }
         }
     }
+    // Biped's Bip01 L Thigh, whose prefix may be another
+    for (letter, side) in [(" l ", Side::Left), (" r ", Side::Right)] {
+        if let Some((_, stem)) = lower.split_once(letter) {
+            return (Some(side), plain(stem));
+        }
+    }
     // CMU's lfemur, Poser's lThigh
     for (letter, side) in [("l", Side::Left), ("r", Side::Right)] {
         let stem = lower.strip_prefix(letter).map(plain);
@@ -71,7 +101,7 @@ fn split(name: &str) -> (Option<Side>, String) {
             return (Some(side), stem);
         }
     }
-    (None, plain(&lower))
+    (None, plain(lower))
 }
 
 fn plain(name: &str) -> String {
@@ -96,7 +126,19 @@ mod tests {
     #[test]
     fn joints_of_many_makers_are_recognized() {
         let wanted = ["root", "left_hip", "left_knee", "left_ankle", "right_shoulder", "right_elbow", "right_wrist"];
-        let makers: [[&str; 7]; 6] = [
+        let makers: [[&str; 7]; 10] = [
+            ["pelvis", "thigh_l", "calf_l", "foot_l", "upperarm_r", "lowerarm_r", "hand_r"],
+            ["hip", "lThigh", "lShin", "lFoot", "rShldr", "rForeArm", "rHand"],
+            [
+                "Bip01 Pelvis",
+                "Bip01 L Thigh",
+                "Bip01 L Calf",
+                "Bip01 L Foot",
+                "Bip01 R UpperArm",
+                "Bip01 R Forearm",
+                "Bip01 R Hand",
+            ],
+            ["DEF-spine", "DEF-thigh.L", "DEF-shin.L", "DEF-foot.L", "DEF-upper_arm.R", "DEF-forearm.R", "DEF-hand.R"],
             ["Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightArm", "RightForeArm", "RightHand"],
             [
                 "mixamorig:Hips",

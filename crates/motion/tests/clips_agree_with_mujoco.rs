@@ -3,42 +3,10 @@
 
 mod common;
 
-use common::{all_shipped, file, model, shipped};
+use common::{all_shipped, file, model, oracle, rows, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
-use serde_json::{Value, json};
-use std::io::Write;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
-
-fn python() -> PathBuf {
-    if let Some(path) = std::env::var_os("MARATHON_PYTHON") {
-        return path.into();
-    }
-    let path = file(".venv/bin/python");
-    assert!(path.exists(), "no Python with MuJoCo at {}: run ./test.sh, which sets up .venv", path.display());
-    path
-}
-
-/// Runs `tests/oracle/motion.py`.
-fn oracle(input: &Value) -> Value {
-    let mut child = Command::new(python())
-        .arg(file("tests/oracle/motion.py"))
-        // MuJoCo leaves a log of its warnings where it runs
-        .current_dir(std::env::temp_dir())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("Python starts");
-    child.stdin.take().expect("piped").write_all(input.to_string().as_bytes()).expect("the oracle reads its input");
-    let output = child.wait_with_output().expect("the oracle ends");
-    assert!(output.status.success(), "the oracle failed: run ./test.sh, which sets up its packages");
-    serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
-}
-
-fn rows(value: &Value) -> Vec<Vec<f64>> {
-    serde_json::from_value(value.clone()).expect("rows of numbers")
-}
+use serde_json::json;
 
 #[test]
 fn kinematics_and_velocities_are_mujocos() {
@@ -56,7 +24,7 @@ fn kinematics_and_velocities_are_mujocos() {
                 }
             }
             let path = file(&format!("assets/agents/{xml}.xml"));
-            let answer = oracle(&json!({ "model": path, "dt": clip.dt(), "frames": frames }));
+            let answer = oracle("motion.py", &json!({ "model": path, "dt": clip.dt(), "frames": frames }));
 
             for (i, (xpos, xquat)) in rows(&answer["xpos"]).iter().zip(rows(&answer["xquat"])).enumerate() {
                 let pose = Pose::of(&model, clip.frame(i));

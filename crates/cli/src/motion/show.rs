@@ -22,6 +22,7 @@ pub fn check(args: &CheckArgs, json: bool) -> Result<(), CliError> {
         } else {
             say(format!("{}: {}", path_word(path), line(&report)));
             report.warnings().iter().for_each(|warning| say(format!("  {warning}")));
+            report.notes().iter().for_each(|note| say(format!("  note: {note}")));
         }
         found += usize::from(!report.warnings().is_empty());
     }
@@ -36,7 +37,7 @@ pub fn check(args: &CheckArgs, json: bool) -> Result<(), CliError> {
 
 /// A report with its file and its warnings.
 pub fn document(path: &Path, report: &Report) -> Value {
-    json!({ "clip": path.to_string_lossy(), "report": report, "warnings": report.warnings() })
+    json!({ "clip": path.to_string_lossy(), "report": report, "warnings": report.warnings(), "notes": report.notes() })
 }
 
 /// A report in a line.

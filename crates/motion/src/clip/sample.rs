@@ -67,6 +67,25 @@ impl Clip {
         }
     }
 
+    /// `qacc` of a frame: the central difference of the velocities beside it, in the layout of `qvel`. At the ends of a clip
+    /// that does not loop it is one-sided.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn acceleration(&self, frame: usize) -> Vec<f64> {
+        let (count, last) = (self.frames(), self.frames() - 1);
+        let beside = |by: i64| {
+            let at = frame as i64 + by;
+            let at = if self.cycle.is_some() { at } else { at.clamp(0, last as i64) };
+            let mut velocity = self.velocity(at.rem_euclid(count as i64) as usize).to_vec();
+            self.turn(&mut velocity, at.div_euclid(count as i64));
+            (at, velocity)
+        };
+        let ((from, before), (to, after)) = (beside(-1), beside(1));
+        let seconds = (to - from) as f64 * self.dt;
+        before.iter().zip(&after).map(|(before, after)| (after - before) / seconds).collect()
+    }
+
     /// Turns the linear velocity of a traveling free joint as the cycles do; its angular velocity is in body axes.
     pub(super) fn turn(&self, qvel: &mut [f64], cycles: i64) {
         if let (Some(cycle), Some(JointKind::Free)) = (self.cycle, self.layout.joints.first().map(|joint| joint.kind)) {

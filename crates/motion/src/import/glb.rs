@@ -1,6 +1,6 @@
 //! glTF animations in `.glb` files, as Mixamo's characters have them after a pass through Blender, and Blender's own.
 //!
-//! The skeleton is the joints of the first skin, or else the nodes that turn. The first animation is read; rotations of all
+//! The skeleton is the joints of the first skin, or else the nodes that move and what hangs from them. The first animation is read; rotations of all
 //! joints, and the translation of the root. Scales are read where they stand still.
 
 use super::unit;
@@ -81,7 +81,7 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
         tracks.iter().filter(|(_, tracks)| tracks.rotation.is_some()).map(|(node, _)| *node).collect();
     let joints: BTreeSet<usize> = match document.skins().next() {
         Some(skin) => skin.joints().map(|joint| joint.index()).collect(),
-        None => turns.clone(),
+        None => with_descendants(&document, tracks.keys().copied()),
     };
     if joints.is_disjoint(&turns) {
         return Err(wrong("animations[0]", "no joint that turns".into(), "rotations of the skeleton's joints"));
@@ -155,6 +155,18 @@ impl<T: Copy> Track<T> {
         let (a, b) = (self.times[after - 1], self.times[after]);
         between(self.values[after - 1], self.values[after], (time - a) / (b - a))
     }
+}
+
+/// Nodes and all that hangs from them.
+fn with_descendants(document: &Document, nodes: impl Iterator<Item = usize>) -> BTreeSet<usize> {
+    let all: Vec<Node> = document.nodes().collect();
+    let (mut found, mut open) = (BTreeSet::new(), nodes.collect::<Vec<_>>());
+    while let Some(node) = open.pop() {
+        if found.insert(node) {
+            open.extend(all[node].children().map(|child| child.index()));
+        }
+    }
+    found
 }
 
 /// A channel, checked. Of cubic splines the values are kept and the tangents are not: at 60 keys per second they say nothing new.

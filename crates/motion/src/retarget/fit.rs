@@ -2,12 +2,12 @@
 
 use super::mapping::Mapping;
 use super::target::Targets;
-use crate::check::Worst;
 use crate::clip::Clip;
 use crate::error::MotionError;
 use crate::kinematics::Pose;
 use crate::rotation::log;
 use crate::skeleton::Animation;
+use crate::worst::Worst;
 use glam::DVec3;
 use marathon_physics::Model;
 use serde::Serialize;
