@@ -2,13 +2,15 @@
 //!
 //! The model's bones are turned as the skeleton's, which gives targets for orientations and positions at the model's own
 //! proportions. Inverse kinematics over all frames at once then finds joint angles that meet them within the joints' limits,
-//! above the ground and smoothly. What stands on the ground in that solution is held there in the next one.
+//! above the ground and smoothly. What stands on the ground in that solution is held there in the next one, and the center of
+//! mass moves as gravity and the ground let it.
 
 mod band;
 mod fit;
 mod mapping;
 mod problem;
 mod target;
+mod weight;
 
 pub use fit::{Fit, fit};
 pub use mapping::{Mapping, soles};
@@ -70,6 +72,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         couples: &[],
         targets,
         held,
+        airborne: &[],
         dt,
         calm: CALM * mapping.smooth,
     };
@@ -85,6 +88,9 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
             frames.push(guess[0].clone());
         }
     }
+    // a figure whose root is fixed is carried by what it is fixed to
+    let travels = matches!(model.joints[0].kind, JointType::Free | JointType::Slide);
+    let mut airborne = Vec::new();
     for pass in 0..PASSES {
         if let Some(cycle) = &cycle {
             repeat(cycle, &layout, &mut frames, margin);
@@ -92,8 +98,11 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         if pass > 0 {
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
         }
+        if travels {
+            airborne = weight::airborne(model, &touches, &frames);
+        }
         let rough = problem(&all, &none);
-        let fine = Problem { couples: &couples, held: &held, calm: mapping.smooth, ..rough };
+        let fine = Problem { couples: &couples, held: &held, airborne: &airborne, calm: mapping.smooth, ..rough };
         if pass == 0 {
             rough.solve(&mut frames, 25)
         } else {
@@ -105,7 +114,8 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let mut calm = mapping.smooth;
     while calm > 0.0 && calm < CALM * mapping.smooth && fastest(model, &frames, dt) > FASTEST {
         calm *= 2.0;
-        Problem { couples: &couples, held: &held, calm, ..problem(&all, &none) }.solve(&mut frames, 25);
+        Problem { couples: &couples, held: &held, airborne: &airborne, calm, ..problem(&all, &none) }
+            .solve(&mut frames, 25);
     }
 
     let mut frames = frames[margin..margin + count].to_vec();

@@ -49,6 +49,8 @@ pub(super) struct Problem<'a> {
     pub targets: &'a [Target],
     /// Per frame and touch: whether it is held.
     pub held: &'a [Vec<bool>],
+    /// Per frame: whether nothing is on the ground; empty if the center of mass may do anything.
+    pub airborne: &'a [bool],
     /// Seconds between frames.
     pub dt: f64,
     /// Factor on the weights of velocities and accelerations.
@@ -56,14 +58,14 @@ pub(super) struct Problem<'a> {
 }
 
 /// A residual, and its derivatives by the variables, `frame * nv + dof`.
-enum Row<'r> {
+pub(super) enum Row<'r> {
     /// Costs its square.
     Even(f64, &'r [(usize, f64)]),
     /// Costs its square while it is negative: a distance from where it must not be.
     Bound(f64, &'r [(usize, f64)]),
 }
 
-type Sink<'s> = dyn FnMut(Row) + 's;
+pub(super) type Sink<'s> = dyn FnMut(Row) + 's;
 
 /// A row of [`Row::Bound`] that is kept.
 struct Bound {
@@ -191,6 +193,7 @@ impl Problem<'_> {
             self.ground_rows(i, &poses, sink);
             self.apart_rows(i, &poses[i], sink);
         }
+        self.weight_rows(&poses, sink);
         for i in 1..frames.len() {
             self.still_rows(i, &frames[i - 1], &frames[i], sink);
         }

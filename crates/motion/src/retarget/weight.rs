@@ -1,0 +1,82 @@
+//! The center of mass, which only gravity and the ground can accelerate.
+//!
+//! Recordings break this law, and retargeting does: a foot that is put where it belongs shifts the whole figure, and a flight
+//! at the proportions of another person is too high for its time. A figure with motors cannot follow that. In the air the center of mass is to fall; on the ground, which only pushes, it may be accelerated within a
+//! cone of friction.
+
+use super::problem::{Problem, Row, Sink};
+use crate::ground::Touch;
+use crate::kinematics::Pose;
+use glam::DVec3;
+use marathon_physics::Model;
+
+/// Of the difference from gravity in the air, and of what the ground cannot do, s^2/m.
+const LAW: f64 = 0.03;
+/// Of accelerations on the ground, s^2/m: people move smoothly.
+const EFFORT: f64 = 0.001;
+/// Gravity, m/s^2.
+const GRAVITY: f64 = 9.81;
+/// Friction of a foot on the ground, in directions along x and y.
+const FRICTION: f64 = 1.0;
+/// Height up to which a part may be on the ground, m.
+const NEAR: f64 = 0.02;
+
+/// Per frame: whether nothing is on the ground.
+pub(super) fn airborne(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> Vec<bool> {
+    let up = |frame: &Vec<f64>| {
+        let pose = Pose::of(model, frame);
+        touches.iter().all(|touch| touch.lowest(&pose).z > NEAR)
+    };
+    frames.iter().map(up).collect()
+}
+
+/// Center of mass of a pose, and how it moves with each degree of freedom.
+fn center(model: &Model, pose: &Pose) -> (DVec3, Vec<DVec3>) {
+    let total: f64 = model.bodies.iter().map(|body| body.mass).sum();
+    let (mut at, mut by) = (DVec3::ZERO, vec![DVec3::ZERO; model.nv]);
+    for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass > 0.0) {
+        let (share, point) = (body.mass / total, pose.point(i, DVec3::from_array(body.ipos)));
+        at += share * point;
+        pose.motions(model, i, point, |dof, _, shift| by[dof] += share * shift);
+    }
+    (at, by)
+}
+
+impl Problem<'_> {
+    /// What the center of mass of figures with a free root may do.
+    pub(super) fn weight_rows(&self, poses: &[Pose], sink: &mut Sink) {
+        let (model, nv) = (self.model, self.model.nv);
+        if self.airborne.is_empty() {
+            return;
+        }
+        let centers: Vec<_> = poses.iter().map(|pose| center(model, pose)).collect();
+        let rate = 1.0 / (self.dt * self.dt);
+        for i in 1..poses.len().saturating_sub(1) {
+            let parts = [(i - 1, 1.0), (i, -2.0), (i + 1, 1.0)];
+            let felt = parts.iter().map(|(k, sign)| sign * rate * centers[*k].0).sum::<DVec3>() + GRAVITY * DVec3::Z;
+            let mut row = |weight: f64, along: DVec3, even: bool| {
+                let by: Vec<(usize, f64)> = parts
+                    .iter()
+                    .flat_map(|(k, sign)| {
+                        let by = &centers[*k].1;
+                        by.iter()
+                            .enumerate()
+                            .map(move |(dof, by)| (k * nv + dof, weight * sign * rate * along.dot(*by)))
+                    })
+                    .filter(|(_, by)| *by != 0.0)
+                    .collect();
+                let residual = weight * along.dot(felt);
+                sink(if even { Row::Even(residual, &by) } else { Row::Bound(residual, &by) });
+            };
+            if self.airborne[i] {
+                [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(LAW, axis, true));
+                continue;
+            }
+            [DVec3::X, DVec3::Y].into_iter().for_each(|axis| row(EFFORT, axis, true));
+            row(LAW, DVec3::Z, false);
+            for side in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y] {
+                row(LAW, FRICTION * DVec3::Z + side, false);
+            }
+        }
+    }
+}
