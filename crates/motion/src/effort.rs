@@ -71,9 +71,9 @@ pub struct Efforts {
     pub flights: Vec<Flight>,
 }
 
-/// The torques that a clip takes, as means over a tenth of a second: inverse dynamics of its frames, less what forces at the points near the ground can give.
-/// These forces lie in a friction cone of coefficient 1; of all that carry the figure, those that spare the motors most are
-/// taken. Accelerations are central differences of the clip's velocities. The path is for messages.
+/// The torques that a clip takes, as means over a tenth of a second: inverse dynamics of its frames, less what forces at the
+/// points near the ground can give. These forces lie in a friction cone of coefficient 1; of all that carry the figure, those
+/// that spare the motors most are taken. Accelerations are central differences of the clip's velocities. The path is for messages.
 ///
 /// # Errors
 /// If the clip is another model's, or the model has tendons, equality constraints, drag, or springs in ball joints.

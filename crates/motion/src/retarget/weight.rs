@@ -46,9 +46,11 @@ impl Problem<'_> {
     /// What the center of mass of figures with a free root may do.
     pub(super) fn weight_rows(&self, poses: &[Pose], sink: &mut Sink) {
         let (model, nv) = (self.model, self.model.nv);
-        if self.airborne.is_empty() {
+        let factor = self.mapping.smooth;
+        if self.airborne.is_empty() || factor == 0.0 {
             return;
         }
+        let (law, effort) = (factor * LAW, factor * EFFORT);
         let centers: Vec<_> = poses.iter().map(|pose| center(model, pose)).collect();
         let rate = 1.0 / (self.dt * self.dt);
         for i in 1..poses.len().saturating_sub(1) {
@@ -69,13 +71,13 @@ impl Problem<'_> {
                 sink(if even { Row::Even(residual, &by) } else { Row::Bound(residual, &by) });
             };
             if self.airborne[i] {
-                [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(LAW, axis, true));
+                [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(law, axis, true));
                 continue;
             }
-            [DVec3::X, DVec3::Y].into_iter().for_each(|axis| row(EFFORT, axis, true));
-            row(LAW, DVec3::Z, false);
+            [DVec3::X, DVec3::Y].into_iter().for_each(|axis| row(effort, axis, true));
+            row(law, DVec3::Z, false);
             for side in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y] {
-                row(LAW, FRICTION * DVec3::Z + side, false);
+                row(law, FRICTION * DVec3::Z + side, false);
             }
         }
     }
