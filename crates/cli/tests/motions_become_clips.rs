@@ -3,24 +3,13 @@
 
 mod common;
 
-use common::{assert_no_leftovers, fail, json, run, succeed};
+use common::{assert_no_leftovers, fail, json, recording, run, succeed};
 use std::path::{Path, PathBuf};
 
 /// A clip that comes with Marathon.
 fn shipped(name: &str) -> String {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions").join(name);
     path.to_string_lossy().into_owned()
-}
-
-/// A person in DeepMimic's format who stands, then bends the right elbow.
-fn recording() -> String {
-    let frame = |elbow: f64| {
-        let turns = |count: usize| ",1,0,0,0".repeat(count);
-        let [four, two, one] = [4, 2, 1].map(turns);
-        format!("[0.0333,0,0.88,0{four},0{two},{elbow}{one},0{two},0]")
-    };
-    let frames: Vec<String> = (0..20).map(|i| frame(0.05 * f64::from(i))).collect();
-    format!("{{\"Loop\": \"none\", \"Frames\": [{}]}}", frames.join(",\n"))
 }
 
 #[test]

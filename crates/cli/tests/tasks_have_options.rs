@@ -146,17 +146,6 @@ fn a_clip_of_a_file_goes_with_its_run_and_its_policy() {
     assert_no_leftovers(path);
 }
 
-/// A person in DeepMimic's format who stands, then bends the right elbow.
-fn recording() -> String {
-    let frame = |elbow: f64| {
-        let turns = |count: usize| ",1,0,0,0".repeat(count);
-        let [four, two, one] = [4, 2, 1].map(turns);
-        format!("[0.0333,0,0.88,0{four},0{two},{elbow}{one},0{two},0]")
-    };
-    let frames: Vec<String> = (0..20).map(|i| frame(0.05 * f64::from(i))).collect();
-    format!("{{\"Loop\": \"none\", \"Frames\": [{}]}}", frames.join(",\n"))
-}
-
 #[test]
 fn a_recording_becomes_the_clip_that_import_makes_of_it() {
     let temp = tempfile::tempdir().unwrap();

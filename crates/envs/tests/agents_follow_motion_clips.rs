@@ -228,36 +228,57 @@ fn episodes_start_all_over_the_clip() {
     assert!((0..20).all(|agent| moments(&clip, &env.state(agent).unwrap()).0 == 0));
 }
 
-/// Half of the adaptive starts after a failure are in the second before it; the same seed starts alike, whatever has been.
+/// Half of the adaptive starts after a failure are where that episode has started if it was short, and in the second before the
+/// failure if it was not; the same seed starts alike, whatever has been.
 #[test]
 fn adaptive_starts_are_where_the_agent_has_failed() {
-    let clip = shipped("backflip");
-    let agents = 64;
-    let options = Options::new().with("clip", "backflip").with("start", "adaptive");
-    let mut env = follow(&options, agents, None);
-    let mut out = env.buffers();
-    env.reset(Some(1), &mut out.obs).unwrap();
-    let (first, rows) = (out.obs.clone(), Cut::new(&clip).rows);
-    let (mut failures, mut near) = (0, 0);
-    for _ in 0..120 {
-        env.step(&vec![0.0; agents * 21], &mut out.as_mut()).unwrap();
-        let failed: Vec<usize> = (0..agents).filter(|agent| out.terminated[*agent]).collect();
-        let phases: Vec<f32> = failed.iter().map(|agent| out.info[agent * 3 + 2]).collect();
-        let ended: Vec<bool> = (0..agents).map(|agent| out.terminated[agent] || out.truncated[agent]).collect();
-        env.reset_agents(&ended, &mut out.obs).unwrap();
-        for (agent, phase) in failed.into_iter().zip(phases) {
-            let (start, failure) =
-                (moments(&clip, &env.state(agent).unwrap()).0, (phase * rows as f32).round() as usize);
-            failures += 1;
-            near += usize::from((failure + rows - start) % rows <= 41);
+    let still = standing();
+    let frames = vec![still.frame(0).to_vec(); 100];
+    let (about, layout) = (About { name: "stand on".into(), ..still.about().clone() }, still.layout().clone());
+    let looping = Clip::new(Path::new("stand on"), about, layout, 0.1, Some(Cycle::default()), &frames).unwrap();
+    clips::add("stand on", looping);
+    let (agents, rows) = (64, 400);
+    let mut env = follow(&Options::new().with("clip", "stand on").with("start", "adaptive"), agents, None);
+    let row = |phase: f32| (phase * rows as f32).round() as usize;
+    let places = |env: &VecEnv| -> Vec<usize> {
+        let mut info = vec![0.0; agents * 3];
+        env.info(&mut info).unwrap();
+        info.chunks(3).map(|info| row(info[2])).collect()
+    };
+    for (stands, by_chance) in [(0, 1.0 / rows as f64), (90, 41.0 / rows as f64)] {
+        let mut out = env.buffers();
+        env.reset(Some(1), &mut out.obs).unwrap();
+        let first = out.obs.clone();
+        let mut begun: Vec<(usize, usize)> = places(&env).into_iter().map(|place| (0, place)).collect();
+        let (mut failures, mut near) = (0, 0);
+        for t in 1..=20 * (stands + 40) {
+            let action = |agent: usize| [if t - begun[agent].0 > stands { 1.0 } else { 0.0 }; 21];
+            let actions: Vec<f32> = (0..agents).flat_map(action).collect();
+            env.step(&actions, &mut out.as_mut()).unwrap();
+            let phases: Vec<f32> = out.info.chunks(3).map(|info| info[2]).collect();
+            let ended: Vec<bool> = (0..agents).map(|agent| out.terminated[agent] || out.truncated[agent]).collect();
+            env.reset_agents(&ended, &mut out.obs).unwrap();
+            let places = places(&env);
+            for agent in (0..agents).filter(|agent| ended[*agent]) {
+                assert!(
+                    out.terminated[agent] && (t - begun[agent].0 < 80) == (stands == 0),
+                    "falls when it is told to"
+                );
+                failures += 1;
+                near += usize::from(match stands {
+                    0 => places[agent] == begun[agent].1,
+                    _ => (row(phases[agent]) + rows - places[agent]) % rows <= 41,
+                });
+                begun[agent] = (t, places[agent]);
+            }
         }
+        // of the random ones, some are there by chance
+        let share = near as f64 / failures as f64;
+        let expected = 0.5 + 0.5 * by_chance;
+        assert!(failures > 400 && (share - expected).abs() < 0.07, "{near} of {failures}, expected {expected}");
+        env.reset(Some(1), &mut out.obs).unwrap();
+        assert_eq!(first, out.obs);
     }
-    // of the random ones, those of a second are near by chance
-    let expected = 0.5 + 0.5 * 41.0 / rows as f64;
-    let share = near as f64 / failures as f64;
-    assert!(failures > 200 && (share - expected).abs() < 0.1, "{near} of {failures}, expected {expected}");
-    env.reset(Some(1), &mut out.obs).unwrap();
-    assert_eq!(first, out.obs);
 }
 
 #[test]

@@ -113,3 +113,14 @@ pub fn assert_no_leftovers(folder: &Path) {
     let left: Vec<_> = files(folder).into_iter().filter(|f| f.extension().is_some_and(|e| e == "tmp")).collect();
     assert!(left.is_empty(), "left behind: {left:?}");
 }
+
+/// A person in DeepMimic's format who stands, then bends the right elbow.
+pub fn recording() -> String {
+    let frame = |elbow: f64| {
+        let turns = |count: usize| ",1,0,0,0".repeat(count);
+        let [four, two, one] = [4, 2, 1].map(turns);
+        format!("[0.0333,0,0.88,0{four},0{two},{elbow}{one},0{two},0]")
+    };
+    let frames: Vec<String> = (0..20).map(|i| frame(0.05 * f64::from(i))).collect();
+    format!("{{\"Loop\": \"none\", \"Frames\": [{}]}}", frames.join(",\n"))
+}

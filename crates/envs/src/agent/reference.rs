@@ -170,9 +170,10 @@ impl<T: Real> Reference<T> {
         }
         let timeline = Timeline::new(clips, dt);
         let columns = Columns::new(model, bindings);
+        let sim = Sim::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
         let mut table = Vec::new();
         for lap in &timeline.clips {
-            let mut rows = shown(lap, &timeline, blueprint, bindings)?;
+            let mut rows = shown(lap, &timeline, &sim, bindings);
             let mut low = vec![f64::INFINITY; bindings.parts.len()];
             for row in &rows {
                 for (i, low) in low.iter_mut().enumerate() {
@@ -200,7 +201,10 @@ impl<T: Real> Reference<T> {
     #[inline(always)]
     pub fn frame(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
         assert!(ahead <= MOST_AHEAD, "a clip is shown for {MOST_AHEAD} decisions ahead");
-        let at = self.place(memory, ahead);
+        let at = match ahead {
+            0 => [0, 1, 2, 3].map(|i| memory[i]),
+            _ => self.place(memory, ahead),
+        };
         let rows = self.rows_of(at[Following::ROW]);
         let (sin, cos) = at[Following::YAW].sin_cos();
         Frame { columns: &self.columns, rows, origin: [at[Following::X], at[Following::Y]], turn: [cos, sin] }
@@ -285,22 +289,16 @@ impl Columns {
 }
 
 /// What the rows of a clip show, as far as each row tells it alone.
-fn shown<T: Real>(
-    lap: &Lap,
-    timeline: &Timeline,
-    blueprint: &Blueprint,
-    bindings: &Bindings<T>,
-) -> Result<Vec<Vec<f64>>, String> {
-    let model = &blueprint.model;
-    let sim = Sim::<f64>::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
-    let (mut group, mut work) = (Group::new(&sim), Work::new(&sim));
+fn shown<T: Real>(lap: &Lap, timeline: &Timeline, sim: &Sim<f64>, bindings: &Bindings<T>) -> Vec<Vec<f64>> {
+    let model = sim.model();
+    let (mut group, mut work) = (Group::new(sim), Work::new(sim));
     let shares: Vec<(usize, f64)> = bindings.mass_shares.iter().map(|(b, x)| (*b, T::widen(*x))).collect();
     let mut rows = Vec::new();
     for i in lap.rows.clone() {
         let (qpos, qvel, phase) = (&timeline.qpos[i], &timeline.qvel[i], timeline.phase[i]);
-        group.reset_lane(&sim, 0, qpos, qvel);
+        group.reset_lane(sim, 0, qpos, qvel);
         sim.refresh(&mut work, &group);
-        let r = Readings::new(&sim, &group, &work);
+        let r = Readings::new(sim, &group, &work);
         let mut row = [qpos.as_slice(), qvel].concat();
         for part in &bindings.parts {
             row.extend(r.geom_pos(part.geom));
@@ -326,7 +324,7 @@ fn shown<T: Real>(
         row.push(lap.cycle.map_or(0.0, |cycle| cycle.yaw * done / lap.rows.len() as f64));
         rows.push(row);
     }
-    Ok(rows)
+    rows
 }
 
 /// A number of each agent's row.

@@ -97,9 +97,9 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         }
         if pass > 0 {
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
-        }
-        if travels {
-            airborne = weight::airborne(model, &touches, &frames);
+            if travels {
+                airborne = weight::airborne(model, &touches, &frames);
+            }
         }
         let rough = problem(&all, &none);
         let fine = Problem { couples: &couples, held: &held, airborne: &airborne, calm: mapping.smooth, ..rough };

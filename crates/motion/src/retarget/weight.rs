@@ -5,6 +5,7 @@
 //! cone of friction.
 
 use super::problem::{Problem, Row, Sink};
+use crate::contact::clearance;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use glam::DVec3;
@@ -23,11 +24,7 @@ const NEAR: f64 = 0.02;
 
 /// Per frame: whether nothing is on the ground.
 pub(super) fn airborne(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> Vec<bool> {
-    let up = |frame: &Vec<f64>| {
-        let pose = Pose::of(model, frame);
-        touches.iter().all(|touch| touch.lowest(&pose).z > NEAR)
-    };
-    frames.iter().map(up).collect()
+    frames.iter().map(|frame| clearance(touches, &Pose::of(model, frame)) > NEAR).collect()
 }
 
 /// Center of mass of a pose, and how it moves with each degree of freedom.

@@ -50,8 +50,12 @@ const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
 const FUTURE_FRAME: usize = 9 + JOINTS.len();
 /// Slot of the memory that counts the episode's decisions.
 const MADE: usize = Following::SLOTS;
+/// Slot of the memory that holds the row where the episode started.
+const BEGUN: usize = MADE + 1;
 /// Decisions of a second.
 const SECOND: usize = 40;
+/// An episode that fails in fewer decisions has failed because of where it started.
+const EARLY: usize = 2 * SECOND;
 
 /// Where an episode starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +64,8 @@ pub enum StartAt {
     Random,
     /// At its beginning.
     First,
-    /// Where it fails most: half of the episodes that follow a failure start in the second before that, the others at
-    /// random.
+    /// Where it fails most: half of the episodes that follow a failure start where that episode did, if it failed early, or
+    /// in the second before it failed; the others start at random.
     Adaptive,
 }
 
@@ -132,12 +136,22 @@ const TASKS: [(&str, &str, &str); 16] = [
     ("MarathonManGetUpFaceUp-v0", "getup_faceup", "a figure of 21 motors: get up, lying on the back"),
 ];
 
-/// The row where the last episode failed, in half of the episodes that follow a failure.
-fn failed_at(start: &mut Start) -> Option<usize> {
-    let (row, made) = (start.previous[Following::ROW] as usize, start.previous[MADE] as usize);
+/// Where to start in half of the episodes that follow a failure.
+fn try_again(start: &mut Start) -> Option<usize> {
+    let [row, made, begun] = [Following::ROW, MADE, BEGUN].map(|slot| start.previous[slot] as usize);
     let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
     let failed = made > 0 && made < MAX_EPISODE_STEPS && !at_its_end;
-    (failed && start.random.whole(0, 1) == 1).then_some(row)
+    if !failed || start.random.whole(0, 1) == 0 {
+        return None;
+    }
+    // the lap of a run is shorter than a second: what is before a failure need not be what led to it
+    match made < EARLY {
+        true => Some(begun),
+        false => {
+            let before = start.random.whole(0, SECOND);
+            Some(start.row_before(row, before))
+        }
+    }
 }
 
 /// Marathon Man with any clip, and with each that comes with the crate.
@@ -206,7 +220,7 @@ impl Agent for MarathonMan {
             parts: names(PARTS),
             touch_sites: names(TOUCH),
             clips: clip.find(),
-            memory: Following::SLOTS + 1,
+            memory: Following::SLOTS + 2,
             termination_reward: None,
             ..Facts::default()
         }
@@ -231,23 +245,18 @@ impl Agent for MarathonMan {
     }
 
     fn reset(&self, start: &mut Start) {
-        let failure = (self.arguments.start == StartAt::Adaptive).then(|| failed_at(start)).flatten();
-        let row = match failure {
-            Some(row) => {
-                let before = start.random.whole(0, SECOND);
-                start.row_before(row, before)
+        let again = (self.arguments.start == StartAt::Adaptive).then(|| try_again(start)).flatten();
+        let row = again.unwrap_or_else(|| {
+            let clips: Vec<_> = start.clips().collect();
+            let clip = if clips.len() == 1 { 0 } else { start.random.whole(0, clips.len() - 1) };
+            let rows = clips[clip].clone();
+            match self.arguments.start {
+                StartAt::First => rows.start,
+                _ => start.random.whole(rows.start, rows.end - 1),
             }
-            None => {
-                let clips: Vec<_> = start.clips().collect();
-                let clip = if clips.len() == 1 { 0 } else { start.random.whole(0, clips.len() - 1) };
-                let rows = clips[clip].clone();
-                match self.arguments.start {
-                    StartAt::First => rows.start,
-                    _ => start.random.whole(rows.start, rows.end - 1),
-                }
-            }
-        };
+        });
         start.start_in_clip(row);
+        start.memory[BEGUN] = row as f64;
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -277,34 +286,14 @@ impl Agent for MarathonMan {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let (now, next) = (s.reference(0), s.reference(1));
-        let [cos, sin] = now.facing();
-        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z];
+        let turned = turned_to(now.facing());
         let r = s.readings();
         out.group("phase");
         for x in now.phase_angles() {
             out.scalar(x);
         }
-        out.group("height");
-        out.scalar(s.height(BUTT));
-        out.group("orientation");
-        out.vector(turned(s.forward(BUTT)));
-        out.vector(turned(s.up(BUTT)));
-        out.group("velocity");
-        out.vector(turned(s.linear_velocity(BUTT)));
-        out.group("angular_velocity");
-        out.vector(turned(s.angular_velocity(BUTT)));
-        out.group("joint_positions");
-        for i in 0..JOINTS.len() {
-            out.scalar(r.qpos(FIRST_QPOS + i));
-        }
-        out.group("joint_velocities");
-        for i in 0..JOINTS.len() {
-            out.scalar(r.qvel(FIRST_QVEL + i));
-        }
-        out.group("touch");
-        for i in 0..TOUCH.len() {
-            out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
-        }
+        observe_body(s, &turned, out);
+        observe_soles(s, out);
         out.group("place_in_clip");
         out.vector(turned(sub(now.position(BUTT), s.position(BUTT))));
         out.group("next_pose");
@@ -353,6 +342,44 @@ impl Agent for MarathonMan {
         out.scalar(error * T::lit(1.0 / JOINTS.len() as f64));
         out.scalar(Self::distance(s, true));
         out.scalar(clip.phase());
+    }
+}
+
+/// Puts vectors into axes of which x is a direction along the ground, cosine and sine of its angle, and z is up.
+#[inline(always)]
+fn turned_to<T: Real>([cos, sin]: [T; 2]) -> impl Fn([T; 3]) -> [T; 3] {
+    move |[x, y, z]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z]
+}
+
+/// Where the butt is and how the joints are, with velocities: the parts of an observation that every task of his has.
+#[inline(always)]
+fn observe_body<T: Real>(s: &Senses<T>, turned: &impl Fn([T; 3]) -> [T; 3], out: &mut Obs<T>) {
+    let r = s.readings();
+    out.group("height");
+    out.scalar(s.height(BUTT));
+    out.group("orientation");
+    out.vector(turned(s.forward(BUTT)));
+    out.vector(turned(s.up(BUTT)));
+    out.group("velocity");
+    out.vector(turned(s.linear_velocity(BUTT)));
+    out.group("angular_velocity");
+    out.vector(turned(s.angular_velocity(BUTT)));
+    out.group("joint_positions");
+    for i in 0..JOINTS.len() {
+        out.scalar(r.qpos(FIRST_QPOS + i));
+    }
+    out.group("joint_velocities");
+    for i in 0..JOINTS.len() {
+        out.scalar(r.qvel(FIRST_QVEL + i));
+    }
+}
+
+/// Which toes and heels are on the ground.
+#[inline(always)]
+fn observe_soles<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    out.group("touch");
+    for i in 0..TOUCH.len() {
+        out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
     }
 }
 

@@ -22,9 +22,9 @@ use std::f64::consts::FRAC_PI_2;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::body::{ACTIONS, BUTT, Control, END_EFFECTORS, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model, parts};
+use super::body::{ACTIONS, BUTT, Control, END_EFFECTORS, JOINTS, PARTS, TOUCH, model, parts};
 use super::clips::{self, STAND};
-use super::{FRAME_SKIP, MAX_EPISODE_STEPS, sub};
+use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_body, observe_soles, sub, turned_to};
 use crate::agent::senses::clamp;
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses,
@@ -203,39 +203,19 @@ impl Agent for Steer {
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let [cos, sin] = s.heading(BUTT);
-        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z];
+        let turned = turned_to([cos, sin]);
         let [x, y] = Self::direction(s);
-        let r = s.readings();
         out.group("command");
         out.scalar(s.command(0));
         out.scalar(s.command(1));
         out.scalar(cos.mul_add(y, -(sin * x)));
         out.scalar(cos.mul_add(x, sin * y));
-        out.group("height");
-        out.scalar(s.height(BUTT));
-        out.group("orientation");
-        out.vector(turned(s.forward(BUTT)));
-        out.vector(turned(s.up(BUTT)));
-        out.group("velocity");
-        out.vector(turned(s.linear_velocity(BUTT)));
-        out.group("angular_velocity");
-        out.vector(turned(s.angular_velocity(BUTT)));
-        out.group("joint_positions");
-        for i in 0..JOINTS.len() {
-            out.scalar(r.qpos(FIRST_QPOS + i));
-        }
-        out.group("joint_velocities");
-        for i in 0..JOINTS.len() {
-            out.scalar(r.qvel(FIRST_QVEL + i));
-        }
+        observe_body(s, &turned, out);
         out.group("ends");
         for part in END_EFFECTORS {
             out.vector(turned(sub(s.position(part), s.position(BUTT))));
         }
-        out.group("touch");
-        for i in 0..TOUCH.len() {
-            out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
-        }
+        observe_soles(s, out);
     }
 
     #[inline(always)]
