@@ -13,7 +13,9 @@ use std::sync::Arc;
 use common::{action, make, oracle, play};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::{AgentState, Autoreset, Options, VecEnv, VecEnvOptions};
+use marathon_motion::kinematics::Pose;
 use marathon_motion::{About, Clip, Cycle};
+use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 use serde_json::{Value, json};
 
@@ -209,6 +211,60 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
     // the comparison means something only if these happened
     assert!(played.len() > 1, "one clip only: {played:?}");
     assert!(touches > 100 && far > 3 && decisions > 300, "{touches} touches, {far} too far, {decisions} decisions");
+}
+
+/// [`VecEnv::reference`] is what rewards compare with: its distance from the agent is what the agent reports and observes, over
+/// laps that turn, for agents at different places, on any vector width.
+#[test]
+fn the_clip_in_the_world_is_the_one_that_rewards_see() {
+    clips::add("circling", circling());
+    let model = marathon_envs::agent("MarathonMan-v0").unwrap().model().unwrap();
+    for isa in [Isa::F64, Isa::best()] {
+        let mut env = follow(&Options::new().with("clip", "circling").with("distance", 1e3), 20, Some(isa));
+        let (obs, info) = (env.spec().obs, env.spec().info.len());
+        let mut out = env.buffers();
+        env.reset(Some(2), &mut out.obs).unwrap();
+        env.info(&mut out.info).unwrap();
+        let first = env.reference(0).unwrap().unwrap();
+        let mut farthest = 0.0_f64;
+        for t in 0..400 {
+            for agent in (0..20).filter(|_| t % 20 == 0) {
+                let clip = env.reference(agent).unwrap().expect("it follows a clip");
+                let state = env.state(agent).unwrap();
+                let [theirs, ours] = [&clip, &state.qpos].map(|qpos| centers(&model, qpos));
+                let butt = (0..3).map(|k| (theirs[0][k] - ours[0][k]).powi(2)).sum::<f64>().sqrt();
+                let away = |(a, b): (&[f64; 3], &[f64; 3])| {
+                    (0..3).map(|k| (a[k] - b[k] - theirs[0][k] + ours[0][k]).powi(2)).sum::<f64>().sqrt()
+                };
+                let parts = theirs.iter().zip(&ours).map(away).sum::<f64>() / theirs.len() as f64;
+                let place: f64 = out.obs[agent * obs + 65..][..3].iter().map(|x| f64::from(*x).powi(2)).sum();
+                let reported = f64::from(out.info[agent * info + 1]);
+                assert!((butt - place.sqrt()).abs() < 2e-4, "decision {t}: {butt} m, observed {}", place.sqrt());
+                assert!((parts - reported).abs() < 2e-4, "decision {t}: {parts} m, reported {reported}");
+                farthest = farthest.max(butt);
+            }
+            env.step(&vec![0.0; 20 * 21], &mut out.as_mut()).unwrap();
+        }
+        let last = env.reference(0).unwrap().unwrap();
+        let way = (last[0] - first[0]).hypot(last[1] - first[1]);
+        assert!(way > 1.0 && farthest > 1.0, "the clip has come {way} m, the agents are up to {farthest} m from it");
+    }
+    for agent in ["Hopper-v0", "MarathonManSteer-v0"] {
+        let env = VecEnv::new(agent, &VecEnvOptions::default()).unwrap();
+        assert_eq!(env.reference(0).unwrap(), None, "{agent} follows no clip");
+        assert!(env.reference(1).is_err(), "there is no agent 1");
+    }
+}
+
+/// Centers of the parts, the butt's first.
+fn centers(model: &Model, qpos: &[f64]) -> Vec<[f64; 3]> {
+    let pose = Pose::of(model, qpos);
+    let parts = marathon_envs::agent("MarathonMan-v0").unwrap().facts().parts;
+    let center = |name: &String| {
+        let geom = model.geoms.iter().find(|geom| geom.name == *name).expect("a part is a geom");
+        pose.point(geom.body, geom.pos.into()).to_array()
+    };
+    parts.iter().map(center).collect()
 }
 
 #[test]

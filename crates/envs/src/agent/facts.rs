@@ -54,6 +54,9 @@ pub struct Facts {
     /// Motions of the model's joints, one of which an agent follows. If there are any, the first
     /// [`Following::SLOTS`](crate::Following::SLOTS) of its memory tell where it is in which.
     pub clips: Vec<Arc<Clip>>,
+    /// Whether agents go on with their clip ([`Senses::follow`](crate::Senses::follow)). Otherwise clips only tell where
+    /// episodes start and what demonstrations show.
+    pub follows_clips: bool,
     /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
     /// What it sees of the physics.
@@ -84,6 +87,7 @@ impl Default for Facts {
             command: Vec::new(),
             roles: Vec::new(),
             clips: Vec::new(),
+            follows_clips: true,
             memory: 0,
             view: View::default(),
             termination_reward: Some(-1.0),

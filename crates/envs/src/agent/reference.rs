@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use marathon_motion::{Clip, Cycle};
+use marathon_motion::{Clip, Cycle, Layout};
 use marathon_physics::lanes::{MAX_LANES, Real};
 use marathon_physics::{Group, Model, Readings, Sim, Work};
 
@@ -156,6 +156,7 @@ pub(crate) struct Reference<T: Real> {
     columns: Columns,
     /// `[row][column]`.
     table: Vec<T::Scalar>,
+    layout: Layout,
 }
 
 impl<T: Real> Reference<T> {
@@ -189,7 +190,7 @@ impl<T: Real> Reference<T> {
                 table.extend(row.iter().map(|x| T::scalar(*x)));
             }
         }
-        Ok(Reference { timeline, columns, table })
+        Ok(Reference { timeline, columns, table, layout: Layout::of(model) })
     }
 
     /// Rows of the table.
@@ -240,6 +241,15 @@ impl<T: Real> Reference<T> {
             *row = &self.table[i * self.columns.width..][..self.columns.width];
         }
         rows
+    }
+
+    /// `qpos` of the clip in the world, in double precision, for an agent with this memory.
+    pub fn qpos(&self, memory: &[f64]) -> Vec<f64> {
+        let row = (memory[Following::ROW] as usize).min(self.rows() - 1);
+        let mut qpos = self.timeline.qpos[row].clone();
+        let moved = Cycle { pos: [memory[Following::X], memory[Following::Y]], yaw: memory[Following::YAW] };
+        moved.advance(&self.layout, &mut qpos, 1);
+        qpos
     }
 
     /// A decision has been made.

@@ -206,6 +206,12 @@ impl<T: Real> AgentShard for LaneShard<T> {
         AgentState { qpos, qvel }
     }
 
+    fn reference(&self, agent: usize) -> Option<Vec<f64>> {
+        let reference = self.task.reference.as_ref().filter(|_| self.task.facts.follows_clips)?;
+        let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
+        Some(reference.qpos(&group.memory_of(agent % T::LANES)))
+    }
+
     fn x_positions(&self, out: &mut [f64]) -> bool {
         let along_x = &self.task.bindings.along_x;
         let groups = self.blocks.iter().flat_map(|block| &block.groups);

@@ -18,6 +18,9 @@ pub struct AgentState {
 pub trait AgentShard: Shard {
     /// State of an agent, numbered within this shard.
     fn state(&self, agent: usize) -> AgentState;
+    /// Configuration of the clip that an agent, numbered within this shard, follows: where it is now, MuJoCo's layout, world.
+    /// `None` if its task follows none.
+    fn reference(&self, agent: usize) -> Option<Vec<f64>>;
     /// Writes the positions of the agents' roots along x, m, which [`BlockStep::forward`](crate::BlockStep::forward) is a difference of; as many as
     /// fit. Returns whether roots can move along x.
     fn x_positions(&self, out: &mut [f64]) -> bool;

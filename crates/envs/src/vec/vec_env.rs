@@ -310,6 +310,16 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.state(agent % self.stride))
     }
 
+    /// Configuration of the clip that an agent follows: `qpos` where the clip is now, in the world, moved by all laps and turns
+    /// since the episode began. Rewards compare the agent with it. `None` for tasks that follow no clips.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn reference(&self, agent: usize) -> Result<Option<Vec<f64>>, EnvError> {
+        self.check_agent(agent)?;
+        Ok(self.workers[agent / self.stride].shard.reference(agent % self.stride))
+    }
+
     /// Position of every agent's root along x, m, as the distances `forward` of [`Step`] add up to. `None` if the root
     /// cannot move along x.
     pub fn x_positions(&self) -> Option<Vec<f64>> {

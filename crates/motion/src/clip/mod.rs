@@ -210,7 +210,10 @@ fn quaternions(layout: &Layout) -> impl Iterator<Item = (&str, usize)> {
 
 impl Cycle {
     /// Moves a pose `count` cycles on, or back if negative.
-    pub(crate) fn advance(&self, layout: &Layout, qpos: &mut [f64], count: i64) {
+    ///
+    /// # Panics
+    /// If `qpos` is shorter than the layout's.
+    pub fn advance(&self, layout: &Layout, qpos: &mut [f64], count: i64) {
         match layout.joints.first().map(|joint| joint.kind) {
             Some(JointKind::Free) => {
                 let turn = about_z(self.yaw * count as f64);

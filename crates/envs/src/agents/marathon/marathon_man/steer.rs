@@ -141,6 +141,7 @@ impl Agent for Steer {
                 CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
             ],
             clips: CLIPS.into_iter().filter_map(clips::find).collect(),
+            follows_clips: false,
             memory: DIRECTION + 2,
             termination_reward: None,
             ..Facts::default()
