@@ -35,12 +35,13 @@ fn options_are_recorded_and_obeyed() {
     train(path, "a", &["clip=run", "future=1"]);
     for file in ["run.json", "summary.json"] {
         let options = read_json(&path.join("a").join(file))["options"].clone();
-        let expected = ("run".into(), 1.0.into(), "random".into());
+        // the configuration that comes with the task says where it starts
+        let expected = ("run".into(), 1.0.into(), "adaptive".into());
         assert_eq!((&options["clip"], &options["future"], &options["start"]), (&expected.0, &expected.1, &expected.2));
     }
     // observations of another length would be refused
     let own = eval(path, &["a"]);
-    assert_eq!(own, eval(path, &["a", "--option", "start=random", "--option", "clip=run"]));
+    assert_eq!(own, eval(path, &["a", "--option", "start=random", "--option", "clip=run"]), "nobody has failed before");
     assert_ne!(own, eval(path, &["a", "--option", "start=first"]));
     assert_ne!(own, eval(path, &["a", "--option", "clip=walk"]));
     let text = fail(path, 1, &["eval", "a", "--option", "future=0"]);
@@ -51,6 +52,64 @@ fn options_are_recorded_and_obeyed() {
     assert_eq!((&exported["falls"], &exported["episodes"]), (&own["falls"], &own["episodes"]));
     succeed(path, &["record-demo", "a", "--out", "a.demo", "--episodes", "1", "--option", "start=first"]);
     succeed(path, &["render", "a", "--out", "a.png", "--frames", "2", "--seconds", "0.1", "--width", "40"]);
+}
+
+#[test]
+fn a_configuration_has_options_and_the_command_line_wins() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    let write = |options: &str| {
+        let text = format!("behaviors: {{MarathonMan: {{trainer_type: ppo, marathon: {{options: {options}}}}}}}");
+        std::fs::write(path.join("c.yaml"), text).unwrap();
+    };
+    write("{clip: run, future: 2, start: first}");
+    let words = ["--config", "c.yaml", "--option", "start=random"];
+    succeed(path, &[&TRAIN[..], &["a"], &words].concat());
+    let options = read_json(&path.join("a").join("run.json"))["options"].clone();
+    assert_eq!((&options["clip"], &options["future"]), (&"run".into(), &2.0.into()));
+    assert_eq!(options["start"], "random");
+
+    write("{strat: first}");
+    let text = fail(path, 1, &[&TRAIN[..], &["b", "--config", "c.yaml"]].concat());
+    assert!(text.contains("c.yaml") && text.contains("marathon.options.strat"), "{text}");
+    assert!(text.contains("did you mean 'start'?"), "{text}");
+    write("[first]");
+    let text = fail(path, 1, &[&TRAIN[..], &["b", "--config", "c.yaml"]].concat());
+    assert!(text.contains("c.yaml:1") && text.contains("expected a mapping"), "{text}");
+    assert!(!path.join("b").exists());
+}
+
+/// From the clip's beginning and from anywhere, for each clip of the task; of tasks without clips nothing.
+#[test]
+fn a_policy_tells_how_well_it_follows_each_clip() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    train(path, "a", &["clip=walk,kick"]);
+    let of_run = read_json(&path.join("a/summary.json"))["imitation"].clone();
+    let of_eval = eval(path, &["a"])["imitation"].clone();
+    for (i, (clip, seconds)) in [("walk", 20.0), ("kick", 1.6)].into_iter().enumerate() {
+        let found = &of_eval[i];
+        assert_eq!(
+            (&found["clip"], &found["episodes"], &of_run[i]["episodes"]),
+            (&clip.into(), &16.into(), &100.into())
+        );
+        for start in ["first", "random"] {
+            let number = |name: &str| found[start][name].as_f64().unwrap();
+            // hardly trained: falls within seconds, not at once
+            assert!(number("seconds") > 0.1 && number("seconds") < seconds, "{found}");
+            assert!(number("joint_error") > 0.01 && number("joint_error") < 1.0, "{found}");
+            assert!(number("pose_error") > 0.005 && number("pose_error") < 0.5, "{found}");
+            assert!(number("completed") <= 16.0 && number("flips") == 0.0, "{found}");
+        }
+    }
+    // starts of its own are no matter
+    assert_eq!(eval(path, &["a", "--option", "start=first"])["imitation"], of_eval);
+    let text = succeed(path, &["eval", "a", "--episodes", "4"]);
+    assert!(text.contains("the clip walk:\n  from its beginning"), "{text}");
+
+    succeed(path, &["train", "hopper", "--agents", "16", "--steps", "512", "--out", "h"]);
+    assert!(read_json(&path.join("h/summary.json")).get("imitation").is_none());
+    assert!(eval(path, &["h"]).get("imitation").is_none());
 }
 
 #[test]
@@ -125,10 +184,13 @@ fn a_clip_of_a_file_goes_with_its_run_and_its_policy() {
     assert_eq!(run["options"]["clip"], "mine.motion");
     assert_eq!(std::fs::read_to_string(path.join("a/mine.motion")).unwrap(), walk());
     let of_shipped = eval(path, &["shipped"]);
-    assert_eq!(eval(path, &["a"]), of_shipped);
+    let mut of_file = eval(path, &["a"]);
+    assert_eq!(of_file["imitation"][0]["clip"], "mine.motion");
+    of_file["imitation"][0]["clip"] = "walk".into();
+    assert_eq!(of_file, of_shipped);
     // the policy alone, too, in both formats
     std::fs::copy(path.join("a/policy.safetensors"), path.join("p.safetensors")).unwrap();
-    assert_eq!(eval(path, &["p.safetensors"]), of_shipped);
+    assert_eq!(eval(path, &["p.safetensors"]), eval(path, &["a"]));
     succeed(path, &["export", "p.safetensors", "--out", "p.onnx"]);
     succeed(path, &["import", "p.onnx", "--out", "again.safetensors"]);
     assert_eq!(eval(path, &["again.safetensors"])["falls"], of_shipped["falls"]);

@@ -5,6 +5,7 @@ use super::behavior::{Behavior, Notes};
 use super::error::ConfigError;
 use super::section::{Entry, Range, Section};
 use super::settings::{Decay, Settings};
+use marathon_envs::options::Value;
 use marathon_learn::{
     A2c, Acktr, Activation, Algorithm, BLOCK, Deviations, Init, Moving, NetworkConfig, Ppo, Ratio, RewardConfig,
     RewardKind, RunConfig, Sac, Schedule, StatisticsConfig, TrainConfig,
@@ -22,7 +23,7 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads, with any algorithm.
-const COMMON: [&str; 16] = [
+const COMMON: [&str; 17] = [
     "agents",
     "horizon",
     "rollouts",
@@ -39,6 +40,7 @@ const COMMON: [&str; 16] = [
     "threads",
     "without",
     "steps_per_agent",
+    "options",
 ];
 
 /// Those of the algorithms that learn from their own rollouts.
@@ -60,6 +62,15 @@ const PPO: [&str; 10] = [
 const A2C: [&str; 4] = ["max_grad_norm", "value_coef", "rms_decay", "rms_epsilon"];
 const ACKTR: [&str; 6] = ["value_coef", "kl_clip", "momentum", "damping", "stats_decay", "inverse_every"];
 const SAC: [&str; 4] = ["value_lr", "adam_epsilon", "updates", "n_step"];
+
+/// Arguments of the task. Whether it takes them, the task knows.
+fn options(marathon: &Section<'_>) -> Result<Vec<(String, Value)>, ConfigError> {
+    let read = |entry: Entry<'_>| {
+        let text = entry.word_of_any_kind("a number, a word, true or false")?;
+        Ok((entry.key.to_string(), text.parse().unwrap_or_else(|never| match never {})))
+    };
+    marathon.section("options")?.entries().map(read).collect()
+}
 
 /// The trainer's configuration, with the values of its base for all that the file leaves out.
 ///
@@ -138,6 +149,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
     })?;
     Ok(Loaded {
         config,
+        options: options(&marathon)?,
         buffer: (!is_sac && marathon.get("horizon").is_none()).then_some(settings.buffer_size),
         summary_freq: settings.summary_freq.saturating_mul(scale),
         checkpoint_interval: settings.checkpoint_interval.saturating_mul(scale),

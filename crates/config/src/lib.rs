@@ -24,6 +24,7 @@ mod settings;
 pub use error::ConfigError;
 pub use parse::{parse, parse_roles};
 
+use marathon_envs::options::Value;
 use marathon_learn::TrainConfig;
 
 /// For Gymnasium's own tasks.
@@ -85,6 +86,8 @@ const FAST: [(&str, (&str, &str)); 36] = [
 pub struct Loaded {
     /// The trainer's configuration; it is valid.
     pub config: TrainConfig,
+    /// Arguments of the task that differ from its defaults.
+    pub options: Vec<(String, Value)>,
     /// Steps of a rollout of all agents, where the file says that and not `horizon`: with more agents, each makes fewer
     /// decisions.
     pub buffer: Option<u64>,
@@ -103,6 +106,7 @@ impl Default for Loaded {
     fn default() -> Self {
         Loaded {
             config: TrainConfig::default(),
+            options: Vec::new(),
             buffer: None,
             summary_freq: 50_000,
             checkpoint_interval: 500_000,

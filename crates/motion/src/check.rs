@@ -127,20 +127,15 @@ fn slides(
 ) {
     let held = contact::held(model, touches, soles, frames, dt);
     let (mut way, mut seconds) = (0.0, 0.0);
-    for (k, touch) in touches.iter().enumerate() {
+    contact::stances(touches, &held, poses, |k, begin, steps| {
         let mut slid = DVec3::ZERO;
-        for i in 0..poses.len() - 1 {
-            if held[i][k] && held[i + 1][k] {
-                let step = contact::slide(touch, &poses[i], &poses[i + 1]);
-                slid += step;
-                report.slide.meet(slid.length(), i, || model.bodies[touch.body].name.clone());
-                way += step.length();
-                seconds += dt;
-            } else {
-                slid = DVec3::ZERO;
-            }
+        for (i, step) in steps.iter().enumerate() {
+            slid += *step;
+            report.slide.meet(slid.length(), begin + i, || model.bodies[touches[k].body].name.clone());
+            way += step.length();
+            seconds += dt;
         }
-    }
+    });
     report.slide_speed = if seconds > 0.0 { way / seconds } else { 0.0 };
     let standing = held.iter().filter(|touches| touches.contains(&true)).count();
     report.standing = standing as f64 / held.len() as f64;

@@ -67,6 +67,28 @@ pub(crate) fn slide(touch: &Touch, now: &Pose, next: &Pose) -> DVec3 {
     (next.point(touch.body, local) - lowest).with_z(0.0)
 }
 
+/// Each time that a touch stands: calls `each` with the touch's index, the first frame, and how its lowest point slides from
+/// frame to frame while it stands.
+pub(crate) fn stances(
+    touches: &[Touch],
+    held: &[Vec<bool>],
+    poses: &[Pose],
+    mut each: impl FnMut(usize, usize, &[DVec3]),
+) {
+    for (k, touch) in touches.iter().enumerate() {
+        let mut begin = 0;
+        while begin < poses.len() {
+            let state = held[begin][k];
+            let end = (begin..poses.len()).find(|i| held[*i][k] != state).unwrap_or(poses.len());
+            if state {
+                let steps: Vec<DVec3> = (begin + 1..end).map(|i| slide(touch, &poses[i - 1], &poses[i])).collect();
+                each(k, begin, &steps);
+            }
+            begin = end;
+        }
+    }
+}
+
 /// The lowest point of a pose above the ground, m; negative below it.
 pub(crate) fn clearance(touches: &[Touch], pose: &Pose) -> f64 {
     touches.iter().map(|touch| touch.lowest(pose).z).fold(f64::INFINITY, f64::min)

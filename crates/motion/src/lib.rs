@@ -43,6 +43,7 @@ mod effort;
 
 mod check;
 mod skeleton;
+mod tracking;
 
 pub mod import;
 
@@ -58,4 +59,5 @@ pub use error::MotionError;
 pub use layout::{JointKind, Layout};
 pub use retarget::{Fit, Mapping, fit, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};
+pub use tracking::{Places, Tracking};
 pub use worst::Worst;

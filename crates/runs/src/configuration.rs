@@ -2,6 +2,8 @@
 
 use crate::error::RunError;
 use marathon_config::{Loaded, parse, parse_roles};
+use marathon_envs::error::nearest;
+use marathon_envs::registry;
 use marathon_learn::RoleConfig;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +13,18 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be read, or is no configuration for the agent; see [`parse`].
 pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
-    Ok(parse(path, &read(path)?, agent)?)
+    let loaded = parse(path, &read(path)?, agent)?;
+    // tasks that a front end makes are not registered, and take no options
+    if let Ok(agent) = registry::agent(agent) {
+        let known: Vec<&str> = agent.options().iter().map(|option| option.name).collect();
+        if let Some((name, value)) = loaded.options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
+            let near = nearest(name, known.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
+            let expected =
+                format!("an option of {}: {}{}", agent.facts().id, known.join(", "), near.unwrap_or_default());
+            return Err(RunError::file(path, format!("marathon.options.{name}"), value, expected));
+        }
+    }
+    Ok(loaded)
 }
 
 /// Reads what a file says about roles of a task but the first.

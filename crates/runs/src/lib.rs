@@ -10,6 +10,7 @@ pub mod configuration;
 pub mod demonstrations;
 pub mod error;
 pub mod folder;
+pub mod imitation;
 pub mod options;
 pub mod play;
 pub mod policy_file;
@@ -22,6 +23,7 @@ pub mod text;
 
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
+pub use imitation::Imitation;
 pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
 pub use play::Play;
 pub use report::Watch;

@@ -21,14 +21,21 @@ impl<'a> Play<'a> {
     /// # Errors
     /// If the policy's task does not exist, or the options make no sense.
     pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
-        let meta = policy.meta();
-        let mut env = Setting::of(meta).vec_env(options)?;
+        Self::of(&Setting::of(policy.meta()), policy, options)
+    }
+
+    /// The same in a task with other arguments.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn of(setting: &Setting, policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
+        let mut env = setting.vec_env(options)?;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
         Ok(Play {
             env,
             pilot: BlockPolicy::new(policy, Isa::best()),
-            actions: vec![0.0; options.agents * meta.act],
+            actions: vec![0.0; options.agents * policy.meta().act],
             step,
         })
     }
@@ -59,5 +66,13 @@ impl<'a> Play<'a> {
     /// If there is no such agent.
     pub fn qpos(&self, agent: usize) -> Result<Vec<f64>, RunError> {
         Ok(self.env.state(agent)?.qpos)
+    }
+
+    /// Generalized positions of the clip that an agent follows, where it is now; none if the task follows no clip.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn reference(&self, agent: usize) -> Result<Option<Vec<f64>>, RunError> {
+        Ok(self.env.reference(agent)?)
     }
 }

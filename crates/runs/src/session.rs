@@ -4,12 +4,13 @@ use crate::configuration;
 use crate::demonstrations::with_demonstrations;
 use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder, write_json};
+use crate::imitation;
 use crate::options::RunOptions;
 use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
 use crate::report::{Reporter, Watch, curve, note_clips, save, save_policies};
-use crate::setting::Setting;
+use crate::setting::{Setting, TaskOptions};
 use crate::task::Task;
 use crate::text::thousands;
 use marathon_config::{Loaded, default_for, default_of};
@@ -102,7 +103,9 @@ impl Session {
         run.threads = learn.threads.unwrap_or(run.threads);
         loaded.config.validate()?;
         Processes::check(&loaded.config, options.processes)?;
-        let (factory, setting) = task.with(&options.task)?.factory(loaded.config.run.agents)?;
+        // what is given by hand comes later, and counts
+        let given = loaded.options.iter().chain(&options.task.given).cloned().collect();
+        let (factory, setting) = task.with(&TaskOptions { given })?.factory(loaded.config.run.agents)?;
         if let (Some(path), [_, others @ ..]) = (&learn.config, &factory.spec().roles[..]) {
             let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
             loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
@@ -213,7 +216,7 @@ impl Session {
         }
 
         let steps = checkpoint.steps();
-        let mut evaluation = None;
+        let (mut evaluation, mut imitation) = (None, Vec::new());
         if steps >= run.config.run.total_steps {
             let options = EvalOptions { episodes: EPISODES, threads: run.config.run.threads, ..Default::default() };
             let all: Vec<&Policy> = [&policy].into_iter().chain(others.iter().map(|(_, policy)| policy)).collect();
@@ -221,10 +224,12 @@ impl Session {
             let policies = [&mut policy].into_iter().chain(others.iter_mut().map(|(_, policy)| policy));
             policies.zip(&evaluations).for_each(|(policy, evaluation)| policy.set_evaluation(evaluation.clone()));
             evaluation = evaluations.into_iter().next();
+            imitation = imitation::measure(&policy, &options)?;
         }
         let path = folder.as_ref().map(|folder| folder.path().into()).unwrap_or_default();
         let mut summary = Summary::new(path, &checkpoint, &history, evaluation.clone());
         summary.options = run.options.clone();
+        summary.imitation = imitation;
         if let Some(folder) = &folder {
             save_policies(folder, &policy, &others)?;
             write_json(&folder.summary(), &summary)?;

@@ -66,6 +66,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     say(outcome.summary.training_line());
     say(format!("\nits best actions over {EPISODES} episodes:"));
     say(evaluation_table(&eval, spec.max_episode_steps, spec.dt));
+    outcome.summary.imitation.iter().for_each(|clip| say(clip.table()));
     say(format!("\nwritten to {path}: policy.safetensors, summary.json, progress.csv, curve.png, TensorBoard events"));
     say(format!("see it by    {program} render {path} --out {}.gif", text::short_name(&agent)));
     Ok(())

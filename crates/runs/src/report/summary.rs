@@ -1,6 +1,7 @@
 //! A run in numbers: `summary.json`, and the same for a person.
 
 use super::csv::History;
+use crate::imitation::Imitation;
 use crate::text::{duration, path_json, short, thousands, unsigned_zero};
 use marathon_envs::Options;
 use marathon_learn::policy::options;
@@ -42,6 +43,9 @@ pub struct Summary {
     pub interrupted: bool,
     /// How the policy does; none for an interrupted run.
     pub eval: Option<Evaluation>,
+    /// How well it follows each clip, if its task follows clips.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imitation: Vec<Imitation>,
 }
 
 impl Summary {
@@ -61,6 +65,7 @@ impl Summary {
             skipped_minibatches: history.column("skipped_minibatches").last().copied().flatten().unwrap_or(0.0) as u64,
             interrupted: eval.is_none(),
             eval,
+            imitation: Vec::new(),
         }
     }
 

@@ -1,0 +1,181 @@
+//! How well a policy follows motion clips: from their first frame and from anywhere, in the measures of the field.
+
+use crate::error::RunError;
+use crate::play::Play;
+use crate::setting::{Setting, TaskOptions};
+use marathon_envs::agents::marathon::marathon_man::clips::ClipNames;
+use marathon_envs::options::Value;
+use marathon_envs::{Autoreset, VecEnvOptions, registry};
+use marathon_learn::{EvalOptions, Policy};
+use marathon_motion::{Places, Tracking};
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+use serde::{Deserialize, Serialize};
+
+/// Arguments of tasks that follow clips: where episodes start, and which clips there are.
+const START: &str = "start";
+const CLIP: &str = "clip";
+
+/// Episodes whose pose errors are averaged: those of table 3 of the AMP paper.
+const WARPED: usize = 32;
+
+/// How well a policy follows one clip.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Imitation {
+    /// The clip; empty if the task has no choice.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub clip: String,
+    /// Episodes of each kind of start.
+    pub episodes: u64,
+    /// From the clip's first frame.
+    pub first: Followed,
+    /// From anywhere in the clip.
+    pub random: Followed,
+}
+
+/// Episodes that start alike, up to the longest time or the end of a clip that does not loop.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Followed {
+    /// Episodes that were followed to the end, without a fall and without losing the clip.
+    pub completed: u64,
+    /// Mean length of the episodes, s.
+    pub seconds: f64,
+    /// Mean over the decisions of the mean absolute difference of the joints' angles, rad.
+    pub joint_error: f64,
+    /// Mean distance of joints, hands and feet from where the clip has them, as seen from the pelvis, after dynamic time
+    /// warping: table 3 of the AMP paper (Peng et al., 2021), m. Of the first 32 episodes.
+    pub pose_error: f64,
+    /// Times that the pelvis was upside down and upright again, before a fall: mean over the episodes.
+    pub flips: f64,
+    /// Fewest flips of an episode.
+    pub flips_least: u64,
+    /// Mean way that a part of a sole slides each time that it stands on the ground, m.
+    pub slide: f64,
+}
+
+/// How well a policy follows each clip of its task: with its own options but for the starts. None for tasks that follow no
+/// clip.
+///
+/// # Errors
+/// If the task cannot be made.
+pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
+    let setting = Setting::of(policy.meta());
+    let Ok(agent) = registry::agent(&setting.agent) else { return Ok(Vec::new()) };
+    let known = agent.options();
+    if !agent.facts().follows_clips || known.iter().all(|option| option.name != START) {
+        return Ok(Vec::new());
+    }
+    let clips = match setting.factory()?.spec().options.get(CLIP) {
+        Some(Value::Text(names)) => ClipNames(names.clone()).names().into_iter().map(String::from).collect(),
+        _ => vec![String::new()],
+    };
+    clips.into_iter().map(|clip| of_clip(policy, &setting, clip, options)).collect()
+}
+
+fn of_clip(policy: &Policy, setting: &Setting, clip: String, options: &EvalOptions) -> Result<Imitation, RunError> {
+    let followed = |start: &str| {
+        let mut given = vec![(START.to_string(), Value::Text(start.into()))];
+        if !clip.is_empty() {
+            given.push((CLIP.to_string(), Value::Text(clip.clone())));
+        }
+        follow(policy, &setting.clone().with(&TaskOptions { given })?, options)
+    };
+    let (first, random) = (followed("first")?, followed("random")?);
+    Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
+}
+
+/// One episode each of so many agents.
+fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<Followed, RunError> {
+    let vec_options = VecEnvOptions {
+        agents: options.episodes,
+        seed: options.seed,
+        threads: options.threads,
+        autoreset: Autoreset::Disabled,
+        ..VecEnvOptions::default()
+    };
+    let mut play = Play::of(setting, policy, &vec_options)?;
+    let model = registry::agent(&setting.agent)?.model()?;
+    let tracking = Tracking::new(&model);
+    let dt = policy.meta().control_dt;
+    let mut episodes: Vec<Episode> = (0..options.episodes).map(|_| Episode::default()).collect();
+    while episodes.iter().any(|episode| !episode.over) {
+        play.decide();
+        let step = play.step()?;
+        let ends: Vec<[bool; 2]> =
+            step.terminated.iter().zip(&step.truncated).map(|(fell, over)| [*fell, *over]).collect();
+        for (agent, episode) in episodes.iter_mut().enumerate().filter(|(_, episode)| !episode.over) {
+            let qpos = play.qpos(agent)?;
+            let clip = play.reference(agent)?.unwrap_or_else(|| qpos.clone());
+            episode.angles += joint_error(&model, &qpos, &clip);
+            if agent < WARPED {
+                episode.places.push(tracking.places(&qpos));
+                episode.clip.push(tracking.places(&clip));
+            }
+            episode.frames.push(qpos);
+            let [fell, over] = ends[agent];
+            episode.over = fell || over;
+            episode.completed = over && !fell;
+        }
+    }
+    Ok(summarize(&episodes, &tracking, dt))
+}
+
+/// What one agent has done.
+#[derive(Default)]
+struct Episode {
+    frames: Vec<Vec<f64>>,
+    places: Vec<Places>,
+    clip: Vec<Places>,
+    /// Sum of the decisions' joint errors.
+    angles: f64,
+    over: bool,
+    completed: bool,
+}
+
+fn summarize(episodes: &[Episode], tracking: &Tracking<'_>, dt: f64) -> Followed {
+    let count = episodes.len() as f64;
+    let decisions: usize = episodes.iter().map(|episode| episode.frames.len()).sum();
+    let flips: Vec<usize> = episodes.iter().map(|episode| tracking.flips(&episode.frames)).collect();
+    let slides: Vec<f64> = episodes.iter().flat_map(|episode| tracking.slides(&episode.frames, dt)).collect();
+    let errors: Vec<f64> = episodes.iter().filter_map(|e| tracking.pose_error(&e.places, &e.clip)).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    Followed {
+        completed: episodes.iter().filter(|episode| episode.completed).count() as u64,
+        seconds: decisions as f64 * dt / count,
+        joint_error: episodes.iter().map(|episode| episode.angles).sum::<f64>() / decisions as f64,
+        pose_error: mean(&errors),
+        flips: flips.iter().sum::<usize>() as f64 / count,
+        flips_least: flips.iter().min().copied().unwrap_or(0) as u64,
+        slide: mean(&slides),
+    }
+}
+
+/// Mean absolute difference of two poses' angles, rad.
+fn joint_error(model: &Model, qpos: &[f64], clip: &[f64]) -> f64 {
+    let hinges = model.joints.iter().filter(|joint| joint.kind == JointType::Hinge);
+    let errors: Vec<f64> = hinges.map(|joint| (qpos[joint.qpos_adr] - clip[joint.qpos_adr]).abs()).collect();
+    errors.iter().sum::<f64>() / errors.len().max(1) as f64
+}
+
+impl Imitation {
+    /// As a few lines for a person.
+    pub fn table(&self) -> String {
+        let clip = if self.clip.is_empty() { String::new() } else { format!(" {}", self.clip) };
+        let row = |from: &str, f: &Followed| {
+            let flips = match f.flips > 0.0 {
+                true => format!(", {:.1} flips (at least {})", f.flips, f.flips_least),
+                false => String::new(),
+            };
+            format!(
+                "\n  from {from:13} {} of {} completed, {:.1} s; joints {:.3} rad off, pose {:.3} m, soles slide {:.1} cm{flips}",
+                f.completed,
+                self.episodes,
+                f.seconds,
+                f.joint_error,
+                f.pose_error,
+                1e2 * f.slide
+            )
+        };
+        format!("the clip{clip}:{}{}", row("its beginning", &self.first), row("anywhere", &self.random))
+    }
+}
