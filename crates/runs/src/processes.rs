@@ -200,7 +200,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_process_that_does_not_leave_is_ended() {
-        for program in ["yes", "trap '' PIPE TERM; while true; do echo y; done 2> /dev/null", "sleep 1000"] {
+        for program in ["yes", "trap '' PIPE TERM; while true; do echo y; done 2> /dev/null", "exec sleep 1000"] {
             let mut workers = Vec::new();
             for _ in 0..2 {
                 workers.push(Worker::start(Command::new("sh").args(["-c", program])).unwrap());
