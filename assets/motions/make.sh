@@ -12,11 +12,13 @@ source="DeepMimic (Peng et al., 2018), from pybullet 3.2.7; retargeted by Marath
 
 make() { # character, clip, file, further options
   "$marathon" motion import "$from/$3.txt" --model "../agents/$1.xml" --out "$1/$2.motion" \
-    --source "$source" --license Zlib "${@:4}"
+    --source "$source" --license Zlib --smooth "${smooth:-0.03}" "${@:4}"
 }
-for clip in walk run backflip cartwheel roll spin jump crawl kick punch getup_faceup; do
+for clip in walk backflip cartwheel roll spin jump crawl kick punch getup_faceup; do
   make marathon_man "$clip" "humanoid3d_$clip"
 done
+# the recording's halves are mirror images, with a seam between them
+smooth=0.05 make marathon_man run humanoid3d_run
 make marathon_man spinkick humanoid3d_spinkick --loop none
 make marathon_man dance humanoid3d_dance_b
 # in the first quarter of a second the arms are where no arm can be
@@ -26,7 +28,6 @@ make marathon_man stand humanoid3d_getup_facedown --trim 2.9 3.03 --loop wrap --
 make marathon_man walk_left walker/turn_left1
 make marathon_man walk_right walker/turn_right1
 for character in humanoid walker2d; do
-  for clip in walk run; do
-    make "$character" "$clip" "humanoid3d_$clip"
-  done
+  make "$character" walk humanoid3d_walk
+  smooth=0.05 make "$character" run humanoid3d_run
 done

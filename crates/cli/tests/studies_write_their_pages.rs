@@ -21,6 +21,30 @@ fn a_page_has_its_command_and_its_files() {
     }
 }
 
+/// A study of clips keeps its runs, and goes on with them.
+#[test]
+fn a_study_of_clips_makes_no_run_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let words =
+        ["study", "style-transfer", "--clips", "walk,kick", "--seeds", "2", "--steps", "4096", "--keep", "kept"];
+    let study = || succeed(folder.path(), &[&words[..], &["--out", "pages"]].concat());
+    let page = study();
+    assert!(
+        page.contains("marathon study style-transfer --seeds 2 --steps 4096 --threads 1 --clips walk,kick"),
+        "{page}"
+    );
+    let rows = std::fs::read_to_string(folder.path().join("pages/style-transfer.csv")).unwrap();
+    let lines: Vec<&str> = rows.lines().skip(1).collect();
+    assert!(lines.len() == 2 && lines[0].starts_with("walk,") && lines[1].starts_with("kick,"), "{rows}");
+    assert!(lines.iter().all(|line| line.contains("(4,096, 4,096)")), "both seeds are told: {rows}");
+    let policy = folder.path().join("kept/MarathonManKick-v0-2/policy.safetensors");
+    let made = std::fs::metadata(&policy).unwrap().modified().unwrap();
+    assert_eq!(study(), page);
+    assert_eq!(std::fs::metadata(&policy).unwrap().modified().unwrap(), made);
+    let error = fail(folder.path(), 2, &["study", "style-transfer", "--clips", "wlak"]);
+    assert!(error.contains("did you mean 'walk'?"), "{error}");
+}
+
 #[test]
 fn json_is_all_that_is_printed_if_it_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();

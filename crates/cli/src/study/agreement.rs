@@ -28,7 +28,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         let mut config = config::parse(Path::new(&format!("{name}.yaml")), file, AGENT)?.config;
         // the buffer is that of all agents
         config.run.horizon = (config.run.rollout_steps() as usize).div_ceil(AGENTS);
-        (config.run.agents, config.run.total_steps, config.run.threads) = (AGENTS, options.steps, options.threads);
+        (config.run.agents, config.run.total_steps, config.run.threads) = (AGENTS, options.steps(), options.threads);
         let keep = options.keep_for(name);
         let (mut theirs, mut ours) = (Vec::new(), Vec::new());
         for seed in 1..=options.seeds {
@@ -41,7 +41,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         }
         rows.push(row(name, "mean", &theirs, &ours));
         for (trainer, runs) in [("mlagents-learn", &theirs), ("marathon train", &ours)] {
-            lines.push((format!("{trainer}, {name}"), mean_curve(runs, options.steps)));
+            lines.push((format!("{trainer}, {name}"), mean_curve(runs, options.steps())));
         }
     }
     Ok(Record {

@@ -31,7 +31,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             if let Algorithm::Ppo(ppo) = &mut c.algorithm {
                 ppo.minibatches = agents * horizon / MINIBATCH;
             }
-            c.run.total_steps = options.steps;
+            c.run.total_steps = options.steps();
             c.run.threads = options.threads;
         });
         let runs = each_seed(options.seeds, |seed| {
@@ -46,7 +46,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             plus_minus(spread(runs.iter().map(|r| r.eval.return_mean)), 0),
             plus_minus(spread(runs.iter().map(|r| r.eval.speed_mean)), 2),
         ]);
-        lines.push((format!("{agents} agents"), mean_curve(&runs, options.steps)));
+        lines.push((format!("{agents} agents"), mean_curve(&runs, options.steps())));
     }
     Ok(Record {
         name: "concurrency",

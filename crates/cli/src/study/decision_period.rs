@@ -41,7 +41,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     }
 
     let base = config::default_for(AGENT).config.with(|c| {
-        c.run.total_steps = options.steps;
+        c.run.total_steps = options.steps();
         c.run.threads = options.threads;
     });
     let own = registry::factory(AGENT, isa)?.spec().frame_skip;

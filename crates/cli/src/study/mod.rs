@@ -8,6 +8,7 @@ mod headless;
 mod multi_env;
 mod peers;
 mod record;
+mod style_transfer;
 mod table1;
 mod table2;
 mod table3;
@@ -55,6 +56,15 @@ pub enum What {
     Headless(Options),
     /// One agent, many agents in one process, threads, several processes.
     MultiEnv(Options),
+    /// Figure 3 of the paper: walk, run, backflip and others learned from motion clips. Keeps its runs in
+    /// runs/style-transfer, unless --keep names another folder.
+    StyleTransfer {
+        #[command(flatten)]
+        options: Options,
+        /// Clips to learn, with commas between them [default: all].
+        #[arg(long, value_name = "CLIPS", value_delimiter = ',')]
+        clips: Vec<String>,
+    },
 }
 
 /// What all studies have.
@@ -63,22 +73,28 @@ pub struct Options {
     /// Seeds of each row.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// Agent-steps of each run; in table1, of an agent with a network of the paper's usual size.
-    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
-    pub steps: u64,
+    /// Agent-steps of each run [default: 1,000,000; in style-transfer what the configuration says]; in table1, of an agent
+    /// with a network of the paper's usual size.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub steps: Option<u64>,
     /// Threads; 0 means one per processor.
     #[arg(long, value_name = "T", default_value_t = 1)]
     pub threads: usize,
     /// Folder that the three files go to.
     #[arg(long, value_name = "DIR", default_value = "docs/studies")]
     pub out: PathBuf,
-    /// Folder that keeps runs of other people's trainers: one that is found there is not made again, so that a study that
-    /// was interrupted goes on.
+    /// Folder that keeps runs, of other people's trainers or, in style-transfer, of all: one that is found there is not made
+    /// again, so that a study that was interrupted goes on.
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
 }
 
 impl Options {
+    /// Agent-steps of each run.
+    fn steps(&self) -> u64 {
+        self.steps.unwrap_or(1_000_000)
+    }
+
     /// A folder in that one, for the runs with one configuration.
     fn keep_for(&self, configuration: &str) -> Option<PathBuf> {
         self.keep.as_ref().map(|folder| folder.join(configuration))
@@ -115,6 +131,7 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::DecisionPeriod(options) => (decision_period::run(options)?, options),
         What::Headless(options) => (headless::run(options)?, options),
         What::MultiEnv(options) => (multi_env::run(options)?, options),
+        What::StyleTransfer { options, clips } => (style_transfer::run(options, clips)?, options),
     };
     let page = record.save(options)?;
     if json {

@@ -41,12 +41,12 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
 
     let factory = registry::factory(AGENT, Isa::best())?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let base = config::default_for(AGENT).config.with(|c| c.run.total_steps = options.steps);
+    let base = config::default_for(AGENT).config.with(|c| c.run.total_steps = options.steps());
     // the same rollouts of one agent, and as long a time
     let solo = base.clone().with(|c| {
         c.run.agents = 1;
         c.run.horizon *= base.run.agents;
-        c.run.total_steps = options.steps / BLOCK as u64;
+        c.run.total_steps = options.steps() / BLOCK as u64;
     });
     let ways = [
         ("solo".to_string(), &solo, 1, 0),

@@ -171,9 +171,10 @@ impl Record {
         for row in &self.rows {
             text += &line(row.iter().map(String::as_str).collect());
         }
-        let Options { seeds, steps, threads, .. } = options;
+        let Options { seeds, threads, .. } = options;
+        let steps = options.steps.map_or(String::new(), |steps| format!(" --steps {steps}"));
         text += &format!(
-            "\n![{}]({}.png)\n\n```sh\nmarathon study {} --seeds {seeds} --steps {steps} --threads {threads}{}\n```\n\n\
+            "\n![{}]({}.png)\n\n```sh\nmarathon study {} --seeds {seeds}{steps} --threads {threads}{}\n```\n\n\
              Marathon {}, {}, {} thread{}, instruction set {}{}. Seconds are processor time of all threads unless said \
              otherwise.\n",
             self.title,

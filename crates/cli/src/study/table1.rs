@@ -29,7 +29,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
     for (agent, paper) in AGENTS {
         let mut config = config::parse(Path::new("paper-appendix-b.yaml"), PAPER, agent)?.config;
         let least = 2 * config.run.rollout_steps();
-        let steps = if agent.starts_with("Humanoid") { options.steps / HUMANOID } else { options.steps };
+        let steps = if agent.starts_with("Humanoid") { options.steps() / HUMANOID } else { options.steps() };
         config.run.total_steps = steps.max(least);
         config.run.threads = options.threads;
         let runs = each_seed(options.seeds, |seed| {

@@ -23,7 +23,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     let cpu = |runs: &[Run]| plus_minus(spread(runs.iter().map(|r| r.cpu)), 1);
     for (algorithm, on_cpu, on_gpu) in ALGORITHMS {
         let mut config = if algorithm == Sb3::Ppo { ppo2() } else { TrainConfig::a2c() };
-        (config.run.total_steps, config.run.threads) = (options.steps, options.threads);
+        (config.run.total_steps, config.run.threads) = (options.steps(), options.threads);
         let ours = each_seed(options.seeds, |seed| {
             config.run.seed = seed;
             train_one(AGENT, &config)
@@ -31,7 +31,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         let mut theirs = |device| {
             each_seed(options.seeds, |seed| {
                 let (run, version) =
-                    peers::sb3((AGENT, algorithm), (device, 0.0), (seed, options.steps), options.keep.as_deref())?;
+                    peers::sb3((AGENT, algorithm), (device, 0.0), (seed, options.steps()), options.keep.as_deref())?;
                 versions = vec![version];
                 Ok(run)
             })

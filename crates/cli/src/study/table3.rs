@@ -91,10 +91,10 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
             plus_minus(spread(runs.iter().map(|r| r.eval.length_mean)), 0),
             paper.to_string(),
         ]);
-        lines.push((name.to_string(), mean_curve(runs, options.steps)));
+        lines.push((name.to_string(), mean_curve(runs, options.steps())));
     };
     for (name, paper, mut config) in cases()? {
-        (config.run.total_steps, config.run.threads) = (options.steps, options.threads);
+        (config.run.total_steps, config.run.threads) = (options.steps(), options.threads);
         let runs = each_seed(options.seeds, |seed| {
             config.run.seed = seed;
             train_one(AGENT, &config)
@@ -109,7 +109,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
             run
         };
         let mut config = supplement_c()?;
-        config.run.total_steps = options.steps;
+        config.run.total_steps = options.steps();
         let keep = options.keep_for("paper-appendix-c");
         let runs = each_seed(peers.peer_seeds, |seed| {
             config.run.seed = seed;
@@ -119,7 +119,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         let keep = options.keep.as_deref();
         for (algorithm, paper) in [(Sb3::Ppo, "475 s, 700"), (Sb3::A2c, "291 s, none")] {
             let runs = each_seed(peers.peer_seeds, |seed| {
-                Ok(note(peers::sb3((AGENT, algorithm), ("cpu", 0.0), (seed, options.steps), keep)?))
+                Ok(note(peers::sb3((AGENT, algorithm), ("cpu", 0.0), (seed, options.steps()), keep)?))
             })?;
             add(&format!("Stable-Baselines3's {}, settings of Baselines", algorithm.name()), paper, &runs);
         }

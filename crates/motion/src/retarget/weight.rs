@@ -1,8 +1,8 @@
 //! The center of mass, which only gravity and the ground can accelerate.
 //!
 //! Recordings break this law, and retargeting does: a foot that is put where it belongs shifts the whole figure, and a flight
-//! at the proportions of another person is too high for its time. A figure with motors cannot follow that. In the air the center of mass is to fall; on the ground, which only pushes, it may be accelerated within a
-//! cone of friction.
+//! at the proportions of another person is too high for its time. A figure with motors cannot follow that. In the air the
+//! center of mass is to fall; on the ground, which only pushes, it may be accelerated within a cone of friction.
 
 use super::problem::{Problem, Row, Sink};
 use crate::contact::clearance;
@@ -11,8 +11,10 @@ use crate::kinematics::Pose;
 use glam::DVec3;
 use marathon_physics::Model;
 
-/// Of the difference from gravity in the air, and of what the ground cannot do, s^2/m.
+/// Of what the ground cannot do, s^2/m.
 const LAW: f64 = 0.03;
+/// Of the difference from gravity in the air, s^2/m: a flight is as high as its time asks for, or nobody lands in step.
+const FALL: f64 = 0.12;
 /// Of accelerations on the ground, s^2/m: people move smoothly.
 const EFFORT: f64 = 0.001;
 /// Gravity, m/s^2.
@@ -47,7 +49,7 @@ impl Problem<'_> {
         if self.airborne.is_empty() || factor == 0.0 {
             return;
         }
-        let (law, effort) = (factor * LAW, factor * EFFORT);
+        let [law, fall, effort] = [LAW, FALL, EFFORT].map(|weight| factor * weight);
         let centers: Vec<_> = poses.iter().map(|pose| center(model, pose)).collect();
         let rate = 1.0 / (self.dt * self.dt);
         for i in 1..poses.len().saturating_sub(1) {
@@ -68,7 +70,7 @@ impl Problem<'_> {
                 sink(if even { Row::Even(residual, &by) } else { Row::Bound(residual, &by) });
             };
             if self.airborne[i] {
-                [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(law, axis, true));
+                [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(fall, axis, true));
                 continue;
             }
             [DVec3::X, DVec3::Y].into_iter().for_each(|axis| row(effort, axis, true));

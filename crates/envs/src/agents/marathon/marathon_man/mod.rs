@@ -43,7 +43,7 @@ const FRAME_SKIP: usize = 5;
 /// 20 seconds.
 const MAX_EPISODE_STEPS: usize = 800;
 /// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
-const LYING: f64 = 0.15;
+const LYING: f64 = 0.16;
 /// How far ahead later frames of the clip are, decisions, and what their observations are called.
 const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
 /// Numbers of such a frame.

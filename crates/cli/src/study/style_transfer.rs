@@ -1,0 +1,277 @@
+//! Style transfer: Marathon Man learns each motion clip, with the configuration that comes with him.
+
+use super::Options;
+use super::record::Record;
+use crate::error::CliError;
+use crate::interrupt;
+use marathon_config::{Loaded, default_for};
+use marathon_envs::{nearest, registry};
+use marathon_learn::{Control, EvalOptions, IterationStats};
+use marathon_physics::lanes::Isa;
+use marathon_runs::report::chart::Chart;
+use marathon_runs::report::csv::History;
+use marathon_runs::text::thousands;
+use marathon_runs::{
+    Imitation, LearnOptions, PolicySource, RunError, RunFolder, RunOptions, Session, Summary, Task, TaskOptions,
+    imitation,
+};
+use std::path::{Path, PathBuf};
+
+/// Folder that keeps the runs unless another is named.
+const KEEP: &str = "runs/style-transfer";
+/// Episodes by which a policy on the way is judged.
+const EPISODES: usize = 16;
+/// Most lines that can be told apart in a picture.
+const LINES: usize = 8;
+
+/// A clip and the task that has it.
+struct Job {
+    clip: String,
+    task: String,
+    /// Of the clip, seconds.
+    duration: f64,
+    /// Most that an episode from the clip's beginning can have, seconds.
+    longest: f64,
+}
+
+/// What a finished run has found.
+struct Found {
+    summary: Summary,
+    imitation: Imitation,
+    /// Agent-steps, processor seconds, and share of the longest time that is followed from the clip's beginning.
+    curve: Vec<[f64; 3]>,
+}
+
+/// Trains and measures.
+///
+/// # Errors
+/// If a clip is unknown, or a run cannot be trained or read.
+pub fn run(options: &Options, clips: &[String]) -> Result<Record, CliError> {
+    let jobs = jobs(clips)?;
+    interrupt::install("finishing this iteration; the same command goes on from there")?;
+    let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
+    let (mut rows, mut lines) = (Vec::new(), Vec::new());
+    for job in &jobs {
+        let mut found = Vec::new();
+        for seed in 1..=options.seeds {
+            let folder = keep.join(format!("{}-{seed}", job.task));
+            train(job, seed, &folder, options)?;
+            found.push(measured(job, &folder)?);
+        }
+        rows.push(row(job, &found));
+        lines.push((job.clip.clone(), middle(&found)));
+    }
+    lines.truncate(LINES);
+    let words = match clips {
+        [] => String::new(),
+        clips => format!(" --clips {}", clips.join(",")),
+    };
+    Ok(Record {
+        name: "style-transfer",
+        title: "Style transfer",
+        about: about(),
+        columns: vec![
+            "clip",
+            "decisions",
+            "processor seconds",
+            "of 100 from the beginning",
+            "of 100 from anywhere",
+            "joint error, rad",
+            "pose error, m",
+            "flips in a row (fewest)",
+            "slide, cm",
+            "once through: decisions",
+            "once through: processor seconds",
+        ],
+        rows,
+        words,
+        versions: Vec::new(),
+        chart: Chart::Lines("share of the longest time that is followed from the clip's beginning", lines),
+    })
+}
+
+fn about() -> String {
+    format!(
+        "Marathon Man learns each clip by PPO with the configuration that comes with him, `marathon_man-fast.yaml`. Each run \
+         has one seed; the table has medians over the seeds, and each seed's number in brackets if there are several. The \
+         policy's best actions are judged over 100 episodes from the clip's first frame and 100 from random ones, each up to \
+         20 s or to the end of a clip that does not loop. An episode is completed if nobody falls and the parts stay within \
+         0.5 m of the clip in the mean. Joint errors, pose errors and slides are those of episodes from the beginning; \
+         the pose error is that of table 3 of the AMP paper (Peng et al., 2021), with dynamic time warping. *Once through* is \
+         the first policy kept on the way that follows the whole clip, or one cycle of it, in the mean of {EPISODES} episodes \
+         from the beginning.\n\n\
+         The paper (Booth and Booth, 2019, section 4.1 and figure 3) trained its backflip for 50 to 128 million steps, 25 hours \
+         on six cores, and its walk and run likewise for each clip by itself. DeepMimic (Peng et al., 2018) took 60 million \
+         samples for a backflip; its pose error is 0.076 m in table 3 of the AMP paper."
+    )
+}
+
+/// The tasks of the clips that are asked for, of all without any.
+fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
+    let mut all = Vec::new();
+    for id in registry::ids() {
+        let agent = registry::agent(&id)?;
+        let (facts, options) = (agent.facts(), agent.options());
+        let own = facts.follows_clips && facts.clips.len() == 1 && options.iter().all(|option| option.name != "clip");
+        if let Some(clip) = facts.clips.first().filter(|_| own) {
+            let limit = facts.max_episode_steps as f64 * registry::factory(&id, Isa::best())?.spec().dt;
+            let duration = clip.duration();
+            let longest = if clip.cycle().is_some() { limit } else { limit.min(duration) };
+            all.push(Job { clip: clip.about().name.clone(), task: id, duration, longest });
+        }
+    }
+    for clip in clips {
+        let known = || all.iter().map(|job| job.clip.as_str());
+        if known().all(|name| name != clip) {
+            let near = nearest(clip, known()).map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
+            let known: Vec<&str> = known().collect();
+            return Err(CliError::Usage(format!(
+                "--clips: found '{clip}', expected some of {}{near}",
+                known.join(", ")
+            )));
+        }
+    }
+    all.retain(|job| clips.is_empty() || clips.contains(&job.clip));
+    Ok(all)
+}
+
+/// Makes the run that is to be in a folder, or what is missing of it.
+fn train(job: &Job, seed: u64, folder: &Path, options: &Options) -> Result<(), CliError> {
+    let mut run = RunOptions::default();
+    let opened = if folder.join("run.json").exists() {
+        run.resume = Some(folder.into());
+        run.learn.steps = options.steps;
+        Session::open(None, &run, None, false)
+    } else {
+        run.out = Some(folder.into());
+        run.learn =
+            LearnOptions { steps: options.steps, seed: Some(seed), threads: Some(options.threads), ..run.learn };
+        // each is looked at afterwards
+        let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&job.task) };
+        Session::open(Some(Task::named(&job.task)?), &run, Some(loaded), false)
+    };
+    let session = match opened {
+        Ok((session, _)) => session,
+        Err(RunError::Complete { .. }) => return Ok(()),
+        Err(error) => return Err(error.into()),
+    };
+    let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
+    let outcome = session.carry_out(true, &mut { stop })?;
+    match outcome.evaluation {
+        Some(_) => Ok(()),
+        None => Err(CliError::Interrupted("what is done is kept; the same command goes on from there".into())),
+    }
+}
+
+/// Reads a finished run, and judges the policies that it has left on the way.
+fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
+    let (folder, _) = RunFolder::open(path)?;
+    let file = folder.summary();
+    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
+    let summary: Summary =
+        serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))?;
+    let Some(imitation) = summary.imitation.first().cloned() else {
+        return Err(CliError::file(&file, "imitation", "nothing", "what a finished run tells of its clip"));
+    };
+    let history = History::read(&folder.progress())?;
+    let column = |name: &str| history.column(name).into_iter().map(|cell| cell.unwrap_or(0.0));
+    let clock: Vec<(f64, f64)> = column("steps").zip(column("cpu_seconds")).collect();
+    let mut policies: Vec<(u64, PathBuf)> = vec![(summary.steps, folder.policy())];
+    let kept = folder.policies();
+    // a short run has left none on the way
+    for entry in std::fs::read_dir(&kept).into_iter().flatten() {
+        let path = entry.map_err(CliError::io(&kept, "read"))?.path();
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        policies.extend(name.rsplit('-').next().and_then(|steps| steps.parse().ok()).map(|steps| (steps, path)));
+    }
+    policies.sort();
+    policies.dedup_by_key(|(steps, _)| *steps);
+    let judge = EvalOptions { episodes: EPISODES, ..EvalOptions::default() };
+    let mut curve = Vec::new();
+    for (steps, policy) in policies {
+        let (policy, _) = PolicySource { policy, agent: None, task: TaskOptions::default() }.load()?;
+        let seconds = clock.iter().rfind(|(done, _)| *done <= steps as f64).map_or(0.0, |(_, seconds)| *seconds);
+        let followed = imitation::measure(&policy, &judge)?;
+        curve.extend(followed.first().map(|clip| [steps as f64, seconds, clip.first.seconds / job.longest]));
+    }
+    Ok(Found { summary, imitation, curve })
+}
+
+/// The middle one of some numbers.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);
+    Some((values[low] + values[high]) / 2.0)
+}
+
+/// A line of the table.
+fn row(job: &Job, found: &[Found]) -> Vec<String> {
+    let cell = |text: &dyn Fn(f64) -> String, of: &dyn Fn(&Found) -> Option<f64>| {
+        let values: Vec<Option<f64>> = found.iter().map(of).collect();
+        let known: Vec<f64> = values.iter().flatten().copied().collect();
+        // what some seeds never reach has no median
+        let middle = if known.len() == values.len() { median(known) } else { None };
+        let middle = middle.map_or("-".into(), text);
+        let each: Vec<String> = values.iter().map(|value| value.map_or("-".into(), text)).collect();
+        if each.len() > 1 { format!("{middle} ({})", each.join(", ")) } else { middle }
+    };
+    let whole = |x: f64| thousands(x.round() as u64);
+    let once = |found: &Found, i: usize| {
+        let share = job.duration / job.longest;
+        // the last decision of a clip that ends is no longer shown
+        found.curve.iter().find(|point| point[2] >= 0.98 * share).map(|point| point[i])
+    };
+    vec![
+        job.clip.clone(),
+        cell(&whole, &|f| Some(f.summary.steps as f64)),
+        cell(&whole, &|f| Some(f.summary.cpu_seconds)),
+        cell(&whole, &|f| Some(f.imitation.first.completed as f64)),
+        cell(&whole, &|f| Some(f.imitation.random.completed as f64)),
+        cell(&|x| format!("{x:.3}"), &|f| Some(f.imitation.first.joint_error)),
+        cell(&|x| format!("{x:.3}"), &|f| Some(f.imitation.first.pose_error)),
+        match found.iter().all(|f| f.imitation.first.flips == 0.0) {
+            true => String::new(),
+            false => {
+                let fewest = found.iter().map(|f| f.imitation.first.flips_least).min().unwrap_or(0);
+                format!("{} ({fewest})", cell(&|x| format!("{x:.1}"), &|f| Some(f.imitation.first.flips)))
+            }
+        },
+        cell(&|x| format!("{:.1}", 1e2 * x), &|f| Some(f.imitation.first.slide)),
+        cell(&whole, &|f| once(f, 0)),
+        cell(&whole, &|f| once(f, 1)),
+    ]
+}
+
+/// The seeds' medians at the places of the first curve.
+fn middle(found: &[Found]) -> Vec<(f64, f64)> {
+    let Some(first) = found.first() else { return Vec::new() };
+    let at = |steps: f64| {
+        let of_run = |f: &Found| f.curve.iter().find(|point| point[0] == steps).map(|point| point[2]);
+        median(found.iter().filter_map(of_run).collect())
+    };
+    first.curve.iter().filter_map(|point| Some((point[0], at(point[0])?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_in_the_middle() {
+        assert_eq!(median(vec![]), None);
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+    }
+
+    #[test]
+    fn every_clip_has_a_task_and_unknown_ones_are_refused() {
+        assert!(jobs(&[]).unwrap().len() >= 16);
+        let some = jobs(&["run".into(), "kick".into()]).unwrap();
+        let names: Vec<&str> = some.iter().map(|job| job.task.as_str()).collect();
+        assert_eq!(names, ["MarathonManKick-v0", "MarathonManRun-v0"]);
+        assert_eq!(some[1].longest, 20.0);
+        assert!(some[0].longest < 3.0 && some[0].longest == some[0].duration);
+        let error = jobs(&["rum".into()]).err().unwrap().to_string();
+        assert!(error.contains("'rum'") && error.contains("did you mean 'run'?"), "{error}");
+    }
+}
