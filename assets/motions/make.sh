@@ -14,15 +14,19 @@ make() { # character, clip, file, further options
   "$marathon" motion import "$from/$3.txt" --model "../agents/$1.xml" --out "$1/$2.motion" \
     --source "$source" --license Zlib --smooth "${smooth:-0.03}" "${@:4}"
 }
-for clip in walk backflip cartwheel roll spin jump crawl kick punch getup_faceup; do
+for clip in walk backflip cartwheel roll spin jump crawl; do
   make marathon_man "$clip" "humanoid3d_$clip"
 done
+for clip in kick punch; do
+  smooth=0 make marathon_man "$clip" "humanoid3d_$clip"
+done
+smooth=0.05 make marathon_man getup_faceup humanoid3d_getup_faceup
 # the recording's halves are mirror images, with a seam between them
 smooth=0.05 make marathon_man run humanoid3d_run
 make marathon_man spinkick humanoid3d_spinkick --loop none
 make marathon_man dance humanoid3d_dance_b
 # in the first quarter of a second the arms are where no arm can be
-make marathon_man getup_facedown humanoid3d_getup_facedown --trim 0.25 3.03
+smooth=0.05 make marathon_man getup_facedown humanoid3d_getup_facedown --trim 0.25 3.03
 # the end of getting up: he stands
 make marathon_man stand humanoid3d_getup_facedown --trim 2.9 3.03 --loop wrap --forward
 make marathon_man walk_left walker/turn_left1
