@@ -1,8 +1,8 @@
-"""Plays Marathon Man in MuJoCo beside a motion clip and computes observations, rewards and terminations in plain Python.
+"""Plays Marathon Man, or another figure, in MuJoCo beside a motion clip and computes observations, rewards and terminations in plain Python.
 
-Written from docs/environments/marathon-man.md, not from the Rust code. Reads one JSON object from stdin:
+Written from docs/environments/marathon-man.md and in-style.md, not from the Rust code. Reads one JSON object from stdin:
 
-    {"cases": [{"xml": "...", "frame_skip": 5, "control": "pd", "reach": 0.5, "reward": "deepmimic", "distance": 0.5,
+    {"cases": [{"figure": "marathon_man", "xml": "...", "frame_skip": 5, "control": "pd", "reach": 0.5, "reward": "deepmimic", "distance": 0.5,
                 "episodes": [{"qpos": [...], "qvel": [...], "actions": [[...], ...],
                               "clip": [{"qpos": [...], "qvel": [...], "phase": 0.1, "facing": 0.0}, ...]}, ...]}, ...]}
 
@@ -17,25 +17,60 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-PARTS = [
-    "butt", "lower_waist", "torso", "upper_waist", "head", "right_thigh", "right_shin", "right_right_foot", "left_thigh",
-    "left_shin", "left_left_foot", "right_upper_arm", "right_larm", "right_hand", "left_upper_arm", "left_larm", "left_hand",
-]  # fmt: skip
-FEET_AND_HANDS = ["right_right_foot", "left_left_foot", "right_hand", "left_hand"]
-TRUNK = ["torso", "head", "butt", "lower_waist", "upper_waist"]
 WEIGHTS = {"abdomen": 0.5, "hip": 0.5, "knee": 0.3, "ankle": 0.2, "shoulder": 0.3, "elbow": 0.2}
+# DeepMimic's weights of hip, knee, ankle, shoulder and elbow
+LEG, ARM = 0.5 + 0.3 + 0.2, 0.3 + 0.2
+UPPER = ["torso", "head", "butt", "lower_waist", "upper_waist"]
+FIGURES = {
+    "marathon_man": {
+        "root": "butt",
+        "parts": [
+            *UPPER, "right_thigh", "right_shin", "right_right_foot", "left_thigh", "left_shin", "left_left_foot",
+            "right_upper_arm", "right_larm", "right_hand", "left_upper_arm", "left_larm", "left_hand",
+        ],
+        "ends": ["right_right_foot", "left_left_foot", "right_hand", "left_hand"],
+        "trunk": UPPER,
+        "touch": None,
+        "qpos": 7,
+        "qvel": 6,
+        "total": 1 + 0.5 + 2 * (LEG + ARM),
+    },
+    "humanoid": {
+        "root": "butt",
+        "parts": [
+            *UPPER, "right_thigh", "right_shin", "right_right_foot", "left_thigh", "left_shin", "left_left_foot",
+            "right_larm", "right_hand", "left_larm", "left_hand",
+        ],
+        "ends": ["right_right_foot", "left_left_foot", "right_hand", "left_hand"],
+        "trunk": UPPER,
+        "touch": ["left_left_foot", "right_left_foot", "right_right_foot", "left_right_foot"],
+        "qpos": 7,
+        "qvel": 6,
+        "total": 1 + 0.5 + 2 * (LEG + ARM),
+    },
+    "walker2d": {
+        "root": "torso",
+        "parts": ["torso", "right_thigh", "right_leg", "right_foot", "left_thigh", "left_leg", "left_foot"],
+        "ends": ["right_foot", "left_foot"],
+        "trunk": ["torso"],
+        "touch": ["left_foot", "right_foot"],
+        "qpos": 3,
+        "qvel": 3,
+        "total": 1 + 2 * LEG,
+    },
+}  # fmt: skip
 
 
 class Figure:
     """A pose with its velocities."""
 
-    def __init__(self, model, qpos, qvel):
+    def __init__(self, model, figure, qpos, qvel):
         self.m, self.d = model, mujoco.MjData(model)
         self.d.qpos[:], self.d.qvel[:] = qpos, qvel
         mujoco.mj_fwdPosition(model, self.d)
         mujoco.mj_fwdVelocity(model, self.d)
         mujoco.mj_subtreeVel(model, self.d)
-        self.q, self.v = self.d.qpos[7:], self.d.qvel[6:]
+        self.q, self.v = self.d.qpos[figure["qpos"] :], self.d.qvel[figure["qvel"] :]
         self.com, self.com_velocity = self.d.subtree_com[1], self.d.subtree_linvel[1]
 
     def at(self, part):
@@ -61,9 +96,12 @@ def angle(a, b):
 
 
 def play(case, model, episode):
+    figure = FIGURES[case["figure"]]
+    root, parts, hinges = figure["root"], figure["parts"], range(model.njnt)[-model.nu :]
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = episode["qpos"], episode["qvel"]
-    clip = [Figure(model, row["qpos"], row["qvel"]) for row in episode["clip"]]
+    spawn = Figure(model, figure, model.key_qpos[0] if model.nkey else model.qpos0, np.zeros(model.nv))
+    clip = [Figure(model, figure, row["qpos"], row["qvel"]) for row in episode["clip"]]
     joint_of = [model.joint(model.actuator_trnid[i, 0]) for i in range(model.nu)]
     decisions = []
     for t, action in enumerate(episode["actions"]):
@@ -78,31 +116,35 @@ def play(case, model, episode):
             mujoco.mj_step(model, data)
             for c in data.contact:
                 pair = {model.geom(c.geom1).name, model.geom(c.geom2).name}
-                fallen |= "floor" in pair and bool(pair & set(TRUNK))
-        felt = data.sensordata > 0
-        me, row = Figure(model, data.qpos, data.qvel), episode["clip"][t + 1]
+                fallen |= "floor" in pair and bool(pair & set(figure["trunk"]))
+        # the paper's figures have sensors that see contacts, Marathon Man's feel forces
+        down = {model.geom(max(c.geom1, c.geom2)).name for c in data.contact}
+        felt = np.array([name in down for name in figure["touch"]]) if figure["touch"] else data.sensordata > 0
+        me, row = Figure(model, figure, data.qpos, data.qvel), episode["clip"][t + 1]
         now, after = clip[t + 1], clip[t + 2]
         level = Rotation.from_euler("z", -row["facing"])
-        spin, speed = me.velocity("butt")
+        spin, speed = me.velocity(root)
         turn = 2 * np.pi * row["phase"]
-        obs = [np.sin(turn), np.cos(turn), np.sin(2 * turn), np.cos(2 * turn), me.at("butt")[2]]
-        for v in [me.axes("butt")[:, 0], me.axes("butt")[:, 2], speed, spin]:
+        obs = [np.sin(turn), np.cos(turn), np.sin(2 * turn), np.cos(2 * turn), me.at(root)[2]]
+        # what points forward and up where the figure spawns
+        forward, _, up = (me.axes(root) @ spawn.axes(root).T).T
+        for v in [forward, up, speed, spin]:
             obs += list(level.apply(v))
-        obs += [*me.q, *me.v, *felt.astype(float), *level.apply(now.at("butt") - me.at("butt")), *(after.q - me.q)]
+        obs += [*me.q, *me.v, *felt.astype(float), *level.apply(now.at(root) - me.at(root)), *(after.q - me.q)]
         for ahead in case["future"]:
             later = clip[t + 1 + ahead]
-            axes = later.axes("butt")
-            obs += [*level.apply(later.at("butt") - me.at("butt")), *level.apply(axes[:, 0]), *level.apply(axes[:, 2])]
+            axes = later.axes(root)
+            obs += [*level.apply(later.at(root) - me.at(root)), *level.apply(axes[:, 0]), *level.apply(axes[:, 2])]
             obs += [*(later.q - me.q)]
 
-        gap = me.at("butt") - now.at("butt")
-        apart = {p: me.at(p) - now.at(p) for p in PARTS}
+        gap = me.at(root) - now.at(root)
+        apart = {p: me.at(p) - now.at(p) for p in parts}
         if case["reward"] == "deepmimic":
-            weights = np.array([next(w for k, w in WEIGHTS.items() if k in model.joint(j + 1).name) for j in range(21)])
-            total = 1 + 0.5 + 2 * (0.5 + 0.3 + 0.2 + 0.3 + 0.2)
-            clip_spin, clip_speed = now.velocity("butt")
-            turned, slip, spun = angle(me.axes("butt"), now.axes("butt")), speed - clip_speed, spin - clip_spin
-            ends = [apart[p] - np.array([gap[0], gap[1], 0]) for p in FEET_AND_HANDS]
+            names, total = [model.joint(j).name for j in hinges], figure["total"]
+            weights = np.array([next(w for k, w in WEIGHTS.items() if k in name) for name in names])
+            clip_spin, clip_speed = now.velocity(root)
+            turned, slip, spun = angle(me.axes(root), now.axes(root)), speed - clip_speed, spin - clip_spin
+            ends = [apart[p] - np.array([gap[0], gap[1], 0]) for p in figure["ends"]]
             drift = me.com_velocity - now.com_velocity
             errors = [
                 (turned**2 + weights @ (me.q - now.q) ** 2) / total,
@@ -115,10 +157,10 @@ def play(case, model, episode):
             terms = [w * np.exp(-k * e) for (w, k), e in zip(scales, errors)]
             far = np.mean([np.linalg.norm(x) for x in apart.values()]) > case["distance"]
         else:
-            ends = [apart[p] - gap for p in [*FEET_AND_HANDS, "torso"]]
+            ends = [apart[p] - gap for p in [*figure["ends"], "torso"]]
             velocity, position = me.com_velocity - now.com_velocity, me.com - now.com
             distances = [
-                sum((angle(me.axes(p), now.axes(p)) / np.pi) ** 2 for p in PARTS),
+                sum((angle(me.axes(p), now.axes(p)) / np.pi) ** 2 for p in parts),
                 velocity @ velocity,
                 sum(e @ e for e in ends),
                 position @ position,

@@ -41,8 +41,11 @@ const MARATHON_MAN: (&str, &str) =
 const MARATHON_MAN_STEER: (&str, &str) =
     ("marathon_man_steer-fast.yaml", include_str!("../../../assets/configs/marathon_man_steer-fast.yaml"));
 
+/// For the paper's Humanoid and Walker in the style of a person.
+const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
+
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 36] = [
+const FAST: [(&str, (&str, &str)); 40] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -79,6 +82,10 @@ const FAST: [(&str, (&str, &str)); 36] = [
     ("MarathonManGetUpFaceDown", MARATHON_MAN),
     ("MarathonManGetUpFaceUp", MARATHON_MAN),
     ("MarathonManSteer", MARATHON_MAN_STEER),
+    ("HumanoidStyleWalk", IN_STYLE),
+    ("HumanoidStyleRun", IN_STYLE),
+    ("Walker2dStyleWalk", IN_STYLE),
+    ("Walker2dStyleRun", IN_STYLE),
 ];
 
 /// What a file says about the training of an agent.

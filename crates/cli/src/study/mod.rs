@@ -61,7 +61,7 @@ pub enum What {
     StyleTransfer {
         #[command(flatten)]
         options: Options,
-        /// Clips to learn, with commas between them [default: all].
+        /// Clips of Marathon Man to learn, or other tasks such as HumanoidStyleRun, with commas between them [default: all].
         #[arg(long, value_name = "CLIPS", value_delimiter = ',')]
         clips: Vec<String>,
     },

@@ -6,6 +6,8 @@
 pub mod ant;
 pub mod hopper;
 pub mod humanoid;
+mod imitation;
+pub mod in_style;
 pub mod marathon_man;
 pub mod walker2d;
 
@@ -26,6 +28,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(ant::AntV1),
     ];
     out.extend(marathon_man::all());
+    out.extend(in_style::all());
     out
 }
 

@@ -2,6 +2,7 @@
 
 use marathon_physics::Model;
 
+use super::super::imitation::Anatomy;
 use crate::agent::options::OptionValue;
 use crate::agent::{Part, Value};
 
@@ -98,6 +99,28 @@ pub const JOINTS: [Joint; 21] = [
     joint("left_shoulder_x", 0.3, 730.0, 180.0, 20.0),
     joint("left_elbow", 0.2, 550.0, 110.0, 40.0),
 ];
+/// What the reward has to know.
+pub const ANATOMY: Anatomy = Anatomy {
+    root: BUTT,
+    parts: PARTS.len(),
+    ends: &END_EFFECTORS,
+    weights: &WEIGHTS,
+    // butt, waist, and twice hip, knee, ankle, shoulder and elbow
+    total: 1.0 + 0.5 + 2.0 * (0.5 + 0.3 + 0.2 + 0.3 + 0.2),
+    qpos: FIRST_QPOS,
+    qvel: FIRST_QVEL,
+};
+
+/// The weights of the table.
+const WEIGHTS: [f64; JOINTS.len()] = {
+    let (mut weights, mut i) = ([0.0; JOINTS.len()], 0);
+    while i < JOINTS.len() {
+        weights[i] = JOINTS[i].weight;
+        i += 1;
+    }
+    weights
+};
+
 /// Damping of a servo for its stiffness, s: DeepMimic's.
 pub const DAMPING_TIME: f64 = 0.1;
 /// Where the hinges begin in `qpos`.

@@ -26,63 +26,28 @@ use std::sync::Arc;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use crate::agent::options::OptionValue;
 use crate::agent::{
-    Agent, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms, Value,
-    names,
+    Agent, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms, names,
 };
 use crate::any_agent::AnyAgent;
 
+pub use super::imitation::StartAt;
+use super::imitation::{self, sub, turned_to};
 pub use body::Control;
-use body::{ACTIONS, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model, parts};
+use body::{ACTIONS, ANATOMY, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model};
 use clips::ClipNames;
 pub use reward::Reward;
 
 /// Physics steps per decision: 200 Hz physics, 40 Hz control.
 const FRAME_SKIP: usize = 5;
+/// Seconds between decisions.
+const DECISION: f64 = 1.0 / 40.0;
 /// 20 seconds.
 const MAX_EPISODE_STEPS: usize = 800;
-/// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
-const LYING: f64 = 0.16;
 /// How far ahead later frames of the clip are, decisions, and what their observations are called.
 const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
 /// Numbers of such a frame.
 const FUTURE_FRAME: usize = 9 + JOINTS.len();
-/// Slot of the memory that counts the episode's decisions.
-const MADE: usize = Following::SLOTS;
-/// Slot of the memory that holds the row where the episode started.
-const BEGUN: usize = MADE + 1;
-/// Decisions of a second.
-const SECOND: usize = 40;
-/// An episode that fails in fewer decisions has failed because of where it started.
-const EARLY: usize = 2 * SECOND;
-
-/// Where an episode starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StartAt {
-    /// At any decision of the clip.
-    Random,
-    /// At its beginning.
-    First,
-    /// Where it fails most: half of the episodes that follow a failure start where that episode did, if it failed early, or
-    /// in the second before it failed; the others start at random.
-    Adaptive,
-}
-
-const STARTS: [(StartAt, &str); 3] =
-    [(StartAt::Random, "random"), (StartAt::First, "first"), (StartAt::Adaptive, "adaptive")];
-
-impl OptionValue for StartAt {
-    const EXPECTED: &'static str = "random, first or adaptive";
-    fn value(&self) -> Value {
-        let known = STARTS.into_iter().find(|(start, _)| start == self);
-        known.map_or("random", |(_, name)| name).into()
-    }
-    fn read(value: &Value) -> Option<Self> {
-        STARTS.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(start, _)| start)
-    }
-}
-
 crate::options! {
     /// Arguments of Marathon Man.
     pub struct Arguments {
@@ -136,24 +101,6 @@ const TASKS: [(&str, &str, &str); 16] = [
     ("MarathonManGetUpFaceUp-v0", "getup_faceup", "a figure of 21 motors: get up, lying on the back"),
 ];
 
-/// Where to start in half of the episodes that follow a failure.
-fn try_again(start: &mut Start) -> Option<usize> {
-    let [row, made, begun] = [Following::ROW, MADE, BEGUN].map(|slot| start.previous[slot] as usize);
-    let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
-    let failed = made > 0 && made < MAX_EPISODE_STEPS && !at_its_end;
-    if !failed || start.random.whole(0, 1) == 0 {
-        return None;
-    }
-    // the lap of a run is shorter than a second: what is before a failure need not be what led to it
-    match made < EARLY {
-        true => Some(begun),
-        false => {
-            let before = start.random.whole(0, SECOND);
-            Some(start.row_before(row, before))
-        }
-    }
-}
-
 /// Marathon Man with any clip, and with each that comes with the crate.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let any = ("MarathonMan-v0", "walk", "a figure of 21 motors: move as a motion clip does");
@@ -175,34 +122,6 @@ fn has_joints(model: &Model) -> Result<(), String> {
     }
 }
 
-impl MarathonMan {
-    /// Mean distance of the parts from where the clip has them, m; from the butt's own place, or in the world.
-    #[inline(always)]
-    fn distance<T: Real>(s: &Senses<T>, from_butt: bool) -> T {
-        let clip = s.reference(0);
-        let mut gap = [T::zero(); 3];
-        if from_butt {
-            gap = sub(s.position(BUTT), clip.position(BUTT));
-        }
-        let mut sum = T::zero();
-        for part in parts() {
-            sum += norm2(sub(sub(s.position(part), clip.position(part)), gap)).sqrt();
-        }
-        sum * T::lit(1.0 / PARTS.len() as f64)
-    }
-
-    /// Lanes in which a part of the trunk touched the ground although the clip does not have it there.
-    #[inline(always)]
-    fn fallen<T: Real>(s: &Senses<T>) -> T::Mask {
-        let (mut fallen, clip) = (T::none(), s.reference(0));
-        for part in TRUNK {
-            let upright = T::lit(LYING).lt(clip.lowest(part));
-            fallen = T::or(fallen, T::and(upright, s.touched_ground(part)));
-        }
-        fallen
-    }
-}
-
 impl Agent for MarathonMan {
     fn facts(&self) -> Facts {
         let Arguments { clip, reward, control, future, .. } = &self.arguments;
@@ -220,7 +139,7 @@ impl Agent for MarathonMan {
             parts: names(PARTS),
             touch_sites: names(TOUCH),
             clips: clip.find(),
-            memory: Following::SLOTS + 2,
+            memory: imitation::MEMORY,
             termination_reward: None,
             ..Facts::default()
         }
@@ -245,18 +164,7 @@ impl Agent for MarathonMan {
     }
 
     fn reset(&self, start: &mut Start) {
-        let again = (self.arguments.start == StartAt::Adaptive).then(|| try_again(start)).flatten();
-        let row = again.unwrap_or_else(|| {
-            let clips: Vec<_> = start.clips().collect();
-            let clip = if clips.len() == 1 { 0 } else { start.random.whole(0, clips.len() - 1) };
-            let rows = clips[clip].clone();
-            match self.arguments.start {
-                StartAt::First => rows.start,
-                _ => start.random.whole(rows.start, rows.end - 1),
-            }
-        });
-        start.start_in_clip(row);
-        start.memory[BEGUN] = row as f64;
+        self.arguments.start.begin(start, DECISION, MAX_EPISODE_STEPS);
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -279,8 +187,7 @@ impl Agent for MarathonMan {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        s.follow(memory);
-        memory[MADE] += T::lit(1.0);
+        imitation::remember(s, memory);
     }
 
     #[inline(always)]
@@ -292,7 +199,7 @@ impl Agent for MarathonMan {
         for x in now.phase_angles() {
             out.scalar(x);
         }
-        observe_body(s, &turned, out);
+        imitation::observe_body(s, &ANATOMY, &turned, out);
         observe_soles(s, out);
         out.group("place_in_clip");
         out.vector(turned(sub(now.position(BUTT), s.position(BUTT))));
@@ -321,10 +228,10 @@ impl Agent for MarathonMan {
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
         let far = match self.arguments.reward {
-            Reward::DeepMimic => T::lit(self.arguments.distance.0).lt(Self::distance(s, false)),
+            Reward::DeepMimic => T::lit(self.arguments.distance.0).lt(imitation::distance(s, &ANATOMY, false)),
             Reward::Paper => reward::too_far(s),
         };
-        T::or(far, Self::fallen(s))
+        T::or(far, imitation::fallen(s, &TRUNK))
     }
 
     #[inline(always)]
@@ -334,43 +241,9 @@ impl Agent for MarathonMan {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        let (clip, r) = (s.reference(0), s.readings());
-        let mut error = T::zero();
-        for i in 0..JOINTS.len() {
-            error += (r.qpos(FIRST_QPOS + i) - clip.qpos(FIRST_QPOS + i)).abs();
-        }
-        out.scalar(error * T::lit(1.0 / JOINTS.len() as f64));
-        out.scalar(Self::distance(s, true));
-        out.scalar(clip.phase());
-    }
-}
-
-/// Puts vectors into axes of which x is a direction along the ground, cosine and sine of its angle, and z is up.
-#[inline(always)]
-fn turned_to<T: Real>([cos, sin]: [T; 2]) -> impl Fn([T; 3]) -> [T; 3] {
-    move |[x, y, z]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z]
-}
-
-/// Where the butt is and how the joints are, with velocities: the parts of an observation that every task of his has.
-#[inline(always)]
-fn observe_body<T: Real>(s: &Senses<T>, turned: &impl Fn([T; 3]) -> [T; 3], out: &mut Obs<T>) {
-    let r = s.readings();
-    out.group("height");
-    out.scalar(s.height(BUTT));
-    out.group("orientation");
-    out.vector(turned(s.forward(BUTT)));
-    out.vector(turned(s.up(BUTT)));
-    out.group("velocity");
-    out.vector(turned(s.linear_velocity(BUTT)));
-    out.group("angular_velocity");
-    out.vector(turned(s.angular_velocity(BUTT)));
-    out.group("joint_positions");
-    for i in 0..JOINTS.len() {
-        out.scalar(r.qpos(FIRST_QPOS + i));
-    }
-    out.group("joint_velocities");
-    for i in 0..JOINTS.len() {
-        out.scalar(r.qvel(FIRST_QVEL + i));
+        out.scalar(imitation::joint_error(s, &ANATOMY));
+        out.scalar(imitation::distance(s, &ANATOMY, true));
+        out.scalar(s.reference(0).phase());
     }
 }
 
@@ -381,15 +254,4 @@ fn observe_soles<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     for i in 0..TOUCH.len() {
         out.scalar(T::masked(T::zero().lt(s.touch_force(i)), T::lit(1.0)));
     }
-}
-
-#[inline(always)]
-fn sub<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// Square of a vector's length.
-#[inline(always)]
-fn norm2<T: Real>([x, y, z]: [T; 3]) -> T {
-    x.mul_add(x, y.mul_add(y, z * z))
 }

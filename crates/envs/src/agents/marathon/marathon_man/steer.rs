@@ -22,9 +22,10 @@ use std::f64::consts::FRAC_PI_2;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::body::{ACTIONS, BUTT, Control, END_EFFECTORS, JOINTS, PARTS, TOUCH, model, parts};
+use super::super::imitation::{observe_body, sub, turned_to};
+use super::body::{ACTIONS, ANATOMY, BUTT, Control, END_EFFECTORS, JOINTS, PARTS, TOUCH, model, parts};
 use super::clips::{self, STAND};
-use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_body, observe_soles, sub, turned_to};
+use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
 use crate::agent::senses::clamp;
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses,
@@ -211,7 +212,7 @@ impl Agent for Steer {
         out.scalar(s.command(1));
         out.scalar(cos.mul_add(y, -(sin * x)));
         out.scalar(cos.mul_add(x, sin * y));
-        observe_body(s, &turned, out);
+        observe_body(s, &ANATOMY, &turned, out);
         out.group("ends");
         for part in END_EFFECTORS {
             out.vector(turned(sub(s.position(part), s.position(BUTT))));

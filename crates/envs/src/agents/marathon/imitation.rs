@@ -1,0 +1,263 @@
+//! What every figure that moves like a clip has in common: where episodes start, DeepMimic's reward, and how far the figure
+//! is from the clip.
+//!
+//! The reward adds `0.5 pose + 0.05 velocity + 0.15 end_effectors + 0.2 root + 0.1 center_of_mass`, each `exp(-scale error)`
+//! with the scales 2, 0.1, 10, 5 and 10 (DeepMimicCore/scenes/SceneImitate.cpp). Errors: sum of the joints' squared angles and
+//! of their squared velocities by DeepMimic's weights; mean squared distance of feet and hands from the root; squared
+//! distance of the root, a tenth of its squared angle, a hundredth of its squared velocity, a thousandth of its squared angular
+//! velocity; a tenth of the squared velocity of the center of mass. A ball joint of DeepMimic's is two or three hinges here,
+//! whose squares add up to that of its angle as long as it is small. The mean over the end effectors is DeepMimic's.
+
+use marathon_physics::lanes::Real;
+
+use crate::agent::options::OptionValue;
+use crate::agent::{Following, Obs, Part, Senses, Start, Terms, Value};
+
+/// Memory of a figure that follows a clip.
+pub(super) const MEMORY: usize = BEGUN + 1;
+/// Slot of the memory that counts the episode's decisions.
+const MADE: usize = Following::SLOTS;
+/// Slot of the memory that holds the row where the episode started.
+const BEGUN: usize = MADE + 1;
+/// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
+const LYING: f64 = 0.16;
+/// An episode that fails in less time has failed because of where it started, s.
+const EARLY: f64 = 2.0;
+/// How long before a later failure episodes start, s.
+const BEFORE: f64 = 1.0;
+
+/// Terms of DeepMimic's reward: name, weight, scale.
+pub(super) const TERMS: [(&str, f64, f64); 5] = [
+    ("pose", 0.5, 2.0),
+    ("velocity", 0.05, 0.1),
+    ("end_effectors", 0.15, 10.0),
+    ("root", 0.2, 5.0),
+    ("center_of_mass", 0.1, 10.0),
+];
+
+/// What a reward has to know of a figure.
+pub(super) struct Anatomy {
+    /// The part from which others are seen.
+    pub root: Part,
+    /// How many parts it has; the first ones that the facts name.
+    pub parts: usize,
+    /// Feet, and hands.
+    pub ends: &'static [Part],
+    /// DeepMimic's weight of each hinge in the order of `qpos`, behind the root's joints.
+    pub weights: &'static [f64],
+    /// What DeepMimic's weights of root and joints add up to, whatever the number of hinges of a joint.
+    pub total: f64,
+    /// Where the hinges begin in `qpos`.
+    pub qpos: usize,
+    /// Where they begin in `qvel`.
+    pub qvel: usize,
+}
+
+/// Where an episode starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartAt {
+    /// At any decision of the clip.
+    Random,
+    /// At its beginning.
+    First,
+    /// Where it fails most: half of the episodes that follow a failure start where that episode did, if it failed early, or
+    /// in the second before it failed. A quarter of the others start at the clip's beginning, where every use of a policy
+    /// starts, the rest at random.
+    Adaptive,
+}
+
+const STARTS: [(StartAt, &str); 3] =
+    [(StartAt::Random, "random"), (StartAt::First, "first"), (StartAt::Adaptive, "adaptive")];
+
+impl OptionValue for StartAt {
+    const EXPECTED: &'static str = "random, first or adaptive";
+    fn value(&self) -> Value {
+        let known = STARTS.into_iter().find(|(start, _)| start == self);
+        known.map_or("random", |(_, name)| name).into()
+    }
+    fn read(value: &Value) -> Option<Self> {
+        STARTS.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(start, _)| start)
+    }
+}
+
+impl StartAt {
+    /// Puts the figure into its clip, or into one of them. `dt`: seconds between decisions. `limit`: decisions after which an
+    /// episode is truncated.
+    pub(super) fn begin(self, start: &mut Start, dt: f64, limit: usize) {
+        let again = (self == StartAt::Adaptive).then(|| try_again(start, dt, limit)).flatten();
+        let row = again.unwrap_or_else(|| {
+            let clips: Vec<_> = start.clips().collect();
+            let clip = if clips.len() == 1 { 0 } else { start.random.whole(0, clips.len() - 1) };
+            let rows = clips[clip].clone();
+            match self {
+                StartAt::First => rows.start,
+                StartAt::Adaptive if start.random.whole(0, 3) == 0 => rows.start,
+                _ => start.random.whole(rows.start, rows.end - 1),
+            }
+        });
+        start.start_in_clip(row);
+        start.memory[BEGUN] = row as f64;
+    }
+}
+
+/// Where to start in half of the episodes that follow a failure.
+fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
+    let [row, made, begun] = [Following::ROW, MADE, BEGUN].map(|slot| start.previous[slot] as usize);
+    let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
+    let failed = made > 0 && made < limit && !at_its_end;
+    if !failed || start.random.whole(0, 1) == 0 {
+        return None;
+    }
+    // the lap of a run is shorter than a second: what is before a failure need not be what led to it
+    match (made as f64) * dt < EARLY {
+        true => Some(begun),
+        false => {
+            let before = start.random.whole(0, (BEFORE / dt).round() as usize);
+            Some(start.row_before(row, before))
+        }
+    }
+}
+
+/// A decision has been made.
+#[inline(always)]
+pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
+    s.follow(memory);
+    memory[MADE] += T::lit(1.0);
+}
+
+/// Adds the terms of DeepMimic's reward.
+#[inline(always)]
+pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, terms: &mut Terms<T>) {
+    for ((name, weight, scale), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
+        terms.add(name, weight, (error * T::lit(-scale)).exp());
+    }
+}
+
+/// The errors of the terms.
+#[inline(always)]
+fn errors<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 5] {
+    let Anatomy { root, ends, weights, total, .. } = *anatomy;
+    let (clip, r) = (s.reference(0), s.readings());
+    let gap = sub(s.position(root), clip.position(root));
+    let spin = sub(s.angular_velocity(root), clip.angular_velocity(root));
+    let turn2 = angle2(s, root);
+    let (mut pose, mut velocity) = (turn2, norm2(spin));
+    for (i, weight) in weights.iter().enumerate() {
+        let q = r.qpos(anatomy.qpos + i) - clip.qpos(anatomy.qpos + i);
+        let v = r.qvel(anatomy.qvel + i) - clip.qvel(anatomy.qvel + i);
+        pose = (q * q).mul_add(T::lit(*weight), pose);
+        velocity = (v * v).mul_add(T::lit(*weight), velocity);
+    }
+    let mut apart = T::zero();
+    for part in ends {
+        // heights are above the ground
+        let [x, y, z] = sub(sub(s.position(*part), clip.position(*part)), gap);
+        apart += norm2([x, y, z + gap[2]]);
+    }
+    let slip = sub(s.linear_velocity(root), clip.linear_velocity(root));
+    let place =
+        norm2(spin).mul_add(T::lit(0.001), norm2(slip).mul_add(T::lit(0.01), turn2.mul_add(T::lit(0.1), norm2(gap))));
+    let drift = norm2(sub(s.center_of_mass_velocity(), clip.center_of_mass_velocity()));
+    let share = T::lit(1.0 / total);
+    [pose * share, velocity * share, apart * T::lit(1.0 / ends.len() as f64), place, drift * T::lit(0.1)]
+}
+
+/// Square of the angle between a part and where the clip has it, rad^2.
+#[inline(always)]
+pub(super) fn angle2<T: Real>(s: &Senses<T>, part: Part) -> T {
+    let (a, b) = (s.axes(part), s.reference(0).axes(part));
+    // of the rotation from one to the other, twice the cosine plus 1, and the axis times twice the sine
+    let mut trace = T::zero();
+    let mut axis = [T::zero(); 3];
+    for k in 0..3 {
+        let [x, y, z] = a[k];
+        let [u, v, w] = b[k];
+        trace += x.mul_add(u, y.mul_add(v, z * w));
+        axis[0] += y.mul_add(w, -(z * v));
+        axis[1] += z.mul_add(u, -(x * w));
+        axis[2] += x.mul_add(v, -(y * u));
+    }
+    let angle = norm2(axis).sqrt().atan2(trace - T::lit(1.0));
+    angle * angle
+}
+
+/// Mean distance of the parts from where the clip has them, m; from the root's own place, or in the world.
+#[inline(always)]
+pub(super) fn distance<T: Real>(s: &Senses<T>, anatomy: &Anatomy, from_root: bool) -> T {
+    let clip = s.reference(0);
+    let mut gap = [T::zero(); 3];
+    if from_root {
+        gap = sub(s.position(anatomy.root), clip.position(anatomy.root));
+    }
+    let mut sum = T::zero();
+    for part in (0..anatomy.parts).map(Part) {
+        sum += norm2(sub(sub(s.position(part), clip.position(part)), gap)).sqrt();
+    }
+    sum * T::lit(1.0 / anatomy.parts as f64)
+}
+
+/// Mean absolute difference of the hinges' angles, rad.
+#[inline(always)]
+pub(super) fn joint_error<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
+    let (clip, r, mut error) = (s.reference(0), s.readings(), T::zero());
+    for i in anatomy.qpos..anatomy.qpos + anatomy.weights.len() {
+        error += (r.qpos(i) - clip.qpos(i)).abs();
+    }
+    error * T::lit(1.0 / anatomy.weights.len() as f64)
+}
+
+/// Lanes in which a part of the trunk touched the ground although the clip does not have it there.
+#[inline(always)]
+pub(super) fn fallen<T: Real>(s: &Senses<T>, trunk: &[Part]) -> T::Mask {
+    let (mut fallen, clip) = (T::none(), s.reference(0));
+    for part in trunk {
+        let upright = T::lit(LYING).lt(clip.lowest(*part));
+        fallen = T::or(fallen, T::and(upright, s.touched_ground(*part)));
+    }
+    fallen
+}
+
+/// Where the root part is and how the joints are, with velocities: what every such figure observes of itself.
+#[inline(always)]
+pub(super) fn observe_body<T: Real>(
+    s: &Senses<T>,
+    anatomy: &Anatomy,
+    turned: &impl Fn([T; 3]) -> [T; 3],
+    out: &mut Obs<T>,
+) {
+    let (root, r) = (anatomy.root, s.readings());
+    out.group("height");
+    out.scalar(s.height(root));
+    out.group("orientation");
+    out.vector(turned(s.forward(root)));
+    out.vector(turned(s.up(root)));
+    out.group("velocity");
+    out.vector(turned(s.linear_velocity(root)));
+    out.group("angular_velocity");
+    out.vector(turned(s.angular_velocity(root)));
+    out.group("joint_positions");
+    for i in 0..anatomy.weights.len() {
+        out.scalar(r.qpos(anatomy.qpos + i));
+    }
+    out.group("joint_velocities");
+    for i in 0..anatomy.weights.len() {
+        out.scalar(r.qvel(anatomy.qvel + i));
+    }
+}
+
+/// Puts vectors into axes of which x is a direction along the ground, cosine and sine of its angle, and z is up.
+#[inline(always)]
+pub(super) fn turned_to<T: Real>([cos, sin]: [T; 2]) -> impl Fn([T; 3]) -> [T; 3] {
+    move |[x, y, z]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z]
+}
+
+#[inline(always)]
+pub(super) fn sub<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Square of a vector's length.
+#[inline(always)]
+pub(super) fn norm2<T: Real>([x, y, z]: [T; 3]) -> T {
+    x.mul_add(x, y.mul_add(y, z * z))
+}
