@@ -21,6 +21,8 @@ use std::path::Path;
 const DT: f64 = 1.0 / 60.0;
 /// Longer motions are mistakes, s.
 const LONGEST: f64 = 3600.0;
+/// A file of a kilobyte can ask for an hour of a thousand joints: no more turns of joints than this, a quarter of an hour of 70.
+const MOST_TURNS: usize = 4_000_000;
 /// Deeper hierarchies are not of a figure.
 const DEEPEST: usize = 200;
 
@@ -124,7 +126,13 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     if !(DT..=LONGEST).contains(&end) {
         return Err(wrong("animations[0]", format!("{end} s"), "from a sixtieth of a second to an hour"));
     }
-    let keyframes: Vec<Keyframe> = (0..=libm::round(end / DT) as usize)
+    let last = libm::round(end / DT) as usize;
+    if (last + 1) * order.len() > MOST_TURNS {
+        let longest = DT * (MOST_TURNS / order.len()) as f64;
+        let found = format!("{end} s of {} joints", order.len());
+        return Err(wrong("animations[0]", found, &format!("up to {longest:.0} s of so many; export a part of it")));
+    }
+    let keyframes: Vec<Keyframe> = (0..=last)
         .map(|i| {
             let time = i as f64 * DT;
             let at = |i: usize| {
