@@ -19,6 +19,8 @@ use std::path::Path;
 
 /// Keyframes are read at this step, s.
 const DT: f64 = 1.0 / 60.0;
+/// Bytes of the file's header.
+const HEADER: u32 = 12;
 /// Longer motions are mistakes, s.
 const LONGEST: f64 = 3600.0;
 /// A file of a kilobyte can ask for an hour of a thousand joints: no more turns of joints than this, a quarter of an hour of 70.
@@ -45,6 +47,11 @@ struct Tracks {
 /// If the file is not glTF, or has no animated skeleton.
 pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     let wrong = |key: &str, found: String, expected: &str| MotionError::value(path, key, found, expected);
+    // the library subtracts the header from the length without a look
+    let length = bytes.get(8..12).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes);
+    if bytes.starts_with(b"glTF") && length < HEADER {
+        return Err(wrong("glTF", format!("a length of {length} bytes"), "the file's, in its third word"));
+    }
     let Gltf { document, blob } =
         Gltf::from_slice(bytes).map_err(|error| wrong("glTF", error.to_string(), "a .glb file of glTF 2.0"))?;
     let blob = blob.ok_or_else(|| wrong("buffers", "buffers in other files".into(), "one .glb file with all data"))?;
