@@ -66,7 +66,7 @@ fn figure() -> &'static (Animation, Model) {
         let model = "<mujoco model='m'><worldbody><body name='a'><freejoint/><geom size='.1'/>\
             <body name='b'><joint/><geom size='.1'/></body></body></worldbody></mujoco>";
         let model = Model::from_xml_str_with(model, "m.xml", &|_| Err(String::new())).expect("a model");
-        let bvh = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 0 JOINT LeftLeg { OFFSET 0 1 0 CHANNELS 1 Xrotation } }\
+        let bvh = "HIERARCHY ROOT Hips { OFFSET 0 0 0 CHANNELS 0 JOINT LeftLeg { OFFSET 0 1 0 CHANNELS 1 Xrotation } } \
             MOTION Frames: 2 Frame Time: 0.1 0 1";
         (import::bvh("m.bvh".as_ref(), bvh.as_bytes()).expect("a skeleton"), model)
     })

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::bench::BenchArgs;
+use crate::film::Ghost;
 use crate::motion::MotionArgs;
 use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
@@ -130,6 +131,9 @@ pub struct RenderArgs {
     /// Agents side by side.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub agents: usize,
+    /// The clip that the agents follow, drawn as their ghost: inside them, or beside.
+    #[arg(long, value_name = "WHERE", num_args = 0..=1, default_missing_value = "inside")]
+    pub ghost: Option<Ghost>,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,

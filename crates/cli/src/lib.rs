@@ -11,6 +11,7 @@ mod bench;
 mod commands;
 mod console;
 mod error;
+mod film;
 mod interrupt;
 mod motion;
 mod program;

@@ -106,6 +106,31 @@ fn both_engines_run_the_same_workload() {
     }
 }
 
+/// The same states and controls on both sides: half a second later, still as many contacts.
+#[test]
+fn both_engines_do_what_a_policy_did() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/policies/humanoid.safetensors");
+    let args = ["--policy", file, "--isa", "f64", "--isa", "f32", "--agents", "16", "--threads", "2", "--json"];
+    let out = against_mujoco(&python(), &args);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    let rows = document["rows"].as_array().unwrap();
+    assert_eq!(rows.iter().map(|row| &row["agent"]).collect::<Vec<_>>(), ["Humanoid-v0"; 2]);
+    for row in rows {
+        let contacts = ["mujoco", "marathon"].map(|engine| row[engine]["contacts"].as_f64().unwrap());
+        assert!(contacts[1] > 0.3 && (contacts[1] / contacts[0] - 1.0).abs() < 0.1, "{contacts:?}");
+        // six scenes of 20 decisions in each of five turns, on two threads
+        let turn = 6 * 20 * 5 * 16 * 2;
+        for engine in ["mujoco", "marathon"] {
+            let steps = row[engine]["steps"].as_u64().unwrap();
+            assert!(steps >= 5 * turn && steps % turn == 0, "{engine}: {steps} steps");
+        }
+        assert_eq!((&row["mujoco"]["broken"], &row["marathon"]["broken"]), (&0.into(), &0.into()));
+    }
+    let out = against_mujoco(&python(), &["--policy", file, "--limp"]);
+    assert_eq!(out.status.code(), Some(2), "a policy's agents are not limp");
+}
+
 #[test]
 fn one_agent_of_a_crowd_is_timed_from_its_first_step() {
     let folder = tempfile::tempdir().unwrap();

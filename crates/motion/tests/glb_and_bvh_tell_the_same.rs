@@ -166,6 +166,11 @@ fn glb() -> Vec<u8> {
         "buffers": [{ "byteLength": bytes.len() }], "bufferViews": views, "accessors": accessors,
         "animations": [{ "samplers": samplers, "channels": channels }],
     });
+    chunks(&document, &bytes)
+}
+
+/// A `.glb` file of its two parts.
+fn chunks(document: &serde_json::Value, bytes: &[u8]) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut out = Vec::new();
@@ -239,10 +244,36 @@ fn damaged_glb_files_are_read_or_refused_by_name() {
     assert!(read > 100 && refused > 500, "{read} read, {refused} refused");
 }
 
+/// A kilobyte must not ask for gigabytes: keys at both ends of an hour, and a thousand joints.
+#[test]
+fn more_than_fits_is_refused_before_it_is_made() {
+    let good = glb();
+    let length = |at: usize| u32::from_le_bytes(good[at..at + 4].try_into().unwrap()) as usize;
+    let mut document: serde_json::Value = serde_json::from_slice(&good[20..20 + length(12)]).unwrap();
+    let nodes = document["nodes"].as_array_mut().unwrap();
+    let (first, last) = (nodes.len(), nodes.len() + 1000);
+    nodes.extend((first..last).map(|i| json!({ "name": format!("bead {i}") })));
+    nodes[1]["children"].as_array_mut().unwrap().extend((first..last).map(|i| json!(i)));
+    document["skins"][0]["joints"].as_array_mut().unwrap().extend((first..last).map(|i| json!(i)));
+    let mut data = good[20 + length(12) + 8..].to_vec();
+    data[4 * (FRAMES - 1)..4 * FRAMES].copy_from_slice(&3600f32.to_le_bytes());
+    let bytes = chunks(&document, &data);
+    let start = std::time::Instant::now();
+    assert_eq!(
+        import::any("m.glb".as_ref(), &bytes).unwrap_err().to_string(),
+        "m.glb: animations[0]: found 3600 s of 1015 joints, expected up to 66 s of so many; export a part of it"
+    );
+    assert!(start.elapsed().as_secs_f64() < 5.0);
+}
+
 #[test]
 fn what_is_no_animation_is_refused_by_name() {
     let error = |bytes: &[u8]| import::any("m.glb".as_ref(), bytes).unwrap_err().to_string();
-    assert!(error(b"glTF").starts_with("m.glb: glTF: found "), "{}", error(b"glTF"));
+    assert!(error(b"glTF").starts_with("m.glb: glTF: found a length of 0"), "{}", error(b"glTF"));
+    // less than the header itself
+    let mut short = glb();
+    short[8..12].copy_from_slice(&4u32.to_le_bytes());
+    assert_eq!(error(&short), "m.glb: glTF: found a length of 4 bytes, expected the file's, in its third word");
     let text = r#"{"asset": {"version": "2.0"}}"#;
     assert_eq!(
         error(text.as_bytes()),

@@ -90,6 +90,7 @@ fn of_bvh() {
         ("0 90 0 5", "0 90 0 nan", "m.bvh:20:8: found \"nan\", expected a number"),
         ("0 90 0 5\n", "0 90 0 5\n7", "m.bvh:21:"),
         ("Time: 0.1", "Time: 0", "m.bvh: dt: found 0, expected a number of seconds"),
+        ("Time: 0.1", "Time: 16.67", "m.bvh:18:13: found a frame time of 16.67, expected seconds, up to 1"),
         ("-80", "0", "m.bvh: HIERARCHY: found joints that all lie in one point"),
         ("}\nMOTION", "}\n}\nMOTION", "m.bvh:16:1: found \"}\", expected MOTION"),
     ];

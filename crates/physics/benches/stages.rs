@@ -18,7 +18,9 @@ const BETWEEN: usize = 20;
 
 const HOPPER: &str = include_str!("../../../assets/agents/hopper.xml");
 const HUMANOID: &str = include_str!("../../../assets/agents/humanoid.xml");
-const SCENES: [Scene; 4] = [Scene::Hopper, Scene::Humanoid, Scene::SelfCollision, Scene::HeightField];
+const MARATHON_MAN: &str = include_str!("../../../assets/agents/marathon_man.xml");
+const SCENES: [Scene; 5] =
+    [Scene::Hopper, Scene::Humanoid, Scene::SelfCollision, Scene::HeightField, Scene::MarathonMan];
 
 fn main() {
     divan::main();
@@ -31,6 +33,7 @@ enum Scene {
     Humanoid,
     SelfCollision,
     HeightField,
+    MarathonMan,
 }
 
 impl std::fmt::Display for Scene {
@@ -40,6 +43,7 @@ impl std::fmt::Display for Scene {
             Scene::Humanoid => "humanoid",
             Scene::SelfCollision => "humanoid, self-collision",
             Scene::HeightField => "humanoid, height field",
+            Scene::MarathonMan => "marathon man",
         })
     }
 }
@@ -49,6 +53,7 @@ impl Scene {
         let text = match self {
             Scene::Hopper => HOPPER.to_string(),
             Scene::Humanoid => HUMANOID.to_string(),
+            Scene::MarathonMan => MARATHON_MAN.to_string(),
             Scene::SelfCollision => {
                 replaced(HUMANOID, r#"contype="1" conaffinity="0""#, r#"contype="1" conaffinity="1""#)
             }

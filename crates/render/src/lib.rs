@@ -47,5 +47,5 @@ pub use kinematics::{BodyPose, GeomPose, Pose};
 pub use mp4::Mp4Writer;
 pub use recorder::{Format, Recorder};
 pub use render::{Antialias, Renderer};
-pub use scene::{AgentView, Frame, Scene};
+pub use scene::{AgentView, Frame, GhostPlace, Scene};
 pub use shape::{Hit, Shape};

@@ -13,6 +13,8 @@ pub(crate) const START_LINE: u32 = 0xf2b632;
 
 /// One base color per agent of a row; the first is the one seen when a single agent runs.
 const AGENTS: [u32; 6] = [0xe8792e, 0x2f86c1, 0x45a35c, 0xc94f7c, 0x8a63c7, 0xd0a52a];
+/// A figure that only shows where another should be.
+pub(crate) const GHOST: u32 = 0xd8ecff;
 /// Things that belong to the world: steps, walls, ramps.
 pub(crate) const WORLD: u32 = 0xb9b2a6;
 

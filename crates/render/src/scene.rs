@@ -11,6 +11,8 @@ use crate::shape::{Plane, Shape, Solid};
 
 /// MuJoCo's default color, which says that nobody chose one.
 const UNCHOSEN: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+/// Opacity of a ghost about its agent.
+const GHOST_ALPHA: f64 = 0.35;
 /// Geom groups from here on are hidden by MuJoCo's viewer unless asked for.
 const FIRST_HIDDEN_GROUP: i32 = 3;
 
@@ -55,6 +57,15 @@ pub struct Frame {
     pub(crate) planes: Vec<Plane>,
     pub(crate) marks: Marks,
     agents: Vec<AgentView>,
+}
+
+/// Where the ghosts of a frame are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GhostPlace {
+    /// Where their `qpos` says: in and about the agents. They are translucent.
+    Inside,
+    /// Each in the lane behind its agent.
+    Beside,
 }
 
 /// Where an agent is in a frame, lateral offset included.
@@ -165,13 +176,46 @@ impl Scene {
     /// # Errors
     /// [`RenderError::QposLength`] and [`RenderError::NotFinite`], with the agent's index.
     pub fn frame<Q: AsRef<[f64]>>(&self, qpos: &[Q]) -> Result<Frame, RenderError> {
+        self.frame_with_ghosts(qpos, &[], GhostPlace::Inside)
+    }
+
+    /// As [`Scene::frame`], with a ghost of each agent: the same figure, pale and without a shadow, at another `qpos`. Ghosts
+    /// beside their agents take every second lane. A camera follows the agents alone.
+    ///
+    /// # Errors
+    /// [`RenderError::QposLength`] and [`RenderError::NotFinite`], with the agent's index.
+    pub fn frame_with_ghosts<Q: AsRef<[f64]>>(
+        &self,
+        qpos: &[Q],
+        ghosts: &[Q],
+        place: GhostPlace,
+    ) -> Result<Frame, RenderError> {
+        let lanes = if place == GhostPlace::Beside { 2 } else { 1 };
         let mut frame = Frame { solids: Vec::new(), planes: Vec::new(), marks: self.marks, agents: Vec::new() };
         for (agent, qpos) in qpos.iter().enumerate() {
             let pose = kinematics::pose(&self.model, qpos.as_ref(), agent)?;
-            let offset = DVec3::new(0.0, self.spacing * agent as f64, 0.0);
-            self.add_agent(&mut frame, agent, offset, &pose);
+            self.add_agent(&mut frame, agent, self.lane(lanes * agent), &pose);
+        }
+        for (agent, qpos) in ghosts.iter().enumerate() {
+            let pose = kinematics::pose(&self.model, qpos.as_ref(), agent)?;
+            self.add_ghost(&mut frame, self.lane(lanes * agent + lanes - 1), &pose, place);
         }
         Ok(frame)
+    }
+
+    /// Offset of a lane of the row.
+    fn lane(&self, lane: usize) -> DVec3 {
+        DVec3::new(0.0, self.spacing * lane as f64, 0.0)
+    }
+
+    fn add_ghost(&self, frame: &mut Frame, offset: DVec3, pose: &Pose, place: GhostPlace) {
+        let share = if place == GhostPlace::Inside { GHOST_ALPHA } else { 1.0 };
+        for shown in self.shown.iter().filter(|shown| shown.runner) {
+            let (pos, rot) = placed(pose, shown.geom);
+            let color = palette::sided(palette::linear(palette::GHOST), shown.side);
+            let solid = Solid::new(shown.shape, pos + offset, rot, color, share * shown.alpha);
+            frame.solids.push(Solid { ghost: true, ..solid });
+        }
     }
 
     fn add_agent(&self, frame: &mut Frame, agent: usize, offset: DVec3, pose: &Pose) {

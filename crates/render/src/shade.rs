@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::ground::Footprint;
 use crate::light::SUN_COLOR;
+use crate::shape::Solid;
 use crate::view::{OCCLUSION_REACH, View};
 
 const SKY_POWER: f64 = 0.42;
@@ -22,8 +23,8 @@ impl View<'_> {
         let mut visible = 1.0_f64;
         for &index in self.shadow_candidates(p) {
             let index = index as usize;
-            if Some(index) != own {
-                let solid = &self.frame.solids[index];
+            let solid = &self.frame.solids[index];
+            if Some(index) != own && !solid.ghost {
                 let open = self.light.visible(solid, p);
                 // parts of one body overlap: the darkest counts, a product would double the penumbra at joints
                 visible = visible.min(1.0 - solid.alpha * (1.0 - open));
@@ -36,7 +37,7 @@ impl View<'_> {
     fn ambient_at(&self, p: DVec3, normal: DVec3, own: Option<usize>) -> f64 {
         let mut open = 1.0;
         for &index in self.nearby(p) {
-            if Some(index as usize) == own {
+            if Some(index as usize) == own || self.frame.solids[index as usize].ghost {
                 continue;
             }
             let rod = &self.rods[index as usize];
@@ -87,11 +88,15 @@ impl View<'_> {
     /// Color of a solid at `p`, seen along `d` from distance `t`.
     pub(crate) fn solid_color(&self, index: usize, p: DVec3, normal: DVec3, d: DVec3, t: f64) -> DVec3 {
         let light = &self.light;
-        let albedo = self.frame.solids[index].color;
+        let Solid { color: albedo, ghost, .. } = self.frame.solids[index];
         let facing = normal.dot(light.sun);
         let lit = soft_cosine(facing);
-        let sun = if lit > 0.0 { self.sun_at(p, Some(index)) } else { 0.0 };
-        let open = self.ambient_at(p, normal, Some(index));
+        // a ghost lies within the figure's own shade, which would blot it
+        let (sun, open) = match ghost {
+            true => (1.0, 1.0),
+            false if lit > 0.0 => (self.sun_at(p, Some(index)), self.ambient_at(p, normal, Some(index))),
+            false => (0.0, self.ambient_at(p, normal, Some(index))),
+        };
 
         // close to the floor its light comes from the runner's own shade
         let height = self.frame.planes.iter().map(|plane| plane.normal().dot(p - plane.pos).max(0.0));

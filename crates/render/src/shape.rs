@@ -252,11 +252,13 @@ pub(crate) struct Solid {
     pub color: DVec3,
     /// Opacity, 0..=1.
     pub alpha: f64,
+    /// Part of a ghost: it casts no shadow, and a ray passes through one such surface at most.
+    pub ghost: bool,
 }
 
 impl Solid {
     pub fn new(shape: Shape, pos: DVec3, rot: DMat3, color: DVec3, alpha: f64) -> Self {
-        Self { shape, pos, rot, inverse: rot.transpose(), color, alpha }
+        Self { shape, pos, rot, inverse: rot.transpose(), color, alpha, ghost: false }
     }
 
     /// First entry of a world ray and the world normal there.

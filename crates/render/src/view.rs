@@ -125,9 +125,9 @@ impl<'a> View<'a> {
         let mut sample = Sample { color: DVec3::ZERO, id: SKY_ID, sun: 1.0 };
         let mut through = 1.0;
         let candidates = self.tiles.at(x, y);
-        let mut start = 0.0;
+        let (mut start, mut haunted) = (0.0, false);
         for layer in 0..LAYERS {
-            let hit = self.nearest(basis.eye, d, start, candidates);
+            let hit = self.nearest(basis.eye, d, start, candidates, haunted);
             let (color, alpha, id, sun) = match hit {
                 None => (self.light.sky(d), 1.0, SKY_ID, 1.0),
                 Some((t, Surface::Plane(index))) => {
@@ -137,6 +137,7 @@ impl<'a> View<'a> {
                 Some((t, Surface::Solid(index, normal))) => {
                     let p = basis.eye + t * d;
                     let color = self.solid_color(index, p, normal, d, t);
+                    haunted |= self.frame.solids[index].ghost;
                     (color, self.frame.solids[index].alpha, self.first_solid() + index as u32, 1.0)
                 }
             };
@@ -151,9 +152,9 @@ impl<'a> View<'a> {
         sample
     }
 
-    /// Nearest surface beyond `start`.
+    /// Nearest surface beyond `start`, of ghosts only if none of them has been met.
     #[inline]
-    fn nearest(&self, o: DVec3, d: DVec3, start: f64, candidates: &[u32]) -> Option<(f64, Surface)> {
+    fn nearest(&self, o: DVec3, d: DVec3, start: f64, candidates: &[u32], haunted: bool) -> Option<(f64, Surface)> {
         let mut best: Option<(f64, Surface)> = None;
         let closer = |t: f64, best: &Option<(f64, Surface)>| t > start && best.as_ref().is_none_or(|b| t < b.0);
         for (index, plane) in self.frame.planes.iter().enumerate() {
@@ -162,7 +163,9 @@ impl<'a> View<'a> {
             }
         }
         for &index in candidates {
-            if let Some((t, normal)) = self.frame.solids[index as usize].enter(o, d)
+            let solid = &self.frame.solids[index as usize];
+            if !(haunted && solid.ghost)
+                && let Some((t, normal)) = solid.enter(o, d)
                 && closer(t, &best)
             {
                 best = Some((t, Surface::Solid(index as usize, normal)));

@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::setting::Setting;
-use marathon_envs::{Step, VecEnv, VecEnvOptions};
+use marathon_envs::{AgentState, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 
@@ -66,6 +66,22 @@ impl<'a> Play<'a> {
     /// If there is no such agent.
     pub fn qpos(&self, agent: usize) -> Result<Vec<f64>, RunError> {
         Ok(self.env.state(agent)?.qpos)
+    }
+
+    /// Configuration and velocity of an agent.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn state(&self, agent: usize) -> Result<AgentState, RunError> {
+        Ok(self.env.state(agent)?)
+    }
+
+    /// Controls of an agent during its last decision, as [`VecEnv::ctrl`] tells.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn ctrl(&self, agent: usize) -> Result<Vec<f64>, RunError> {
+        Ok(self.env.ctrl(agent)?)
     }
 
     /// Generalized positions of the clip that an agent follows, where it is now; none if the task follows no clip.

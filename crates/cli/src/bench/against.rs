@@ -67,7 +67,7 @@ struct Document<'a> {
 pub fn run(plan: &Plan, subjects: &[Subject], head: Head, json: bool) -> Result<(), CliError> {
     let mut mujoco = Mujoco::start()?;
     if !json {
-        print_head(plan, &mujoco.version);
+        print_head(plan, subjects, &mujoco.version);
     }
     let mut rows: Vec<Row> = Vec::new();
     for subject in subjects {
@@ -152,7 +152,7 @@ fn turn(
     // rounds have starts and controls of their own
     let mut seed = (round as u64) << 32;
     while sum.cpu < seconds * plan.threads as f64 {
-        let sample = repeat(plan, &subject.model, isa, seed, counts).map_err(|e| subject.refused(e))?;
+        let sample = repeat(plan, subject, isa, seed, counts).map_err(|e| subject.refused(e))?;
         seed += 1;
         sum.steps += sample.steps;
         sum.cpu += sample.cpu;
@@ -180,7 +180,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-fn print_head(plan: &Plan, version: &str) {
+fn print_head(plan: &Plan, subjects: &[Subject], version: &str) {
     let contacts = match plan.contacts {
         Which::Ground => "contacts with the ground only",
         Which::All => "all contacts",
@@ -190,7 +190,7 @@ fn print_head(plan: &Plan, version: &str) {
         "MuJoCo {version} in double precision and Marathon by instruction set, in turns on {threads} thread(s), {agents} \
          agent(s) each:"
     ));
-    say(format!("one physics step of one agent {}, nobody reset, {contacts}; medians\n", plan.load()));
+    say(format!("one physics step of one agent {}, nobody reset, {contacts}; medians\n", plan.load(subjects)));
     let (theirs, ours) = ("MuJoCo", "Marathon");
     say(format!(
         "{:23}  {:^26}  {:^26}  {:^18}",

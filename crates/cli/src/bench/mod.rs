@@ -10,6 +10,7 @@ mod mujoco;
 mod options;
 mod physics;
 mod row;
+mod scene;
 mod train;
 
 use crate::error::CliError;
@@ -31,7 +32,7 @@ pub struct BenchArgs {
 /// What to measure.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// The physics alone: random torques, nobody is reset. A step is a physics step.
+    /// The physics alone: random torques, or what a policy did. A step is a physics step.
     Physics(physics::PhysicsArgs),
     /// The environments: random actions, observations, rewards, resets. A step is a decision.
     Env(env::EnvArgs),

@@ -104,6 +104,7 @@ impl Mujoco {
             "hold": HOLD,
             "limp": plan.limp,
             "contacts": plan.contacts,
+            "scenes": subject.scenes,
         });
         match &subject.source {
             Source::Text(text) => job["xml"] = json!(text),

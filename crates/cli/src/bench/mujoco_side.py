@@ -4,11 +4,13 @@ The command runs this text with `python -c` and talks to it in lines of JSON, a 
 
     (start)                                         {"mujoco": version}, or {"missing": why}
     {"xml": text or "path": file, "agents": n, "threads": t, "warmup": s, "steps": s, "hold": s, "limp": bool,
-     "contacts": "ground" or "all"}                 {}
+     "contacts": "ground" or "all", "scenes": [..]} {}
     {"seconds": s}                                  {"steps": n, "cpu": s, "wall": s, "contacts": x, "broken": n}
 
 Protocol: hinges off by up to 0.1 rad and velocities up to 0.1, warm up, then time steps under uniform random controls
 held for `hold` steps. Nobody is reset. The model's own integrator and solver settings, sensors off, double precision.
+A scene has `starts` of agents, qpos and qvel, `controls` by decision, [agents][nu] row-major, and `hold`, the steps of a
+decision; with scenes, a repetition is all of them, without a warm-up, and each thread has its own copy of the agents.
 """
 
 import json
@@ -67,6 +69,9 @@ class Workload:
         self.rng = np.random.default_rng(1)
         self.datas = [mujoco.MjData(self.model) for _ in range(self.threads)]
         self.size = mujoco.mj_stateSize(self.model, self.kind)
+        self.scenes = [self.scene(scene) for scene in job["scenes"]]
+        if self.scenes:
+            self.warmup, self.steps = 0, self.scenes[0][1].shape[1]
         # written once before the clock starts: the first touch of memory is not physics
         self.out = np.empty((self.agents, self.steps, self.size))
         self.out.fill(0.0)
@@ -88,13 +93,28 @@ class Workload:
         held = self.rng.uniform(-1, 1, (self.agents, -(-steps // self.hold), self.model.nu))
         return np.ascontiguousarray(np.repeat(held, self.hold, axis=1)[:, :steps])
 
-    def repeat(self):
-        """One repetition: processor seconds, seconds passed, contacts of an agent, agents that broke down."""
+    def scene(self, scene):
+        """The agents' starts and controls in a scene."""
+        model, data = self.model, self.datas[0]
+        start = np.zeros((len(scene["starts"]), self.size))
+        for agent, (qpos, qvel) in enumerate(scene["starts"]):
+            mujoco.mj_resetData(model, data)
+            data.qpos[:], data.qvel[:] = qpos, qvel
+            mujoco.mj_getState(model, data, start[agent], self.kind)
+        held = np.array(scene["controls"]).reshape(len(scene["controls"]), len(start), model.nu).swapaxes(0, 1)
+        controls = np.repeat(held, scene["hold"], axis=1)
+        return np.tile(start, (self.threads, 1)), np.ascontiguousarray(np.tile(controls, (self.threads, 1, 1)))
+
+    def drawn(self):
+        """Random starts, some steps later, and random controls."""
         warm = self.starts()
         if self.warmup:
             states, _ = self.runner.rollout(self.model, self.datas, warm, self.controls(self.warmup))
             warm = np.ascontiguousarray(states[:, -1])
-        controls = self.controls(self.steps)
+        return warm, self.controls(self.steps)
+
+    def repeat(self, warm, controls):
+        """One repetition: processor seconds, seconds passed, contacts of an agent, agents that broke down."""
         cpu, wall = time.process_time(), time.perf_counter()
         self.runner.rollout(self.model, self.datas, warm, controls, state=self.out)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
@@ -118,7 +138,8 @@ class Workload:
     def measure(self, seconds):
         repetitions = []
         while not repetitions or sum(r[0] for r in repetitions) < seconds * self.threads:
-            repetitions.append(self.repeat())
+            parts = self.scenes or [self.drawn()]
+            repetitions.extend(self.repeat(*part) for part in parts)
         cpu, wall, contacts, broken = (sum(column) for column in zip(*repetitions))
         steps = len(repetitions) * self.agents * self.steps
         return {"steps": steps, "cpu": cpu, "wall": wall, "contacts": contacts / len(repetitions), "broken": broken}

@@ -3,6 +3,7 @@
 use super::against;
 use super::options::{Common, Head, isas, seconds, supported};
 use super::row::{Figures, Row, Sample, Table, on_threads, thread_cpu};
+use super::scene::{self, Scene};
 use crate::error::CliError;
 use clap::ValueEnum;
 use marathon_envs::{EnvError, ModelSource, registry};
@@ -29,6 +30,10 @@ pub struct PhysicsArgs {
     /// MJCF file to measure; may be repeated.
     #[arg(long, value_name = "FILE.xml")]
     pub model: Vec<PathBuf>,
+    /// Policy, a file or the folder of a run: measure half seconds of its agents, with the states and controls that they had,
+    /// instead of random torques; may be repeated.
+    #[arg(long, value_name = "RUN|F", conflicts_with_all = ["warmup", "limp"])]
+    pub policy: Vec<PathBuf>,
     /// Instruction set: f64, f32, baseline, avx2 or avx512; may be repeated [default: all that the processor has].
     #[arg(long, value_name = "ISA", value_parser = supported)]
     pub isa: Vec<Isa>,
@@ -74,6 +79,8 @@ pub struct Subject {
     pub name: String,
     pub model: Model,
     pub source: Source,
+    /// What the agents do; empty: random torques.
+    pub scenes: Vec<Scene>,
 }
 
 /// Where a model comes from.
@@ -146,7 +153,7 @@ pub fn run(args: &PhysicsArgs, json: bool) -> Result<(), CliError> {
     if args.against == Some(Engine::Mujoco) {
         return against::run(&plan, &subjects, head, json);
     }
-    let step = format!("one physics step of one agent {}, nobody reset", plan.load());
+    let step = format!("one physics step of one agent {}, nobody reset", plan.load(&subjects));
     let mut table = Table::new(json, head, args.seconds, &step);
     for subject in &subjects {
         for isa in &plan.isas {
@@ -160,19 +167,23 @@ pub fn run(args: &PhysicsArgs, json: bool) -> Result<(), CliError> {
 fn subjects(args: &PhysicsArgs) -> Result<Vec<Subject>, CliError> {
     let mut subjects = Vec::new();
     // files alone mean the files alone
-    let agents =
-        if args.common.agent.is_empty() && !args.model.is_empty() { Vec::new() } else { args.common.agents(false)? };
+    let files = !args.model.is_empty() || !args.policy.is_empty();
+    let agents = if args.common.agent.is_empty() && files { Vec::new() } else { args.common.agents(false)? };
     for id in agents {
         let agent = registry::agent(&id)?;
         let source = match agent.facts().model {
             ModelSource::Text(text) => Source::Text(text.into()),
             ModelSource::File(path) => Source::File(path),
         };
-        subjects.push(Subject { name: id, model: agent.model()?, source });
+        subjects.push(Subject { name: id, model: agent.model()?, source, scenes: Vec::new() });
     }
     for file in &args.model {
         let name = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
-        subjects.push(Subject { name, model: Model::from_xml_file(file)?, source: Source::File(file.clone()) });
+        let (model, source) = (Model::from_xml_file(file)?, Source::File(file.clone()));
+        subjects.push(Subject { name, model, source, scenes: Vec::new() });
+    }
+    for file in &args.policy {
+        subjects.push(scene::subject(file, args.agents as usize)?);
     }
     subjects.iter_mut().for_each(|s| s.model.opt.flags.actuation &= !args.limp);
     Ok(subjects)
@@ -180,8 +191,14 @@ fn subjects(args: &PhysicsArgs) -> Result<Vec<Subject>, CliError> {
 
 impl Plan {
     /// What moves the agents.
-    pub fn load(&self) -> &'static str {
-        if self.limp { "without actuators" } else { "under random torques" }
+    pub fn load(&self, subjects: &[Subject]) -> &'static str {
+        let replayed = subjects.iter().filter(|subject| !subject.scenes.is_empty()).count();
+        match (self.limp, replayed) {
+            (true, _) => "without actuators",
+            (false, 0) => "under random controls",
+            (false, n) if n == subjects.len() => "that does what its policy did",
+            (false, _) => "under random controls or those of its policy",
+        }
     }
 }
 
@@ -197,7 +214,7 @@ fn measure(plan: &Plan, subject: &Subject, isa: Isa) -> Result<Row<Physics>, Sim
     let mut counts = Counts::default();
     while samples.iter().map(|s| s.cpu).sum::<f64>() < plan.seconds * plan.threads as f64 {
         let seed = samples.len() as u64;
-        samples.push(repeat(plan, &subject.model, isa, seed, &mut counts)?);
+        samples.push(repeat(plan, subject, isa, seed, &mut counts)?);
     }
     let steps: u64 = samples.iter().map(|s| s.steps).sum();
     let figures = Physics {
@@ -213,7 +230,11 @@ fn measure(plan: &Plan, subject: &Subject, isa: Isa) -> Result<Row<Physics>, Sim
 ///
 /// # Errors
 /// If the model cannot be simulated.
-pub fn repeat(plan: &Plan, model: &Model, isa: Isa, seed: u64, counts: &mut Counts) -> Result<Sample, SimError> {
+pub fn repeat(plan: &Plan, subject: &Subject, isa: Isa, seed: u64, counts: &mut Counts) -> Result<Sample, SimError> {
+    let Subject { model, scenes, .. } = subject;
+    if !scenes.is_empty() {
+        return scene::replay(plan, model, scenes, isa, counts);
+    }
     let work = |thread: usize, _: &mut ()| {
         let sim = SimOptions { ground_contacts_only: plan.contacts == Which::Ground, ..Default::default() };
         let seed = seed * plan.threads as u64 + thread as u64;

@@ -2,10 +2,13 @@
 
 mod import;
 mod model;
+mod policy;
 mod show;
 
 use crate::error::CliError;
+use crate::film::Ghost;
 use clap::{Subcommand, ValueEnum};
+use marathon_runs::TaskOptions;
 use std::path::PathBuf;
 
 const HELP: &str = "\
@@ -13,6 +16,7 @@ Examples:
   marathon motion import walk.bvh --model humanoid --out walk.motion    a recording, as the humanoid would do it
   marathon motion check walk.motion                                     limits, ground, overlaps, jumps, slides
   marathon motion render walk.motion --out walk.png                     see it
+  marathon motion render walk.motion --policy runs/MarathonMan-1 --out follow.gif    how a policy follows it
   marathon motion retarget walk.motion --model walker2d --out w.motion  the same by another character";
 
 /// Options of `motion`.
@@ -33,7 +37,7 @@ pub enum What {
     Retarget(RetargetArgs),
     /// Measure what is wrong with clips; the exit code is 1 if anything is.
     Check(CheckArgs),
-    /// Draw a clip: a strip of frames, an animation or a film.
+    /// Draw a clip, alone or with a policy that follows it: a strip of frames, an animation or a film.
     Render(RenderArgs),
 }
 
@@ -135,7 +139,17 @@ pub struct RenderArgs {
     /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Length, seconds [default: that of the clip].
+    /// Policy that follows the clip, a file or the folder of a run: draw it, with the clip as its ghost, from the clip's first
+    /// frame on.
+    #[arg(long, value_name = "RUN|F", conflicts_with = "model")]
+    pub policy: Option<PathBuf>,
+    /// Where the ghost is: inside the policy's figure, or beside it [default: inside].
+    #[arg(long, value_name = "WHERE", num_args = 0..=1, default_missing_value = "inside", requires = "policy")]
+    pub ghost: Option<Ghost>,
+    /// Arguments of the policy's task.
+    #[command(flatten)]
+    pub task: TaskOptions,
+    /// Length, seconds [default: that of the clip; 8 for a film of a policy whose clip loops].
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
     /// Frames of a .png strip.
@@ -158,6 +172,9 @@ pub fn run(args: &MotionArgs, json: bool) -> Result<(), CliError> {
         What::Import(import) => import::import(import, json),
         What::Retarget(retarget) => import::retarget(retarget, json),
         What::Check(check) => show::check(check, json),
-        What::Render(render) => show::render(render, json),
+        What::Render(render) => match &render.policy {
+            Some(policy) => policy::render(render, policy, json),
+            None => show::render(render, json),
+        },
     }
 }

@@ -1,6 +1,7 @@
 //! The character of a clip.
 
 use crate::error::CliError;
+use crate::program;
 use marathon_envs::registry;
 use marathon_motion::Clip;
 use marathon_physics::Model;
@@ -40,6 +41,15 @@ fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
 
 /// Reads a clip.
 pub fn clip(path: &Path) -> Result<Clip, CliError> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if ["bvh", "glb", "txt"].contains(&ending.as_str()) {
+        let name = path_word(path);
+        return Err(CliError::Usage(format!(
+            "{name} is a recording, expected a clip; `{} motion import {name} --model MarathonMan --out {}` makes one",
+            program::name(),
+            path_word(&path.with_extension("motion"))
+        )));
+    }
     let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
     Ok(Clip::parse(path, &bytes)?)
 }

@@ -3,6 +3,7 @@
 use super::{CheckArgs, RenderArgs, model};
 use crate::console::{print_json, say};
 use crate::error::CliError;
+use crate::film::Shot;
 use crate::interrupt;
 use marathon_motion::{Fit, Report, soles};
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene};
@@ -66,42 +67,54 @@ pub fn fit_line(fit: &Fit) -> String {
     )
 }
 
-/// Draws a clip.
-pub fn render(args: &RenderArgs, json: bool) -> Result<(), CliError> {
-    let clip = model::clip(&args.clip)?;
-    let model = model::of_clip(&args.clip, &clip, args.model.as_deref())?;
-    let seconds = args.seconds.unwrap_or(clip.duration());
-    if !(seconds > 0.0 && seconds <= 3600.0) {
-        return Err(CliError::Usage(format!("--seconds is {seconds}, expected up to 3600")));
+/// The picture that is asked for of a clip; the seconds are those of a picture without `--seconds`.
+pub fn shot(args: &RenderArgs, seconds: f64) -> Result<Shot, CliError> {
+    let length = args.seconds.unwrap_or(seconds);
+    if !(length > 0.0 && length <= 3600.0) {
+        return Err(CliError::Usage(format!("--seconds is {length}, expected up to 3600")));
     }
     if !(1.0..=240.0).contains(&args.fps) {
         return Err(CliError::Usage(format!("--fps is {}, expected 1 to 240", args.fps)));
     }
-    let still = Format::of(&args.out)? == Format::Png;
+    let format = Format::of(&args.out)?;
+    let still = format == Format::Png;
     let width = args.width.unwrap_or(if still { 240 } else { 480 });
     // video encoders want even sides
     let height = if still { width * 4 / 3 } else { width * 9 / 16 / 2 * 2 };
-    let count = if still { args.frames as usize } else { (seconds * args.fps).round().max(1.0) as usize };
-    let step = if still { seconds / (count.max(2) - 1) as f64 } else { 1.0 / args.fps };
+    Ok(Shot { format, width, height, length, frames: args.frames as usize, fps: args.fps })
+}
+
+/// Draws a clip.
+pub fn render(args: &RenderArgs, json: bool) -> Result<(), CliError> {
+    if let Some((name, _)) = args.task.given.first() {
+        return Err(CliError::Usage(format!(
+            "--option {name} is for the task of a policy, expected --policy beside it"
+        )));
+    }
+    let clip = model::clip(&args.clip)?;
+    let model = model::of_clip(&args.clip, &clip, args.model.as_deref())?;
+    let shot = shot(args, clip.duration())?;
 
     interrupt::install("leaving without a picture")?;
     let scene = Scene::new(&model);
-    let renderer = Renderer::new(width, height)?;
-    let mut camera = Follow::new(&scene, 1, width, height);
-    let mut recorder = Recorder::create(&args.out, args.fps, count.div_ceil(count.div_ceil(8)))?;
+    let renderer = Renderer::new(shot.width, shot.height)?;
+    let mut camera = Follow::new(&scene, 1, shot.width, shot.height);
+    let mut recorder = Recorder::create(&args.out, shot.fps, shot.columns())?;
     let mut qpos = vec![0.0; model.nq];
-    for i in 0..count {
-        let time = i as f64 * step;
-        clip.qpos(time, &mut qpos);
+    let (times, mut before) = (shot.times(), 0.0);
+    for time in &times {
+        clip.qpos(*time, &mut qpos);
         let frame = scene.frame(&[&qpos])?;
-        let mut image = renderer.render(&frame, &camera.update(&frame, step));
+        let mut image = renderer.render(&frame, &camera.update(&frame, time - before));
         image.caption(Corner::TopLeft, &[format!("{} {time:.2} s", clip.about().name)]);
         recorder.push(&image)?;
+        before = *time;
         if interrupt::requested() {
             return Err(CliError::Interrupted("nothing was written".into()));
         }
     }
     recorder.finish()?;
+    let (count, Shot { width, height, .. }) = (times.len(), shot);
     if json {
         print_json(&json!({ "out": args.out.to_string_lossy(), "frames": count, "width": width, "height": height }));
     } else {

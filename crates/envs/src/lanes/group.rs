@@ -118,6 +118,11 @@ impl<T: Real> LaneGroup<T> {
         (read(&self.physics.qpos), read(&self.physics.qvel))
     }
 
+    /// Controls of an agent.
+    pub fn ctrl(&self, lane: usize) -> Vec<f64> {
+        self.physics.ctrl.iter().map(|x| T::widen(x.get(lane))).collect()
+    }
+
     /// Positions of the first agents along the axes that lead to +x.
     pub fn x_positions(&self, along_x: &[(usize, T::Scalar)], out: &mut [f64]) {
         for (lane, out) in out.iter_mut().enumerate() {

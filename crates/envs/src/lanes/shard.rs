@@ -221,6 +221,10 @@ impl<T: Real> AgentShard for LaneShard<T> {
         !along_x.is_empty()
     }
 
+    fn ctrl(&self, agent: usize) -> Vec<f64> {
+        self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES].ctrl(agent % T::LANES)
+    }
+
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
         let model = &self.task.blueprint.model;
         for (what, given, expected) in [("qpos", &state.qpos, model.nq), ("qvel", &state.qvel, model.nv)] {

@@ -29,6 +29,8 @@ pub trait AgentShard: Shard {
     /// # Errors
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
+    /// Controls of an agent, numbered within this shard, during its last decision, in the actuators' units.
+    fn ctrl(&self, agent: usize) -> Vec<f64>;
     /// What an agent, numbered within this shard, is given from outside: commands, pushes, constants and ground of its own.
     fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_>;
     /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision: a bit each, of the first 32.

@@ -331,6 +331,15 @@ impl VecEnv {
         there.then_some(x)
     }
 
+    /// Controls of an agent during its last decision, `[nu]`, in the actuators' units: what its action has become.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn ctrl(&self, agent: usize) -> Result<Vec<f64>, EnvError> {
+        self.check_agent(agent)?;
+        Ok(self.workers[agent / self.stride].shard.ctrl(agent % self.stride))
+    }
+
     /// Puts an agent into a state, as if an episode had begun there.
     ///
     /// # Errors

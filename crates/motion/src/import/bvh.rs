@@ -12,6 +12,8 @@ use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 
+/// Frames further apart are milliseconds that were meant as seconds, and would make hours of a short file, s.
+const LONGEST_STEP: f64 = 1.0;
 /// More joints, or deeper ones, are not of a figure.
 const MOST_JOINTS: usize = 1000;
 
@@ -59,7 +61,10 @@ pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     }
     words.expect("Frame")?;
     words.expect("Time:")?;
-    let dt = words.number()?;
+    let (line, dt) = (words.line(), words.number()?);
+    if dt > LONGEST_STEP {
+        return Err(words.wrong(line, format!("found a frame time of {dt}, expected seconds, up to {LONGEST_STEP}")));
+    }
     let width: usize = nodes.iter().map(|node| node.channels.len()).sum();
     let numbers: Vec<f64> = (0..count as usize * width)
         .map(|i| {

@@ -19,8 +19,12 @@ use std::path::Path;
 
 /// Keyframes are read at this step, s.
 const DT: f64 = 1.0 / 60.0;
+/// Bytes of the file's header.
+const HEADER: u32 = 12;
 /// Longer motions are mistakes, s.
 const LONGEST: f64 = 3600.0;
+/// A file of a kilobyte can ask for an hour of a thousand joints: no more turns of joints than this, a quarter of an hour of 70.
+const MOST_TURNS: usize = 4_000_000;
 /// Deeper hierarchies are not of a figure.
 const DEEPEST: usize = 200;
 
@@ -43,6 +47,11 @@ struct Tracks {
 /// If the file is not glTF, or has no animated skeleton.
 pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     let wrong = |key: &str, found: String, expected: &str| MotionError::value(path, key, found, expected);
+    // the library subtracts the header from the length without a look
+    let length = bytes.get(8..12).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes);
+    if bytes.starts_with(b"glTF") && length < HEADER {
+        return Err(wrong("glTF", format!("a length of {length} bytes"), "the file's, in its third word"));
+    }
     let Gltf { document, blob } =
         Gltf::from_slice(bytes).map_err(|error| wrong("glTF", error.to_string(), "a .glb file of glTF 2.0"))?;
     let blob = blob.ok_or_else(|| wrong("buffers", "buffers in other files".into(), "one .glb file with all data"))?;
@@ -124,7 +133,13 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     if !(DT..=LONGEST).contains(&end) {
         return Err(wrong("animations[0]", format!("{end} s"), "from a sixtieth of a second to an hour"));
     }
-    let keyframes: Vec<Keyframe> = (0..=libm::round(end / DT) as usize)
+    let last = libm::round(end / DT) as usize;
+    if (last + 1) * order.len() > MOST_TURNS {
+        let longest = DT * (MOST_TURNS / order.len()) as f64;
+        let found = format!("{end} s of {} joints", order.len());
+        return Err(wrong("animations[0]", found, &format!("up to {longest:.0} s of so many; export a part of it")));
+    }
+    let keyframes: Vec<Keyframe> = (0..=last)
         .map(|i| {
             let time = i as f64 * DT;
             let at = |i: usize| {

@@ -1,0 +1,109 @@
+//! What a policy's agents do, to be done again by the physics alone: `bench physics --policy`.
+
+use super::physics::{Counts, Plan, Source, Subject, Which};
+use super::row::{Sample, on_threads, thread_cpu};
+use crate::error::CliError;
+use marathon_envs::{ModelSource, VecEnvOptions, registry};
+use marathon_learn::Policy;
+use marathon_physics::lanes::Isa;
+use marathon_physics::{Batch, BatchOptions, Model, SimError, SimOptions};
+use marathon_runs::{Play, PolicySource};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Scenes of a policy, each with every agent.
+const SCENES: usize = 6;
+/// Decisions of a scene: controls alone do not hold a figure up for long.
+const DECISIONS: usize = 20;
+/// Decisions between two scenes.
+const BETWEEN: usize = 60;
+
+/// Where agents are at some moment, and their controls from then on.
+#[derive(Clone, Debug, Serialize)]
+pub struct Scene {
+    /// `qpos` and `qvel` of each agent.
+    starts: Vec<[Vec<f64>; 2]>,
+    /// By decision, `[agents][nu]`, row-major.
+    controls: Vec<Vec<f64>>,
+    /// Physics steps of a decision.
+    hold: usize,
+}
+
+/// The model of a policy's task, with scenes of so many agents.
+///
+/// # Errors
+/// If there is no such policy.
+pub fn subject(file: &Path, agents: usize) -> Result<Subject, CliError> {
+    let (policy, factory) = PolicySource { policy: file.into(), ..Default::default() }.load()?;
+    let spec = factory.spec();
+    let agent = registry::global().agent_with(&spec.id, &spec.options)?;
+    let model = agent.model()?;
+    let source = match agent.facts().model {
+        ModelSource::Text(text) => Source::Text(text.into()),
+        ModelSource::File(path) => Source::File(path),
+    };
+    let scenes = record(&policy, agents, spec.frame_skip)?;
+    Ok(Subject { name: spec.id.clone(), model, source, scenes })
+}
+
+fn record(policy: &Policy, agents: usize, hold: usize) -> Result<Vec<Scene>, CliError> {
+    let mut play = Play::new(policy, &VecEnvOptions { agents, ..Default::default() })?;
+    let mut scenes = Vec::new();
+    for _ in 0..SCENES {
+        for _ in 0..BETWEEN {
+            play.decide();
+            play.step()?;
+        }
+        let starts = (0..agents).map(|i| play.state(i).map(|state| [state.qpos, state.qvel]));
+        let mut scene = Scene { starts: starts.collect::<Result<_, _>>()?, controls: Vec::new(), hold };
+        for _ in 0..DECISIONS {
+            play.decide();
+            play.step()?;
+            let mut row = Vec::new();
+            for i in 0..agents {
+                row.extend(play.ctrl(i)?);
+            }
+            scene.controls.push(row);
+        }
+        scenes.push(scene);
+    }
+    Ok(scenes)
+}
+
+/// All scenes once on every thread, and their counts.
+///
+/// # Errors
+/// If the model cannot be simulated.
+pub fn replay(plan: &Plan, model: &Model, scenes: &[Scene], isa: Isa, counts: &mut Counts) -> Result<Sample, SimError> {
+    let sim = SimOptions { ground_contacts_only: plan.contacts == Which::Ground, ..Default::default() };
+    let options = BatchOptions { agents: plan.agents, threads: 1, isa, sim, guard: 0 };
+    let work = |_: usize, _: &mut ()| -> Result<(Counts, Sample), SimError> {
+        let mut batch = Batch::new(model, &options)?;
+        let mut sample = Sample::default();
+        for scene in scenes {
+            for (agent, [qpos, qvel]) in scene.starts.iter().enumerate() {
+                batch.reset(agent, qpos, qvel);
+            }
+            let (cpu, wall) = (thread_cpu(), Instant::now());
+            for ctrl in &scene.controls {
+                batch.step(ctrl, scene.hold);
+            }
+            sample.cpu += thread_cpu() - cpu;
+            sample.wall += wall.elapsed().as_secs_f64();
+            sample.steps += (plan.agents * scene.controls.len() * scene.hold) as u64;
+        }
+        Ok((Counts { stats: batch.stats(), non_finite: batch.quarantined() }, sample))
+    };
+    let (threads, _) = on_threads(&mut vec![(); plan.threads], work);
+    let mut sum = Sample::default();
+    for thread in threads {
+        let (own, sample) = thread?;
+        sum.steps += sample.steps;
+        sum.cpu += sample.cpu;
+        sum.wall = sum.wall.max(sample.wall);
+        counts.stats.add(&own.stats);
+        counts.non_finite += own.non_finite;
+    }
+    Ok(sum)
+}
