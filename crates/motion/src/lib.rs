@@ -57,7 +57,7 @@ pub use contact::contacts;
 pub use effort::{Effort, Efforts, Flight, efforts};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
-pub use retarget::{Fit, Mapping, fit, retarget, soles};
+pub use retarget::{Fit, Mapping, Wear, fit, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Skeleton};
 pub use tracking::{Places, Tracking};
 pub use worst::Worst;

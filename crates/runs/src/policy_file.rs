@@ -19,7 +19,7 @@ pub fn load(
     agent: Option<&str>,
     options: &TaskOptions,
 ) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
-    let noted = noted(given)?.map(|meta| Setting::of(&meta));
+    let noted = task_of(given)?;
     let setting = match (agent.map(Setting::named).transpose()?, noted) {
         (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
         (Some(asked), _) => asked,
@@ -34,14 +34,19 @@ pub fn load(
     Ok((policy, factory))
 }
 
-/// What a file says of its policy; nothing, if another program has written it.
-fn noted(given: &Path) -> Result<Option<PolicyMeta>, RunError> {
+/// The task that a file notes for its policy; none, if another program has written it.
+///
+/// # Errors
+/// If there is no such file, or it is no policy.
+pub fn task_of(given: &Path) -> Result<Option<Setting>, RunError> {
     let path = policy_path(given)?;
-    if is_onnx(&path) {
+    let noted: Option<PolicyMeta> = if is_onnx(&path) {
         let bytes = std::fs::read(&path).map_err(RunError::io(&path, "read"))?;
-        return Ok(Policy::meta_of_onnx(&bytes));
-    }
-    Ok(Some(Policy::load(&path)?.meta().clone()))
+        Policy::meta_of_onnx(&bytes)
+    } else {
+        Some(Policy::load(&path)?.meta().clone())
+    };
+    Ok(noted.map(|meta| Setting::of(&meta)))
 }
 
 /// Reads a policy for a task, or, without one, for whatever task its file names: this program may not know that.

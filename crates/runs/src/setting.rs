@@ -74,10 +74,24 @@ impl Setting {
             };
             self.options.set(name, value);
         }
+        self.forget_unused_clips();
+        Ok(self)
+    }
+
+    fn forget_unused_clips(&mut self) {
         if let Some(Value::Text(names)) = self.options.get(CLIP) {
             self.clips.retain(|clip, _| names.split(',').any(|name| name.trim() == clip));
         }
-        Ok(self)
+    }
+
+    /// The same with all arguments that another setting of the agent has, and its clips.
+    pub fn overlaid(mut self, other: &Setting) -> Self {
+        for (name, value) in other.options.iter() {
+            self.options.set(name, value.clone());
+        }
+        self.clips.extend(other.clips.clone());
+        self.forget_unused_clips();
+        self
     }
 
     /// Its environments.
@@ -105,7 +119,12 @@ impl Setting {
         self.with_clips(|| Ok(VecEnv::new(&self.agent, &options)?))
     }
 
-    fn with_clips<T>(&self, make: impl FnOnce() -> Result<T, RunError>) -> Result<T, RunError> {
+    /// Makes something while the setting's clips have their names: environments look them up when they are made, and another
+    /// setting's clips may have the same names.
+    ///
+    /// # Errors
+    /// If a clip is damaged, or those of `make`.
+    pub fn with_clips<T, E: From<RunError>>(&self, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
         clips::name(&self.clips)?;
         make()

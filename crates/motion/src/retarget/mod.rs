@@ -5,15 +5,18 @@
 //! above the ground and smoothly. What stands on the ground in that solution is held there in the next one, and the center of
 //! mass moves as gravity and the ground let it.
 
+mod align;
 mod band;
 mod fit;
 mod mapping;
 mod problem;
 mod target;
+mod wear;
 mod weight;
 
 pub use fit::{Fit, fit};
 pub use mapping::{Mapping, soles};
+pub use wear::Wear;
 
 use crate::apart::Couple;
 use crate::clip::{About, Clip, Cycle};

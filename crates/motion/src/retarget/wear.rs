@@ -1,0 +1,117 @@
+//! The way back: a skeleton that moves as a model does, with bones of its own lengths. A skinned mesh needs it to be worn.
+
+use super::align::Alignment;
+use super::mapping::Mapping;
+use crate::rotation::{quat, slerp, wxyz};
+use crate::skeleton::{Keyframe, Skeleton};
+use glam::{DQuat, DVec3};
+use marathon_physics::Model;
+
+/// How a skeleton wears a model.
+#[derive(Clone, Debug)]
+pub struct Wear {
+    skeleton: Skeleton,
+    /// Orientation of each bone at rest, with the skeleton's front turned to the model's.
+    rest: Vec<DQuat>,
+    follows: Vec<Follows>,
+    /// Of each hip: the body, the place in it where the thigh turns, and the joint of the skeleton.
+    hips: [(usize, DVec3, usize); 2],
+    scale: f64,
+}
+
+/// What turns a bone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Follows {
+    /// A body, whose orientation times this is the bone's.
+    Body(usize, DQuat),
+    /// Two other bones: the share of the way from the turn of the first to that of the second.
+    Between(usize, usize, f64),
+    /// Its parent.
+    Parent,
+}
+
+impl Wear {
+    /// A skeleton that is to move as a model. A mapping's parts turn their joints; the joints between two that one part lies
+    /// between, such as those of a spine, share the turn; all others keep their rest pose.
+    pub fn new(model: &Model, mapping: &Mapping, skeleton: &Skeleton) -> Self {
+        let Alignment { rest: model_rest, source, facing, align, scale, .. } = Alignment::new(model, mapping, skeleton);
+        let rest: Vec<DQuat> = source.quat.iter().map(|turn| facing * *turn).collect();
+        let mut follows = vec![Follows::Parent; skeleton.bones.len()];
+        for (part, align) in mapping.parts.iter().zip(&align).filter(|(part, _)| part.whole && part.toward.is_none()) {
+            if follows[part.joint] == Follows::Parent {
+                let turn = model_rest.quat[part.body].conjugate() * align.conjugate() * rest[part.joint];
+                follows[part.joint] = Follows::Body(part.body, turn);
+            }
+        }
+        for part in &mapping.parts {
+            let Some((other, _)) = part.toward else { continue };
+            let between = chain(skeleton, part.joint, other);
+            let count = between.len() as f64 + 1.0;
+            for (i, bone) in between.into_iter().enumerate() {
+                if follows[bone] == Follows::Parent {
+                    follows[bone] = Follows::Between(part.joint, other, (i + 1) as f64 / count);
+                }
+            }
+        }
+        let hips = mapping.hips.map(|hip| {
+            let part = &mapping.parts[hip];
+            (part.body, DVec3::from_array(part.local), part.joint)
+        });
+        Wear { skeleton: skeleton.clone(), rest, follows, hips, scale }
+    }
+
+    /// Factor on the skeleton's lengths with which its legs are as long as the model's.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// The skeleton, with its lengths times [`Wear::scale`], while the model's bodies are at these places: position, m, and
+    /// orientation, `[w, x, y, z]`, of each. The skeleton's hips are where the model's are.
+    ///
+    /// # Panics
+    /// If there are fewer places than the model has bodies.
+    pub fn pose(&self, bodies: &[([f64; 3], [f64; 4])]) -> Keyframe {
+        let bones = &self.skeleton.bones;
+        let body = |i: usize| (DVec3::from_array(bodies[i].0), quat(&bodies[i].1).normalize());
+        let own = |bone: usize| match self.follows[bone] {
+            Follows::Body(i, turn) => body(i).1 * turn,
+            _ => self.rest[bone],
+        };
+        let turned = |bone: usize| own(bone) * self.rest[bone].conjugate();
+        let (mut turns, mut places) = (Vec::with_capacity(bones.len()), Vec::with_capacity(bones.len()));
+        let mut rotations = Vec::with_capacity(bones.len());
+        for (i, bone) in bones.iter().enumerate() {
+            let parent: Option<(DVec3, DQuat)> = bone.parent.map(|parent| (places[parent], turns[parent]));
+            let turn = match (self.follows[i], parent) {
+                (Follows::Between(a, b, share), _) => slerp(turned(a), turned(b), share) * self.rest[i],
+                (Follows::Parent, Some((_, turn))) => turn * quat(&bone.rest),
+                _ => own(i),
+            };
+            let offset = self.scale * DVec3::from_array(bone.offset);
+            places.push(parent.map_or(DVec3::ZERO, |(place, turn)| place + turn * offset));
+            rotations.push(wxyz(parent.map_or(turn, |(_, above)| above.conjugate() * turn)));
+            turns.push(turn);
+        }
+        let mut root = DVec3::ZERO;
+        for (i, local, joint) in self.hips {
+            let (place, turn) = body(i);
+            root += 0.5 * (place + turn * local - places[joint]);
+        }
+        Keyframe { root: root.to_array(), rotations }
+    }
+}
+
+/// The bones between one bone and another that it hangs from, or that hangs from it, from the first on; none otherwise.
+fn chain(skeleton: &Skeleton, from: usize, to: usize) -> Vec<usize> {
+    let up = |from: usize, to: usize| {
+        let mut bones = Vec::new();
+        let mut at = skeleton.bones[from].parent;
+        while let Some(bone) = at.filter(|bone| *bone != to) {
+            bones.push(bone);
+            at = skeleton.bones[bone].parent;
+        }
+        at.map(|_| bones)
+    };
+    let down = || up(to, from).map(|bones| bones.into_iter().rev().collect());
+    up(from, to).or_else(down).unwrap_or_default()
+}
