@@ -12,7 +12,7 @@
 //! | n | how far the clip's next angles are from the agent's own, rad |
 //!
 //! Vectors are in the clip's [direction of travel](crate::Frame::facing). An action is what it is in `Humanoid-v0` and
-//! `Walker2d-v0`: a share of each motor's torque. The reward is DeepMimic's ([`imitation`](super::imitation)). The agent fails
+//! `Walker2d-v0`: a share of each motor's torque. The reward is DeepMimic's, as Marathon Man's (`imitation.rs`). The agent fails
 //! when its trunk touches the ground, and when the mean distance of its parts from the clip exceeds 0.5 m.
 
 use std::path::Path;

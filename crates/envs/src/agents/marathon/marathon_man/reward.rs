@@ -1,6 +1,6 @@
 //! Rewards for following a clip.
 //!
-//! `deepmimic`: that of all [figures that move like a clip](super::super::imitation).
+//! `deepmimic`: that of all figures that move like a clip (`imitation.rs`).
 //!
 //! `paper`: ActiveRagdollStyleTransfer 0.002.124, in which a distance `d` of at most `n` is worth `((n - d)/n)^n`. Its
 //! velocities were 5 times too large, on both sides; these are true.
