@@ -41,7 +41,7 @@ fn options_are_recorded_and_obeyed() {
     }
     // observations of another length would be refused
     let own = eval(path, &["a"]);
-    assert_eq!(own, eval(path, &["a", "--option", "start=random", "--option", "clip=run"]), "nobody has failed before");
+    assert_eq!(own, eval(path, &["a", "--option", "start=adaptive", "--option", "clip=run"]));
     assert_ne!(own, eval(path, &["a", "--option", "start=first"]));
     assert_ne!(own, eval(path, &["a", "--option", "clip=walk"]));
     let text = fail(path, 1, &["eval", "a", "--option", "future=0"]);
