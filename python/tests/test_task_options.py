@@ -40,7 +40,7 @@ def test_a_policy_plays_the_task_it_was_trained_for(mine: Path, tmp_path: Path) 
     own = evaluate(policy, 16)
     again = pickle.loads(pickle.dumps(policy))  # noqa: S301
     assert own == evaluate(shipped.policy, 16) == evaluate(again, 16)
-    assert own == evaluate(policy, 16, start="random")
+    assert own == evaluate(policy, 16, start="adaptive")
     assert own != evaluate(policy, 16, start="first")
     longer = train(resume=tmp_path / "run", steps=1024)
     assert longer.steps == 1024
