@@ -41,6 +41,16 @@ fn a_study_of_clips_makes_no_run_twice() {
     let made = std::fs::metadata(&policy).unwrap().modified().unwrap();
     assert_eq!(study(), page);
     assert_eq!(std::fs::metadata(&policy).unwrap().modified().unwrap(), made);
+    // what is kept beside the runs is enough for the page, and says so where it is of another configuration
+    for task in ["MarathonManWalk-v0-1", "MarathonManWalk-v0-2", "MarathonManKick-v0-1", "MarathonManKick-v0-2"] {
+        std::fs::remove_dir_all(folder.path().join("kept").join(task)).unwrap();
+    }
+    let kept = succeed(folder.path(), &[&words[..], &["--kept-only", "--out", "pages"]].concat());
+    assert_eq!(kept.replace(" --kept-only", ""), page);
+    let error = fail(folder.path(), 1, &[&words[..6], &["--steps", "8192", "--keep", "kept"]].concat());
+    assert!(error.contains("MarathonManWalk-v0-1.json") && error.contains("run.config"), "{error}");
+    let error = fail(folder.path(), 1, &["study", "style-transfer", "--clips", "run", "--kept-only", "--keep", "kept"]);
+    assert!(error.contains("none of these clips"), "{error}");
     let error = fail(folder.path(), 2, &["study", "style-transfer", "--clips", "wlak"]);
     assert!(error.contains("did you mean 'walk'?"), "{error}");
 }

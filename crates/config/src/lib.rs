@@ -81,6 +81,7 @@ const FAST: [(&str, (&str, &str)); 40] = [
     ("MarathonManCrawl", MARATHON_MAN),
     ("MarathonManGetUpFaceDown", MARATHON_MAN),
     ("MarathonManGetUpFaceUp", MARATHON_MAN),
+    ("MarathonManSparse", MARATHON_MAN),
     ("MarathonManSteer", MARATHON_MAN_STEER),
     ("HumanoidStyleWalk", IN_STYLE),
     ("HumanoidStyleRun", IN_STYLE),

@@ -59,29 +59,51 @@ pub struct Followed {
 /// # Errors
 /// If the task cannot be made.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
+    let (setting, clips) = clips_of(policy)?;
+    let of_clip = |clip: String| {
+        let first = follow_from("first", &clip, policy, &setting, options)?;
+        let random = follow_from("random", &clip, policy, &setting, options)?;
+        Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
+    };
+    clips.into_iter().map(of_clip).collect()
+}
+
+/// The half of [`measure`] that begins at each clip's first frame.
+///
+/// # Errors
+/// If the task cannot be made.
+pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Followed>, RunError> {
+    let (setting, clips) = clips_of(policy)?;
+    clips.iter().map(|clip| follow_from("first", clip, policy, &setting, options)).collect()
+}
+
+/// A policy's task and the clips that it follows; an empty name where the task has no choice.
+fn clips_of(policy: &Policy) -> Result<(Setting, Vec<String>), RunError> {
     let setting = Setting::of(policy.meta());
-    let Ok(agent) = registry::agent(&setting.agent) else { return Ok(Vec::new()) };
+    let Ok(agent) = registry::agent(&setting.agent) else { return Ok((setting, Vec::new())) };
     let known = agent.options();
     if !agent.facts().follows_clips || known.iter().all(|option| option.name != START) {
-        return Ok(Vec::new());
+        return Ok((setting, Vec::new()));
     }
     let clips = match setting.factory()?.spec().options.get(CLIP) {
         Some(Value::Text(names)) => ClipNames(names.clone()).names().into_iter().map(String::from).collect(),
         _ => vec![String::new()],
     };
-    clips.into_iter().map(|clip| of_clip(policy, &setting, clip, options)).collect()
+    Ok((setting, clips))
 }
 
-fn of_clip(policy: &Policy, setting: &Setting, clip: String, options: &EvalOptions) -> Result<Imitation, RunError> {
-    let followed = |start: &str| {
-        let mut given = vec![(START.to_string(), Value::Text(start.into()))];
-        if !clip.is_empty() {
-            given.push((CLIP.to_string(), Value::Text(clip.clone())));
-        }
-        follow(policy, &setting.clone().with(&TaskOptions { given })?, options)
-    };
-    let (first, random) = (followed("first")?, followed("random")?);
-    Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
+fn follow_from(
+    start: &str,
+    clip: &str,
+    policy: &Policy,
+    setting: &Setting,
+    options: &EvalOptions,
+) -> Result<Followed, RunError> {
+    let mut given = vec![(START.to_string(), Value::Text(start.into()))];
+    if !clip.is_empty() {
+        given.push((CLIP.to_string(), Value::Text(clip.into())));
+    }
+    follow(policy, &setting.clone().with(&TaskOptions { given })?, options)
 }
 
 /// One episode each of so many agents.

@@ -57,13 +57,16 @@ pub enum What {
     /// One agent, many agents in one process, threads, several processes.
     MultiEnv(Options),
     /// Figure 3 of the paper: walk, run, backflip and others learned from motion clips. Keeps its runs in
-    /// runs/style-transfer, unless --keep names another folder.
+    /// runs/style-transfer, unless --keep names another folder, and a small file beside each, which is enough for the page.
     StyleTransfer {
         #[command(flatten)]
         options: Options,
         /// Clips of Marathon Man to learn, or other tasks such as HumanoidStyleRun, with commas between them [default: all].
         #[arg(long, value_name = "CLIPS", value_delimiter = ',')]
         clips: Vec<String>,
+        /// Only what is kept: a page of the runs that are there, without training any.
+        #[arg(long)]
+        kept_only: bool,
     },
 }
 
@@ -131,7 +134,9 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::DecisionPeriod(options) => (decision_period::run(options)?, options),
         What::Headless(options) => (headless::run(options)?, options),
         What::MultiEnv(options) => (multi_env::run(options)?, options),
-        What::StyleTransfer { options, clips } => (style_transfer::run(options, clips)?, options),
+        What::StyleTransfer { options, clips, kept_only } => {
+            (style_transfer::run(options, clips, *kept_only)?, options)
+        },
     };
     let page = record.save(options)?;
     if json {

@@ -33,6 +33,8 @@ pub struct Senses<'a, T: Real> {
     pub(crate) memory: &'a [T],
     /// An episode has just begun: there has been no physics step whose contacts could be felt.
     pub(crate) fresh: bool,
+    /// Lanes whose episode's time is over.
+    pub(crate) last: T::Mask,
     /// Seconds between decisions.
     pub(crate) dt: f64,
 }
@@ -88,6 +90,13 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn center_of_mass_velocity(&self) -> [T; 3] {
         center_of_mass(&self.readings, &self.bindings.mass_shares)[1]
+    }
+
+    /// Whether this decision is the last that the time of the episode allows; for rewards that are paid at its end. An episode
+    /// that ends otherwise has no such decision.
+    #[inline(always)]
+    pub fn time_is_up(&self) -> T::Mask {
+        self.last
     }
 
     /// Number of touch sensors.

@@ -26,8 +26,8 @@ pub(crate) trait AgentKernel<T: Real>: Send + Sync {
 
 /// What an agent perceives for.
 pub(crate) enum Occasion<'a> {
-    /// A decision that has been carried out.
-    Decision,
+    /// A decision that has been carried out; with it the time of the episodes in the lanes `last` is over, a bit each.
+    Decision { last: u32 },
     /// The start of episodes in these lanes, a bit each; the reward is then not used.
     Start(u32),
     /// A start in all lanes, to see what the agent names.
@@ -110,10 +110,10 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
     #[inline(always)]
     fn run(self) -> Perceived {
         let Perceive { agent, task, group, work, occasion } = self;
-        let (fresh, term_names, group_names) = match occasion {
-            Occasion::Decision => (None, None, None),
-            Occasion::Start(lanes) => (Some(lanes), None, None),
-            Occasion::Rehearsal(Named { terms, groups }) => (Some(!0), Some(terms), Some(groups)),
+        let (fresh, last, term_names, group_names) = match occasion {
+            Occasion::Decision { last } => (None, last, None, None),
+            Occasion::Start(lanes) => (Some(lanes), 0, None, None),
+            Occasion::Rehearsal(Named { terms, groups }) => (Some(!0), 0, Some(terms), Some(groups)),
         };
         let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, decides, .. } = group;
         let mut s = Senses {
@@ -124,6 +124,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             command: &commands.present,
             memory: &[],
             fresh: fresh.is_some(),
+            last: T::from_bits(last & ((1 << T::LANES) - 1)),
             dt: task.spec.dt,
         };
         match fresh {

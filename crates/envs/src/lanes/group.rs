@@ -192,8 +192,8 @@ impl<T: Real> LaneGroup<T> {
         store_lanes(&self.info, lanes, first, info);
     }
 
-    /// Makes one decision. `action` is the block's, `[act][16]`.
-    pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize) -> Ended {
+    /// Makes one decision. `action` is the block's, `[act][16]`. `last`: lanes whose time is over with it, a bit each.
+    pub fn decide(&mut self, task: &Task<T>, work: &mut Work<T>, action: &[f32], first: usize, last: u32) -> Ended {
         let along_x = &task.bindings.along_x;
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(TakeActions { group: self, along_x, action, first, clip });
@@ -201,7 +201,7 @@ impl<T: Real> LaneGroup<T> {
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
         task.sim.measure(work, &self.physics, &task.bindings.measure);
         T::enter(CompleteForward { group: self, along_x });
-        let perceived = task.agent.perceive(task, self, work, Occasion::Decision);
+        let perceived = task.agent.perceive(task, self, work, Occasion::Decision { last });
         self.commands.advance();
         let ended = Ended { terminated: perceived.failed, truncated: perceived.over, diverged: unsound };
         let (termination_reward, of_first) = (task.facts.termination_reward, task.terms_of_first());

@@ -152,10 +152,12 @@ impl<T: Real> Shard for LaneShard<T> {
         out.decides.resize(task.spec.roles.len(), 0);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
+            let mut last = 0;
             for (lane, life) in lives[first..].iter().take(T::LANES).enumerate() {
                 group.commands.tell(task, lane, life.id, life.steps + 1);
+                last |= u32::from(life.steps + 1 >= self.max_episode_steps) << lane;
             }
-            let ended = group.decide(task, &mut self.work, action, first);
+            let ended = group.decide(task, &mut self.work, action, first, last);
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
             out.truncated |= (ended.truncated << first) as u16;

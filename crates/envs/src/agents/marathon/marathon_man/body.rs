@@ -39,6 +39,8 @@ const RIGHT_FOOT: Part = Part::named(&PARTS, "right_right_foot");
 const LEFT_FOOT: Part = Part::named(&PARTS, "left_left_foot");
 const RIGHT_HAND: Part = Part::named(&PARTS, "right_hand");
 const LEFT_HAND: Part = Part::named(&PARTS, "left_hand");
+/// Both feet.
+pub const FEET: [Part; 2] = [RIGHT_FOOT, LEFT_FOOT];
 /// DeepMimic's end effectors.
 pub const END_EFFECTORS: [Part; 4] = [RIGHT_FOOT, LEFT_FOOT, RIGHT_HAND, LEFT_HAND];
 /// The original's end effectors.

@@ -19,6 +19,7 @@
 mod body;
 pub mod clips;
 pub mod reward;
+mod sparse;
 pub mod steer;
 
 use std::sync::Arc;
@@ -53,7 +54,8 @@ crate::options! {
     pub struct Arguments {
         /// Motion to follow: a clip's name; several, with commas between them, or `all` that are shipped: an episode has one.
         clip: ClipNames = ClipNames("walk".into()),
-        /// Reward: `deepmimic` (Peng et al., 2018), or `paper` (Booth and Booth, 2019).
+        /// Reward: `deepmimic` (Peng et al., 2018), `paper` (Booth and Booth, 2019), or `sparse`: how far the feet have come, at
+        /// the episode's end.
         reward: Reward = Reward::DeepMimic,
         /// What an action does: `pd` moves the target of a servo away from the clip's next pose, `pd_range` is the target
         /// within the joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's
@@ -62,7 +64,7 @@ crate::options! {
         /// Where an episode starts: at `random` decisions of the clip, at its `first`, or more often where it fails: `adaptive`.
         start: StartAt = StartAt::Random,
         /// Mean distance of the parts from where the clip has them that ends an episode, m. With the reward `paper`, a sum of
-        /// its first five terms below 0.334 ends it instead.
+        /// its first five terms below 0.334 ends it instead; with `sparse`, only a fall does.
         distance: Scale = Scale(0.5),
         /// Most that an action of `pd` moves a target, rad.
         reach: Scale = Scale(1.0),
@@ -104,9 +106,11 @@ const TASKS: [(&str, &str, &str); 16] = [
 /// Marathon Man with any clip, and with each that comes with the crate.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let any = ("MarathonMan-v0", "walk", "a figure of 21 motors: move as a motion clip does");
-    let tasks = [any].into_iter().chain(TASKS).enumerate();
+    let sparse = ("MarathonManSparse-v0", "walk", "a figure of 21 motors: walk for one reward at the end");
+    let tasks = [any].into_iter().chain(TASKS).chain([sparse]).enumerate();
     let agent = |(i, (id, clip, summary)): (usize, (&'static str, &str, &'static str))| {
-        let arguments = Arguments { clip: ClipNames(clip.into()), ..Arguments::default() };
+        let reward = if id == sparse.0 { Reward::Sparse } else { Reward::DeepMimic };
+        let arguments = Arguments { clip: ClipNames(clip.into()), reward, ..Arguments::default() };
         Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
     };
     tasks.map(agent).chain([Arc::new(steer::Steer::default()) as Arc<dyn AnyAgent>]).collect()
@@ -139,7 +143,8 @@ impl Agent for MarathonMan {
             parts: names(PARTS),
             touch_sites: names(TOUCH),
             clips: clip.find(),
-            memory: imitation::MEMORY,
+            follows_clips: *reward != Reward::Sparse,
+            memory: if *reward == Reward::Sparse { sparse::MEMORY } else { imitation::MEMORY },
             termination_reward: None,
             ..Facts::default()
         }
@@ -186,8 +191,18 @@ impl Agent for MarathonMan {
     }
 
     #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        if self.arguments.reward == Reward::Sparse {
+            sparse::begin(s, memory);
+        }
+    }
+
+    #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         imitation::remember(s, memory);
+        if self.arguments.reward == Reward::Sparse {
+            sparse::remember(s, memory);
+        }
     }
 
     #[inline(always)]
@@ -228,6 +243,7 @@ impl Agent for MarathonMan {
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
         let far = match self.arguments.reward {
+            Reward::Sparse => T::none(),
             Reward::DeepMimic => T::lit(self.arguments.distance.0).lt(imitation::distance(s, &ANATOMY, false)),
             Reward::Paper => reward::too_far(s),
         };

@@ -4,12 +4,15 @@
 //!
 //! `paper`: ActiveRagdollStyleTransfer 0.002.124, in which a distance `d` of at most `n` is worth `((n - d)/n)^n`. Its
 //! velocities were 5 times too large, on both sides; these are true.
+//!
+//! `sparse`: how far the feet have come, once, at the episode's end ([`sparse`](super::sparse)).
 
 use std::f64::consts::FRAC_1_PI;
 
 use marathon_physics::lanes::Real;
 
 use super::super::imitation::{self, TERMS, angle2, norm2, sub};
+use super::sparse;
 use super::body::{ANATOMY, BUTT, PAPER_END_EFFECTORS, TOUCH, parts};
 use crate::agent::options::OptionValue;
 use crate::agent::senses::clamp;
@@ -22,18 +25,21 @@ pub enum Reward {
     DeepMimic,
     /// The paper's.
     Paper,
+    /// How far the feet have come, at the end.
+    Sparse,
 }
 
 impl OptionValue for Reward {
-    const EXPECTED: &'static str = "deepmimic or paper";
+    const EXPECTED: &'static str = "deepmimic, paper or sparse";
     fn value(&self) -> Value {
         match self {
             Reward::DeepMimic => "deepmimic".into(),
             Reward::Paper => "paper".into(),
+            Reward::Sparse => "sparse".into(),
         }
     }
     fn read(value: &Value) -> Option<Self> {
-        [Reward::DeepMimic, Reward::Paper].into_iter().find(|reward| reward.value() == *value)
+        [Reward::DeepMimic, Reward::Paper, Reward::Sparse].into_iter().find(|reward| reward.value() == *value)
     }
 }
 
@@ -55,6 +61,7 @@ impl Reward {
         match self {
             Reward::DeepMimic => TERMS.map(|(name, ..)| name).to_vec(),
             Reward::Paper => PAPER.map(|(name, ..)| name).into_iter().chain(["touch", "joints_at_limit"]).collect(),
+            Reward::Sparse => vec![sparse::TERM],
         }
     }
 
@@ -74,6 +81,7 @@ impl Reward {
                 }
                 terms.add("joints_at_limit", PAPER_REST, driven.neg_mul_add(T::lit(1.0 / 21.0), T::lit(1.0)));
             }
+            Reward::Sparse => sparse::add(s, terms),
         }
     }
 }

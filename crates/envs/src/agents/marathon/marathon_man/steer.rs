@@ -23,12 +23,12 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::super::imitation::{observe_body, sub, turned_to};
-use super::body::{ACTIONS, ANATOMY, BUTT, Control, END_EFFECTORS, JOINTS, PARTS, TOUCH, model, parts};
+use super::body::{ACTIONS, ANATOMY, BUTT, Control, END_EFFECTORS, FEET, JOINTS, PARTS, TOUCH, model, parts};
 use super::clips::{self, STAND};
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses,
+    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses,
     Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
@@ -52,9 +52,6 @@ const STRAIGHT: f64 = 0.4;
 
 /// Slots of the memory: cosine and sine of the commanded direction.
 const DIRECTION: usize = Following::SLOTS;
-
-/// Parts that may touch the ground.
-const FEET: [Part; 2] = [Part::named(&PARTS, "right_right_foot"), Part::named(&PARTS, "left_left_foot")];
 
 /// Target of a joint's servo without action, and how far an action moves it, rad. The damping of a servo, a tenth of its
 /// stiffness, takes 0.1 s of the joint's velocity away, so targets reach farther than poses.

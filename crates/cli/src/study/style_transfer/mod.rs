@@ -1,5 +1,7 @@
 //! Style transfer: Marathon Man learns each motion clip, with the configuration that comes with him.
 
+mod kept;
+
 use super::Options;
 use super::record::Record;
 use crate::error::CliError;
@@ -11,9 +13,9 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::report::csv::History;
 use marathon_runs::text::thousands;
+use kept::Found;
 use marathon_runs::{
-    Imitation, LearnOptions, PolicySource, RunError, RunFolder, RunOptions, Session, Summary, Task, TaskOptions,
-    imitation,
+    LearnOptions, PolicySource, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions, imitation,
 };
 use std::path::{Path, PathBuf};
 
@@ -21,6 +23,8 @@ use std::path::{Path, PathBuf};
 const KEEP: &str = "runs/style-transfer";
 /// Episodes by which a policy on the way is judged.
 const EPISODES: usize = 16;
+/// Policies on the way that are judged have at least so many times the steps of the one before.
+const APART: f64 = 1.1;
 /// Most lines that can be told apart in a picture.
 const LINES: usize = 8;
 
@@ -29,25 +33,19 @@ struct Job {
     /// The clip's name, or for other figures than Marathon Man that of the task.
     clip: String,
     task: String,
+    /// The clip's file.
+    motion: Vec<u8>,
     /// Of the clip, seconds.
     duration: f64,
     /// Most that an episode from the clip's beginning can have, seconds.
     longest: f64,
 }
 
-/// What a finished run has found.
-struct Found {
-    summary: Summary,
-    imitation: Imitation,
-    /// Agent-steps, processor seconds, and share of the longest time that is followed from the clip's beginning.
-    curve: Vec<[f64; 3]>,
-}
-
-/// Trains and measures.
+/// Trains and measures; with `kept_only`, tells of what is kept without training anything.
 ///
 /// # Errors
-/// If a clip is unknown, or a run cannot be trained or read.
-pub fn run(options: &Options, clips: &[String]) -> Result<Record, CliError> {
+/// If a clip is unknown, or a run cannot be trained or read, or was made with another configuration.
+pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Record, CliError> {
     let jobs = jobs(clips)?;
     interrupt::install("finishing this iteration; the same command goes on from there")?;
     let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
@@ -56,17 +54,37 @@ pub fn run(options: &Options, clips: &[String]) -> Result<Record, CliError> {
         let mut found = Vec::new();
         for seed in 1..=options.seeds {
             let folder = keep.join(format!("{}-{seed}", job.task));
-            train(job, seed, &folder, options)?;
-            found.push(measured(job, &folder)?);
+            let file = kept::file(&folder);
+            let (new, loaded) = new_run(job, seed, options);
+            let known = Session::open(Some(Task::named(&job.task)?), &new, Some(loaded), true)?.0.run;
+            match Found::read(&file, job, Some(&known))? {
+                Some(kept) => found.push(kept),
+                None if kept_only => {}
+                None => {
+                    train(job, seed, &folder, options)?;
+                    let made = measured(job, &folder)?;
+                    made.write(&file)?;
+                    found.push(made);
+                }
+            }
+        }
+        if found.is_empty() {
+            continue;
         }
         rows.push(row(job, &found));
         lines.push((job.clip.clone(), middle(&found)));
     }
     lines.truncate(LINES);
-    let words = match clips {
+    if rows.is_empty() {
+        return Err(CliError::file(&keep, "runs", "none of these clips", "what an earlier study has kept"));
+    }
+    let mut words = match clips {
         [] => String::new(),
         clips => format!(" --clips {}", clips.join(",")),
     };
+    if kept_only {
+        words.push_str(" --kept-only");
+    }
     Ok(Record {
         name: "style-transfer",
         title: "Style transfer",
@@ -123,7 +141,7 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
                 true => clip.about().name.clone(),
                 false => id.rsplit_once('-').map_or(id.clone(), |(name, _)| name.to_string()),
             };
-            all.push(Job { clip: name, task: id, duration, longest });
+            all.push(Job { clip: name, task: id, motion: clip.to_bytes(), duration, longest });
         }
     }
     for clip in clips {
@@ -141,19 +159,28 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
     Ok(all)
 }
 
+/// Options and configuration of a new run.
+fn new_run(job: &Job, seed: u64, options: &Options) -> (RunOptions, Loaded) {
+    let learn = LearnOptions {
+        steps: options.steps,
+        seed: Some(seed),
+        threads: Some(options.threads),
+        ..LearnOptions::default()
+    };
+    // each is looked at afterwards
+    let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&job.task) };
+    (RunOptions { learn, ..RunOptions::default() }, loaded)
+}
+
 /// Makes the run that is to be in a folder, or what is missing of it.
 fn train(job: &Job, seed: u64, folder: &Path, options: &Options) -> Result<(), CliError> {
-    let mut run = RunOptions::default();
     let opened = if folder.join("run.json").exists() {
-        run.resume = Some(folder.into());
+        let mut run = RunOptions { resume: Some(folder.into()), ..RunOptions::default() };
         run.learn.steps = options.steps;
         Session::open(None, &run, None, false)
     } else {
-        run.out = Some(folder.into());
-        run.learn =
-            LearnOptions { steps: options.steps, seed: Some(seed), threads: Some(options.threads), ..run.learn };
-        // each is looked at afterwards
-        let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&job.task) };
+        let (run, loaded) = new_run(job, seed, options);
+        let run = RunOptions { out: Some(folder.into()), ..run };
         Session::open(Some(Task::named(&job.task)?), &run, Some(loaded), false)
     };
     let session = match opened {
@@ -171,7 +198,7 @@ fn train(job: &Job, seed: u64, folder: &Path, options: &Options) -> Result<(), C
 
 /// Reads a finished run, and judges the policies that it has left on the way.
 fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
-    let (folder, _) = RunFolder::open(path)?;
+    let (folder, run): (_, RunFile) = RunFolder::open(path)?;
     let file = folder.summary();
     let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
     let summary: Summary =
@@ -193,14 +220,19 @@ fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
     policies.sort();
     policies.dedup_by_key(|(steps, _)| *steps);
     let judge = EvalOptions { episodes: EPISODES, ..EvalOptions::default() };
-    let mut curve = Vec::new();
+    let (mut curve, mut judged, last) = (Vec::new(), 0.0, summary.steps);
     for (steps, policy) in policies {
+        if steps != last && (steps as f64) < APART * judged {
+            continue;
+        }
+        judged = steps as f64;
         let (policy, _) = PolicySource { policy, agent: None, task: TaskOptions::default() }.load()?;
         let seconds = clock.iter().rfind(|(done, _)| *done <= steps as f64).map_or(0.0, |(_, seconds)| *seconds);
-        let followed = imitation::measure(&policy, &judge)?;
-        curve.extend(followed.first().map(|clip| [steps as f64, seconds, clip.first.seconds / job.longest]));
+        let followed = imitation::from_beginning(&policy, &judge)?;
+        curve.extend(followed.first().map(|clip| [steps as f64, seconds, clip.seconds / job.longest]));
     }
-    Ok(Found { summary, imitation, curve })
+    let Summary { steps, cpu_seconds, .. } = summary;
+    Ok(Found { run, clip: kept::clip(job), steps, cpu_seconds, imitation, curve })
 }
 
 /// The middle one of some numbers.
@@ -229,8 +261,8 @@ fn row(job: &Job, found: &[Found]) -> Vec<String> {
     };
     vec![
         job.clip.clone(),
-        cell(&whole, &|f| Some(f.summary.steps as f64)),
-        cell(&whole, &|f| Some(f.summary.cpu_seconds)),
+        cell(&whole, &|f| Some(f.steps as f64)),
+        cell(&whole, &|f| Some(f.cpu_seconds)),
         cell(&whole, &|f| Some(f.imitation.first.completed as f64)),
         cell(&whole, &|f| Some(f.imitation.random.completed as f64)),
         cell(&|x| format!("{x:.3}"), &|f| Some(f.imitation.first.joint_error)),
