@@ -3,7 +3,7 @@
 //! They are profiles along the track, the same at every distance from it. The first meters are level, so that episodes
 //! begin as in training.
 
-use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Registry, registry};
+use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Options, Registry, registry};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -86,7 +86,16 @@ impl Ground {
     /// # Errors
     /// If there is no such agent, or its model cannot be read.
     pub fn agent(self, name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
-        let agent = registry::agent(name)?;
+        self.agent_with(name, &Options::new())
+    }
+
+    /// The same with other values for some of its arguments.
+    ///
+    /// # Errors
+    /// The same, or if it does not take an argument or its value.
+    pub fn agent_with(self, name: &str, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        // an argument may change the model, which the ground becomes a part of
+        let agent = registry::agent(name)?.with_options(options)?;
         if self == Ground::Level {
             return Ok(agent);
         }
@@ -97,14 +106,14 @@ impl Ground {
         Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(text))))
     }
 
-    /// A registry of this one agent, on this ground.
-    pub(crate) fn registry(self, name: &str) -> Result<Registry, EnvError> {
+    /// A registry that has an agent on this ground, and the arguments that are still to be given to it.
+    pub(crate) fn registry(self, name: &str, options: &Options) -> Result<(Registry, Options), EnvError> {
         if self == Ground::Level {
-            return Ok(registry::global());
+            return Ok((registry::global(), options.clone()));
         }
         let mut registry = Registry::empty();
-        registry.register(self.agent(name)?)?;
-        Ok(registry)
+        registry.register(self.agent_with(name, options)?)?;
+        Ok((registry, Options::new()))
     }
 
     /// MJCF with this ground in it; `None` if it has no world.

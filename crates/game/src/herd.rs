@@ -8,10 +8,11 @@ use crate::ground::Ground;
 use crate::ragdoll::{Character, Controls, End, Episode, Restart};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
-use marathon_envs::{Autoreset, BLOCK, EnvError, Spec, Step, VecEnv, VecEnvOptions, registry};
+use marathon_envs::{Autoreset, BLOCK, EnvError, Spec, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, Variation};
+use marathon_runs::{RunError, Setting};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,6 +27,8 @@ pub(crate) enum HerdError {
     #[error(transparent)]
     Env(#[from] EnvError),
     #[error(transparent)]
+    Setting(#[from] RunError),
+    #[error(transparent)]
     Sim(#[from] marathon_physics::SimError),
     #[error("a body without a task takes no command")]
     Command,
@@ -34,6 +37,8 @@ pub(crate) enum HerdError {
 /// All ragdolls of one kind.
 pub(crate) struct Herd {
     pub character: Character,
+    /// The task of an agent.
+    pub setting: Setting,
     pub ground: Ground,
     pub model: Arc<Model>,
     pub spec: Option<Arc<Spec>>,
@@ -49,23 +54,24 @@ pub(crate) struct Herd {
 }
 
 impl Herd {
-    /// A herd of an agent of the registry on a ground, without ragdolls yet.
-    pub fn of_agent(name: &str, ground: Ground, time: Duration) -> Result<Self, HerdError> {
-        let registry = ground.registry(name)?;
-        // the registry of another ground knows its agent by the full name alone
-        let agent = registry.agent(&registry::agent(name)?.facts().id)?;
-        let spec = agent.clone().shards(Isa::best())?.spec().clone();
-        Ok(Herd {
-            character: Character::Agent(name.into()),
-            ground,
-            model: Arc::new(agent.model()?),
-            feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
-            substeps: spec.frame_skip,
-            dt: spec.dt,
-            period: Duration::from_secs_f64(spec.dt),
-            spec: Some(Arc::new(spec)),
-            time,
-            pens: Vec::new(),
+    /// A herd of an agent of the registry, in a task of its, on a ground, without ragdolls yet.
+    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, HerdError> {
+        setting.with_clips(|| {
+            let agent = ground.agent_with(&setting.agent, &setting.options)?;
+            let spec = agent.clone().shards(Isa::best())?.spec().clone();
+            Ok(Herd {
+                character: Character::Agent(name.into()),
+                setting: setting.clone(),
+                ground,
+                model: Arc::new(agent.model()?),
+                feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
+                substeps: spec.frame_skip,
+                dt: spec.dt,
+                period: Duration::from_secs_f64(spec.dt),
+                spec: Some(Arc::new(spec)),
+                time,
+                pens: Vec::new(),
+            })
         })
     }
 
@@ -75,6 +81,7 @@ impl Herd {
         let dt = substeps as f64 * model.opt.timestep;
         Herd {
             character: Character::Prefab(prefab.clone()),
+            setting: Setting::default(),
             ground: Ground::Level,
             model,
             feet: Vec::new(),
@@ -153,6 +160,8 @@ pub(crate) struct Still {
     pub time: Duration,
     pub qpos: Vec<f64>,
     pub qvel: Vec<f64>,
+    /// Where the clip is that it follows, if it does.
+    pub reference: Option<Vec<f64>>,
     /// It did not come out of the one before, but of a reset.
     pub fresh: bool,
 }
@@ -233,9 +242,12 @@ impl Pen {
     fn new(herd: &Herd) -> Result<Self, HerdError> {
         let (engine, n_obs, out) = match &herd.character {
             Character::Agent(name) => {
-                let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, ..default() };
-                let id = herd.spec.as_ref().map_or(name, |spec| &spec.id);
-                let mut env = VecEnv::from_registry(&herd.ground.registry(id)?, id, &options)?;
+                let (setting, id) = (&herd.setting, herd.spec.as_ref().map_or(name, |spec| &spec.id));
+                let mut env = setting.with_clips(|| -> Result<VecEnv, HerdError> {
+                    let (registry, options) = herd.ground.registry(id, &setting.options)?;
+                    let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
+                    Ok(VecEnv::from_registry(&registry, id, &options)?)
+                })?;
                 let (n_obs, out) = (env.spec().obs, env.buffers());
                 env.reset(None, &mut vec![0.0; n_obs * BLOCK])?;
                 (Engine::Env(Box::new(env)), n_obs, out)
@@ -343,16 +355,17 @@ impl Pen {
 
     /// Appends the state of a lane to its trail, and notes what it is told.
     fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
-        let (qpos, qvel, command) = match self.engine.get() {
+        let (qpos, qvel, command, reference) = match self.engine.get() {
             Engine::Env(env) => {
                 let command = env.context(lane).map(|context| context.command()).unwrap_or_default();
-                env.state(lane).map(|s| (s.qpos, s.qvel, command)).unwrap_or_default()
+                let reference = env.reference(lane).unwrap_or_default();
+                env.state(lane).map(|s| (s.qpos, s.qvel, command, reference)).unwrap_or_default()
             }
-            Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new()),
+            Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new(), None),
         };
         if let Some(resident) = &mut self.lanes[lane] {
             resident.episode.command = command;
-            resident.trail.push_back(Still { time, qpos, qvel, fresh });
+            resident.trail.push_back(Still { time, qpos, qvel, reference, fresh });
         }
     }
 
@@ -485,6 +498,9 @@ impl Pen {
             episode.total += f64::from(out.reward[lane]);
             episode.terms.clear();
             episode.terms.extend_from_slice(&out.terms[lane * n..(lane + 1) * n]);
+            let n = out.info.len() / BLOCK;
+            episode.info.clear();
+            episode.info.extend_from_slice(&out.info[lane * n..(lane + 1) * n]);
             episode.distance += f64::from(out.forward[lane]);
             episode.speed = out.forward[lane] / self.dt as f32;
         }

@@ -58,10 +58,12 @@ pub use simulate::{Marathon, RagdollState};
 pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::look::{
-        FollowCamera, FollowCameraPlugin, LookPlugin, Marks, MarksPlugin, Quality, SceneryPlugin, Tint,
+        ErrorColors, FollowCamera, FollowCameraPlugin, Ghost, GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality,
+        SceneryPlugin, Skin, SkinPlugin, Tint,
     };
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{Ground, Marathon, PolicyAsset, RagdollPrefab, RagdollState};
     pub use marathon_physics::Variation;
+    pub use marathon_runs::Setting;
 }

@@ -5,6 +5,7 @@ use crate::ground::Ground;
 use bevy::prelude::*;
 use marathon_envs::Spec;
 use marathon_physics::{Model, Variation};
+use marathon_runs::Setting;
 use std::sync::Arc;
 
 /// A physical character. Its [`Transform`] is where its track begins and which way it runs (along its own +x); the
@@ -23,6 +24,9 @@ pub struct Ragdoll {
     pub number: u64,
     /// What an agent runs on; a prefab brings its own.
     pub ground: Ground,
+    /// An agent's task with its arguments and clips. `None`: what its [`Policy`] notes when the ragdoll enters the simulation,
+    /// which waits for a policy that is still being loaded; without a policy, the defaults.
+    pub setting: Option<Setting>,
 }
 
 /// Kind of a [`Ragdoll`].
@@ -37,7 +41,7 @@ pub enum Character {
 
 impl Ragdoll {
     fn new(character: Character) -> Self {
-        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level }
+        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level, setting: None }
     }
 
     /// An agent of the registry; to add one's own, see [`marathon_envs::register`].
@@ -53,6 +57,12 @@ impl Ragdoll {
     /// The same as agent `number` of another seed.
     pub fn with_seed(mut self, seed: u64, number: u64) -> Self {
         (self.seed, self.number) = (seed, number);
+        self
+    }
+
+    /// The same with a task of these arguments, whatever its policy notes.
+    pub fn with_setting(mut self, setting: Setting) -> Self {
+        self.setting = Some(setting);
         self
     }
 
@@ -125,6 +135,8 @@ pub struct Episode {
     pub reward: f32,
     /// Its terms, in the order of [`Spec::reward_terms`].
     pub terms: Vec<f32>,
+    /// What the agent reports of the state reached, in the order of [`Spec::info`].
+    pub info: Vec<f32>,
     /// Distance run along the track, m.
     pub distance: f64,
     /// Speed along the track in the last decision, m/s.

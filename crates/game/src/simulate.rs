@@ -10,11 +10,14 @@ use crate::ragdoll::{
     Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
 };
 use crate::stage;
+use bevy::asset::LoadState;
 use bevy::ecs::lifecycle::Remove;
 use bevy::prelude::*;
 use bevy::tasks::ComputeTaskPool;
 use marathon_envs::AgentState;
+use marathon_learn::PolicyMeta;
 use marathon_render::Scene;
+use marathon_runs::{RunError, Setting};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -65,6 +68,15 @@ impl Marathon {
         stage::places(model, &stage::mix(model, &a.qpos, &b.qpos, share))
     }
 
+    /// Where the clip that a ragdoll follows has the bodies at a time, as [`Marathon::places`] has them. `None` if its task
+    /// follows no clip.
+    pub fn clip_places(&self, ragdoll: &RagdollState, at: Duration) -> Option<Vec<Transform>> {
+        let Seat { herd, .. } = ragdoll.0;
+        let model = &self.herds.get(herd)?.model;
+        let (a, b, share) = self.resident(ragdoll.0)?.between(at)?;
+        stage::places(model, &stage::mix(model, a.reference.as_ref()?, b.reference.as_ref()?, share))
+    }
+
     /// Puts a ragdoll into a state.
     ///
     /// # Errors
@@ -111,12 +123,18 @@ pub(crate) fn admit(
     mut marathon: ResMut<Marathon>,
     time: Res<Time<Fixed>>,
     prefabs: Res<Assets<RagdollPrefab>>,
-    new: Query<(Entity, &Ragdoll, &Restart), (Without<Seat>, Without<Unfit>)>,
+    (policies, server): (Res<Assets<PolicyAsset>>, Res<AssetServer>),
+    new: Query<(Entity, &Ragdoll, &Restart, Option<&Policy>), (Without<Seat>, Without<Unfit>)>,
 ) {
     // the tick that begins here shows times from `now` on; its elapsed time is that of its end
     marathon.now = time.elapsed();
-    for (entity, ragdoll, restart) in &new {
-        match enter(&mut marathon, &prefabs, ragdoll, *restart) {
+    for (entity, ragdoll, restart, policy) in &new {
+        let meta = policy.and_then(|policy| policies.get(&policy.0)).map(|asset| asset.0.meta());
+        let loads = |policy: &Policy| matches!(server.load_state(&policy.0), LoadState::Loading);
+        if ragdoll.setting.is_none() && meta.is_none() && policy.is_some_and(loads) {
+            continue;
+        }
+        match enter(&mut marathon, &prefabs, ragdoll, meta, *restart) {
             Ok(Some(seat)) => build(&mut commands, &marathon.herds[seat.herd], entity, seat),
             // a prefab that is still being loaded
             Ok(None) => {}
@@ -132,6 +150,7 @@ fn enter(
     marathon: &mut Marathon,
     prefabs: &Assets<RagdollPrefab>,
     ragdoll: &Ragdoll,
+    policy: Option<&PolicyMeta>,
     restart: Restart,
 ) -> Result<Option<Seat>, String> {
     let now = marathon.now;
@@ -139,11 +158,13 @@ fn enter(
         Character::Agent(_) => ragdoll.ground,
         Character::Prefab(_) => Ground::Level,
     };
-    let herd = match marathon.herds.iter().position(|h| h.character == ragdoll.character && h.ground == ground) {
+    let setting = setting(ragdoll, policy).map_err(|e| e.to_string())?;
+    let same = |h: &Herd| h.character == ragdoll.character && h.ground == ground && h.setting == setting;
+    let herd = match marathon.herds.iter().position(same) {
         Some(herd) => herd,
         None => {
             let herd = match &ragdoll.character {
-                Character::Agent(name) => Herd::of_agent(name, ground, now).map_err(|e| e.to_string())?,
+                Character::Agent(name) => Herd::of_agent(name, &setting, ground, now).map_err(|e| e.to_string())?,
                 Character::Prefab(handle) => match prefabs.get(handle) {
                     Some(prefab) => Herd::of_prefab(handle, prefab.model.clone(), now),
                     None => return Ok(None),
@@ -161,6 +182,17 @@ fn enter(
     let resident = Resident::new((ragdoll.seed, ragdoll.number), restart);
     let (pen, lane) = kind.admit(resident).map_err(|e| e.to_string())?;
     Ok(Some(Seat { herd, pen, lane }))
+}
+
+/// The task of a ragdoll: its own, or else that of its policy, or else that of its agent's defaults.
+fn setting(ragdoll: &Ragdoll, policy: Option<&PolicyMeta>) -> Result<Setting, RunError> {
+    let Character::Agent(name) = &ragdoll.character else { return Ok(Setting::default()) };
+    if let Some(setting) = &ragdoll.setting {
+        return Ok(setting.clone());
+    }
+    let named = Setting::named(name)?;
+    // a policy for another agent is refused later
+    Ok(policy.map(Setting::of).filter(|noted| noted.agent == named.agent).unwrap_or(named))
 }
 
 /// Makes the entities of a ragdoll's bodies.

@@ -107,13 +107,47 @@ fn a_ball_is_thrown_on_its_cue() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Share of the numbers of two pictures that differ clearly.
+fn differing(a: &Image, b: &Image) -> f64 {
+    let pairs = a.rgb().iter().zip(b.rgb());
+    pairs.filter(|(a, b)| a.abs_diff(**b) > 30).count() as f64 / a.rgb().len() as f64
+}
+
+#[test]
+fn a_ghost_errors_and_a_skin_are_drawn() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let words = ["MarathonMan", "--mode", "imitate", "--no-hud", "--option", "start=first"];
+    let draw = |name: &str, more: &[&str]| draw(folder.path(), name, &[&words[..], more].concat());
+    let off = ["--press", "0:ghost", "--press", "0:ghost"];
+    let plain = draw("man.png", &[&off[..], &["--press", "0:errors"]].concat())?;
+    let beside = draw("man-ghost.png", &["--press", "0:ghost", "--press", "0:errors"])?;
+    let errors = draw("man-errors.png", &off)?;
+    let skin = draw("man-skin.png", &[&off[..], &["--press", "0:errors", "--skin", "marathon_man"]].concat())?;
+    for (what, image) in [("the ghost", &beside), ("errors", &errors), ("the skin", &skin)] {
+        let share = differing(&plain, image);
+        assert!((0.003..0.2).contains(&share), "{what}: {share} of the numbers differ");
+    }
+    let green = |image: &Image| {
+        let pixels = image.rgb().as_chunks::<3>().0.iter();
+        pixels
+            .filter(|[r, g, b]| *g > 90 && i32::from(*g) > i32::from(*r) + 30 && i32::from(*g) > i32::from(*b) + 30)
+            .count()
+    };
+    assert!(green(&errors) > green(&plain) + 150, "green pixels: {}, with errors {}", green(&plain), green(&errors));
+    Ok(())
+}
+
 #[test]
 fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("broken.safetensors"), "no policy")?;
     std::fs::write(folder.path().join("broken.xml"), "<mujoco><worldbody><geom type='spere'/></worldbody></mujoco>")?;
     std::fs::create_dir(folder.path().join("empty"))?;
-    let cases: [(&[&str], i32, &[&str]); 10] = [
+    let skin = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/skins/marathon_man.glb"))?;
+    let shin = skin.windows(9).position(|name| name == b"\"LeftLeg\"").ok_or("a shin")?;
+    std::fs::write(folder.path().join("lame.glb"), [&skin[..shin], b"\"LeftLog\"", &skin[shin + 9..]].concat())?;
+    std::fs::write(folder.path().join("half.glb"), &skin[..skin.len() / 2])?;
+    let cases: [(&[&str], i32, &[&str]); 18] = [
         (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
@@ -121,6 +155,18 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (&["empty"], 1, &["no policy.safetensors", "the folder of a run"]),
         (&["broken.xml"], 1, &["broken.xml:1", "sphere"]),
         (&["--replay", "broken.safetensors"], 1, &["broken.safetensors", "not a recording"]),
+        (&["MarathonMan", "--option", "clip=wlak"], 1, &["'wlak'", "did you mean 'walk'"]),
+        (&["hopper", "--option", "clip=run"], 1, &["'Hopper-v0' takes no option 'clip'"]),
+        (&["hopper", "--mode", "imitate"], 1, &["--mode", "follows none", "MarathonMan-v0 does"]),
+        (&["MarathonMan", "--skin", "hero.glb"], 1, &["hero.glb", "no such file"]),
+        (&["MarathonMan", "--skin", "broken.xml"], 1, &["broken.xml", "no .glb file"]),
+        (
+            &["MarathonMan", "--skin", "lame.glb", "--record", "a.png"],
+            1,
+            &["lame.glb", "left_shin", "left_knee", "LeftLog"],
+        ),
+        (&["MarathonMan", "--skin", "half.glb", "--record", "a.png"], 1, &["half.glb cannot be worn"]),
+        (&["hopper", "--skin", "marathon_man", "--record", "a.png"], 1, &["no mapping", "marathon_man, humanoid"]),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
         (&["hopper", "--press", "1:thorw"], 2, &["--press", "did you mean 'throw'"]),
         (&["hopper", "--record", "a.mov"], 1, &["a.mov", "mp4"]),

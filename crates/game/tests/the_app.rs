@@ -7,14 +7,15 @@ use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::settings::WgpuSettings;
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
+use bevy::window::{ExitCondition, FileDragAndDrop};
 use bevy::winit::WinitPlugin;
 use clap::Parser;
 use marathon_game::app::{
-    Actor, Args, Ball, Bindings, Deed, Focus, GamePlugin, Lesson, Mode, Playback, Recorder, Recording, Show,
+    Actor, Args, Ball, Bindings, Costume, Deed, Fitting, Focus, GamePlugin, Lesson, Mode, Notes, Playback, Reading,
+    Recorder, Recording, Show,
 };
 use marathon_game::axes::to_game;
-use marathon_game::look::CameraMode;
+use marathon_game::look::{CameraMode, part_errors};
 use marathon_game::prelude::*;
 use marathon_render::Scene;
 use std::path::Path;
@@ -49,6 +50,8 @@ fn press(app: &mut App, deed: Deed) {
         "Up" => KeyCode::ArrowUp,
         "Left" => KeyCode::ArrowLeft,
         "Right" => KeyCode::ArrowRight,
+        "E" => KeyCode::KeyE,
+        "K" => KeyCode::KeyK,
         "N" => KeyCode::KeyN,
         "P" => KeyCode::KeyP,
         "B" => KeyCode::KeyB,
@@ -265,5 +268,213 @@ fn any_model_moves_by_sliders() -> Result<(), Box<dyn std::error::Error>> {
     let key = app.world().get::<RagdollState>(entity).copied().ok_or("it is simulated")?;
     let state = app.world().resource::<Marathon>().state(&key).ok_or("it has a state")?;
     assert!(state.qvel.iter().any(|v| v.abs() > 0.5), "{state:?}");
+    Ok(())
+}
+
+/// Where the parts of the only ghost are, by body, and of the only character.
+fn ghost_and_body(app: &mut App) -> Option<[Vec<Vec3>; 2]> {
+    let mut names = app.world_mut().query::<(&Name, &Children, &GlobalTransform)>();
+    let (_, children, _) = names.iter(app.world()).find(|(name, ..)| name.as_str() == "ghost")?;
+    let ghost: Vec<Entity> = children.iter().collect();
+    let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
+    let parts = anatomies.single(app.world()).ok()?.parts.clone();
+    let place = |entity: &Entity| app.world().get::<GlobalTransform>(*entity).map(GlobalTransform::translation);
+    Some([ghost.iter().filter_map(place).collect(), parts.iter().filter_map(place).collect()])
+}
+
+#[test]
+fn a_ghost_moves_as_the_clip_does_and_keys_switch_it() -> Result<(), Box<dyn std::error::Error>> {
+    let mut app = app(&["MarathonManRun", "--mode", "imitate", "--option", "start=first"]);
+    frames(&mut app, 10);
+    let [ghost, body] = ghost_and_body(&mut app).ok_or("a ghost and a body")?;
+    assert_eq!(ghost.len(), body.len());
+    let apart = |pair: (&Vec3, &Vec3)| pair.0.distance(*pair.1);
+    let worst = ghost.iter().zip(&body).map(apart).fold(0.0, f32::max);
+    assert!((1e-4..0.6).contains(&worst), "{worst} m apart");
+    // the clip, computed apart: 40 decisions a second
+    let clip =
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions/marathon_man/run.motion"))?;
+    let clip = marathon_motion::Clip::parse(Path::new("run.motion"), &clip)?;
+    let model = marathon_envs::agent("MarathonMan")?.model()?;
+    let seconds = app.world().resource::<Time<Fixed>>().elapsed() + app.world().resource::<Time<Fixed>>().overstep();
+    let mut nearest = f32::INFINITY;
+    // the episode has begun in one of the first ticks
+    for delay in 0..200 {
+        let mut qpos = vec![0.0; model.nq];
+        clip.qpos(seconds.as_secs_f64() - 0.001 * f64::from(delay), &mut qpos);
+        let places = marathon_game::stage::places(&model, &qpos).ok_or("a sound pose")?;
+        let apart = places.iter().zip(&ghost).map(|(place, at)| place.translation.distance(*at));
+        nearest = nearest.min(apart.fold(0.0, f32::max));
+    }
+    assert!(nearest < 0.02, "the ghost is {nearest} m from the clip at best");
+    assert!(actors(&mut app)[0].1.info.len() == 3, "errors and phase are told");
+
+    let inside = ghost[1].z;
+    press(&mut app, Deed::Ghost);
+    frames(&mut app, 2);
+    let [ghost, _] = ghost_and_body(&mut app).ok_or("a ghost beside the body")?;
+    assert!((0.8..1.0).contains(&(inside - ghost[1].z)), "beside: it has moved from {inside} to {} m", ghost[1].z);
+    press(&mut app, Deed::Ghost);
+    frames(&mut app, 2);
+    assert!(ghost_and_body(&mut app).is_none(), "off");
+
+    let mut colored = app.world_mut().query::<&ErrorColors>();
+    assert_eq!(colored.iter(app.world()).count(), 1);
+    press(&mut app, Deed::Errors);
+    frames(&mut app, 2);
+    assert_eq!(colored.iter(app.world()).count(), 0);
+    Ok(())
+}
+
+#[test]
+fn an_agent_of_any_clip_goes_on_to_the_next() -> Result<(), Box<dyn std::error::Error>> {
+    let mut app = app(&["MarathonMan", "--mode", "imitate", "--option", "clip=run", "--option", "control=torque"]);
+    for clip in ["backflip", "spinkick"] {
+        press(&mut app, Deed::NextAgent);
+        frames(&mut app, 3);
+        let mut specs = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
+        let spec = specs.single(app.world())?.spec.clone().ok_or("a task")?;
+        assert_eq!(spec.options.get("clip"), Some(&clip.into()));
+        assert_eq!(spec.options.get("control"), Some(&"torque".into()), "other options stay");
+    }
+    Ok(())
+}
+
+/// Greatest distance of a geom of the only character from where the clip has it, m, and that geom's color.
+fn worst_part(app: &mut App) -> Option<(f32, LinearRgba)> {
+    let mut query = app.world_mut().query_filtered::<(&Anatomy, &RagdollState), With<Actor>>();
+    let (anatomy, state) = query.single(app.world()).ok()?;
+    let time = app.world().resource::<Time<Fixed>>();
+    let (marathon, now) = (app.world().resource::<Marathon>(), time.elapsed() + time.overstep());
+    let errors = part_errors(&anatomy.model, &marathon.places(state, now)?, &marathon.clip_places(state, now)?);
+    let geoms = anatomy.model.geoms.iter().zip(errors).filter(|(geom, _)| geom.body > 0);
+    let (geom, error) = geoms.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let name = geom.name.clone();
+    let mut shapes = app.world_mut().query::<(&Name, &MeshMaterial3d<StandardMaterial>, &ChildOf)>();
+    let (_, material, _) = shapes.iter(app.world()).find(|(known, ..)| known.as_str() == name)?;
+    let material = app.world().resource::<Assets<StandardMaterial>>().get(&material.0)?;
+    Some((error, material.base_color.into()))
+}
+
+#[test]
+fn parts_near_their_clip_are_green_and_far_ones_red() -> Result<(), Box<dyn std::error::Error>> {
+    // nobody keeps it on its feet
+    let mut app = app(&["MarathonMan", "--mode", "imitate", "--option", "clip=run", "--option", "start=first"]);
+    let mut seen = [0, 0];
+    for _ in 0..300 {
+        frames(&mut app, 1);
+        let (error, LinearRgba { red, green, .. }) = worst_part(&mut app).ok_or("a part")?;
+        if error < 0.1 {
+            assert!(green > 1.2 * red, "{error} m: {red} {green}");
+            seen[0] += 1;
+        }
+        if error > 0.3 {
+            assert!(red > 10.0 * green, "{error} m: {red} {green}");
+            seen[1] += 1;
+        }
+    }
+    assert!(seen.iter().all(|times| *times > 5), "near and far {seen:?} times");
+    Ok(())
+}
+
+#[test]
+fn agents_of_one_clip_take_turns_and_keep_to_it() {
+    let mut app = app(&["--mode", "imitate"]);
+    for agent in ["MarathonManWalk-v0", "MarathonManRun-v0", "MarathonManBackflip-v0", "MarathonManWalk-v0"] {
+        assert_eq!(app.world().resource::<Show>().agent, agent);
+        frames(&mut app, 200);
+        let (_, episode) = actors(&mut app)[0].clone();
+        assert_eq!(episode.number, 1, "{agent} is still up after 4 s: {episode:?}");
+        assert!(episode.info[1] < 0.2, "{agent} is near its clip: {:?}", episode.info);
+        press(&mut app, Deed::NextAgent);
+        frames(&mut app, 3);
+    }
+}
+
+/// Drops a file on the window, and waits until it has been read.
+fn drop_file(app: &mut App, path: &Path) {
+    let window = Entity::PLACEHOLDER;
+    app.world_mut().write_message(FileDragAndDrop::DroppedFile { window, path_buf: path.into() });
+    app.update();
+    let begun = Instant::now();
+    while app.world().get_resource::<Reading>().is_some() {
+        app.update();
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(begun.elapsed() < Duration::from_secs(120), "it is still being read");
+    }
+    frames(app, 5);
+}
+
+#[test]
+fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let [good, bad] = ["mine.motion", "broken.bvh"].map(|name| folder.path().join(name));
+    let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions/marathon_man/kick.motion");
+    std::fs::copy(run, &good)?;
+    std::fs::write(&bad, "HIERARCHY nothing")?;
+    let mut app = app(&["hopper"]);
+    drop_file(&mut app, &bad);
+    let show = app.world().resource::<Show>();
+    assert_eq!((show.agent.as_str(), show.mode), ("Hopper-v0", Mode::Watch));
+    assert!(app.world().resource::<Notes>().0.iter().any(|note| note.error && note.text.contains("broken.bvh")));
+    drop_file(&mut app, &good);
+    let show = app.world().resource::<Show>();
+    assert_eq!((show.agent.as_str(), show.mode), ("MarathonMan-v0", Mode::Imitate));
+    let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
+    let spec = anatomies.single(app.world())?.spec.clone().ok_or("a task")?;
+    assert_eq!(spec.options.get("clip"), Some(&"mine.motion".into()));
+    assert!(ghost_and_body(&mut app).is_some(), "its ghost is there");
+    // L learns it
+    press(&mut app, Deed::Learn);
+    let begun = Instant::now();
+    let newest = loop {
+        app.update();
+        if let Some(newest) = app.world().get_resource::<Lesson>().and_then(Lesson::newest) {
+            break newest;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(begun.elapsed() < Duration::from_secs(240), "no progress");
+    };
+    assert_eq!(newest.meta().options.get("clip"), Some(&"mine.motion".into()));
+    assert!(newest.meta().clips.contains_key("mine.motion"), "a policy holds its clip");
+    Ok(())
+}
+
+#[test]
+fn a_skin_follows_the_body() -> Result<(), Box<dyn std::error::Error>> {
+    let mut app = app(&["MarathonManWalk", "--skin", "marathon_man"]);
+    let begun = Instant::now();
+    while app.world().resource::<Costume>().fitting == Fitting::Waiting {
+        frames(&mut app, 1);
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(begun.elapsed() < Duration::from_secs(60), "it is still being read");
+    }
+    assert_eq!(app.world().resource::<Costume>().fitting, Fitting::Worn);
+    let mut names = app.world_mut().query::<(&Name, &GlobalTransform)>();
+    let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
+    for _ in 0..3 {
+        frames(&mut app, 15);
+        for (bone, body, most) in [
+            ("LeftLeg", "left_shin", 0.005),
+            ("RightFoot", "right_foot", 0.005),
+            ("RightForeArm", "right_larm", 0.06),
+            ("LeftArm", "left_upper_arm", 0.06),
+        ] {
+            let anatomy = anatomies.single(app.world())?;
+            let part = *app.world().get::<GlobalTransform>(anatomy.part(body).ok_or("a part")?).ok_or("a place")?;
+            let (_, bone_at) = names.iter(app.world()).find(|(name, _)| name.as_str() == bone).ok_or("a bone")?;
+            let apart = bone_at.translation().distance(part.translation());
+            assert!(apart < most, "{bone} is {apart} m from {body}");
+            // the skin rests in the axes of glTF: z forward, y up
+            let rest = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+            let angle = (bone_at.rotation() * rest.inverse()).angle_between(part.rotation());
+            assert!(angle < 0.02, "{bone} is turned by {angle} rad from {body}");
+        }
+    }
+    let mut meshes = app.world_mut().query::<(&Name, &Mesh3d, &Visibility)>();
+    let hidden = |name: &str| {
+        meshes.iter(app.world()).filter(|(n, ..)| n.as_str() == name).all(|(.., v)| *v == Visibility::Hidden)
+    };
+    assert!(["torso", "left_shin", "joint"].map(hidden) == [true; 3], "the shapes are hidden");
     Ok(())
 }

@@ -5,20 +5,23 @@
 mod common;
 
 use bevy::prelude::*;
-use common::{Log, app, policy, run_until};
-use marathon_envs::registry;
+use common::{Log, app, assets, policy, run_until};
+use marathon_envs::{Options, Value};
 use marathon_game::prelude::*;
-use marathon_learn::{EvalOptions, Evaluation, evaluate};
+use marathon_learn::{
+    Control, EvalOptions, Evaluation, IterationStats, Policy as Net, Snapshot, TrainConfig, evaluate, train,
+};
 use marathon_physics::lanes::Isa;
+use marathon_runs::TaskOptions;
 use std::time::Duration;
 
 const EPISODES: usize = 20;
 const SEED: u64 = 5;
 
 /// Plays one episode each in a game.
-fn play(agent: &str, frame: Duration, order: impl Fn(usize) -> usize) -> Vec<Episode> {
+fn play(agent: &str, policy: Net, frame: Duration, order: impl Fn(usize) -> usize) -> Vec<Episode> {
     let mut app = app(frame);
-    let handle = app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy(agent));
+    let handle = app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy);
     let mut ragdolls = [Entity::PLACEHOLDER; EPISODES];
     for i in 0..EPISODES {
         let number = order(i);
@@ -36,14 +39,13 @@ fn play(agent: &str, frame: Duration, order: impl Fn(usize) -> usize) -> Vec<Epi
     ragdolls.iter().filter_map(|r| first(app.world(), *r)).map(|e| e.episode).collect()
 }
 
-fn measure(agent: &str) -> Evaluation {
-    let factory = registry::factory(agent, Isa::best()).expect("the agent exists");
+fn measure(setting: &Setting, policy: &Net) -> Evaluation {
+    let factory = setting.factory().expect("the task exists");
     let options = EvalOptions { episodes: EPISODES, seed: SEED, threads: 1 };
-    evaluate(&*factory, Isa::best(), &policy(agent), &options).expect("the policy fits")
+    evaluate(&*factory, Isa::best(), policy, &options).expect("the policy fits")
 }
 
-fn compare(agent: &str, episodes: &[Episode]) {
-    let eval = measure(agent);
+fn compare(agent: &str, eval: &Evaluation, episodes: &[Episode]) {
     let n = EPISODES as f64;
     let mean = |f: &dyn Fn(&Episode) -> f64| episodes.iter().map(f).sum::<f64>() / n;
     assert_eq!(mean(&|e| e.total).to_bits(), eval.return_mean.to_bits(), "{agent}: mean return");
@@ -53,20 +55,58 @@ fn compare(agent: &str, episodes: &[Episode]) {
     assert_eq!(least.to_bits(), eval.return_min.to_bits(), "{agent}: lowest return");
 }
 
+/// A policy that comes with its agent.
+fn shipped(agent: &str, frame: Duration, order: impl Fn(usize) -> usize) {
+    let setting = Setting::named(agent).expect("the agent exists");
+    compare(agent, &measure(&setting, &policy(agent)), &play(agent, policy(agent), frame, order));
+}
+
 #[test]
 fn at_sixty_frames_per_second() {
-    let episodes = play("hopper", Duration::from_nanos(16_666_667), |i| i);
-    compare("hopper", &episodes);
+    shipped("hopper", Duration::from_nanos(16_666_667), |i| i);
 }
 
 #[test]
 fn at_an_odd_frame_rate_in_another_order() {
-    let episodes = play("hopper", Duration::from_millis(73), |i| (i * 7 + 3) % EPISODES);
-    compare("hopper", &episodes);
+    shipped("hopper", Duration::from_millis(73), |i| (i * 7 + 3) % EPISODES);
 }
 
 #[test]
 fn on_four_legs() {
-    let episodes = play("ant", Duration::from_millis(33), |i| i);
-    compare("ant", &episodes);
+    shipped("ant", Duration::from_millis(33), |i| i);
+}
+
+/// A policy is played in its own task: with the arguments that it notes, and with its clip, which no other program knows.
+#[test]
+fn in_the_task_that_the_policy_notes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("mine.motion");
+    std::fs::copy(assets().join("motions/marathon_man/run.motion"), &file).expect("a clip");
+    let given = [("clip", file.to_string_lossy().as_ref()), ("start", "first"), ("control", "torque"), ("future", "2")]
+        .map(|(name, value): (&str, &str)| {
+            (name.to_string(), value.parse::<Value>().unwrap_or_else(|never| match never {}))
+        });
+    let plain = Setting::named("MarathonMan").expect("the agent exists");
+    let setting = plain.clone().with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
+    let policy = hardly_trained(&setting);
+    assert_eq!(Setting::of(policy.meta()).clips, setting.clips);
+    let eval = measure(&setting, &policy);
+    compare("MarathonMan", &eval, &play("MarathonMan", policy.clone(), Duration::from_millis(40), |i| i));
+    // the file is not needed, and what somebody says goes before what the policy notes
+    drop(folder);
+    let other = setting.overlaid(&Setting { options: Options::new().with("start", "random"), ..plain });
+    assert_ne!(measure(&other, &policy).length_mean, eval.length_mean);
+}
+
+/// A policy of some steps of training.
+fn hardly_trained(setting: &Setting) -> Net {
+    let factory = setting.factory().expect("the task exists");
+    let config = TrainConfig::default().with(|config| {
+        (config.run.agents, config.run.horizon, config.run.total_steps) = (16, 8, 256);
+        config.network.actor_hidden = vec![8];
+    });
+    let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
+    let mut policy = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains").policy;
+    policy.set_task(factory.spec().options.clone(), setting.clips.clone());
+    policy
 }

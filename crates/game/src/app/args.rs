@@ -5,7 +5,7 @@ use crate::ground::Ground;
 use crate::look::{CameraMode, Quality};
 use clap::{Parser, ValueEnum};
 use marathon_learn::EvalOptions;
-use marathon_runs::{FilmOptions, LearnOptions};
+use marathon_runs::{FilmOptions, LearnOptions, TaskOptions};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -14,9 +14,12 @@ Examples:
   marathon-game humanoid --agents 16             a row of them
   marathon-game runs/hopper-1                    the policy of a run, which is read again whenever training saves it
   marathon-game hopper --mode learn              from random weights to a run, before your eyes
+  marathon-game --mode imitate                   a person walks, beside the clip that it follows; N: runs, flips
+  marathon-game MarathonMan --mode imitate --option clip=my.bvh   a clip of your own; L learns it
   marathon-game walker --mode push               click to push, B to throw balls, sliders for gravity and friction
   marathon-game --mode testbed my-robot.xml      a slider per motor
   marathon-game ant --ground stairs              or hills, or boards
+  marathon-game MarathonManRun --skin marathon_man   with the skin of a person; or with that of hero.glb
   marathon-game hopper --record hop.mp4          a film, without a window (needs ffmpeg)
   marathon-game hopper --mode push --press 1.5:throw --record ball.mp4   the same with a ball thrown at it
   marathon-game --replay run.replay              what R recorded, with a time line
@@ -28,8 +31,9 @@ Keys are shown on the screen (F1) and can be changed in the menu.";
 #[derive(Clone, Debug, Parser)]
 #[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
 pub struct Args {
-    /// Agent (such as hopper, walker, humanoid, ant), policy file, folder of a run, or MJCF file (.xml).
-    #[arg(default_value = "hopper")]
+    /// Agent (such as hopper, walker, humanoid, MarathonManRun), policy file, folder of a run, or MJCF file (.xml) [with
+    /// --mode imitate: MarathonManWalk].
+    #[arg(default_value = "hopper", default_value_if("mode", "imitate", "MarathonManWalk"))]
     pub what: String,
     /// What to do.
     #[arg(long, value_enum, default_value_t = Mode::Watch)]
@@ -43,9 +47,15 @@ pub struct Args {
     /// What they run on.
     #[arg(long, value_enum, default_value_t = GroundArg::Level)]
     pub ground: GroundArg,
+    /// Arguments of the task; the others are those that the policy was trained with.
+    #[command(flatten)]
+    pub task: TaskOptions,
     /// Recording to show, as R makes them.
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
+    /// Character that they wear: a .glb file with a skeleton, or marathon_man, which comes with Marathon.
+    #[arg(long, value_name = "FILE")]
+    pub skin: Option<PathBuf>,
     /// How --mode learn learns; the seed is that of everything random.
     #[command(flatten)]
     pub learn: LearnOptions,
@@ -133,6 +143,8 @@ pub enum Mode {
     Watch,
     /// Try to make it fall.
     Push,
+    /// See how near one is to the motion clip that it follows.
+    Imitate,
     /// Train from random weights and look on.
     Learn,
     /// Move the motors of any MJCF model.
@@ -150,6 +162,7 @@ impl Mode {
         match self {
             Mode::Watch => "watch",
             Mode::Push => "push",
+            Mode::Imitate => "imitate",
             Mode::Learn => "learn live",
             Mode::Testbed => "test bed",
             Mode::Replay => "replay",

@@ -2,6 +2,7 @@
 
 use crate::app::args::Mode;
 use crate::app::hud::Hud;
+use crate::app::imitate::next_clip;
 use crate::app::keys::{Deed, Do};
 use crate::app::menu::Menu;
 use crate::app::notes::Notes;
@@ -77,6 +78,7 @@ pub fn stage(
             Deed::Restart if show.mode != Mode::Learn => {
                 restarts.write_batch(actors.iter().map(|ragdoll| RestartNow { ragdoll }));
             }
+            Deed::NextAgent if show.mode == Mode::Imitate => next_clip(&mut show, &mut notes),
             Deed::NextAgent if !matches!(show.mode, Mode::Replay | Mode::Outside) => {
                 let all = shipped_agents();
                 let next = all.iter().position(|a| *a == show.agent).map_or(0, |i| (i + 1) % all.len());

@@ -2,6 +2,7 @@
 //! the same run, however slow the machine.
 
 use crate::app::args::Args;
+use crate::app::costume::{Costume, Fitting};
 use crate::app::error::GameError;
 use crate::app::learn::Filmed;
 use crate::app::{GamePlugin, TICKS, check_graphics};
@@ -20,12 +21,15 @@ use bevy::winit::WinitPlugin;
 use marathon_render::{Format, Image as Picture, Recorder};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Frames before the first that counts: until everything has been handed to the graphics card.
 const WARM_UP: usize = 4;
 /// Frames that pictures may come late.
 const PATIENCE: usize = 200;
+
+/// Longest time that a skin takes to read.
+const LONGEST_FITTING: Duration = Duration::from_secs(120);
 
 /// Pictures that have come back, oldest first.
 #[derive(Resource, Default)]
@@ -143,6 +147,20 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
     draw(&mut app, false);
     let before = (args.film.start / frame.as_secs_f64()).round() as usize;
     pace(&mut app, Duration::from_secs_f64(1.0 / TICKS));
+    // a skin is read beside the picture
+    let begun = Instant::now();
+    while let Some(costume) = app.world().get_resource::<Costume>() {
+        match &costume.fitting {
+            Fitting::Worn => break,
+            Fitting::Refused(problem) => return Err(GameError::System(problem.clone())),
+            Fitting::Waiting if begun.elapsed() > LONGEST_FITTING => {
+                return Err(GameError::System(format!("{}: it takes too long to read", costume.path.display())));
+            }
+            Fitting::Waiting => {}
+        }
+        pace(&mut app, Duration::ZERO);
+        std::thread::sleep(Duration::from_millis(2));
+    }
     (0..before).for_each(|_| pace(&mut app, frame));
     draw(&mut app, true);
     (0..WARM_UP).for_each(|_| pace(&mut app, Duration::ZERO));

@@ -16,6 +16,7 @@ use bevy_egui::egui::{
     self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Painter, Pos2, Rect, RichText,
     Sense, Stroke, Ui,
 };
+use marathon_envs::options::Value;
 use std::collections::VecDeque;
 
 /// Decisions that the reward's curve shows.
@@ -195,6 +196,7 @@ pub fn draw(
                         line(ui, text(13.0, if command.is_some() { ACCENT } else { FAINT }, told));
                     }
                 }
+                imitation(ui, anatomy, episode);
                 let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
                 let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
                 // what comes from elsewhere is decided elsewhere
@@ -230,6 +232,27 @@ pub fn draw(
         keys(&ctx, &bindings, hud.help, show.mode, *steering);
     }
     Ok(())
+}
+
+/// How far the clip is and how near the character is to it, if it follows one.
+fn imitation(ui: &mut Ui, anatomy: &Anatomy, episode: &Episode) {
+    let Some(spec) = &anatomy.spec else { return };
+    let info = |name: &str| episode.info.get(spec.info.iter().position(|known| known == name)?).copied();
+    let Some(phase) = info("phase") else { return };
+    const WIDTH: f32 = 190.0;
+    ui.horizontal(|ui| {
+        let (response, painter) = ui.allocate_painter(egui::vec2(WIDTH, 13.0), Sense::hover());
+        let bar = response.rect.shrink2(egui::vec2(0.0, 3.0));
+        painter.rect_filled(bar, 3.0, Color32::from_white_alpha(18));
+        let over = bar.with_max_x(bar.left() + bar.width() * phase.clamp(0.0, 1.0));
+        painter.rect_filled(over, 3.0, ACCENT);
+        if let Some(Value::Text(clip)) = spec.options.get("clip") {
+            line(ui, text(13.0, TEXT, clip.as_str()));
+        }
+    });
+    let errors = [("joint_error", "joints", "rad"), ("position_error", "parts", "m")];
+    let told = errors.iter().filter_map(|(name, what, unit)| Some(format!("{what} {:.2} {unit}", info(name)?)));
+    line(ui, text(13.0, FAINT, format!("off by   {}", told.collect::<Vec<_>>().join("   "))));
 }
 
 /// Bars of the reward's terms, and their curves.
@@ -362,6 +385,16 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
         Mode::Watch => {
             &[Deed::Menu, Deed::Pause, Deed::NextFocus, Deed::NextAgent, Deed::Camera, Deed::Push, Deed::Learn]
         }
+        Mode::Imitate => &[
+            Deed::Menu,
+            Deed::Ghost,
+            Deed::Errors,
+            Deed::NextAgent,
+            Deed::Push,
+            Deed::Throw,
+            Deed::Camera,
+            Deed::Learn,
+        ],
         Mode::Push => &[Deed::Menu, Deed::Push, Deed::Throw, Deed::Restart, Deed::Camera, Deed::Contacts],
         Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
         Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
@@ -383,7 +416,8 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
                         Deed::Release => steering.0,
                         _ => useful.contains(&deed),
                     };
-                    for (_, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {
+                    for (deed, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {
+                        let name = if (deed, mode) == (Deed::NextAgent, Mode::Imitate) { "next clip" } else { name };
                         ui.label(text(12.0, ACCENT, key).strong());
                         ui.label(text(12.0, TEXT, name));
                         ui.add_space(4.0);

@@ -37,6 +37,10 @@ pub enum Deed {
     Contacts,
     /// Joints and limits.
     Joints,
+    /// Ghost of the clip: inside the character, beside it, or off.
+    Ghost,
+    /// Color the character's parts by how far they are from the clip.
+    Errors,
     /// Text and bars.
     Hud,
     /// Keys on the screen.
@@ -62,7 +66,7 @@ pub enum Deed {
 /// A deed, its name on the screen, its key and its button.
 type Row = (Deed, &'static str, KeyCode, Option<GamepadButton>);
 
-const DEFAULTS: [Row; 23] = [
+const DEFAULTS: [Row; 25] = [
     (Deed::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
     (Deed::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
     (Deed::Step, "one step", KeyCode::Period, None),
@@ -76,6 +80,8 @@ const DEFAULTS: [Row; 23] = [
     (Deed::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::East)),
     (Deed::Contacts, "contacts", KeyCode::KeyF, None),
     (Deed::Joints, "joints", KeyCode::KeyJ, None),
+    (Deed::Ghost, "ghost of the clip", KeyCode::KeyK, None),
+    (Deed::Errors, "errors in color", KeyCode::KeyE, None),
     (Deed::Hud, "text and bars", KeyCode::KeyH, None),
     (Deed::Help, "keys", KeyCode::F1, None),
     (Deed::Learn, "learn live", KeyCode::KeyL, None),

@@ -9,7 +9,7 @@ use crate::ground::Ground;
 use bevy::prelude::*;
 use marathon_learn::{Control, IterationStats, Policy, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
-use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Task};
+use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Setting, Task};
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -65,23 +65,23 @@ struct Board {
 #[derive(Resource)]
 pub struct Lesson {
     shared: Arc<(Mutex<Board>, Condvar)>,
-    agent: String,
+    setting: Setting,
     ground: Ground,
     shown: Option<Arc<Policy>>,
     /// Seconds of the picture since it began.
     age: f64,
 }
 
-/// What the trainer for an agent is told: its own fast configuration, or that of a file, and the options.
+/// What the trainer for a task is told: the agent's own fast configuration, or that of a file, and the options.
 ///
 /// # Errors
 /// If the options make no sense, or the file is no configuration for the agent.
-pub fn settings(agent: &str, teaching: &Teaching) -> Result<TrainConfig, RunError> {
+pub fn settings(setting: &Setting, teaching: &Teaching) -> Result<TrainConfig, RunError> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = teaching.learn.threads.unwrap_or(cores.saturating_sub(1).max(1));
     let learn = LearnOptions { seed: Some(teaching.seed), threads: Some(threads), ..teaching.learn.clone() };
     let options = RunOptions { learn, ..Default::default() };
-    let (session, _) = Session::open(Some(Task::named(agent)?), &options, None, true)?;
+    let (session, _) = Session::open(Some(Task::set(setting.clone())), &options, None, true)?;
     Ok(session.run.config)
 }
 
@@ -90,19 +90,28 @@ impl Lesson {
     ///
     /// # Errors
     /// If the configuration cannot be used.
-    pub fn begin(agent: &str, ground: Ground, teaching: &Teaching) -> Result<Self, String> {
-        let config = settings(agent, teaching).map_err(|e| e.spelled(&Flags("marathon")))?;
-        let factory = ground.agent(agent).and_then(|a| a.shards(Isa::best())).map_err(|e| e.to_string())?;
+    pub fn begin(setting: &Setting, ground: Ground, teaching: &Teaching) -> Result<Self, String> {
+        let spelled = |error: RunError| error.spelled(&Flags("marathon"));
+        let config = settings(setting, teaching).map_err(spelled)?;
+        let make =
+            || -> Result<_, RunError> { Ok(ground.agent_with(&setting.agent, &setting.options)?.shards(Isa::best())?) };
+        let factory = setting.with_clips(make).map_err(spelled)?;
         let shared = Arc::new((Mutex::new(Board::default()), Condvar::new()));
         board(&shared).progress.state = "first steps".into();
         let ours = shared.clone();
+        let (options, clips) = (factory.spec().options.clone(), setting.clips.clone());
         let learn = move || {
-            let mut observer = |stats: &IterationStats, snapshot: &Snapshot<'_>| observe(&ours, stats, snapshot);
+            let noted = |mut policy: Policy| {
+                policy.set_task(options.clone(), clips.clone());
+                Arc::new(policy)
+            };
+            let mut observer =
+                |stats: &IterationStats, snapshot: &Snapshot<'_>| observe(&ours, stats, noted(snapshot.policy()));
             let result = train(&*factory, Isa::best(), &config, None, &mut observer);
             let mut board = board(&ours);
             board.progress.state = match result {
                 Ok(output) => {
-                    board.newest = Some(Arc::new(output.policy));
+                    board.newest = Some(noted(output.policy));
                     "finished".into()
                 }
                 Err(error) => error.to_string(),
@@ -110,7 +119,7 @@ impl Lesson {
         };
         let thread = std::thread::Builder::new().name("marathon-trainer".into()).spawn(learn);
         thread.map_err(|e| format!("the trainer's thread cannot be started: {e}"))?;
-        Ok(Lesson { shared, agent: agent.into(), ground, shown: None, age: 0.0 })
+        Ok(Lesson { shared, setting: setting.clone(), ground, shown: None, age: 0.0 })
     }
 
     /// How it goes.
@@ -143,8 +152,7 @@ fn board(shared: &(Mutex<Board>, Condvar)) -> MutexGuard<'_, Board> {
     shared.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &Snapshot<'_>) -> Control {
-    let policy = Arc::new(snapshot.policy());
+fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, policy: Arc<Policy>) -> Control {
     let mut board = board(shared);
     board.newest = Some(policy);
     board.progress.state = "from random weights".into();
@@ -163,6 +171,7 @@ fn observe(shared: &(Mutex<Board>, Condvar), stats: &IterationStats, snapshot: &
 pub fn attend(
     mut commands: Commands,
     show: Res<Show>,
+    script: Res<Script>,
     lesson: Option<Res<Lesson>>,
     mut teaching: ResMut<Teaching>,
     mut notes: ResMut<Notes>,
@@ -172,12 +181,12 @@ pub fn attend(
         *failed = false;
     }
     let wanted = show.mode == Mode::Learn && show.source == Source::Trainer;
-    let right = lesson.as_ref().is_some_and(|l| l.agent == show.agent && l.ground == show.ground);
+    let right = lesson.as_ref().is_some_and(|l| l.setting == script.setting && l.ground == show.ground);
     if lesson.is_some() && !(wanted && right) {
         commands.remove_resource::<Lesson>();
     }
     if wanted && !right && !*failed {
-        match Lesson::begin(&show.agent, show.ground, &teaching) {
+        match Lesson::begin(&script.setting, show.ground, &teaching) {
             Ok(lesson) => {
                 info!("learning {} from random weights, seed {}", show.agent, teaching.seed);
                 commands.insert_resource(lesson);
@@ -250,7 +259,7 @@ pub fn obey(
         match (deed, &lesson) {
             (Deed::Pause, Some(lesson)) => lesson.pause(time.is_paused()),
             (Deed::Save, Some(lesson)) => match lesson.newest() {
-                Some(policy) => match save(&policy, &lesson.agent) {
+                Some(policy) => match save(&policy, &lesson.setting.agent) {
                     Ok(path) => notes.say(format!("saved as {}", path.display())),
                     Err(error) => notes.error(error),
                 },
@@ -264,7 +273,7 @@ pub fn obey(
             (Deed::Learn, _) => {
                 let learning = show.mode == Mode::Learn;
                 show.mode = if learning { Mode::Watch } else { Mode::Learn };
-                show.source = if learning { Source::Shipped } else { Source::Trainer };
+                show.play(if learning { Source::Shipped } else { Source::Trainer });
                 show.again();
             }
             _ => {}

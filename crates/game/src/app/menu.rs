@@ -2,6 +2,7 @@
 
 use crate::app::args::Mode;
 use crate::app::hud::card;
+use crate::app::imitate::{FOLLOWER, choose_clip, clip_of, follows_clip};
 use crate::app::keys::{Bindings, Rebinding};
 use crate::app::show::{Actor, Show, Source};
 use crate::app::weather::Weather;
@@ -11,6 +12,7 @@ use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{self, Align2, Area, ComboBox, Id, RichText, Slider, Ui};
+use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::{AgentState, registry};
 use marathon_physics::model::JointType;
 use std::path::PathBuf;
@@ -102,15 +104,19 @@ pub fn draw(
 
 fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
     ui.horizontal(|ui| {
-        for mode in [Mode::Watch, Mode::Push, Mode::Learn, Mode::Testbed] {
+        for mode in [Mode::Watch, Mode::Push, Mode::Imitate, Mode::Learn, Mode::Testbed] {
             let clicked = ui.selectable_label(choice.mode == mode, RichText::new(mode.name()).size(15.0)).clicked();
             if clicked {
                 choice.mode = mode;
-                choice.source = match mode {
-                    Mode::Learn => Source::Trainer,
-                    Mode::Testbed => Source::Nothing,
-                    _ => Source::Shipped,
-                };
+                match (mode, &choice.source) {
+                    (Mode::Learn, _) => choice.play(Source::Trainer),
+                    (Mode::Testbed, _) => choice.play(Source::Nothing),
+                    (_, Source::File(_)) => {}
+                    _ => choice.play(Source::Shipped),
+                }
+                if mode == Mode::Imitate && !follows_clip(&choice.agent) {
+                    choice.agent = FOLLOWER.into();
+                }
             }
         }
     });
@@ -124,7 +130,22 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
             }
         });
         ui.end_row();
-        if matches!(choice.mode, Mode::Watch | Mode::Push) {
+        if let Some(clip) = clip_of(choice).filter(|_| choice.mode != Mode::Testbed) {
+            ui.label("Clip");
+            let mut wanted = clip.clone();
+            ComboBox::from_id_salt("clip").selected_text(clip.as_str()).width(230.0).show_ui(ui, |ui| {
+                let known = clips::all_names();
+                // those of files are known by the texts that somebody has chosen
+                for name in known.into_iter().filter(|name| !name.ends_with(".motion") || *name == clip) {
+                    ui.selectable_value(&mut wanted, name.clone(), name);
+                }
+            });
+            if wanted != clip {
+                choose_clip(choice, &wanted);
+            }
+            ui.end_row();
+        }
+        if matches!(choice.mode, Mode::Watch | Mode::Push | Mode::Imitate) {
             ui.label("Policy");
             let name = |source: &Source| match source {
                 Source::Shipped => "the one that comes with it".to_string(),
@@ -132,15 +153,19 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
                 Source::Trainer => "being learned".into(),
                 Source::Nothing => "none: let it fall".into(),
             };
+            let mut wanted = choice.source.clone();
             ComboBox::from_id_salt("policy").selected_text(name(&choice.source)).width(230.0).show_ui(ui, |ui| {
                 for source in [Source::Shipped, Source::Nothing] {
                     let label = name(&source);
-                    ui.selectable_value(&mut choice.source, source, label);
+                    ui.selectable_value(&mut wanted, source, label);
                 }
                 for (file, label) in runs {
-                    ui.selectable_value(&mut choice.source, Source::File(file.clone()), label);
+                    ui.selectable_value(&mut wanted, Source::File(file.clone()), label);
                 }
             });
+            if wanted != choice.source {
+                choice.play(wanted);
+            }
             ui.end_row();
         }
         if choice.mode != Mode::Testbed {

@@ -16,9 +16,12 @@ const SHOWN: usize = 16;
 /// # Errors
 /// If there is no trainer, or the agent does not exist.
 pub fn serve(show: &Show, port: u16, threads: usize) -> Result<Feed, GameError> {
-    let behavior = BehaviorOptions { env: show.agent.clone(), agents: show.agents, ..Default::default() };
+    let setting = show.setting()?;
+    let options = setting.options.clone();
+    let behavior = BehaviorOptions { env: show.agent.clone(), agents: show.agents, options, ..Default::default() };
     let options = PlayerOptions { port, threads: threads.max(1), behaviors: vec![behavior], ..Default::default() };
-    let mut player = Player::connect(&options, Log::to_stderr())?;
+    let mut player =
+        setting.with_clips(|| -> Result<Player, GameError> { Ok(Player::connect(&options, Log::to_stderr())?) })?;
     let behavior = &player.behaviors()[0];
     let spec = Arc::new(behavior.spec().clone());
     let kind = Kind::new(behavior.model().clone(), Some(spec.clone()), spec.dt);

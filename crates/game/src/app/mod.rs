@@ -2,11 +2,13 @@
 
 mod args;
 mod control;
+mod costume;
 mod cues;
 mod error;
 mod feed;
 mod film;
 mod hud;
+mod imitate;
 mod keys;
 mod learn;
 mod menu;
@@ -20,23 +22,29 @@ mod stream;
 mod weather;
 
 pub use args::{Args, CameraArg, GroundArg, Mode, QualityArg};
+pub use costume::{Costume, Fitting};
 pub use cues::{Cue, Cues};
 pub use error::GameError;
 pub use feed::{Board, Feed, Sight};
 pub use hud::Hud;
+pub use imitate::{GhostAt, Imitation, Reading};
 pub use keys::{Bindings, Deed, Do, KeysPlugin};
 pub use learn::{Lesson, Teaching};
+pub use notes::{Note, Notes};
 pub use replay::{Playback, Recorder, Recording};
 pub use show::{Actor, Focus, Show, Source};
 pub use steer::Steering;
 pub use weather::{Ball, Weather, WeatherPlugin};
 
-use crate::look::{FollowCamera, FollowCameraPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin};
+use crate::look::{
+    FollowCamera, FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
+};
 use crate::plugin::{MarathonPlugin, MarathonSystems};
 use bevy::prelude::*;
 use bevy::window::{PresentMode, WindowResolution};
 use bevy_egui::{EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use clap::Parser;
+use marathon_runs::RunError;
 use std::ffi::OsString;
 use std::io::BufReader;
 use std::process::ExitCode;
@@ -156,6 +164,7 @@ pub struct GamePlugin {
     show: Show,
     playback: Option<Recording>,
     feed: Option<Feed>,
+    skin: Option<costume::File>,
     quality: Quality,
 }
 
@@ -169,17 +178,21 @@ impl GamePlugin {
         let mut playback = None;
         if let Some(path) = &args.replay {
             let recording = Recording::load(path)?;
-            (show.mode, show.agent, show.agents) = (Mode::Replay, recording.agent.clone(), recording.agents);
+            if !args.task.given.is_empty() {
+                return Err(RunError::option("option", "does not go with a recording, which has its run's").into());
+            }
+            (show.mode, show.agent, show.agents) = (Mode::Replay, recording.setting.agent.clone(), recording.agents);
             show.ground = recording.ground;
             playback = Some(recording);
         }
         if show.mode == Mode::Learn {
-            learn::settings(&show.agent, &Teaching { learn: args.learn.clone(), seed: 0 })?;
+            learn::settings(&show.setting()?, &Teaching { learn: args.learn.clone(), seed: 0 })?;
         }
         if args.mlagents_port.is_some() || args.watch_stream {
             show.mode = Mode::Outside;
         }
-        Ok(GamePlugin { args: args.clone(), show, playback, feed: None, quality: args.quality() })
+        let skin = args.skin.as_deref().map(costume::File::read).transpose()?;
+        Ok(GamePlugin { args: args.clone(), show, playback, feed: None, skin, quality: args.quality() })
     }
 }
 
@@ -192,6 +205,8 @@ impl Plugin for GamePlugin {
             LookPlugin,
             FollowCameraPlugin,
             MarksPlugin,
+            GhostPlugin,
+            SkinPlugin,
             WeatherPlugin,
             KeysPlugin,
         ))
@@ -206,6 +221,7 @@ impl Plugin for GamePlugin {
         .insert_resource(Cues::new(args.press.clone()))
         .init_resource::<Focus>()
         .init_resource::<show::Script>()
+        .init_resource::<Imitation>()
         .init_resource::<Steering>()
         .init_resource::<notes::Notes>()
         .init_resource::<menu::Menu>()
@@ -216,6 +232,7 @@ impl Plugin for GamePlugin {
             Update,
             (
                 (control::time, control::stage, learn::obey, replay::obey, replay::scrub, feed::obey).chain(),
+                (imitate::take_files, imitate::take_clip, imitate::enter, imitate::obey).chain(),
                 (
                     show::set_stage,
                     replay::set_stage,
@@ -226,7 +243,15 @@ impl Plugin for GamePlugin {
                     learn::tell,
                 )
                     .chain(),
-                (show::reload, show::follow_focus, show::show_marks, control::look, notes::fade, hud::clock),
+                (
+                    show::reload,
+                    show::follow_focus,
+                    show::show_marks,
+                    imitate::show,
+                    control::look,
+                    notes::fade,
+                    hud::clock,
+                ),
                 (control::picture, replay::play, feed::play, leave_replay, feed::leave),
             )
                 .chain(),
@@ -236,6 +261,9 @@ impl Plugin for GamePlugin {
             EguiPrimaryContextPass,
             (style, hud::fit, hud::draw, menu::circumstances, menu::motors, replay::time_line, menu::draw).chain(),
         );
+        if let Some(skin) = &self.skin {
+            costume::lay_out(app, skin);
+        }
         if let Some(feed) = self.feed.clone() {
             app.insert_resource(feed);
         }

@@ -6,7 +6,7 @@ use crate::app::hud::card;
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
 use crate::app::puppets::{self, Kind};
-use crate::app::show::{Actor, Show, file_stem, free_name};
+use crate::app::show::{Actor, Script, Show, file_stem, free_name};
 use crate::ground::Ground;
 use crate::look::FollowCamera;
 use crate::ragdoll::{Anatomy, Episode, Part};
@@ -15,9 +15,8 @@ use crate::stage;
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{Align2, Area, Id, Slider};
-use marathon_envs::registry;
 use marathon_physics::Model;
-use marathon_physics::lanes::Isa;
+use marathon_runs::Setting;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -37,8 +36,8 @@ const LONGEST: usize = 60_000;
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Registry name of the agent.
-    pub agent: String,
+    /// The task.
+    pub setting: Setting,
     /// What it ran on.
     pub ground: Ground,
     /// Seconds between frames.
@@ -56,9 +55,9 @@ pub struct Recording {
 }
 
 impl Recording {
-    fn new(agent: String, ground: Ground, dt: f64, places: Vec<f32>) -> Self {
+    fn new(setting: Setting, ground: Ground, dt: f64, places: Vec<f32>) -> Self {
         let agents = places.len() / 3;
-        Recording { agent, ground, dt, agents, places, qpos: Vec::new(), numbers: Vec::new(), terms: Vec::new() }
+        Recording { setting, ground, dt, agents, places, qpos: Vec::new(), numbers: Vec::new(), terms: Vec::new() }
     }
 
     /// Number of frames.
@@ -116,7 +115,9 @@ impl Recording {
             views.push((*name, TensorView::new(Dtype::F32, shape.clone(), data).map_err(|e| broken(e.to_string()))?));
         }
         // one entry, because several would be written in any order
-        let about = serde_json::json!({ "agent": self.agent, "ground": self.ground.name(), "dt": self.dt });
+        let about = serde_json::json!({
+            "agent": self.setting.agent, "ground": self.ground.name(), "dt": self.dt, "task": self.setting,
+        });
         let meta = HashMap::from([(FORMAT.to_string(), about.to_string())]);
         let file = safetensors::serialize(views, Some(meta)).map_err(|e| broken(e.to_string()))?;
         marathon_learn::write_atomic(path, &file)?;
@@ -138,8 +139,12 @@ impl Recording {
             return Err(bad("not a recording of the game, which writes such files by the key R".into()));
         };
         let file = SafeTensors::deserialize(&bytes).map_err(|e| no_recording(&e))?;
-        let agent = about["agent"].as_str().unwrap_or_default().to_string();
-        let spec = registry::factory(&agent, Isa::best())?.spec().clone();
+        // older recordings have the agent alone
+        let setting = match &about["task"] {
+            Value::Null => Setting::named(about["agent"].as_str().unwrap_or_default())?,
+            task => serde_json::from_value(task.clone()).map_err(|e| bad(format!("its task cannot be read: {e}")))?,
+        };
+        let spec = setting.factory()?.spec().clone();
         let found = about["ground"].as_str().unwrap_or_default();
         let ground = Ground::named(found).ok_or_else(|| {
             let known = Ground::ALL.map(Ground::name).join(", ");
@@ -171,7 +176,7 @@ impl Recording {
         if [with_poses, with_numbers, with_terms] != [agents; 3] || [others, more] != [frames; 2] {
             return Err(bad("its tensors are about different numbers of agents or frames".into()));
         }
-        Ok(Recording { agent, ground, dt, agents, places, qpos, numbers, terms })
+        Ok(Recording { setting, ground, dt, agents, places, qpos, numbers, terms })
     }
 }
 
@@ -206,8 +211,10 @@ impl Playback {
     /// # Errors
     /// If its agent is not known here.
     pub fn new(recording: Recording) -> Result<Self, GameError> {
-        let model = Arc::new(recording.ground.agent(&recording.agent)?.model()?);
-        let spec = Arc::new(registry::factory(&recording.agent, Isa::best())?.spec().clone());
+        let Setting { agent, options, .. } = &recording.setting;
+        let make = || -> Result<_, GameError> { Ok(recording.ground.agent_with(agent, options)?.model()?) };
+        let model = Arc::new(recording.setting.with_clips(make)?);
+        let spec = Arc::new(recording.setting.factory()?.spec().clone());
         let kind = Kind::new(model, Some(spec), recording.dt);
         Ok(Playback { recording: Arc::new(recording), kind, at: 0.0, staged: false })
     }
@@ -217,7 +224,7 @@ impl Playback {
 pub fn obey(
     mut commands: Commands,
     mut deeds: MessageReader<Do>,
-    show: Res<Show>,
+    (show, script): (Res<Show>, Res<Script>),
     recorder: Option<Res<Recorder>>,
     mut notes: ResMut<Notes>,
     actors: Query<(&Actor, &Anatomy, &Transform), With<Seat>>,
@@ -242,7 +249,7 @@ pub fn obey(
         all.sort_by_key(|(actor, ..)| actor.0);
         let Some((_, anatomy, _)) = all.first() else { continue };
         let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
-        let recording = Recording::new(show.agent.clone(), show.ground, anatomy.dt, places);
+        let recording = Recording::new(script.setting.clone(), show.ground, anatomy.dt, places);
         commands.insert_resource(Recorder { recording, until: Duration::ZERO });
         notes.say("recording; the same key ends it");
     }
@@ -250,7 +257,7 @@ pub fn obey(
 
 /// Saves under the first free name.
 fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
-    let path = free_name(&file_stem(&recording.agent), "replay");
+    let path = free_name(&file_stem(&recording.setting.agent), "replay");
     recording.save(&path)?;
     Ok(path)
 }
@@ -364,9 +371,9 @@ mod tests {
     use super::*;
 
     fn sample() -> Result<Recording, GameError> {
-        let spec = registry::factory("hopper", Isa::best())?.spec().clone();
-        let mut recording =
-            Recording::new(spec.id.clone(), Ground::Level, spec.dt, vec![0.0, 0.0, 0.0, 0.0, 0.0, -2.0]);
+        let setting = Setting::named("hopper")?;
+        let spec = setting.factory()?.spec().clone();
+        let mut recording = Recording::new(setting, Ground::Level, spec.dt, vec![0.0, 0.0, 0.0, 0.0, 0.0, -2.0]);
         for frame in 0..5 {
             for agent in 0..2 {
                 recording.qpos.extend((0..spec.nq).map(|i| (frame * 10 + agent * 100 + i) as f32));
@@ -384,7 +391,7 @@ mod tests {
         let path = folder.path().join("a.replay");
         recording.save(&path)?;
         assert_eq!(Recording::load(&path)?, recording);
-        let model = registry::agent("hopper")?.model()?;
+        let model = marathon_envs::agent("hopper")?.model()?;
         let pose = |seconds: f64| recording.pose(&model, 1, seconds)[0];
         assert_eq!((pose(0.0), pose(0.5 * recording.dt), pose(99.0)), (100.0, 105.0, 140.0));
         // frame 3 begins an episode: nothing lies between it and the one before

@@ -2,6 +2,7 @@
 
 use crate::app::args::{Args, Mode};
 use crate::app::error::GameError;
+use crate::app::imitate::{FOLLOWER, follows_clip};
 use crate::app::notes::Notes;
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::ground::Ground;
@@ -11,10 +12,9 @@ use bevy::prelude::*;
 use marathon_envs::{nearest, registry};
 use marathon_learn::Policy as Net;
 use marathon_physics::Model;
-use marathon_physics::lanes::Isa;
 use marathon_render::Scene;
 use marathon_runs::folder::policy_path;
-use marathon_runs::{PolicySource, policy_file};
+use marathon_runs::{Flags, RunError, Setting, policy_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -29,11 +29,14 @@ const WATCH: f32 = 0.5;
 const LIE: f64 = 1.2;
 
 /// Policies that come with the game.
-const SHIPPED: [&[u8]; 4] = [
+const SHIPPED: [&[u8]; 7] = [
     include_bytes!("../../../../assets/policies/hopper.safetensors"),
     include_bytes!("../../../../assets/policies/walker2d.safetensors"),
     include_bytes!("../../../../assets/policies/humanoid.safetensors"),
     include_bytes!("../../../../assets/policies/ant.safetensors"),
+    include_bytes!("../../../../assets/policies/MarathonManWalk.safetensors"),
+    include_bytes!("../../../../assets/policies/MarathonManRun.safetensors"),
+    include_bytes!("../../../../assets/policies/MarathonManBackflip.safetensors"),
 ];
 
 /// What is on stage. Who changes it calls [`Show::again`].
@@ -43,6 +46,8 @@ pub struct Show {
     pub mode: Mode,
     /// Registry name of the agent; unused by the test bed.
     pub agent: String,
+    /// Arguments of its task that somebody has chosen, over those that the policy notes. Those of another agent do not count.
+    pub chosen: Setting,
     /// What moves them.
     pub source: Source,
     /// How many.
@@ -83,6 +88,8 @@ pub struct Focus(pub usize);
 pub struct Script {
     /// The asset that all actors have.
     pub policy: Option<Handle<PolicyAsset>>,
+    /// The task on stage.
+    pub setting: Setting,
     written: Option<SystemTime>,
     looked: f32,
 }
@@ -96,6 +103,7 @@ impl Show {
         let mut show = Show {
             mode: args.mode,
             agent: String::new(),
+            chosen: Setting::default(),
             source: Source::Shipped,
             agents: usize::from(args.agents),
             ground: args.ground.into(),
@@ -115,6 +123,9 @@ impl Show {
                 Model::from_xml_file(path).map_err(Box::new)?;
                 (show.mode, show.model, show.source) = (Mode::Testbed, Some(path.into()), Source::Nothing);
                 show.agent = "hopper".into();
+                if !args.task.given.is_empty() {
+                    return Err(RunError::option("option", "is for tasks, and a model of the test bed has none").into());
+                }
                 return Ok(show);
             }
             (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => Some(path.to_path_buf()),
@@ -122,15 +133,58 @@ impl Show {
             (_, Err(error)) => return Err(error.into()),
         };
         if let Some(given) = given {
-            let agent = Some(show.agent.clone()).filter(|agent| !agent.is_empty());
-            let (_, factory) = PolicySource { policy: given.clone(), agent, ..Default::default() }.load()?;
-            show.agent = factory.spec().id.clone();
+            if show.agent.is_empty() {
+                let name = match policy_file::task_of(&given)? {
+                    Some(noted) => noted.agent,
+                    None => policy_file::read(&given, None)?.meta().agent.clone(),
+                };
+                show.agent = registry::agent(&name)?.facts().id;
+            }
             show.source = Source::File(policy_path(&given)?);
         }
+        if show.mode == Mode::Imitate && !follows_clip(&show.agent) {
+            let problem = format!(
+                "imitate is for agents that follow a motion clip, {} follows none; {FOLLOWER} does",
+                show.agent
+            );
+            return Err(RunError::option("mode", problem).into());
+        }
+        show.chosen = Setting::named(&show.agent)?.with(&args.task)?;
+        let setting = show.setting()?;
+        match &show.source {
+            Source::File(path) => drop(policy_file::read(path, Some(setting.factory()?.spec()))?),
+            _ if !args.task.given.is_empty() => drop(setting.factory()?),
+            _ => {}
+        }
         if show.mode == Mode::Learn {
-            show.source = Source::Trainer;
+            show.play(Source::Trainer);
         }
         Ok(show)
+    }
+
+    /// The task: with the arguments that the policy notes, and over them those that somebody has chosen.
+    ///
+    /// # Errors
+    /// If there is no such agent, or the policy's file cannot be read.
+    pub fn setting(&self) -> Result<Setting, RunError> {
+        let named = Setting::named(&self.agent)?;
+        let noted = match &self.source {
+            Source::File(path) => policy_file::task_of(path)?,
+            Source::Shipped => shipped(&self.agent).map(|policy| Setting::of(policy.meta())),
+            Source::Trainer | Source::Nothing => None,
+        };
+        let noted = noted.filter(|noted| noted.agent == named.agent).unwrap_or(named);
+        Ok(if self.chosen.agent == noted.agent { noted.overlaid(&self.chosen) } else { noted })
+    }
+
+    /// Lets something else move the characters: a file in its own task, anything else in the present one.
+    pub fn play(&mut self, source: Source) {
+        self.chosen = match source {
+            Source::File(_) => Setting::default(),
+            // a file that can no longer be read has no task to keep
+            _ => self.setting().unwrap_or_default(),
+        };
+        self.source = source;
     }
 
     /// Sets the stage anew.
@@ -225,7 +279,13 @@ pub fn set_stage(
     let testbed = show.mode == Mode::Testbed;
     let model = match show.model.as_ref().filter(|_| testbed) {
         Some(path) => Model::from_xml_file(path).map_err(|e| e.to_string()),
-        None => registry::agent(&show.agent).and_then(|a| a.model()).map_err(|e| e.to_string()),
+        None => show
+            .setting()
+            .and_then(|setting| {
+                script.setting = setting;
+                body(&script.setting)
+            })
+            .map_err(|e| e.spelled(&Flags("marathon"))),
     };
     let model = match model {
         Ok(model) => Arc::new(model),
@@ -234,10 +294,13 @@ pub fn set_stage(
     let ragdoll = if testbed {
         Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() }))
     } else {
-        Ragdoll::agent(&show.agent).on(show.ground)
+        Ragdoll::agent(&show.agent).on(show.ground).with_setting(script.setting.clone())
     };
-    match read_policy(&show) {
+    match read_policy(&show, &script.setting) {
         Ok(Some(policy)) => script.policy = Some(policies.add(policy)),
+        Ok(None) if show.mode == Mode::Imitate && show.source == Source::Shipped => {
+            notes.say(format!("no policy comes with {}: its servos alone follow the clip; learn live (L)", show.agent));
+        }
         Ok(None) => {}
         Err(text) => notes.error(text),
     }
@@ -276,16 +339,22 @@ pub fn set_stage(
     info!("on stage: {} of {who} ({})", show.agents, show.mode.name());
 }
 
+/// The body of a task.
+fn body(setting: &Setting) -> Result<Model, RunError> {
+    setting.with_clips(|| Ok(registry::agent(&setting.agent)?.with_options(&setting.options)?.model()?))
+}
+
 /// The policy of a show; the text of an error names the remedy.
-fn read_policy(show: &Show) -> Result<Option<PolicyAsset>, String> {
-    let spec = || registry::factory(&show.agent, Isa::best()).map_err(|e| e.to_string());
+fn read_policy(show: &Show, setting: &Setting) -> Result<Option<PolicyAsset>, String> {
     match &show.source {
         Source::Nothing | Source::Trainer => Ok(None),
         Source::File(path) => {
-            let policy = policy_file::read(path, Some(spec()?.spec())).map_err(|e| e.to_string())?;
-            Ok(Some(policy.into()))
+            let policy = setting.factory().and_then(|factory| policy_file::read(path, Some(factory.spec())));
+            Ok(Some(policy.map_err(|e| e.to_string())?.into()))
         }
         Source::Shipped if show.mode == Mode::Testbed => Ok(None),
+        // its servos alone follow the clip for a while
+        Source::Shipped if show.mode == Mode::Imitate => Ok(shipped(&show.agent).map(PolicyAsset::from)),
         Source::Shipped => match shipped(&show.agent) {
             Some(policy) => Ok(Some(policy.into())),
             None => {
@@ -303,7 +372,7 @@ fn written(path: &Path) -> Option<SystemTime> {
 /// Reads the policy's file again when it has changed.
 pub fn reload(
     time: Res<Time<Real>>,
-    show: Res<Show>,
+    mut show: ResMut<Show>,
     mut script: ResMut<Script>,
     mut policies: ResMut<Assets<PolicyAsset>>,
     mut notes: ResMut<Notes>,
@@ -319,7 +388,12 @@ pub fn reload(
         return;
     }
     script.written = now;
-    match read_policy(&show) {
+    // one of another run may have been trained for another clip
+    if show.setting().is_ok_and(|setting| setting != script.setting) {
+        show.again();
+        return;
+    }
+    match read_policy(&show, &script.setting) {
         Ok(Some(policy)) => {
             let steps = policy.0.meta().training.as_ref().map(|t| t.steps);
             if let Some(handle) = &script.policy {

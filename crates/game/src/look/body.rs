@@ -47,9 +47,23 @@ impl Tint {
     }
 }
 
+/// A mesh of a [`Ragdoll`] that moves with it.
+#[derive(Component, Clone, Copy, Debug)]
+pub(crate) struct BodyMesh(pub Entity);
+
+/// A visible geom of a [`Ragdoll`].
+#[derive(Component, Clone, Debug)]
+pub(crate) struct Shape {
+    pub ragdoll: Entity,
+    /// Index in the model's geoms.
+    pub geom: usize,
+    /// What it is made of when nothing else is to be seen on it.
+    pub own: Handle<StandardMaterial>,
+}
+
 /// Meshes and materials that are in use already.
 #[derive(Resource, Default)]
-struct Wardrobe {
+pub(crate) struct Wardrobe {
     meshes: BTreeMap<(u8, [u32; 3]), Handle<Mesh>>,
     materials: BTreeMap<[u8; 6], Handle<StandardMaterial>>,
     /// That of height fields: the ground's checker.
@@ -72,12 +86,12 @@ fn dress(
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut images: ResMut<Assets<Image>>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    new: Query<(&Anatomy, &Transform, Option<&Tint>), Added<Anatomy>>,
+    new: Query<(Entity, &Anatomy, &Transform, Option<&Tint>), Added<Anatomy>>,
 ) {
-    for (anatomy, track, tint) in &new {
+    for (ragdoll, anatomy, track, tint) in &new {
         let model = &*anatomy.model;
         let main = main_color(model);
-        for geom in visible(model) {
+        for (number, geom) in visible(model) {
             let (mesh, material) = match geom.kind {
                 GeomType::Plane | GeomType::Mesh => continue,
                 GeomType::Hfield => {
@@ -93,7 +107,12 @@ fn dress(
             };
             let place = place_to_game(geom.pos, geom.quat);
             let name = Name::new(if geom.name.is_empty() { "geom".into() } else { geom.name.clone() });
-            commands.spawn((Mesh3d(mesh), MeshMaterial3d(material), place, name, ChildOf(anatomy.parts[geom.body])));
+            let shape = Shape { ragdoll, geom: number, own: material.clone() };
+            let looks = (Mesh3d(mesh), MeshMaterial3d(material), place, name);
+            let mut shape = commands.spawn((looks, shape, ChildOf(anatomy.parts[geom.body])));
+            if model.bodies[geom.body].weld_id != 0 {
+                shape.insert(BodyMesh(ragdoll));
+            }
         }
         for (body, at, radius) in joint_places(model) {
             let size = [radius as f32, 0.0, 0.0];
@@ -102,19 +121,21 @@ fn dress(
             let material = wardrobe.material(&mut materials, metal);
             let place = Transform::from_translation(to_game(at));
             let name = Name::new("joint");
-            commands.spawn((Mesh3d(mesh), MeshMaterial3d(material), place, name, ChildOf(anatomy.parts[body])));
+            let looks = (Mesh3d(mesh), MeshMaterial3d(material), place, name);
+            commands.spawn((looks, BodyMesh(ragdoll), ChildOf(anatomy.parts[body])));
         }
     }
 }
 
-/// Geoms that are drawn: opaque ones that MuJoCo's viewer would show, or all of a body that has none of these.
-fn visible(model: &Model) -> impl Iterator<Item = &Geom> {
+/// Geoms that are drawn, and their numbers: opaque ones that MuJoCo's viewer would show, or all of a body that has none of these.
+pub(crate) fn visible(model: &Model) -> impl Iterator<Item = (usize, &Geom)> {
     let moving = |g: &Geom| model.bodies[g.body].weld_id != 0;
     let listed = |g: &Geom| g.group < FIRST_HIDDEN_GROUP;
     let all_hidden = !model.geoms.iter().any(|g| moving(g) && g.rgba[3] > 0.0 && listed(g));
     // level planes are the ground, which the scenery draws
     let ground = |g: &Geom| g.kind == GeomType::Plane;
-    model.geoms.iter().filter(move |g| g.rgba[3] > 0.0 && (listed(g) || (all_hidden && moving(g))) && !ground(g))
+    let drawn = move |g: &Geom| g.rgba[3] > 0.0 && (listed(g) || (all_hidden && moving(g))) && !ground(g);
+    model.geoms.iter().enumerate().filter(move |(_, geom)| drawn(geom))
 }
 
 /// Places of a body's joints and the radius of a ball that shows there: `(body, place in its frame, m)`.
@@ -146,7 +167,7 @@ pub fn joint_places(model: &Model) -> Vec<(usize, [f64; 3], f64)> {
 /// The color that most of the model's shape has, which a [`Tint`] replaces.
 fn main_color(model: &Model) -> [f32; 4] {
     let mut areas: Vec<([f32; 4], f64)> = Vec::new();
-    for geom in visible(model).filter(|g| model.bodies[g.body].weld_id != 0) {
+    for (_, geom) in visible(model).filter(|(_, g)| model.bodies[g.body].weld_id != 0) {
         let [a, b, c] = geom.size;
         let area = a * (a + b + c);
         match areas.iter_mut().find(|(color, _)| *color == geom.rgba) {
@@ -197,7 +218,7 @@ impl Wardrobe {
         self.soil.get_or_insert_with(|| materials.add(make())).clone()
     }
 
-    fn shape(&mut self, meshes: &mut Assets<Mesh>, kind: GeomType, size: [f32; 3]) -> Handle<Mesh> {
+    pub fn shape(&mut self, meshes: &mut Assets<Mesh>, kind: GeomType, size: [f32; 3]) -> Handle<Mesh> {
         let key = (kind as u8, size.map(f32::to_bits));
         self.meshes.entry(key).or_insert_with(|| meshes.add(shape(kind, size))).clone()
     }

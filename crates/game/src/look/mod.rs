@@ -3,15 +3,19 @@
 
 mod body;
 mod camera;
+mod ghost;
 mod ground;
 mod marks;
 mod meters;
 mod scenery;
+mod skin;
 
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
+pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin};
 pub use scenery::{Quality, SceneryPlugin};
+pub use skin::{Dressed, Skin, SkinPlugin, UnfitSkin};
 
 /// Colors of a row of ragdolls, one after the other.
 pub const TINTS: [[f32; 3]; 8] = [
