@@ -27,8 +27,8 @@ fn main() {
 fn spawn(mut commands: Commands, assets: Res<AssetServer>) {
     let file = std::env::args().nth(1).unwrap_or_else(|| "skins/marathon_man.glb".into());
     let skin = Skin::new(assets.load(GltfAssetLabel::Scene(0).from_asset(file)));
-    // its servos alone follow the clip for a while; a policy does so for good
-    let walker = commands.spawn((Ragdoll::agent("MarathonManWalk"), skin)).id();
+    let policy = Policy(assets.load("policies/MarathonManWalk.safetensors"));
+    let walker = commands.spawn((Ragdoll::agent("MarathonManWalk"), policy, skin)).id();
     commands.spawn(FollowCamera::following(walker));
 }
 

@@ -3,7 +3,7 @@
 use crate::app::args::Mode;
 use crate::app::keys::{Bindings, Deed};
 use crate::app::learn::Lesson;
-use crate::app::notes::Notes;
+use crate::app::notes::{Note, Notes};
 use crate::app::replay::Recorder;
 use crate::app::show::{Actor, Focus, Show};
 use crate::app::steer::Steering;
@@ -154,7 +154,7 @@ pub fn draw(
     actors: Query<(&Actor, &Anatomy, &Episode, Option<&AgentCommand>)>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?.clone();
-    say(&ctx, &notes);
+    say(&ctx, &notes, hud.on);
     if !hud.on {
         return Ok(());
     }
@@ -428,13 +428,14 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
     });
 }
 
-/// Messages.
-fn say(ctx: &egui::Context, notes: &Notes) {
-    if notes.0.is_empty() {
+/// Messages; without text and bars, errors alone.
+fn say(ctx: &egui::Context, notes: &Notes, all: bool) {
+    let shown = |note: &&Note| all || note.error;
+    if !notes.0.iter().any(|note| shown(&note)) {
         return;
     }
     Area::new(Id::new("notes")).anchor(Align2::CENTER_TOP, [0.0, 18.0]).interactable(false).show(ctx, |ui: &mut Ui| {
-        for note in &notes.0 {
+        for note in notes.0.iter().filter(shown) {
             card().show(ui, |ui| {
                 ui.set_max_width(560.0);
                 ui.label(text(14.0, if note.error { BAD } else { TEXT }, &note.text));
