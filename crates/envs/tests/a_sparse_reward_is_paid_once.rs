@@ -16,7 +16,9 @@ const TOUCHES: [std::ops::Range<usize>; 2] = [59..62, 62..65];
 fn ends(scale: f32, limit: Option<usize>, clip: Option<&str>, isa: Isa) -> [usize; 2] {
     const AGENTS: usize = 20;
     let (id, given) = match clip {
-        Some(clip) => ("MarathonMan-v0", Options::new().with("clip", clip).with("reward", "sparse").with("start", "first")),
+        Some(clip) => {
+            ("MarathonMan-v0", Options::new().with("clip", clip).with("reward", "sparse").with("start", "first"))
+        }
         None => ("MarathonManSparse-v0", Options::new()),
     };
     let options = VecEnvOptions {
@@ -48,10 +50,7 @@ fn ends(scale: f32, limit: Option<usize>, clip: Option<&str>, isa: Isa) -> [usiz
             let seen = &out.final_obs[agent * obs..][..obs];
             let feet = ["right_right_foot", "left_left_foot"].into_iter().zip(TOUCHES);
             let down = feet.filter(|(_, touches)| seen[touches.clone()].iter().any(|touch| *touch > 0.0));
-            last[agent] = down
-                .map(|(foot, _)| center(&env, agent, foot))
-                .max_by(f64::total_cmp)
-                .unwrap_or(last[agent]);
+            last[agent] = down.map(|(foot, _)| center(&env, agent, foot)).max_by(f64::total_cmp).unwrap_or(last[agent]);
             over[agent] = out.terminated[agent] || out.truncated[agent];
             let paid = f64::from(out.reward[agent]);
             if !over[agent] {

@@ -136,7 +136,7 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::MultiEnv(options) => (multi_env::run(options)?, options),
         What::StyleTransfer { options, clips, kept_only } => {
             (style_transfer::run(options, clips, *kept_only)?, options)
-        },
+        }
     };
     let page = record.save(options)?;
     if json {

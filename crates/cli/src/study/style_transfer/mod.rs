@@ -6,6 +6,7 @@ use super::Options;
 use super::record::Record;
 use crate::error::CliError;
 use crate::interrupt;
+use kept::Found;
 use marathon_config::{Loaded, default_for};
 use marathon_envs::{nearest, registry};
 use marathon_learn::{Control, EvalOptions, IterationStats};
@@ -13,9 +14,9 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::report::csv::History;
 use marathon_runs::text::thousands;
-use kept::Found;
 use marathon_runs::{
-    LearnOptions, PolicySource, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions, imitation,
+    LearnOptions, PolicySource, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions,
+    imitation,
 };
 use std::path::{Path, PathBuf};
 

@@ -12,8 +12,8 @@ use std::f64::consts::FRAC_1_PI;
 use marathon_physics::lanes::Real;
 
 use super::super::imitation::{self, TERMS, angle2, norm2, sub};
-use super::sparse;
 use super::body::{ANATOMY, BUTT, PAPER_END_EFFECTORS, TOUCH, parts};
+use super::sparse;
 use crate::agent::options::OptionValue;
 use crate::agent::senses::clamp;
 use crate::agent::{Senses, Terms, Value};

@@ -28,8 +28,8 @@ use super::clips::{self, STAND};
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses,
-    Start, Terms, names,
+    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start,
+    Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
