@@ -5,7 +5,7 @@
 //! `paper`: ActiveRagdollStyleTransfer 0.002.124, in which a distance `d` of at most `n` is worth `((n - d)/n)^n`. Its
 //! velocities were 5 times too large, on both sides; these are true.
 //!
-//! `sparse`: how far the feet have come, once, at the episode's end ([`sparse`](super::sparse)).
+//! `sparse`: how far the feet have come, once, at the episode's end.
 
 use std::f64::consts::FRAC_1_PI;
 
