@@ -37,7 +37,7 @@ impl Found {
     ///
     /// # Errors
     /// If the file cannot be read, or is of another configuration or clip.
-    pub fn read(path: &Path, job: &Job, expected: Option<&RunFile>) -> Result<Option<Self>, CliError> {
+    pub fn read(path: &Path, job: &Job, expected: &RunFile) -> Result<Option<Self>, CliError> {
         let text = match std::fs::read_to_string(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             text => text.map_err(CliError::io(path, "read"))?,
@@ -49,9 +49,7 @@ impl Found {
             let expected = format!("{clip}, that of the clip {}; delete the file to train again", job.clip);
             return Err(CliError::file(path, "clip", found.clip, expected));
         }
-        if let Some(expected) = expected
-            && let Some(key) = first_difference(&found.run, expected)
-        {
+        if let Some(key) = first_difference(&found.run, expected) {
             let expected = "what the task's configuration says now; delete the file to train again";
             return Err(CliError::file(path, format!("run.{key}"), "another value", expected));
         }

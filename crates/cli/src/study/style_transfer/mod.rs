@@ -58,7 +58,7 @@ pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Recor
             let file = kept::file(&folder);
             let (new, loaded) = new_run(job, seed, options);
             let known = Session::open(Some(Task::named(&job.task)?), &new, Some(loaded), true)?.0.run;
-            match Found::read(&file, job, Some(&known))? {
+            match Found::read(&file, job, &known)? {
                 Some(kept) => found.push(kept),
                 None if kept_only => {}
                 None => {
