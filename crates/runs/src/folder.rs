@@ -101,6 +101,17 @@ impl RunFile {
     }
 }
 
+/// The first place where two runs differ, and what is there in each; but for threads, which change no result.
+pub fn difference_of_runs(found: &RunFile, expected: &RunFile) -> Option<(String, Value, Value)> {
+    let keys = |run: &RunFile| {
+        let mut run = run.clone();
+        run.config.run.threads = 1;
+        serde_json::to_value(run).unwrap_or_default()
+    };
+    let (found, expected) = (keys(found), keys(expected));
+    difference("run", &found, &expected).map(|(place, a, b)| (place, a.clone(), b.clone()))
+}
+
 /// The first place where two documents differ, and what is there.
 fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<(String, &'v Value, &'v Value)> {
     match (found, expected) {

@@ -113,14 +113,16 @@ fn fit(
     for (entity, mut worn, mut transform) in &mut clothes {
         let Ok((anatomy, skin)) = ragdolls.get(worn.ragdoll) else { continue };
         let result = match (scenes.get(&skin.scene), server.load_state(&skin.scene)) {
-            (Some(scene), _) => fitted(&tree(&scene.world), anatomy, skin).map(|fitted| (scene, fitted)),
+            (Some(scene), _) => {
+                let nodes = tree(&scene.world);
+                fitted(&nodes, anatomy, skin).map(|fitted| (scene, nodes, fitted))
+            }
             (None, LoadState::Failed(error)) => Err(error.to_string()),
             _ => continue,
         };
         match result {
-            Ok((scene, (wear, above, bones))) => {
+            Ok((scene, nodes, (wear, above, bones))) => {
                 let scale = wear.scale() as f32;
-                let nodes = tree(&scene.world);
                 let spawned = spawn(&mut commands, entity, &scene.world, &nodes, bones[0]);
                 let bones = bones.into_iter().map(|bone| spawned[bone]).collect();
                 transform.scale = Vec3::splat(scale);

@@ -2,7 +2,8 @@
 
 use super::Job;
 use crate::error::CliError;
-use marathon_learn::{checksum, write_atomic};
+use marathon_learn::checksum;
+use marathon_runs::folder::{difference_of_runs, write_json};
 use marathon_runs::{Imitation, RunFile};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -49,9 +50,9 @@ impl Found {
             let expected = format!("{clip}, that of the clip {}; delete the file to train again", job.clip);
             return Err(CliError::file(path, "clip", found.clip, expected));
         }
-        if let Some(key) = first_difference(&found.run, expected) {
-            let expected = "what the task's configuration says now; delete the file to train again";
-            return Err(CliError::file(path, format!("run.{key}"), "another value", expected));
+        if let Some((place, found, expected)) = difference_of_runs(&found.run, expected) {
+            let expected = format!("{expected}, as the task's configuration says now; delete the file to train again");
+            return Err(CliError::file(path, place, found, expected));
         }
         Ok(Some(found))
     }
@@ -61,26 +62,11 @@ impl Found {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), CliError> {
-        let bad = |error: serde_json::Error| CliError::file(path, "JSON", error, "plain data");
-        let mut text = serde_json::to_string(self).map_err(bad)?;
-        text.push('\n');
-        Ok(write_atomic(path, text.as_bytes())?)
+        Ok(write_json(path, self)?)
     }
 }
 
 /// Checksum of a task's clip.
 pub fn clip(job: &Job) -> String {
     checksum(&job.motion)
-}
-
-/// The first key in which two runs differ, but for threads, which change no result.
-fn first_difference(a: &RunFile, b: &RunFile) -> Option<String> {
-    let keys = |run: &RunFile| {
-        let mut run = run.clone();
-        run.config.run.threads = 1;
-        serde_json::to_value(run).unwrap_or_default()
-    };
-    let (a, b) = (keys(a), keys(b));
-    let names = a.as_object()?.keys().cloned().collect::<Vec<_>>();
-    names.into_iter().find(|key| a[key] != b[key])
 }
