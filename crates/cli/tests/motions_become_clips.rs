@@ -59,6 +59,23 @@ fn a_clip_of_one_character_becomes_one_of_another() {
 }
 
 #[test]
+fn a_clip_that_comes_with_marathon_has_a_name() {
+    let temp = tempfile::tempdir().unwrap();
+    let by_name = json(&succeed(temp.path(), &["--json", "motion", "check", "walk"]));
+    let by_file = json(&succeed(temp.path(), &["--json", "motion", "check", &shipped("marathon_man/walk.motion")]));
+    assert_eq!(by_name["clips"][0]["report"], by_file["clips"][0]["report"]);
+    let text = fail(temp.path(), 1, &["motion", "check", "wakl"]);
+    assert!(text.contains("wakl: clip: no such file") && text.contains("did you mean 'walk'?"), "{text}");
+    std::fs::write(temp.path().join("mine.motion"), "").unwrap();
+    let text = fail(temp.path(), 1, &["motion", "check", "min.motion"]);
+    assert!(text.contains("did you mean 'mine.motion'?"), "{text}");
+    // a file goes before a name
+    std::fs::copy(shipped("marathon_man/run.motion"), temp.path().join("walk")).unwrap();
+    let file = json(&succeed(temp.path(), &["--json", "motion", "check", "walk"]));
+    assert_eq!(file["clips"][0]["report"]["frames"], 48);
+}
+
+#[test]
 fn a_clip_with_a_foot_in_the_ground_fails_the_check() {
     let temp = tempfile::tempdir().unwrap();
     let good = std::fs::read_to_string(shipped("walker2d/walk.motion")).unwrap();

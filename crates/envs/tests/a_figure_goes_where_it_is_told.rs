@@ -1,12 +1,14 @@
-//! Marathon Man told where to go: the direction that he is to keep turns as commanded, his reward is its formula, and the
-//! demonstrations of his style are what he would observe in his clips.
+//! Marathon Man told where to go: the direction that he is to keep turns as commanded, his gait goes round as fast as its pace
+//! asks for and its pace follows the command, his reward is its formula, and the demonstrations of his style are what he would
+//! observe in his clips.
 
 mod common;
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use common::{action, isas, make};
 use marathon_envs::agents::marathon::marathon_man::clips;
+use marathon_envs::agents::marathon::marathon_man::gait::gaits;
 use marathon_envs::agents::marathon::marathon_man::steer::{MOST_BEHIND, STYLE};
 use marathon_envs::{AgentState, Autoreset, Demonstrations, factory};
 use marathon_physics::lanes::Isa;
@@ -69,7 +71,7 @@ fn his_style_has_names() {
     let spec = factory(ID, Isa::best()).unwrap().spec().clone();
     let named: Vec<&str> = spec.observations.iter().map(|group| group.name.as_str()).collect();
     assert!(STYLE.iter().all(|name| named.contains(name)), "{named:?}");
-    assert!(["command", "touch"].iter().all(|name| named.contains(name) && !STYLE.contains(name)));
+    assert!(["command", "touch", "gait", "next_pose"].iter().all(|name| named.contains(name) && !STYLE.contains(name)));
 }
 
 /// Angle of the butt's forward axis along the ground: the torso's rotation, then the waist's about z and y. That about x,
@@ -83,6 +85,66 @@ fn heading(state: &AgentState) -> f64 {
     ];
     let [forward, left] = rows.map(|row| row.iter().zip(&axis).map(|(a, b)| a * b).sum::<f64>());
     left.atan2(forward)
+}
+
+/// DeepMimic's weights of the joints in the order of `qpos`: abdomen, then a right and a left leg (hip of three axes, knee,
+/// ankle of two), then a right and a left arm (shoulder of two axes, elbow).
+fn weights() -> Vec<f64> {
+    let (leg, arm) = ([0.5, 0.5, 0.5, 0.3, 0.2, 0.2], [0.3, 0.3, 0.2]);
+    [0.5; 3].into_iter().chain(leg).chain(leg).chain(arm).chain(arm).collect()
+}
+
+#[test]
+fn his_gait_follows_the_command_and_leads_him_by_little() {
+    let mut env = make(ID, AGENTS, 1, Some(Isa::F64), Autoreset::Disabled);
+    let (n, dt) = (env.spec().obs, env.spec().dt);
+    let mut out = env.buffers();
+    for agent in 0..AGENTS {
+        // a turn on the spot takes the pace of a walk on a circle of 0.4 m
+        let command = if agent % 4 == 0 { [0.0, FRAC_PI_2] } else { [3.0 * agent as f64 / (AGENTS - 1) as f64, 0.0] };
+        env.set_command(agent, Some(&command)).unwrap();
+    }
+    env.reset(Some(7), &mut out.obs).unwrap();
+    let mut actions = vec![0.0; AGENTS * env.spec().act];
+    let (mut over, mut checked, mut faster) = ([false; AGENTS], 0, 0);
+    for decision in 0..40 {
+        for (agent, row) in actions.chunks_exact_mut(21).enumerate() {
+            action(agent, decision, 0.1, row);
+        }
+        let before = out.obs.clone();
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
+            let row = |obs: &[f32]| obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
+            let (was, is) = (row(&before), row(&out.obs));
+            let [[pace, cos, sin], [next_pace, next_cos, next_sin]] =
+                [&was, &is].map(|obs| [obs[77], obs[78], obs[79]]);
+            let turned = next_sin.atan2(next_cos) - sin.atan2(cos);
+            let expected = TAU * gaits().frequency(pace) * dt;
+            assert!((turned.rem_euclid(TAU) - expected).abs() < 1e-5, "agent {agent}: {turned}, expected {expected}");
+            // to the command by 4 m/s^2, but no farther from his own speed than 0.8 m/s: it may come nearer, never leave
+            let asked = was[0].max(0.4 * was[1].abs());
+            let change = next_pace - pace;
+            assert!(change.abs() < 4.0 * dt + 1e-5);
+            if change > 1e-5 && pace > asked + 1e-5 {
+                // he is faster than the pace by more than it may be behind
+                faster += 1;
+            }
+            // the next pose, less his own
+            let next =
+                gaits().moment(next_sin.atan2(next_cos) / TAU + gaits().frequency(next_pace) * dt, next_pace, 0.0);
+            for joint in 0..21 {
+                let expected = gaits().angle(&next, joint) - is[17 + joint];
+                assert!(
+                    (is[80 + joint] - expected).abs() < 1e-4,
+                    "joint {joint}: {}, expected {expected}",
+                    is[80 + joint]
+                );
+            }
+            checked += 1;
+            over[agent] = out.terminated[agent] || out.truncated[agent];
+        }
+    }
+    assert!(checked > 10 * AGENTS && faster < checked / 4, "{checked} {faster}");
 }
 
 #[test]
@@ -120,7 +182,16 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             assert!((angle - expected).abs() < 1e-5, "agent {agent}: {angle}, expected {expected}");
             let [e, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
             assert!((a - angle.abs()).abs() < 1e-5);
-            let worth = 0.4 * (-5.0 * e * e).exp() + 0.3 * (-0.5 * e * e).exp() + 0.3 * (-4.0 * a * a).exp();
+            let gait = gaits().moment(is[79].atan2(is[78]) / TAU, is[77], 0.0);
+            let (mut apart, mut total) = (0.0, 0.0);
+            for (joint, weight) in weights().into_iter().enumerate() {
+                apart += weight * (gaits().angle(&gait, joint) - is[17 + joint]).powi(2);
+                total += weight;
+            }
+            let worth = 0.35 * (-5.0 * e * e).exp()
+                + 0.25 * (-0.5 * e * e).exp()
+                + 0.2 * (-4.0 * a * a).exp()
+                + 0.2 * (-5.0 * apart / total).exp();
             assert!((f64::from(out.reward[agent]) - worth).abs() < 1e-5, "{} {worth}", out.reward[agent]);
             checked += 1;
             over[agent] = out.terminated[agent] || out.truncated[agent];

@@ -37,10 +37,15 @@ fn frames(app: &mut App, n: usize) {
     (0..n).for_each(|_| app.update());
 }
 
-/// The game, without a window.
+/// The game with the rover, without a window.
 fn game(words: &[&str]) -> App {
     LazyLock::force(&ROVER);
-    let args = Args::parse_from([&["marathon-game", "rover"], words].concat());
+    game_of("rover", words)
+}
+
+/// The game with an agent, without a window.
+fn game_of(agent: &str, words: &[&str]) -> App {
+    let args = Args::parse_from([&["marathon-game", agent], words].concat());
     let mut app = App::new();
     let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
@@ -214,4 +219,29 @@ fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
     key(&mut app, KeyCode::ArrowUp, ButtonState::Pressed);
     frames(&mut app, 2);
     assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 2.0);
+}
+
+/// The policy that comes with him is good enough to be led: he runs when the stick is up, and stands when it is released.
+#[test]
+fn marathon_man_goes_as_the_stick_says() {
+    let mut app = game_of("MarathonManSteer", &[]);
+    let pad = pad(&mut app);
+    let mut errors = |app: &mut App, seconds: usize| {
+        let mut sum = 0.0;
+        for _ in 0..50 * seconds {
+            app.update();
+            let mut query = app.world_mut().query_filtered::<&Episode, With<Actor>>();
+            let episode = query.single(app.world()).expect("he is alone");
+            assert_eq!(episode.number, 1, "he has not fallen: {episode:?}");
+            sum += f64::from(episode.info[0]);
+        }
+        sum / (50 * seconds) as f64
+    };
+    for (stick, speed) in [(1.0, 3.0), (0.0, 0.0)] {
+        push(&mut app, pad, GamepadAxis::LeftStickY, stick);
+        errors(&mut app, 3);
+        assert_eq!(commands(&mut app), [(speed, true)]);
+        let error = errors(&mut app, 2);
+        assert!(error < 0.5, "{error} m/s off {speed}");
+    }
 }

@@ -105,7 +105,7 @@ pub struct ImportArgs {
 /// Options of `motion retarget`.
 #[derive(Debug, clap::Args)]
 pub struct RetargetArgs {
-    /// Clip to read.
+    /// Clip to read: a .motion file, or the name of one that comes with Marathon.
     pub clip: PathBuf,
     /// Character of the clip that is read: an agent, or an MJCF file [default: the agent that the clip names].
     #[arg(long, value_name = "AGENT|F.xml")]
@@ -120,7 +120,7 @@ pub struct RetargetArgs {
 /// Options of `motion check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArgs {
-    /// Clips to read.
+    /// Clips to read: .motion files, or names of those that come with Marathon.
     #[arg(required = true)]
     pub clips: Vec<PathBuf>,
     /// Character: an agent, or an MJCF file [default: the agent that the clip names].
@@ -131,7 +131,7 @@ pub struct CheckArgs {
 /// Options of `motion render`.
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
-    /// Clip to read.
+    /// Clip to read: a .motion file, or the name of one that comes with Marathon.
     pub clip: PathBuf,
     /// Character: an agent, or an MJCF file [default: the agent that the clip names].
     #[arg(long, value_name = "AGENT|F.xml")]

@@ -2,10 +2,11 @@
 
 use crate::error::CliError;
 use crate::program;
-use marathon_envs::registry;
+use marathon_envs::agents::marathon::marathon_man::clips as known;
+use marathon_envs::{nearest, registry};
 use marathon_motion::Clip;
 use marathon_physics::Model;
-use marathon_runs::text::path_word;
+use marathon_runs::text::{nearest_path, path_word};
 use std::path::Path;
 
 /// A model by the name of an agent or an MJCF file.
@@ -39,7 +40,7 @@ fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
     Err(CliError::Usage(text))
 }
 
-/// Reads a clip.
+/// Reads a clip: a file, or one that comes with Marathon, by its name.
 pub fn clip(path: &Path) -> Result<Clip, CliError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     if ["bvh", "glb", "txt"].contains(&ending.as_str()) {
@@ -50,6 +51,23 @@ pub fn clip(path: &Path) -> Result<Clip, CliError> {
             path_word(&path.with_extension("motion"))
         )));
     }
+    if !path.exists() {
+        let name = path.to_str().unwrap_or_default();
+        return match known::find(name) {
+            Some(clip) => Ok((*clip).clone()),
+            None => Err(missing(path, name)),
+        };
+    }
     let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
     Ok(Clip::parse(path, &bytes)?)
+}
+
+/// What to say of a clip that is neither a file nor known.
+fn missing(path: &Path, name: &str) -> CliError {
+    let names = known::all_names();
+    let file = nearest_path(path, &[], |file| file.extension().is_some_and(|ending| ending == "motion"));
+    let near = file.or_else(|| nearest(name, names.iter().map(String::as_str)).map(Into::into));
+    let near = near.map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
+    let expected = format!("a file of a clip (.motion){near} or the name of a clip: {}", names.join(", "));
+    CliError::file(path, "clip", "no such file", expected)
 }

@@ -61,6 +61,14 @@ impl Start<'_> {
         lap.rows.start + earlier
     }
 
+    /// Share of the clip, or of its cycle, that is over in a row: 0 to 1.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn phase(&self, row: usize) -> f64 {
+        self.timeline.expect("the facts name clips").phase[row]
+    }
+
     /// Puts the agent into a row of the clips, with its velocities.
     ///
     /// # Panics

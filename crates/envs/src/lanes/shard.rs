@@ -153,14 +153,15 @@ impl<T: Real> Shard for LaneShard<T> {
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
             let mut last = 0;
-            for (lane, life) in lives[first..].iter().take(T::LANES).enumerate() {
-                group.commands.tell(task, lane, life.id, life.steps + 1);
-                last |= u32::from(life.steps + 1 >= self.max_episode_steps) << lane;
+            for (lane, life) in lives[first..].iter_mut().take(T::LANES).enumerate() {
+                life.steps += 1;
+                group.commands.tell(task, lane, life.id, life.steps);
+                last |= u32::from(life.steps >= self.max_episode_steps) << lane;
             }
             let ended = group.decide(task, &mut self.work, action, first, last);
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
-            out.truncated |= (ended.truncated << first) as u16;
+            out.truncated |= ((ended.truncated | last) << first) as u16;
             out.diverged |= (ended.diverged << first) as u16;
             for (all, lanes) in out.decides.iter_mut().zip(&group.decides) {
                 *all |= (lanes << first) as u16;
@@ -168,12 +169,6 @@ impl<T: Real> Shard for LaneShard<T> {
             // a broken state is put away at once: it must not slow its group down until the caller resets it
             for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
                 group.put(&task.sim, lane, &task.blueprint.spawn, &vec![0.0; task.blueprint.model.nv]);
-            }
-        }
-        for (i, life) in lives.iter_mut().enumerate() {
-            life.steps += 1;
-            if life.steps >= self.max_episode_steps {
-                out.truncated |= 1 << i;
             }
         }
         out.truncated &= !out.terminated;

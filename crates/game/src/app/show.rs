@@ -29,7 +29,7 @@ const WATCH: f32 = 0.5;
 const LIE: f64 = 1.2;
 
 /// Policies that come with the game.
-const SHIPPED: [&[u8]; 7] = [
+const SHIPPED: [&[u8]; 8] = [
     include_bytes!("../../../../assets/policies/hopper.safetensors"),
     include_bytes!("../../../../assets/policies/walker2d.safetensors"),
     include_bytes!("../../../../assets/policies/humanoid.safetensors"),
@@ -37,6 +37,7 @@ const SHIPPED: [&[u8]; 7] = [
     include_bytes!("../../../../assets/policies/MarathonManWalk.safetensors"),
     include_bytes!("../../../../assets/policies/MarathonManRun.safetensors"),
     include_bytes!("../../../../assets/policies/MarathonManBackflip.safetensors"),
+    include_bytes!("../../../../assets/policies/MarathonManSteer.safetensors"),
 ];
 
 /// What is on stage. Who changes it calls [`Show::again`].

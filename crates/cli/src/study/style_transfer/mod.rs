@@ -92,6 +92,7 @@ pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Recor
         about: about(),
         columns: vec![
             "clip",
+            "seeds",
             "decisions",
             "processor seconds",
             "of 100 from the beginning",
@@ -114,7 +115,7 @@ fn about() -> String {
     format!(
         "Marathon Man learns each clip by PPO with the configuration that comes with him, `marathon_man-fast.yaml`; the paper's \
          Humanoid and Walker learn theirs with `in_style-fast.yaml`. Each run \
-         has one seed; the table has medians over the seeds, and each seed's number in brackets if there are several. The \
+         has one seed; the table has medians over the seeds, and each seed's number in brackets if they differ. The \
          policy's best actions are judged over 100 episodes from the clip's first frame and 100 from random ones, each up to \
          20 s or to the end of a clip that does not loop. An episode is completed if nobody falls and the parts stay within \
          0.5 m of the clip in the mean. Joint errors, pose errors and slides are those of episodes from the beginning; \
@@ -252,7 +253,8 @@ fn row(job: &Job, found: &[Found]) -> Vec<String> {
         let middle = if known.len() == values.len() { median(known) } else { None };
         let middle = middle.map_or("-".into(), text);
         let each: Vec<String> = values.iter().map(|value| value.map_or("-".into(), text)).collect();
-        if each.len() > 1 { format!("{middle} ({})", each.join(", ")) } else { middle }
+        let differ = each.iter().any(|text| *text != middle);
+        if differ { format!("{middle} ({})", each.join(", ")) } else { middle }
     };
     let whole = |x: f64| thousands(x.round() as u64);
     let once = |found: &Found, i: usize| {
@@ -262,6 +264,7 @@ fn row(job: &Job, found: &[Found]) -> Vec<String> {
     };
     vec![
         job.clip.clone(),
+        found.len().to_string(),
         cell(&whole, &|f| Some(f.steps as f64)),
         cell(&whole, &|f| Some(f.cpu_seconds)),
         cell(&whole, &|f| Some(f.imitation.first.completed as f64)),

@@ -35,6 +35,9 @@ pub(super) const TERMS: [(&str, f64, f64); 5] = [
     ("center_of_mass", 0.1, 10.0),
 ];
 
+/// Terms for the pose, without regard to where he is and how fast he moves.
+const POSE: [&str; 2] = ["pose", "end_effectors"];
+
 /// What a reward has to know of a figure.
 pub(super) struct Anatomy {
     /// The part from which others are seen.
@@ -125,10 +128,11 @@ pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     memory[MADE] += T::lit(1.0);
 }
 
-/// Adds the terms of DeepMimic's reward.
+/// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of those that are for the pose; DeepMimic's is 1.
 #[inline(always)]
-pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, terms: &mut Terms<T>) {
+pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64, terms: &mut Terms<T>) {
     for ((name, weight, scale), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
+        let scale = if POSE.contains(&name) { sharpness * scale } else { scale };
         terms.add(name, weight, (error * T::lit(-scale)).exp());
     }
 }

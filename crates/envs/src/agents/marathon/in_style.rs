@@ -224,7 +224,7 @@ impl Agent for InStyle {
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        imitation::add_terms(s, &self.figure.anatomy, terms);
+        imitation::add_terms(s, &self.figure.anatomy, 1.0, terms);
     }
 
     #[inline(always)]

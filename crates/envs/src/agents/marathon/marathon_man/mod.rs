@@ -18,6 +18,7 @@
 
 mod body;
 pub mod clips;
+pub mod gait;
 pub mod reward;
 mod sparse;
 pub mod steer;
@@ -66,6 +67,9 @@ crate::options! {
         /// Mean distance of the parts from where the clip has them that ends an episode, m. With the reward `paper`, a sum of
         /// its first five terms below 0.334 ends it instead; with `sparse`, only a fall does.
         distance: Scale = Scale(0.5),
+        /// What the scales of the terms `pose` and `end_effectors` of `deepmimic` are multiplied by: the more, the closer the pose
+        /// has to be.
+        sharpness: Scale = Scale(1.0),
         /// Most that an action of `pd` moves a target, rad.
         reach: Scale = Scale(1.0),
         /// How many later frames of the clip are observed: up to three, 4, 8 and 16 decisions ahead.
@@ -237,7 +241,7 @@ impl Agent for MarathonMan {
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        self.arguments.reward.add(s, terms);
+        self.arguments.reward.add(s, self.arguments.sharpness.0, terms);
     }
 
     #[inline(always)]

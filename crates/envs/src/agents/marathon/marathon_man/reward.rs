@@ -65,11 +65,11 @@ impl Reward {
         }
     }
 
-    /// Adds the terms.
+    /// Adds the terms; `sharpness` is for `deepmimic`.
     #[inline(always)]
-    pub fn add<T: Real>(self, s: &Senses<T>, terms: &mut Terms<T>) {
+    pub fn add<T: Real>(self, s: &Senses<T>, sharpness: f64, terms: &mut Terms<T>) {
         match self {
-            Reward::DeepMimic => imitation::add_terms(s, &ANATOMY, terms),
+            Reward::DeepMimic => imitation::add_terms(s, &ANATOMY, sharpness, terms),
             Reward::Paper => {
                 for ((name, weight, _), worth) in PAPER.into_iter().zip(paper_worths(s)) {
                     terms.add(name, weight, worth);
