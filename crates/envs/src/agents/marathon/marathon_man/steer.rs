@@ -16,7 +16,7 @@
 //! Vectors are in his heading, the direction along the ground in which the butt faces. The commanded direction turns as the
 //! command says; where he cannot follow, it stays within [`MOST_BEHIND`] of his heading.
 //!
-//! No clip leads him through the world. His [gait](gait) goes round as fast as his pace asks for, and the pace follows the
+//! No clip leads him through the world. His [gait](super::gait) goes round as fast as his pace asks for, and the pace follows the
 //! command. An action of `pd` is a deviation from the gait.
 //!
 //! The task's reward is for velocity and heading alone. The style comes from a discriminator that learns from his clips
