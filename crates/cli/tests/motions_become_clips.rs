@@ -65,7 +65,7 @@ fn a_clip_that_comes_with_marathon_has_a_name() {
     let by_file = json(&succeed(temp.path(), &["--json", "motion", "check", &shipped("marathon_man/walk.motion")]));
     assert_eq!(by_name["clips"][0]["report"], by_file["clips"][0]["report"]);
     let text = fail(temp.path(), 1, &["motion", "check", "wakl"]);
-    assert!(text.contains("wakl: clip: no such file") && text.contains("did you mean 'walk'?"), "{text}");
+    assert!(text.contains("wakl: clip: found no such file") && text.contains("did you mean 'walk'?"), "{text}");
     std::fs::write(temp.path().join("mine.motion"), "").unwrap();
     let text = fail(temp.path(), 1, &["motion", "check", "min.motion"]);
     assert!(text.contains("did you mean 'mine.motion'?"), "{text}");

@@ -226,7 +226,7 @@ fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
 fn marathon_man_goes_as_the_stick_says() {
     let mut app = game_of("MarathonManSteer", &[]);
     let pad = pad(&mut app);
-    let mut errors = |app: &mut App, seconds: usize| {
+    let errors = |app: &mut App, seconds: usize| {
         let mut sum = 0.0;
         for _ in 0..50 * seconds {
             app.update();
