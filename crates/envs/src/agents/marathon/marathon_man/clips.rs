@@ -62,7 +62,12 @@ pub fn add(name: &str, clip: Clip) {
 pub fn find(name: &str) -> Option<Arc<Clip>> {
     let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
     let of_callers = added.iter().find(|(known, _)| known == name).map(|(_, clip)| clip.clone());
-    of_callers.or_else(|| SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| (*shipped.clip).clone()))
+    of_callers.or_else(|| shipped(name))
+}
+
+/// The clip of a name that comes with the crate, whatever callers have added.
+pub(super) fn shipped(name: &str) -> Option<Arc<Clip>> {
+    SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| (*shipped.clip).clone())
 }
 
 /// Names of all clips that are known, those that come with the crate first.

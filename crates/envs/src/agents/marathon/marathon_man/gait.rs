@@ -50,7 +50,7 @@ pub struct Moment<T> {
 /// The gaits of the clips that come with the crate.
 pub fn gaits() -> &'static Gaits {
     static GAITS: LazyLock<Gaits> = LazyLock::new(|| {
-        let clip = |name| clips::find(name).expect("the clip comes with the crate");
+        let clip = |name| clips::shipped(name).expect("the clip comes with the crate");
         let mut pose = vec![0.0; clip(STAND).layout().nq()];
         clip(STAND).qpos(0.0, &mut pose);
         let stand = std::array::from_fn(|i| pose[FIRST_QPOS + i]);

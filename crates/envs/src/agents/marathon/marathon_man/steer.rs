@@ -86,7 +86,7 @@ crate::options! {
 /// Where in the cycle of each clip the gait begins.
 fn beginnings() -> &'static [f64; CLIPS.len()] {
     static BEGINNINGS: LazyLock<[f64; CLIPS.len()]> =
-        LazyLock::new(|| CLIPS.map(|name| clips::find(name).map_or(0.0, |clip| beginning(&clip))));
+        LazyLock::new(|| CLIPS.map(|name| clips::shipped(name).map_or(0.0, |clip| beginning(&clip))));
     &BEGINNINGS
 }
 
@@ -165,7 +165,7 @@ impl Agent for Steer {
                 CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
                 CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
             ],
-            clips: CLIPS.into_iter().filter_map(clips::find).collect(),
+            clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
             memory: PACE + 1,
             termination_reward: None,
