@@ -87,6 +87,11 @@ fn heading(state: &AgentState) -> f64 {
     left.atan2(forward)
 }
 
+/// What an agent observes.
+fn row(obs: &[f32], agent: usize, n: usize) -> Vec<f64> {
+    obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect()
+}
+
 /// DeepMimic's weights of the joints in the order of `qpos`: abdomen, then a right and a left leg (hip of three axes, knee,
 /// ankle of two), then a right and a left arm (shoulder of two axes, elbow).
 fn weights() -> Vec<f64> {
@@ -107,15 +112,16 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
     env.reset(Some(7), &mut out.obs).unwrap();
     let mut actions = vec![0.0; AGENTS * env.spec().act];
     let (mut over, mut checked, mut faster) = ([false; AGENTS], 0, 0);
+    let mut info = vec![0.0f32; AGENTS * 2];
     for decision in 0..40 {
         for (agent, row) in actions.chunks_exact_mut(21).enumerate() {
             action(agent, decision, 0.1, row);
         }
         let before = out.obs.clone();
         env.step(&actions, &mut out.as_mut()).unwrap();
+        env.info(&mut info).unwrap();
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
-            let row = |obs: &[f32]| obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
-            let (was, is) = (row(&before), row(&out.obs));
+            let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
             let [[pace, cos, sin], [next_pace, next_cos, next_sin]] =
                 [&was, &is].map(|obs| [obs[77], obs[78], obs[79]]);
             let turned = next_sin.atan2(next_cos) - sin.atan2(cos);
@@ -125,6 +131,13 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
             let asked = was[0].max(0.4 * was[1].abs());
             let change = next_pace - pace;
             assert!(change.abs() < 4.0 * dt + 1e-5);
+            // told to go nowhere, the error of his velocity is his speed
+            if was[0] == 0.0 {
+                let speed = f64::from(info[2 * agent]);
+                let led = speed + (asked - speed).clamp(-0.8, 0.8);
+                let expected = (led - pace).clamp(-4.0 * dt, 4.0 * dt);
+                assert!((change - expected).abs() < 1e-5, "agent {agent}: {change}, expected {expected}");
+            }
             if change > 1e-5 && pace > asked + 1e-5 {
                 // he is faster than the pace by more than it may be behind
                 faster += 1;
@@ -170,8 +183,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
         env.step(&actions, &mut out.as_mut()).unwrap();
         env.info(&mut info).unwrap();
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
-            let row = |obs: &[f32]| obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
-            let (was, is) = (row(&before), row(&out.obs));
+            let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
             let angle = is[2].atan2(is[3]);
             assert!((is[2].hypot(is[3]) - 1.0).abs() < 1e-5 && angle.abs() < MOST_BEHIND + 1e-5);
             behind = behind.max(angle.abs());

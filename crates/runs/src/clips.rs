@@ -76,13 +76,8 @@ pub fn check_name(name: &str) -> Result<(), RunError> {
 /// A clip's text: of a `.motion` file as it is, of a recording what `marathon motion import` makes of it by default.
 fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError> {
     if !path.is_file() {
-        let found = if path.is_dir() { "a folder" } else { "no such file" };
         let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
-        let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-        let names = known::all_names().join(", ");
-        let endings = ENDINGS.join(", .");
-        let expected = format!("a file of a motion (.{endings}){near} or the name of a clip: {names}");
-        return Err(RunError::file(path, "clip", found, expected));
+        return Err(missing(path, &format!("a motion (.{})", ENDINGS.join(", .")), near));
     }
     let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
     let clip = match ending(path).as_str() {
@@ -95,6 +90,14 @@ fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError>
     clip.check_model(path, model)?;
     let text = if ending(path) == MOTION { bytes } else { clip.to_bytes() };
     String::from_utf8(text).map_err(|e| RunError::file(path, "text", e, "UTF-8"))
+}
+
+/// What to say of a path that is neither a file of `what` nor the name of a clip. `near`: what may have been meant.
+pub fn missing(path: &Path, what: &str, near: Option<String>) -> RunError {
+    let found = if path.is_dir() { "a folder" } else { "no such file" };
+    let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
+    let names = known::all_names().join(", ");
+    RunError::file(path, "clip", found, format!("a file of {what}{near} or the name of a clip: {names}"))
 }
 
 /// What a character makes of a recording, with the mapping that comes with Marathon.

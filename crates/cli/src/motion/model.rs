@@ -6,6 +6,7 @@ use marathon_envs::agents::marathon::marathon_man::clips as known;
 use marathon_envs::{nearest, registry};
 use marathon_motion::Clip;
 use marathon_physics::Model;
+use marathon_runs::clips::missing;
 use marathon_runs::text::{nearest_path, path_word};
 use std::path::Path;
 
@@ -53,21 +54,14 @@ pub fn clip(path: &Path) -> Result<Clip, CliError> {
     }
     if !path.exists() {
         let name = path.to_str().unwrap_or_default();
-        return match known::find(name) {
-            Some(clip) => Ok((*clip).clone()),
-            None => Err(missing(path, name)),
-        };
+        if let Some(clip) = known::find(name) {
+            return Ok((*clip).clone());
+        }
+        let file = nearest_path(path, &[], |file| file.extension().is_some_and(|ending| ending == "motion"));
+        let names = known::all_names();
+        let near = file.or_else(|| nearest(name, names.iter().map(String::as_str)).map(Into::into));
+        return Err(missing(path, "a clip (.motion)", near).into());
     }
     let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
     Ok(Clip::parse(path, &bytes)?)
-}
-
-/// What to say of a clip that is neither a file nor known.
-fn missing(path: &Path, name: &str) -> CliError {
-    let names = known::all_names();
-    let file = nearest_path(path, &[], |file| file.extension().is_some_and(|ending| ending == "motion"));
-    let near = file.or_else(|| nearest(name, names.iter().map(String::as_str)).map(Into::into));
-    let near = near.map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
-    let expected = format!("a file of a clip (.motion){near} or the name of a clip: {}", names.join(", "));
-    CliError::file(path, "clip", "no such file", expected)
 }

@@ -441,8 +441,9 @@ fn world<T: Real>(i: usize) -> [T; 3] {
     v
 }
 
+/// Length of a vector in a plane.
 #[inline(always)]
-fn hypot<T: Real>(x: T, y: T) -> T {
+pub(crate) fn hypot<T: Real>(x: T, y: T) -> T {
     x.mul_add(x, y * y).sqrt()
 }
 

@@ -26,17 +26,15 @@ const EARLY: f64 = 2.0;
 /// How long before a later failure episodes start, s.
 const BEFORE: f64 = 1.0;
 
-/// Terms of DeepMimic's reward: name, weight, scale.
-pub(super) const TERMS: [(&str, f64, f64); 5] = [
-    ("pose", 0.5, 2.0),
-    ("velocity", 0.05, 0.1),
-    ("end_effectors", 0.15, 10.0),
-    ("root", 0.2, 5.0),
-    ("center_of_mass", 0.1, 10.0),
+/// Terms of DeepMimic's reward: name, weight, scale, and whether it is for the pose, without regard to where the figure is and
+/// how fast it moves.
+pub(super) const TERMS: [(&str, f64, f64, bool); 5] = [
+    ("pose", 0.5, 2.0, true),
+    ("velocity", 0.05, 0.1, false),
+    ("end_effectors", 0.15, 10.0, true),
+    ("root", 0.2, 5.0, false),
+    ("center_of_mass", 0.1, 10.0, false),
 ];
-
-/// Terms for the pose, without regard to where he is and how fast he moves.
-const POSE: [&str; 2] = ["pose", "end_effectors"];
 
 /// What a reward has to know of a figure.
 pub(super) struct Anatomy {
@@ -131,8 +129,8 @@ pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
 /// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of those that are for the pose; DeepMimic's is 1.
 #[inline(always)]
 pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64, terms: &mut Terms<T>) {
-    for ((name, weight, scale), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
-        let scale = if POSE.contains(&name) { sharpness * scale } else { scale };
+    for ((name, weight, scale, of_pose), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
+        let scale = if of_pose { sharpness * scale } else { scale };
         terms.add(name, weight, (error * T::lit(-scale)).exp());
     }
 }

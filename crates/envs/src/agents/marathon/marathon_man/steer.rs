@@ -19,7 +19,7 @@
 //! No clip leads him through the world. His [gait](super::gait) goes round as fast as his pace asks for, and the pace follows the
 //! command. An action of `pd` is a deviation from the gait.
 //!
-//! The task's reward is for velocity and heading alone. The style comes from a discriminator that learns from his clips
+//! The task's reward is for velocity, heading and the gait. The style comes from a discriminator that learns from his clips
 //! ([`STYLE`]): the task's [demonstrations](crate::ShardFactory::demonstrations) are what he would observe in them.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -35,7 +35,7 @@ use super::body::{
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
-use crate::agent::senses::clamp;
+use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start,
     Terms, names,
@@ -114,16 +114,17 @@ impl Steer {
     #[inline(always)]
     fn speed<T: Real>(s: &Senses<T>) -> T {
         let [x, y, _] = s.center_of_mass_velocity();
-        x.mul_add(x, y * y).sqrt()
+        hypot(x, y)
     }
 
     /// Mean square of the joints' distances from the gait, by DeepMimic's weights, rad^2.
     #[inline(always)]
     fn out_of_step<T: Real>(s: &Senses<T>) -> T {
-        let now = gaits().moment(s.memory(PHASE), s.memory(PACE), 0.0);
+        let gaits = gaits();
+        let now = gaits.moment(s.memory(PHASE), s.memory(PACE), 0.0);
         let (mut sum, mut total) = (T::zero(), 0.0);
         for (i, joint) in JOINTS.iter().enumerate() {
-            let off = gaits().angle(&now, i) - s.readings().qpos(FIRST_QPOS + i);
+            let off = gaits.angle(&now, i) - s.readings().qpos(FIRST_QPOS + i);
             sum = (off * off).mul_add(T::lit(joint.weight), sum);
             total += joint.weight;
         }
@@ -141,8 +142,7 @@ impl Steer {
     #[inline(always)]
     fn slip<T: Real>(s: &Senses<T>) -> T {
         let ([vx, vy, _], [x, y], speed) = (s.center_of_mass_velocity(), Self::direction(s), s.command(0));
-        let (dx, dy) = (speed.neg_mul_add(x, vx), speed.neg_mul_add(y, vy));
-        dx.mul_add(dx, dy * dy).sqrt()
+        hypot(speed.neg_mul_add(x, vx), speed.neg_mul_add(y, vy))
     }
 }
 
@@ -209,9 +209,10 @@ impl Agent for Steer {
                 let reach = T::lit(self.arguments.reach.0);
                 // the servo's damping, which slows every motion, is not to slow the gait
                 let [phase, pace] = [PHASE, PACE].map(|slot| c.memory[slot]);
-                let next = gaits().moment(Self::next_phase(phase, pace, c.dt), pace, DAMPING_TIME);
+                let gaits = gaits();
+                let next = gaits.moment(Self::next_phase(phase, pace, c.dt), pace, DAMPING_TIME);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    c.ctrl[i] = c.action[i].mul_add(reach, gaits().angle(&next, joint));
+                    c.ctrl[i] = c.action[i].mul_add(reach, gaits.angle(&next, joint));
                 }
             }
         }
@@ -259,10 +260,11 @@ impl Agent for Steer {
         for x in [pace, cos, sin] {
             out.scalar(x);
         }
-        let next = gaits().moment(Self::next_phase(phase, pace, s.dt()), pace, 0.0);
+        let gaits = gaits();
+        let next = gaits.moment(Self::next_phase(phase, pace, s.dt()), pace, 0.0);
         out.group("next_pose");
         for i in 0..JOINTS.len() {
-            out.scalar(gaits().angle(&next, i) - s.readings().qpos(FIRST_QPOS + i));
+            out.scalar(gaits.angle(&next, i) - s.readings().qpos(FIRST_QPOS + i));
         }
     }
 
