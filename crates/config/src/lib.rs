@@ -33,6 +33,9 @@ const GYMNASIUM: (&str, &str) = ("gymnasium-fast.yaml", include_str!("../../../a
 /// For dm_control's suite.
 const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../../assets/configs/dm_control-fast.yaml"));
 
+/// For figures in a plane that are told how fast to go.
+const CONTROLLER: (&str, &str) = ("controller-fast.yaml", include_str!("../../../assets/configs/controller-fast.yaml"));
+
 /// For Marathon Man and his clips.
 const MARATHON_MAN: (&str, &str) =
     ("marathon_man-fast.yaml", include_str!("../../../assets/configs/marathon_man-fast.yaml"));
@@ -45,7 +48,7 @@ const MARATHON_MAN_STEER: (&str, &str) =
 const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 41] = [
+const FAST: [(&str, (&str, &str)); 43] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -64,6 +67,8 @@ const FAST: [(&str, (&str, &str)); 41] = [
     ("Walker2d", ("walker2d-fast.yaml", include_str!("../../../assets/configs/walker2d-fast.yaml"))),
     ("Humanoid", ("humanoid-fast.yaml", include_str!("../../../assets/configs/humanoid-fast.yaml"))),
     ("Ant", ("ant-fast.yaml", include_str!("../../../assets/configs/ant-fast.yaml"))),
+    ("HopperController", CONTROLLER),
+    ("WalkerController", CONTROLLER),
     ("MarathonMan", MARATHON_MAN),
     ("MarathonManWalk", MARATHON_MAN),
     ("MarathonManWalkLeft", MARATHON_MAN),

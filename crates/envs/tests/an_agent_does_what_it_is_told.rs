@@ -34,11 +34,12 @@ const MODEL: &str = r#"
 </mujoco>"#;
 
 /// What it observes: place, velocity, the two numbers of its command, its memory.
-const OBS: usize = 6;
+const OBS: usize = 7;
 const VELOCITY: usize = 2;
 const BRAKE: usize = 3;
 const DELAYED: usize = 4;
 const DRAWN: usize = 5;
+const FORETOLD: usize = 6;
 
 #[derive(Clone, Copy, Default)]
 struct Cart {
@@ -56,7 +57,7 @@ impl Agent for Cart {
             reward_terms: names(["error"]),
             info: names(["told", "height"]),
             command: vec![CommandRange::new("velocity", -2.0..=2.0, "m/s"), CommandRange::new("brake", 0.0..=1.0, "")],
-            memory: 2,
+            memory: 3,
             termination_reward: None,
             ..Facts::default()
         }
@@ -65,6 +66,7 @@ impl Agent for Cart {
     fn reset(&self, start: &mut Start) {
         start.qpos[0] = start.random.uniform(-1.0, 1.0);
         start.memory[1] = start.random.uniform(1.0, 2.0);
+        start.memory[2] = start.scheduled[0];
         if self.hilly {
             let height = start.random.uniform(0.1, 0.2) as f32;
             start.set_ground(0, vec![height; 15]);
@@ -93,6 +95,7 @@ impl Agent for Cart {
         out.scalar(s.command(1));
         out.scalar(s.memory(0));
         out.scalar(s.memory(1));
+        out.scalar(s.memory(2));
     }
 
     #[inline(always)]
@@ -189,6 +192,26 @@ fn the_schedule_draws_a_command_and_holds_it() {
         firsts.push(commands[0][0]);
     }
     assert!((1..N).all(|i| !firsts[..i].contains(&firsts[i])), "each agent has chances of its own: {firsts:?}");
+}
+
+#[test]
+fn a_start_knows_what_the_schedule_begins_with() {
+    const N: usize = 24;
+    for id in ["Cart-v0", "HillyCart-v0"] {
+        let mut env = carts(id, N, 1, None);
+        env.set_command(3, Some(&[-0.5, 0.0])).expect("within the range");
+        let story = play(&mut env, 60, |_, _| {});
+        for agent in (0..N).filter(|agent| *agent != 3) {
+            assert_eq!(seen(&story[0], agent, FORETOLD), seen(&story[0], agent, VELOCITY), "{id}, agent {agent}");
+            // the second episode begins after 40 decisions
+            assert_eq!(seen(&story[40], agent, FORETOLD), seen(&story[40], agent, VELOCITY), "{id}, agent {agent}");
+            assert_ne!(seen(&story[0], agent, FORETOLD), seen(&story[40], agent, FORETOLD));
+        }
+        // a start is a function of seed, agent and episode, whatever a caller says
+        let alone = play(&mut carts(id, N, 1, None), 1, |_, _| {});
+        assert_eq!(seen(&story[0], 3, FORETOLD), seen(&alone[0], 3, FORETOLD));
+        assert_eq!(seen(&story[0], 3, VELOCITY), -0.5);
+    }
 }
 
 #[test]

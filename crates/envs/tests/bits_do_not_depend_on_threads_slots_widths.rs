@@ -77,6 +77,12 @@ fn marathon_man_steered() {
     check("MarathonManSteer-v0");
 }
 
+/// Its commands and the velocities that it remembers are its own.
+#[test]
+fn walker_controller() {
+    check("WalkerController-v0");
+}
+
 /// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
 #[test]
 fn gymnasiums_ant() {

@@ -87,6 +87,13 @@ pub enum RunError {
         /// Its steps.
         steps: u64,
     },
+    /// A task cannot be told how fast to go.
+    NoSpeed {
+        /// The task.
+        task: String,
+        /// Tasks that can.
+        others: Vec<String>,
+    },
     /// A picture of the results cannot be drawn.
     Draw {
         /// The picture.
@@ -177,6 +184,9 @@ impl RunError {
                 thousands(*steps),
                 spelling.with_value("steps", &thousands(steps.saturating_mul(2)))
             ),
+            RunError::NoSpeed { task, others } => {
+                format!("{task} cannot be told a speed; expected a policy for one of {}", others.join(", "))
+            }
             RunError::Draw { path, reason } => format!("{}: {reason}", path.display()),
             RunError::Motion(error) => error.to_string(),
             RunError::Recording { error, path, agent } => format!(

@@ -7,6 +7,7 @@
 
 pub mod clips;
 pub mod configuration;
+pub mod controller;
 pub mod demonstrations;
 pub mod error;
 pub mod folder;
@@ -21,6 +22,7 @@ pub mod setting;
 pub mod task;
 pub mod text;
 
+pub use controller::Obedience;
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
 pub use imitation::Imitation;

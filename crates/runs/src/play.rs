@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::setting::Setting;
-use marathon_envs::{AgentState, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{AgentState, Spec, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 
@@ -82,6 +82,35 @@ impl<'a> Play<'a> {
     /// If there is no such agent.
     pub fn ctrl(&self, agent: usize) -> Result<Vec<f64>, RunError> {
         Ok(self.env.ctrl(agent)?)
+    }
+
+    /// Facts of the task.
+    pub fn spec(&self) -> &Spec {
+        self.env.spec()
+    }
+
+    /// The command that an agent observed last.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn command(&mut self, agent: usize) -> Result<Vec<f64>, RunError> {
+        Ok(self.env.context(agent)?.command())
+    }
+
+    /// Tells an agent what to do, as [`VecEnv::set_command`] has it.
+    ///
+    /// # Errors
+    /// If there is no such agent, or it cannot be told this.
+    pub fn set_command(&mut self, agent: usize, command: Option<&[f64]>) -> Result<(), RunError> {
+        Ok(self.env.set_command(agent, command)?)
+    }
+
+    /// Pushes a body of an agent with a force, N, until told otherwise, as [`VecEnv::push`] has it.
+    ///
+    /// # Errors
+    /// If there is no such agent or body.
+    pub fn push(&mut self, agent: usize, body: usize, force: [f64; 3]) -> Result<(), RunError> {
+        Ok(self.env.push(agent, body, force, [0.0; 3])?)
     }
 
     /// Generalized positions of the clip that an agent follows, where it is now; none if the task follows no clip.

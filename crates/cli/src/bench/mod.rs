@@ -1,9 +1,10 @@
-//! `marathon bench`: how fast the physics, the environments or the training are on this computer.
+//! `marathon bench`: how fast the physics, the environments or the training are on this computer, and how well a policy obeys.
 //!
 //! Figures are processor time: what a step costs, whoever else uses the computer. The step is that of one agent. A row is
 //! the median of several repetitions; `spread` is the distance between its fastest and slowest repetition.
 
 mod against;
+mod controller;
 pub mod env;
 mod gait;
 mod mujoco;
@@ -40,6 +41,8 @@ pub enum What {
     Train(train::TrainArgs),
     /// Processor seconds of training until the agent runs at --speed and hardly falls, for each of --seeds.
     Gait(gait::GaitArgs),
+    /// How well a policy obeys commands: a minute of random ones, steps of the speed, turns, standing, pushes.
+    Controller(controller::ControllerArgs),
 }
 
 /// Measures and prints.
@@ -52,5 +55,6 @@ pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
         What::Env(args) => env::run(args, json),
         What::Train(args) => train::run(args, json),
         What::Gait(args) => gait::run(args, json),
+        What::Controller(args) => controller::run(args, json),
     }
 }

@@ -30,6 +30,9 @@ pub struct Start<'a> {
     pub memory: &'a mut [f64],
     /// The agent's own variables at the end of its last episode, zeros if there has been none since it was given its seed.
     pub previous: &'a [f64],
+    /// What the agent's own schedule tells it at the start, [`Facts::command`](crate::Facts::command); a caller may tell it
+    /// something else.
+    pub scheduled: &'a [f64],
     pub(crate) grounds: &'a mut Vec<(usize, Vec<f32>)>,
     pub(crate) timeline: Option<&'a Timeline>,
     pub(crate) blueprint: &'a Blueprint,

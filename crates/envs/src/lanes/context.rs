@@ -8,7 +8,7 @@ use marathon_physics::lanes::Real;
 use super::group::LaneGroup;
 use super::task::Task;
 use crate::agent::CommandRange;
-use crate::episode_rng::{EpisodeId, EpisodeRng};
+use crate::episode_rng::EpisodeId;
 use crate::error::EnvError;
 use crate::shard::AgentContext;
 
@@ -58,12 +58,8 @@ impl<T: Real> Commands<T> {
             (told.scheduled, told.due) = (idle(ranges), 0);
         }
         if step >= told.due {
-            let holds = task.agent.command(&mut EpisodeRng::at(id, step), step as usize, &mut told.scheduled);
+            let holds = task.draw_command(id, step, &mut told.scheduled);
             told.due = step.saturating_add(holds.max(1) as u64);
-            for (x, range) in told.scheduled.iter_mut().zip(ranges) {
-                // NaN becomes the low end
-                *x = x.max(range.low).min(range.high);
-            }
         }
         let command = told.given.as_ref().unwrap_or(&told.scheduled);
         for (next, x) in self.next.iter_mut().zip(command) {
@@ -109,7 +105,7 @@ impl<T: Real> Commands<T> {
 }
 
 /// The command before any schedule.
-fn idle(ranges: &[CommandRange]) -> Vec<f64> {
+pub fn idle(ranges: &[CommandRange]) -> Vec<f64> {
     ranges.iter().map(CommandRange::rest).collect()
 }
 

@@ -108,7 +108,7 @@ impl<T: Real> LaneShard<T> {
         let id = lives[agent].next();
         if starts.get(number, id).is_none() {
             let previous = if id.episode <= 1 { vec![0.0; task.facts.memory] } else { group.memory_of(lane) };
-            task.draw_start(start, &mut EpisodeRng::new(id), &previous);
+            task.draw_start(start, id, &mut EpisodeRng::new(id), &previous);
             if start.takes_physics() {
                 let ids: Vec<EpisodeId> = lives[agent - lane..][..T::LANES].iter().map(Life::next).collect();
                 starts.make(task, work, number - lane, &ids);

@@ -86,7 +86,7 @@ fn draw<T: Real>(
         let mut doubtful = Vec::new();
         for lane in missing {
             let start = &mut drawn[lane];
-            task.draw_start(start, &mut randoms[lane], &no_past);
+            task.draw_start(start, ids[lane], &mut randoms[lane], &no_past);
             group.reset_lane(&task.sim, lane, &start.state.qpos, &start.state.qvel);
             for (field, elevations) in &start.grounds {
                 group.set_ground(&task.sim, lane, *field, elevations);

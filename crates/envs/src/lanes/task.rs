@@ -7,6 +7,7 @@ use marathon_physics::model::Actuator;
 use marathon_physics::{Model, Sim, Work};
 
 use super::agent_kernel::AgentKernel;
+use super::context::idle;
 use super::group::{LaneGroup, Rehearsal};
 use super::roles;
 use crate::agent::bindings::{Bindings, Blueprint, sim_options};
@@ -165,7 +166,7 @@ impl<T: Real> Task<T> {
         let facts = &self.facts;
         let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
         let (mut start, id) = (EpisodeStart::new(), EpisodeId { seed: 0, agent: 0, episode: 0 });
-        self.draw_start(&mut start, &mut EpisodeRng::new(id), &vec![0.0; facts.memory]);
+        self.draw_start(&mut start, id, &mut EpisodeRng::new(id), &vec![0.0; facts.memory]);
         if let Some(x) = start.state.qpos.iter().chain(&start.state.qvel).find(|x| !x.is_finite()) {
             return wrong(format!("its episodes start with a coordinate or velocity of {x}, expected finite numbers"));
         }
@@ -195,10 +196,25 @@ impl<T: Real> Task<T> {
         self.spec.roles.first().map_or(self.spec.reward_terms.len(), |role| role.terms.end)
     }
 
-    /// Lets the agent draw the start of an episode into `out`.
+    /// Draws what the agent's own schedule tells it in its observation number `step` of an episode, in place of what it has
+    /// told it so far. Returns for how many decisions it holds.
+    pub fn draw_command(&self, id: EpisodeId, step: u64, out: &mut [f64]) -> usize {
+        let holds = self.agent.command(&mut EpisodeRng::at(id, step), step as usize, out);
+        for (x, range) in out.iter_mut().zip(&self.spec.command) {
+            // NaN becomes the low end
+            *x = x.max(range.low).min(range.high);
+        }
+        holds
+    }
+
+    /// Lets the agent draw the start of an episode into `out`, with the episode's random numbers from where `random` is.
     /// The agent's last episode has left `previous` as its memory.
-    pub fn draw_start(&self, out: &mut EpisodeStart, random: &mut EpisodeRng, previous: &[f64]) {
+    pub fn draw_start(&self, out: &mut EpisodeStart, id: EpisodeId, random: &mut EpisodeRng, previous: &[f64]) {
         let blueprint = &self.blueprint;
+        let mut scheduled = idle(&self.spec.command);
+        if !scheduled.is_empty() {
+            self.draw_command(id, 0, &mut scheduled);
+        }
         let EpisodeStart { state: AgentState { qpos, qvel }, memory, grounds, .. } = out;
         qpos.clone_from(&blueprint.spawn);
         qvel.clone_from(&blueprint.spawn_velocity);
@@ -214,6 +230,7 @@ impl<T: Real> Task<T> {
             settle: 0,
             memory,
             previous,
+            scheduled: &scheduled,
             grounds,
             timeline: self.reference.as_ref().map(|reference| &reference.timeline),
             blueprint,

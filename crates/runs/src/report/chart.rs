@@ -1,4 +1,4 @@
-//! Pictures that compare runs: lines over steps, or bars.
+//! Pictures that compare runs: lines over steps or over time, or bars.
 
 use super::canvas::{
     DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
@@ -30,6 +30,8 @@ const LINE_NAME: u32 = 20;
 pub enum Chart {
     /// Lines over agent-steps: what is drawn, and each line's name and points.
     Lines(&'static str, Vec<(String, Vec<(f64, f64)>)>),
+    /// Lines over seconds: the same.
+    Times(&'static str, Vec<(String, Vec<(f64, f64)>)>),
     /// Bars: what is drawn, and each bar's name and height.
     Bars(&'static str, Vec<(String, f64)>),
 }
@@ -52,7 +54,7 @@ impl Chart {
             let root = BitMapBackend::with_buffer(&mut rgb, (width, height)).into_drawing_area();
             root.fill(&WHITE)?;
             let (label, ends, low, high) = match self {
-                Chart::Lines(label, lines) => {
+                Chart::Lines(label, lines) | Chart::Times(label, lines) => {
                     let points = || lines.iter().flat_map(|(_, points)| points);
                     let end = points().map(|p| p.0).fold(1.0, f64::max);
                     let low = points().map(|p| p.1).fold(0.0, f64::min);
@@ -66,7 +68,7 @@ impl Chart {
             let room = 0.08 * (high - low).max(1e-6);
             let bottom = if low < 0.0 { low - room } else { 0.0 };
             let names = match self {
-                Chart::Lines(_, lines) => LINE_NAME * lines.len().div_ceil(2) as u32,
+                Chart::Lines(_, lines) | Chart::Times(_, lines) => LINE_NAME * lines.len().div_ceil(2) as u32,
                 Chart::Bars(..) => 0,
             };
             let mut chart = ChartBuilder::on(&root)
@@ -77,7 +79,9 @@ impl Chart {
                 .x_label_area_size(if let Chart::Bars(..) = self { NAMES } else { 28 } * SCALE)
                 .y_label_area_size(64 * SCALE)
                 .build_cartesian_2d(ends, bottom..high + room)?;
-            let (of_y, of_x) = (|y: &f64| axis_number(*y), |x: &f64| axis_steps(*x));
+            let timed = matches!(self, Chart::Times(..));
+            let of_y = |y: &f64| axis_number(*y);
+            let of_x = |x: &f64| if timed { format!("{} s", axis_number(*x)) } else { axis_steps(*x) };
             let mut mesh = chart.configure_mesh();
             mesh.disable_x_mesh()
                 .bold_line_style(GRID.stroke_width(SCALE))
@@ -87,7 +91,7 @@ impl Chart {
                 .y_labels(7)
                 .y_label_formatter(&of_y);
             match self {
-                Chart::Lines(_, lines) => {
+                Chart::Lines(_, lines) | Chart::Times(_, lines) => {
                     mesh.x_labels(9).x_label_formatter(&of_x).draw()?;
                     for (i, (name, points)) in lines.iter().enumerate() {
                         let color = COLORS[i % COLORS.len()];

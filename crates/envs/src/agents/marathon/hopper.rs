@@ -29,8 +29,8 @@ const MAX_EPISODE_STEPS: usize = 1000;
 const ACTIONS: [&str; 4] = ["waist", "hip", "knee", "ankle"];
 const PARTS: [&str; 2] = ["torso", "foot"];
 /// The original calls it "pelvis" and maps it to the torso.
-const TORSO: Part = Part::named(&PARTS, "torso");
-const FOOT: Part = Part::named(&PARTS, "foot");
+pub(super) const TORSO: Part = Part::named(&PARTS, "torso");
+pub(super) const FOOT: Part = Part::named(&PARTS, "foot");
 /// The calf counts as foot because it pokes through the sole's capsule at the ankle.
 const FEET: [&str; 2] = ["foot", "calf"];
 

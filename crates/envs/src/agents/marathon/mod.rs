@@ -4,6 +4,7 @@
 //! code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
 
 pub mod ant;
+pub mod controller;
 pub mod hopper;
 pub mod humanoid;
 mod imitation;
@@ -26,6 +27,8 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(humanoid::HumanoidV1),
         Arc::new(ant::AntV0),
         Arc::new(ant::AntV1),
+        Arc::new(controller::hopper::HopperController::default()),
+        Arc::new(controller::walker::WalkerController::default()),
     ];
     out.extend(marathon_man::all());
     out.extend(in_style::all());

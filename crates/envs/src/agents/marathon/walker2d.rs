@@ -28,9 +28,9 @@ const MAX_EPISODE_STEPS: usize = 1000;
 
 const ACTIONS: [&str; 6] = ["right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle"];
 const PARTS: [&str; 3] = ["torso", "left_foot", "right_foot"];
-const TORSO: Part = Part::named(&PARTS, "torso");
-const LEFT_FOOT: Part = Part::named(&PARTS, "left_foot");
-const RIGHT_FOOT: Part = Part::named(&PARTS, "right_foot");
+pub(super) const TORSO: Part = Part::named(&PARTS, "torso");
+pub(super) const LEFT_FOOT: Part = Part::named(&PARTS, "left_foot");
+pub(super) const RIGHT_FOOT: Part = Part::named(&PARTS, "right_foot");
 /// The lower legs count as feet because they poke through the feet's capsules at the ankles.
 const FEET: [&str; 4] = ["right_leg", "left_leg", "right_foot", "left_foot"];
 

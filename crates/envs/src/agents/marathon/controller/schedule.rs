@@ -1,0 +1,147 @@
+//! What a figure in a plane is told where nobody commands: the schedules of the original's experiments 001 to 004, and one
+//! for sticks.
+//!
+//! A command holds for 40 to 239 decisions, each as likely; with `toggle`, for 100.
+
+use super::{FASTEST, Input};
+use crate::agent::Value;
+use crate::agent::options::OptionValue;
+use crate::episode_rng::EpisodeRng;
+
+/// Decisions for which a command holds, at least and at most.
+const HOLDS: [usize; 2] = [40, 239];
+/// Decisions of a toggle: 400 physics steps.
+const TOGGLE: usize = 100;
+/// Share of commands that are to jump, too.
+const JUMPS: f64 = 0.25;
+
+/// What a figure is told where nobody commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Schedule {
+    /// Experiment 004: whoever moves is told the same again in 40 % of the draws. All other draws: right in 40 %, left in 40 %,
+    /// stand in 20 %; a jump in 25 %.
+    Repeats,
+    /// The same without telling anything again.
+    Anew,
+    /// Experiment 002: from rest, to either side in 45 % each, rest again in 10 %. From a side, the same in 60 %, the other side
+    /// in 20 %, rest in 20 %. No jumps.
+    Thirds,
+    /// Experiment 001: from one side to the other, every 100 decisions. No jumps.
+    Toggle,
+    /// Any velocity, each as likely; rest in 20 %; a jump in 25 %.
+    Uniform,
+}
+
+const SCHEDULES: [(Schedule, &str); 5] = [
+    (Schedule::Repeats, "repeats"),
+    (Schedule::Anew, "anew"),
+    (Schedule::Thirds, "thirds"),
+    (Schedule::Toggle, "toggle"),
+    (Schedule::Uniform, "uniform"),
+];
+
+impl OptionValue for Schedule {
+    const EXPECTED: &'static str = "repeats, anew, thirds, toggle or uniform";
+    fn value(&self) -> Value {
+        SCHEDULES.into_iter().find(|(schedule, _)| schedule == self).map_or("repeats", |(_, name)| name).into()
+    }
+    fn read(value: &Value) -> Option<Self> {
+        SCHEDULES.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(schedule, _)| schedule)
+    }
+}
+
+impl Schedule {
+    /// Draws a command in place of the one before, at rest to begin with. Returns for how many decisions it holds.
+    pub(super) fn draw(self, input: Input, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        let before = out[0];
+        let luck = random.uniform(0.0, 1.0);
+        let side = |luck: f64| if luck < 0.5 { FASTEST } else { -FASTEST };
+        let moving = before != 0.0 || out.get(1).is_some_and(|jump| *jump > 0.0);
+        out[0] = match self {
+            Schedule::Repeats if moving && luck < 0.4 => return random.whole(HOLDS[0], HOLDS[1]),
+            Schedule::Repeats | Schedule::Anew => match random.uniform(0.0, 1.0) {
+                luck if luck < 0.4 => FASTEST,
+                luck if luck < 0.8 => -FASTEST,
+                _ => 0.0,
+            },
+            Schedule::Thirds if before == 0.0 => match luck {
+                luck if luck < 0.45 => FASTEST,
+                luck if luck < 0.9 => -FASTEST,
+                _ => 0.0,
+            },
+            Schedule::Thirds => match luck {
+                luck if luck < 0.6 => before,
+                luck if luck < 0.8 => -before,
+                _ => 0.0,
+            },
+            Schedule::Toggle if step == 0 => side(luck),
+            Schedule::Toggle => -before,
+            Schedule::Uniform if luck < 0.2 => 0.0,
+            Schedule::Uniform => random.around_zero(FASTEST),
+        };
+        if input == Input::Discrete {
+            let jumps = matches!(self, Schedule::Repeats | Schedule::Anew | Schedule::Uniform);
+            out[1] = f64::from(u8::from(jumps && random.uniform(0.0, 1.0) < JUMPS));
+        }
+        if self == Schedule::Toggle { TOGGLE } else { random.whole(HOLDS[0], HOLDS[1]) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::episode_rng::EpisodeId;
+
+    /// Shares of commands: right, left, stand, jump, and the same as before of those after which something moved.
+    fn shares(schedule: Schedule, input: Input) -> ([f64; 5], Vec<usize>) {
+        let mut random = EpisodeRng::new(EpisodeId { seed: 1, agent: 2, episode: 3 });
+        let mut out = vec![0.0; if input == Input::Discrete { 2 } else { 1 }];
+        let (mut counts, mut moved, mut holds) = ([0.0; 5], 0.0f64, Vec::new());
+        const MANY: usize = 20_000;
+        for step in 0..MANY {
+            let before = out.clone();
+            holds.push(schedule.draw(input, &mut random, step * 100, &mut out));
+            let jump = out.get(1).is_some_and(|jump| *jump == 1.0);
+            for (count, is) in counts.iter_mut().zip([out[0] > 0.0, out[0] < 0.0, out[0] == 0.0, jump]) {
+                *count += f64::from(u8::from(is)) / MANY as f64;
+            }
+            if before.iter().any(|x| *x != 0.0) {
+                moved += 1.0;
+                counts[4] += f64::from(u8::from(out == before));
+            }
+        }
+        counts[4] /= moved.max(1.0);
+        (counts, holds)
+    }
+
+    fn near(got: f64, expected: f64) -> bool {
+        (got - expected).abs() < 0.02
+    }
+
+    #[test]
+    fn commands_come_as_often_as_in_the_original() {
+        let ([right, left, stand, jump, same], holds) = shares(Schedule::Repeats, Input::Discrete);
+        // of what is drawn anew, a quarter jumps; rest is never told again, so that it is rarer
+        assert!(near(right, left) && stand < 0.2 && jump > 0.25, "{right} {left} {stand} {jump}");
+        // 40 %, and what the draw happens to find again: one of six, by their shares
+        assert!((0.55..0.65).contains(&same), "{same}");
+        assert_eq!((holds.iter().min(), holds.iter().max()), (Some(&40), Some(&239)));
+        let ([right, left, stand, jump, _], _) = shares(Schedule::Anew, Input::Discrete);
+        assert!(near(right, 0.4) && near(left, 0.4) && near(stand, 0.2) && near(jump, 0.25));
+        let ([right, left, stand, jump, same], _) = shares(Schedule::Thirds, Input::Continuous);
+        // the stationary shares of the chain: stand = 0.2 moving + 0.1 stand
+        assert!(near(right, left) && near(stand, 2.0 / 11.0) && jump == 0.0 && near(same, 0.6), "{stand} {same}");
+        let ([right, left, stand, ..], holds) = shares(Schedule::Toggle, Input::Discrete);
+        assert!(near(right, 0.5) && near(left, 0.5) && stand == 0.0 && holds.iter().all(|hold| *hold == TOGGLE));
+        let ([right, left, stand, jump, _], _) = shares(Schedule::Uniform, Input::Discrete);
+        assert!(near(right, 0.4) && near(left, 0.4) && near(stand, 0.2) && near(jump, 0.25));
+    }
+
+    #[test]
+    fn a_stick_has_no_jump() {
+        for (schedule, _) in SCHEDULES {
+            let ([.., jump, _], _) = shares(schedule, Input::Continuous);
+            assert_eq!(jump, 0.0);
+        }
+    }
+}

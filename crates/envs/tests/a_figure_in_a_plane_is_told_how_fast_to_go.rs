@@ -1,0 +1,111 @@
+//! The paper's controllers: figures in a plane observe what they are told, the mean velocity is that of three decisions, and
+//! the reward is the original's formula with a term for standing still.
+
+mod common;
+
+use common::action;
+use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions, agent};
+use marathon_motion::dynamics::Motion;
+use marathon_physics::Model;
+use std::f64::consts::PI;
+
+const AGENTS: usize = 16;
+
+fn env(id: &str, input: &str) -> VecEnv {
+    let options = Options::new().with("input", input);
+    let options = VecEnvOptions { agents: AGENTS, options, autoreset: Autoreset::Disabled, ..Default::default() };
+    VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Velocities of the bodies' centers of mass, m/s.
+fn velocities(model: &Model, env: &VecEnv, agent: usize) -> Vec<[f64; 3]> {
+    let state = env.state(agent).unwrap();
+    let motion = Motion::of(model, &state.qpos, &state.qvel, &vec![0.0; model.nv]);
+    (1..model.bodies.len()).map(|i| motion.velocity[i].to_array()).collect()
+}
+
+#[test]
+fn observations_are_the_originals_and_the_command() {
+    // numbers of the original: 34 and 46 with buttons, of which one is the jump
+    for (id, own, buttons) in [("HopperController-v0", 31, 34), ("WalkerController-v0", 43, 46)] {
+        for (input, numbers) in [("discrete", buttons), ("continuous", buttons - 1)] {
+            let mut env = env(id, input);
+            let spec = env.spec().clone();
+            assert_eq!((spec.obs, spec.command.len()), (numbers, numbers - own - 1), "{id} {input}");
+            let mut out = env.buffers();
+            let told: Vec<f64> = [-2.5, 1.0][..spec.command.len()].to_vec();
+            env.set_command(3, Some(&told)).unwrap();
+            env.reset(Some(1), &mut out.obs).unwrap();
+            let seen: Vec<f64> = out.obs[3 * numbers + own..4 * numbers - 1].iter().map(|x| f64::from(*x)).collect();
+            assert_eq!(seen, told, "{id} {input}");
+        }
+    }
+}
+
+#[test]
+fn the_reward_is_its_formula() {
+    for input in ["discrete", "continuous"] {
+        let id = "WalkerController-v0";
+        let mut env = env(id, input);
+        let model = agent(id).unwrap().model().unwrap();
+        let (n, act, k) = (env.spec().obs, env.spec().act, env.spec().reward_terms.len());
+        assert_eq!(env.spec().reward_terms[..5], ["velocity", "uprightness", "jump", "still", "effort"]);
+        let commands = env.spec().command.len();
+        let mut told = vec![vec![0.0; commands]; AGENTS];
+        for (agent, command) in told.iter_mut().enumerate() {
+            // a third is to stand
+            command[0] = if agent % 3 == 0 { 0.0 } else { agent as f64 * 0.5 - 4.0 };
+            if commands > 1 {
+                command[1] = f64::from(u8::from(agent % 2 == 0));
+            }
+            env.set_command(agent, Some(command)).unwrap();
+        }
+        let mut out: Step = env.buffers();
+        env.reset(Some(2), &mut out.obs).unwrap();
+        let first = |env: &VecEnv, agent: usize| velocities(&model, env, agent)[0][0];
+        let mut past: Vec<[f64; 3]> = (0..AGENTS).map(|agent| [first(&env, agent); 3]).collect();
+        let mut actions = vec![0.0; AGENTS * act];
+        let (mut leapt, mut rested, mut over) = (0, 0.0f64, [false; AGENTS]);
+        for decision in 0..60 {
+            for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
+                // four of them do nothing
+                action(agent, decision, if agent < 4 { 0.0 } else { 1.0 }, row);
+            }
+            env.step(&actions, &mut out.as_mut()).unwrap();
+            for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
+                let obs: Vec<f64> = out.obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect();
+                let moving = velocities(&model, &env, agent);
+                past[agent] = [moving[0][0], past[agent][0], past[agent][1]];
+                let mean = past[agent].iter().sum::<f64>() / 3.0;
+                assert!((obs[n - 1] - mean).abs() < 1e-4, "{} {mean}", obs[n - 1]);
+                over[agent] = out.terminated[agent];
+                if over[agent] {
+                    assert_eq!(out.reward[agent], -1.0);
+                    continue;
+                }
+                let (command, jump) = (told[agent][0], told[agent].get(1).copied().unwrap_or(0.0));
+                let off = (command - mean).abs();
+                assert!((f64::from(out.info[agent]) - off).abs() < 1e-4);
+                let tilt = obs[3].clamp(-1.0, 1.0).acos();
+                let (touching, feet) = (obs[9] + obs[10], [obs[41], obs[42]]);
+                let leap = if touching > 0.0 { 0.0 } else { 1.0 + feet[0].min(feet[1]) };
+                let square = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
+                let speed2 = moving.iter().map(square).sum::<f64>() / moving.len() as f64;
+                let still = if command == 0.0 && jump == 0.0 { 0.5 * (-speed2 / 0.04).exp() } else { 0.0 };
+                let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
+                let expected =
+                    [(1.0 - 0.3 * off).clamp(-1.0, 1.0), 0.5 - tilt / PI, jump * leap, still, -EFFORT * effort];
+                for (i, expected) in expected.into_iter().enumerate() {
+                    let got = f64::from(out.terms[agent * k + i]);
+                    assert!((got - expected).abs() < 2e-3, "agent {agent}, term {i}: {got}, expected {expected}");
+                }
+                leapt += usize::from(jump * leap > 0.0);
+                rested = rested.max(still);
+            }
+        }
+        assert!((leapt > 0) == (input == "discrete") && rested > 0.05, "{leapt} {rested}");
+    }
+}
+
+/// Price of the effort.
+const EFFORT: f64 = 0.3;

@@ -1,0 +1,352 @@
+//! How well a policy obeys commands: minutes of random ones, steps from one velocity to another, turns, standing, pushes.
+//!
+//! Velocities are those of the center of mass from one decision to the next. Forward is where the root's x axis points along
+//! the ground, or +x for figures in a plane. A command is observed at the end of the decision in which it is given, so that a
+//! response includes this decision.
+
+mod response;
+mod table;
+mod trial;
+
+use crate::error::RunError;
+use crate::setting::Setting;
+use marathon_envs::registry;
+use marathon_learn::{EvalOptions, Policy};
+use marathon_motion::Tracking;
+pub use response::Response;
+use serde::Serialize;
+use std::f64::consts::TAU;
+use trial::{Moment, Track, Trial};
+
+/// Length of a sequence of random commands, s.
+const MINUTE: f64 = 60.0;
+/// Time after a change of command from which on the command counts as obeyed, s.
+const SETTLED: f64 = 1.5;
+/// Time at the old command before a new one, s, and time at the new one.
+const BEFORE: f64 = 4.0;
+const AFTER: f64 = 4.0;
+/// Time that is left for coming to a stand, and time of standing, s.
+const STOPPING: f64 = 4.0;
+const STANDING: f64 = 10.0;
+/// What counts as standing still: way of the center of mass, m, and mean speed of the parts, m/s.
+const DRIFT: f64 = 0.1;
+const RESTLESS: f64 = 0.05;
+/// Pushes: what they would add to the velocity of a rigid body of the figure's mass, m/s, and how long they last, s.
+const PUSHES: [f64; 3] = [0.25, 0.5, 1.0];
+const PUSH: f64 = 0.1;
+/// Angle between the pushes of one agent and of the next: the golden angle, so that they come from all sides.
+const GOLDEN: f64 = 0.381_966_011_250_105 * TAU;
+
+/// How well a policy obeys commands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Obedience {
+    /// The task.
+    pub task: String,
+    /// Agents of each trial.
+    pub agents: u64,
+    /// Seconds between decisions.
+    pub dt: f64,
+    /// A minute of random commands each.
+    pub minutes: Minutes,
+    /// From one velocity to another.
+    pub responses: Vec<Response>,
+    /// The sharpest turns at each speed; empty for figures in a plane.
+    pub turns: Vec<Turn>,
+    /// Told to stand.
+    pub stand: Stand,
+    /// Pushed at half of the highest speed.
+    pub pushes: Vec<Push>,
+}
+
+/// Minutes of commands by the task's own schedule.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Minutes {
+    /// Minutes without a fall.
+    pub without_fall: u64,
+    /// Falls by the time that was played, 1/min.
+    pub falls_per_minute: f64,
+    /// Mean distance of the velocity from the commanded one, m/s: what the task reports as `velocity_error`, or else that of
+    /// the forward speed.
+    pub velocity_error: f64,
+    /// The same from 1.5 s after a change of command on.
+    pub settled_error: f64,
+    /// Mean way that a part of a sole slides each time that it stands on the ground, m.
+    pub slide: f64,
+}
+
+/// A turn held for seconds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Turn {
+    /// Commanded speed, m/s.
+    pub speed: f64,
+    /// Commanded turn to either side, rad/s.
+    pub turn: f64,
+    /// Mean speed from 1.5 s on, m/s.
+    pub reached_speed: f64,
+    /// Mean turn from 1.5 s on, rad/s; positive to the commanded side.
+    pub reached_turn: f64,
+    /// Agents that turned.
+    pub agents: u64,
+    /// Those of them that fell.
+    pub falls: u64,
+}
+
+/// Ten seconds of standing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stand {
+    /// Agents that stayed within 0.1 m and whose parts moved by less than 0.05 m/s in the mean.
+    pub still: u64,
+    /// Agents that fell, those that came to a stand before included.
+    pub falls: u64,
+    /// Median of the farthest way of the center of mass, m; none if all fell.
+    pub drift: Option<f64>,
+    /// Median of the mean speed of the parts, m/s.
+    pub speed: Option<f64>,
+}
+
+/// A push from any side.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Push {
+    /// Impulse by the figure's mass, m/s.
+    pub velocity: f64,
+    /// Agents that were pushed.
+    pub agents: u64,
+    /// Those of them that fell.
+    pub falls: u64,
+    /// Median of the time until the mean speed of a quarter of a second is that of before to within 0.3 m/s, s; none if fewer
+    /// than half of them got there.
+    pub recovery: Option<f64>,
+}
+
+/// Where a command has its speed and its turn.
+struct Commands {
+    rest: Vec<f64>,
+    speed: usize,
+    range: [f64; 2],
+    turn: Option<(usize, f64)>,
+}
+
+impl Commands {
+    fn of(policy: &Policy, setting: &Setting) -> Result<Self, RunError> {
+        let spec = setting.factory()?.spec().clone();
+        let unit = |unit: &str| spec.command.iter().position(|range| range.unit == unit);
+        let Some(speed) = unit("m/s") else {
+            return Err(RunError::NoSpeed { task: policy.meta().agent.clone(), others: obedient() });
+        };
+        Ok(Commands {
+            rest: spec.command.iter().map(|range| range.rest()).collect(),
+            speed,
+            range: [spec.command[speed].low, spec.command[speed].high],
+            turn: unit("rad/s").map(|i| (i, spec.command[i].high)),
+        })
+    }
+
+    /// Three speeds: the lowest, the highest and rest, or what is halfway if the lowest is rest.
+    fn levels(&self) -> [f64; 3] {
+        let ([low, high], rest) = (self.range, self.rest[self.speed]);
+        [low, if low < rest { rest } else { 0.5 * (low + high) }, high]
+    }
+
+    /// To go at a speed, and to turn.
+    fn at(&self, speed: f64, turn: f64) -> Vec<f64> {
+        let mut command = self.rest.clone();
+        command[self.speed] = speed;
+        if let Some((i, _)) = self.turn {
+            command[i] = turn;
+        }
+        command
+    }
+}
+
+/// Tasks that can be told a speed.
+fn obedient() -> Vec<String> {
+    let told =
+        |id: &String| registry::agent(id).is_ok_and(|a| a.facts().command.iter().any(|range| range.unit == "m/s"));
+    registry::ids().into_iter().filter(told).collect()
+}
+
+/// Plays all trials with a policy's best actions, with so many agents each as `options` has episodes.
+///
+/// # Errors
+/// If the policy's task does not exist, or cannot be told a speed.
+pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
+    let setting = Setting::of(policy.meta());
+    let commands = Commands::of(policy, &setting)?;
+    let trial = || Trial::new(&setting, policy, options);
+    let levels = commands.levels();
+    let mut responses = Vec::new();
+    for from in levels {
+        for to in levels.into_iter().filter(|to| *to != from) {
+            let (dt, tracks) = step(trial()?, &commands, from, to)?;
+            responses.push(Response::of(&tracks, dt, [from, to]));
+        }
+    }
+    let mut turns = Vec::new();
+    if let Some((_, sharpest)) = commands.turn {
+        for speed in levels {
+            turns.push(turn(trial()?, &commands, speed, sharpest)?);
+        }
+    }
+    let half = 0.5 * commands.range[1];
+    let pushes = PUSHES.into_iter().map(|velocity| push(trial()?, &commands, half, velocity));
+    Ok(Obedience {
+        task: policy.meta().agent.clone(),
+        agents: options.episodes as u64,
+        dt: policy.meta().control_dt,
+        minutes: minutes(trial()?, &setting)?,
+        responses,
+        turns,
+        stand: stand(trial()?, &commands)?,
+        pushes: pushes.collect::<Result<_, RunError>>()?,
+    })
+}
+
+/// A minute of each agent's own schedule.
+fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError> {
+    let dt = trial.dt();
+    let (model, settled) = (registry::agent(&setting.agent)?.model()?, (SETTLED / dt).ceil() as usize);
+    let tracking = Tracking::new(&model);
+    let tracks = trial.play(MINUTE)?;
+    let (mut all, mut late, mut slides) = (Mean::default(), Mean::default(), Vec::new());
+    for track in &tracks {
+        let mut since = 0;
+        for (i, moment) in track.moments.iter().enumerate() {
+            since = if i > 0 && track.moments[i - 1].command != moment.command { 0 } else { since + 1 };
+            all.add(moment.error);
+            if since >= settled {
+                late.add(moment.error);
+            }
+        }
+        let frames: Vec<Vec<f64>> = track.moments.iter().map(|moment| moment.qpos.clone()).collect();
+        slides.extend(tracking.slides(&frames, dt));
+    }
+    let falls = tracks.iter().filter(|track| track.fallen).count();
+    let played: usize = tracks.iter().map(|track| track.moments.len()).sum();
+    Ok(Minutes {
+        without_fall: (tracks.len() - falls) as u64,
+        falls_per_minute: falls as f64 / (played as f64 * dt / 60.0),
+        velocity_error: all.get(),
+        settled_error: late.get(),
+        slide: slides.iter().sum::<f64>() / slides.len().max(1) as f64,
+    })
+}
+
+/// From one speed to another: what the agents did that had not fallen before.
+fn step(mut trial: Trial<'_>, commands: &Commands, from: f64, to: f64) -> Result<(f64, Vec<Track>), RunError> {
+    trial.command(|_| commands.at(from, 0.0))?;
+    trial.play(BEFORE)?;
+    trial.command(|_| commands.at(to, 0.0))?;
+    Ok((trial.dt(), trial.play(AFTER)?))
+}
+
+/// The sharpest turn at a speed, to the left and to the right in turns.
+fn turn(mut trial: Trial<'_>, commands: &Commands, speed: f64, sharpest: f64) -> Result<Turn, RunError> {
+    let side = |agent: usize| if agent.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let dt = trial.dt();
+    trial.command(|_| commands.at(speed, 0.0))?;
+    trial.play(BEFORE)?;
+    trial.command(|agent| commands.at(speed, sharpest * side(agent)))?;
+    let tracks = trial.play(SETTLED + AFTER)?;
+    let (mut reached_speed, mut reached_turn) = (Mean::default(), Mean::default());
+    for track in &tracks {
+        let late = &track.moments[((SETTLED / dt) as usize).min(track.moments.len())..];
+        late.iter().for_each(|moment| reached_speed.add(moment.speed));
+        if let [first, .., last] = late {
+            let turned = side(track.agent) * (last.heading - first.heading);
+            reached_turn.add(turned / ((late.len() - 1) as f64 * dt));
+        }
+    }
+    Ok(Turn {
+        speed,
+        turn: sharpest,
+        reached_speed: reached_speed.get(),
+        reached_turn: reached_turn.get(),
+        agents: tracks.len() as u64,
+        falls: falls(&tracks),
+    })
+}
+
+/// Ten seconds at rest.
+fn stand(mut trial: Trial<'_>, commands: &Commands) -> Result<Stand, RunError> {
+    let all = trial.agents();
+    trial.command(|_| commands.rest.clone())?;
+    trial.play(STOPPING)?;
+    let tracks = trial.play(STANDING)?;
+    let stood: Vec<[f64; 2]> = tracks.iter().filter(|track| !track.fallen).map(|track| still(&track.moments)).collect();
+    let median = |i: usize| response::median(stood.iter().map(|x| x[i]).collect());
+    Ok(Stand {
+        still: stood.iter().filter(|[drift, speed]| *drift < DRIFT && *speed < RESTLESS).count() as u64,
+        falls: (all - stood.len()) as u64,
+        drift: median(0),
+        speed: median(1),
+    })
+}
+
+/// Farthest way of the center of mass, m, and mean speed of the parts, m/s.
+fn still(moments: &[Moment]) -> [f64; 2] {
+    let Some(first) = moments.first() else { return [0.0; 2] };
+    let way = |moment: &Moment| (moment.at[0] - first.at[0]).hypot(moment.at[1] - first.at[1]);
+    let mut speed = Mean::default();
+    moments.iter().for_each(|moment| speed.add(moment.parts));
+    [moments.iter().map(way).fold(0.0, f64::max), speed.get()]
+}
+
+/// A push at a speed.
+fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) -> Result<Push, RunError> {
+    let dt = trial.dt();
+    trial.command(|_| commands.at(speed, 0.0))?;
+    let before = trial.play(BEFORE)?;
+    let usual = |agent: usize| {
+        let track = before.iter().find(|track| track.agent == agent)?;
+        let last = &track.moments[track.moments.len().saturating_sub((1.0 / dt) as usize)..];
+        Some(last.iter().map(|moment| moment.speed).sum::<f64>() / last.len() as f64)
+    };
+    let mut tracks = trial.pushed(PUSH, velocity, |agent| agent as f64 * GOLDEN)?;
+    let mut late = trial.play(AFTER)?;
+    for track in &mut tracks {
+        if let Some(more) = late.iter_mut().find(|more| more.agent == track.agent) {
+            track.moments.append(&mut more.moments);
+            track.fallen = more.fallen;
+        }
+    }
+    let window = (0.25 / dt).round().max(1.0) as usize;
+    let times = tracks.iter().map(|track| {
+        let usual = usual(track.agent).filter(|_| !track.fallen)?;
+        let mean = |w: &[Moment]| w.iter().map(|moment| moment.speed).sum::<f64>() / window as f64;
+        // from the last moment that is not as before
+        let speeds: Vec<f64> = track.moments.windows(window).map(mean).collect();
+        let last = speeds.iter().rposition(|speed| (speed - usual).abs() > 0.3);
+        let settled = last.map_or(0, |i| i + 1);
+        (settled < speeds.len()).then_some(settled as f64 * dt)
+    });
+    let times: Vec<f64> = times.map(|time| time.unwrap_or(f64::INFINITY)).collect();
+    Ok(Push {
+        velocity,
+        agents: tracks.len() as u64,
+        falls: falls(&tracks),
+        recovery: response::median(times).filter(|time| time.is_finite()),
+    })
+}
+
+/// Agents that fell.
+fn falls(tracks: &[Track]) -> u64 {
+    tracks.iter().filter(|track| track.fallen).count() as u64
+}
+
+/// A mean that grows.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: usize,
+}
+
+impl Mean {
+    fn add(&mut self, x: f64) {
+        self.sum += x;
+        self.count += 1;
+    }
+
+    fn get(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+}

@@ -1,0 +1,194 @@
+//! Agents that are told what to do, and what they do.
+
+use crate::error::RunError;
+use crate::play::Play;
+use crate::setting::Setting;
+use glam::DVec3;
+use marathon_envs::{Autoreset, VecEnvOptions, registry};
+use marathon_learn::{EvalOptions, Policy};
+use marathon_motion::kinematics::Pose;
+use marathon_physics::Model;
+use marathon_physics::model::JointType;
+use std::f64::consts::{PI, TAU};
+
+/// Name of the number with which a task tells how far a velocity is from the commanded one.
+const ERROR: &str = "velocity_error";
+
+/// What an agent did in a decision.
+pub struct Moment {
+    /// Where its center of mass is along the ground, m.
+    pub at: [f64; 2],
+    /// Direction of the root's x axis along the ground, rad, without jumps; 0 for figures in a plane.
+    pub heading: f64,
+    /// Forward speed of the center of mass, m/s.
+    pub speed: f64,
+    /// Mean speed of the parts' centers of mass, m/s.
+    pub parts: f64,
+    /// How far the velocity is from the commanded one, m/s.
+    pub error: f64,
+    /// The command that it has observed.
+    pub command: Vec<f64>,
+    pub qpos: Vec<f64>,
+}
+
+/// What an agent did that had not fallen before.
+pub struct Track {
+    /// Its number.
+    pub agent: usize,
+    pub moments: Vec<Moment>,
+    /// Whether it fell.
+    pub fallen: bool,
+}
+
+/// Where an agent was last.
+struct Place {
+    centers: Vec<DVec3>,
+    com: DVec3,
+    heading: f64,
+}
+
+/// Agents at play.
+pub struct Trial<'a> {
+    play: Play<'a>,
+    model: Model,
+    /// Number of the command that is a speed.
+    speed: Option<usize>,
+    /// Number of the task's own report of the error.
+    error: Option<usize>,
+    /// Where each agent was last; none of those that fell.
+    places: Vec<Option<Place>>,
+}
+
+impl<'a> Trial<'a> {
+    /// Agents at the start of an episode that only a fall ends.
+    pub fn new(setting: &Setting, policy: &'a Policy, options: &EvalOptions) -> Result<Self, RunError> {
+        let vec_options = VecEnvOptions {
+            agents: options.episodes,
+            seed: options.seed,
+            threads: options.threads,
+            autoreset: Autoreset::Disabled,
+            max_episode_steps: Some(usize::MAX),
+            ..VecEnvOptions::default()
+        };
+        let play = Play::of(setting, policy, &vec_options)?;
+        let spec = play.spec();
+        let speed = spec.command.iter().position(|range| range.unit == "m/s");
+        let error = spec.info.iter().position(|name| name == ERROR);
+        let model = registry::agent(&setting.agent)?.model()?;
+        let place = |agent| Ok(Some(Place::of(&model, &play.qpos(agent)?, 0.0)));
+        let places = (0..options.episodes).map(place).collect::<Result<_, RunError>>()?;
+        Ok(Trial { play, model, speed, error, places })
+    }
+
+    /// Seconds between decisions.
+    pub fn dt(&self) -> f64 {
+        self.play.spec().dt
+    }
+
+    /// How many there are.
+    pub fn agents(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Tells each agent what to do.
+    pub fn command(&mut self, command: impl Fn(usize) -> Vec<f64>) -> Result<(), RunError> {
+        (0..self.agents()).try_for_each(|agent| self.play.set_command(agent, Some(&command(agent))))
+    }
+
+    /// Plays for some seconds.
+    pub fn play(&mut self, seconds: f64) -> Result<Vec<Track>, RunError> {
+        let standing = (0..self.agents()).filter(|agent| self.places[*agent].is_some());
+        let mut tracks: Vec<Track> =
+            standing.map(|agent| Track { agent, moments: Vec::new(), fallen: false }).collect();
+        for _ in 0..(seconds / self.dt()).round() as usize {
+            self.play.decide();
+            self.play.step()?;
+            for track in tracks.iter_mut().filter(|track| !track.fallen) {
+                let (step, agent) = (self.play.last(), track.agent);
+                track.fallen = step.terminated[agent] || step.diverged[agent];
+                if track.fallen {
+                    self.places[agent] = None;
+                } else {
+                    track.moments.push(self.look(agent)?);
+                }
+            }
+        }
+        Ok(tracks)
+    }
+
+    /// Plays for some seconds in which each agent's root is pushed: by an impulse that gives the figure's mass a velocity, m/s,
+    /// in a direction along the ground, rad. Figures in a plane are pushed forward and backward.
+    pub fn pushed(
+        &mut self,
+        seconds: f64,
+        velocity: f64,
+        direction: impl Fn(usize) -> f64,
+    ) -> Result<Vec<Track>, RunError> {
+        let mass: f64 = self.model.bodies.iter().map(|body| body.mass).sum();
+        let planar = free(&self.model).is_none();
+        for agent in 0..self.agents() {
+            let angle = if planar { (agent % 2) as f64 * PI } else { direction(agent) };
+            let force = mass * velocity / seconds;
+            let force = [force * libm::cos(angle), if planar { 0.0 } else { force * libm::sin(angle) }, 0.0];
+            self.play.push(agent, free(&self.model).unwrap_or(1), force)?;
+        }
+        let tracks = self.play(seconds)?;
+        (0..self.agents()).try_for_each(|agent| self.play.push(agent, free(&self.model).unwrap_or(1), [0.0; 3]))?;
+        Ok(tracks)
+    }
+
+    /// What an agent has done since it was looked at last.
+    fn look(&mut self, agent: usize) -> Result<Moment, RunError> {
+        let (qpos, dt) = (self.play.qpos(agent)?, self.dt());
+        let before = self.places[agent].as_ref();
+        let now = Place::of(&self.model, &qpos, before.map_or(0.0, |place| place.heading));
+        let old = before.unwrap_or(&now);
+        let velocity = (now.com - old.com) / dt;
+        let speed = velocity.x * libm::cos(now.heading) + velocity.y * libm::sin(now.heading);
+        let ways = now.centers.iter().zip(&old.centers).map(|(a, b)| a.distance(*b));
+        let parts = ways.sum::<f64>() / (now.centers.len() as f64 * dt);
+        let command = self.play.command(agent)?;
+        let asked = self.speed.map_or(0.0, |i| command[i]);
+        let infos = self.play.spec().info.len();
+        let told = self.error.map(|i| f64::from(self.play.last().info[agent * infos + i]));
+        let moment = Moment {
+            at: [now.com.x, now.com.y],
+            heading: now.heading,
+            speed,
+            parts,
+            error: told.unwrap_or((speed - asked).abs()),
+            command,
+            qpos,
+        };
+        self.places[agent] = Some(now);
+        Ok(moment)
+    }
+}
+
+/// The body that moves freely in space.
+fn free(model: &Model) -> Option<usize> {
+    let has = |body: &marathon_physics::model::Body| {
+        model.joints[body.joint_start..body.joint_start + body.joint_count].iter().any(|j| j.kind == JointType::Free)
+    };
+    model.bodies.iter().position(has)
+}
+
+impl Place {
+    /// Of a configuration; the heading is the angle nearest to another one.
+    fn of(model: &Model, qpos: &[f64], near: f64) -> Place {
+        let pose = Pose::of(model, qpos);
+        let (mut com, mut mass, mut centers) = (DVec3::ZERO, 0.0, Vec::new());
+        for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass > 0.0 && body.weld_id != 0) {
+            let center = pose.point(i, DVec3::from_array(body.ipos));
+            com += body.mass * center;
+            mass += body.mass;
+            centers.push(center);
+        }
+        let heading = free(model).map_or(0.0, |root| {
+            let forward = pose.quat[root] * DVec3::X;
+            let angle = libm::atan2(forward.y, forward.x);
+            angle + TAU * ((near - angle) / TAU).round()
+        });
+        Place { centers, com: com / mass.max(f64::MIN_POSITIVE), heading }
+    }
+}
