@@ -271,6 +271,31 @@ fn people_get_a_table() {
     assert_eq!(header.len(), rows[0].len(), "{text}");
 }
 
+/// A policy that obeys nobody.
+const HOPPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/policies/hopper.safetensors");
+
+#[test]
+fn controller_tells_how_a_policy_obeys() {
+    let policy = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/policies/MarathonManSteer.safetensors");
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = folder.path().join("responses.png");
+    let args = ["controller", policy, "--episodes", "6", "--threads", "1"];
+    let out = bench(&[&args[..], &["--json", "--out", picture.to_str().unwrap()]].concat());
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let document: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
+    assert_eq!((&document["bench"], &document["task"]), (&"controller".into(), &"MarathonManSteer-v0".into()));
+    let lengths = ["responses", "turns", "pushes"].map(|key| document[key].as_array().unwrap().len());
+    assert_eq!(lengths, [6, 3, 3]);
+    for response in document["responses"].as_array().unwrap() {
+        // four seconds of 40 decisions; those who have fallen before are not counted
+        assert!(response["agents"].as_u64().unwrap() <= 6 && response["speeds"].as_array().unwrap().len() == 160);
+    }
+    assert_eq!(&std::fs::read(&picture).unwrap()[..8], b"\x89PNG\r\n\x1a\n");
+    let text = String::from_utf8(bench(&args).stdout).unwrap();
+    let minutes = document["minutes"]["without_fall"].as_u64().unwrap();
+    assert!(text.contains(&format!("a minute of random commands: {minutes} of 6 without a fall")), "{text}");
+}
+
 #[test]
 fn mistakes_are_named() {
     for (args, code, message) in [
@@ -281,6 +306,13 @@ fn mistakes_are_named() {
         (&["gait", "--speed", "nan"], 2, "expected a finite number of meters per second"),
         (&["gait", "--speed", "inf"], 2, "expected a finite number of meters per second"),
         (&["gait", "--falls", "101"], 2, "0..=100"),
+        (&["controller", "no-such-run"], 1, "no-such-run"),
+        (
+            &["controller", HOPPER],
+            1,
+            "Hopper-v0 cannot be told a speed; expected a policy for one of HopperController-v0,",
+        ),
+        (&["controller", HOPPER, "--episodes", "0"], 2, "1..=100000"),
         (&["train", "--isa", "f64"], 2, "single precision"),
         (&["physics", "--isa", "mmx"], 2, "unknown instruction set 'mmx'"),
         (&["physics", "--seconds", "0"], 2, "expected a positive number of seconds"),

@@ -1,6 +1,7 @@
-//! Marathon Man told where to go: the direction that he is to keep turns as commanded, his gait goes round as fast as its pace
-//! asks for and its pace follows the command, his reward is its formula, and the demonstrations of his style are what he would
-//! observe in his clips.
+//! Marathon Man told where to go: the direction that he is to keep turns as commanded, the velocity that he is to have changes
+//! no faster than a person can, his gait goes round as fast as its pace asks for and its pace follows that velocity, his reward
+//! is its formula, his starts fit the command where they should, and the demonstrations of his style are what he would observe
+//! in his clips.
 
 mod common;
 
@@ -10,11 +11,19 @@ use common::{action, isas, make};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::agents::marathon::marathon_man::gait::gaits;
 use marathon_envs::agents::marathon::marathon_man::steer::{MOST_BEHIND, STYLE};
-use marathon_envs::{AgentState, Autoreset, Demonstrations, factory};
+use marathon_envs::{AgentState, Autoreset, Demonstrations, VecEnv, VecEnvOptions, agent, factory};
+use marathon_motion::dynamics::Motion;
+use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 
 const ID: &str = "MarathonManSteer-v0";
 const AGENTS: usize = 16;
+/// Where the observation has the target velocity, his own, the joints' angles and velocities, the gait and its next pose.
+const TARGET: usize = 4;
+const VELOCITY: usize = 13;
+const ANGLES: usize = 19;
+const GAIT: usize = 79;
+const NEXT: usize = 82;
 
 fn demonstrations(id: &str, isa: Isa) -> Demonstrations {
     factory(id, isa).unwrap().demonstrations().expect("an agent with clips has demonstrations")
@@ -52,7 +61,7 @@ fn demonstrations_of_loops_are_closed_and_as_fast_as_the_clips() {
     for (motion, speed) in all.motions.iter().zip([0.88, 0.84, 0.78, 3.2, 0.0]) {
         let first = all.decisions[motion.start][0];
         assert_eq!(all.decisions[motion.end - 1], [first + motion.len() - 1, first]);
-        let sum: f32 = motion.clone().map(|i| all.row(all.decisions[i][0])[11]).sum();
+        let sum: f32 = motion.clone().map(|i| all.row(all.decisions[i][0])[VELOCITY]).sum();
         let mean = f64::from(sum) / motion.len() as f64;
         assert!((mean - speed).abs() < 0.1, "{mean} m/s, expected {speed}");
     }
@@ -85,6 +94,13 @@ fn heading(state: &AgentState) -> f64 {
     ];
     let [forward, left] = rows.map(|row| row.iter().zip(&axis).map(|(a, b)| a * b).sum::<f64>());
     left.atan2(forward)
+}
+
+/// Velocity of the center of mass along the ground, m/s.
+fn center_velocity(model: &Model, state: &AgentState) -> [f64; 2] {
+    let motion = Motion::of(model, &state.qpos, &state.qvel, &vec![0.0; model.nv]);
+    let (_, velocity, _) = motion.momentum(model);
+    [velocity.x, velocity.y]
 }
 
 /// What an agent observes.
@@ -123,12 +139,12 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
             let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
             let [[pace, cos, sin], [next_pace, next_cos, next_sin]] =
-                [&was, &is].map(|obs| [obs[77], obs[78], obs[79]]);
+                [&was, &is].map(|obs| [obs[GAIT], obs[GAIT + 1], obs[GAIT + 2]]);
             let turned = next_sin.atan2(next_cos) - sin.atan2(cos);
             let expected = TAU * gaits().frequency(pace) * dt;
             assert!((turned.rem_euclid(TAU) - expected).abs() < 1e-5, "agent {agent}: {turned}, expected {expected}");
-            // to the command by 4 m/s^2, but no farther from his own speed than 0.8 m/s: it may come nearer, never leave
-            let asked = was[0].max(0.4 * was[1].abs());
+            // to the target by 4 m/s^2, but no farther from his own speed than 0.8 m/s: it may come nearer, never leave
+            let asked = is[TARGET].hypot(is[TARGET + 1]).max(0.4 * was[1].abs());
             let change = next_pace - pace;
             assert!(change.abs() < 4.0 * dt + 1e-5);
             // told to go nowhere, the error of his velocity is his speed
@@ -146,12 +162,8 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
             let next =
                 gaits().moment(next_sin.atan2(next_cos) / TAU + gaits().frequency(next_pace) * dt, next_pace, 0.0);
             for joint in 0..21 {
-                let expected = gaits().angle(&next, joint) - is[17 + joint];
-                assert!(
-                    (is[80 + joint] - expected).abs() < 1e-4,
-                    "joint {joint}: {}, expected {expected}",
-                    is[80 + joint]
-                );
+                let (got, expected) = (is[NEXT + joint], gaits().angle(&next, joint) - is[ANGLES + joint]);
+                assert!((got - expected).abs() < 1e-4, "joint {joint}: {got}, expected {expected}");
             }
             checked += 1;
             over[agent] = out.terminated[agent] || out.truncated[agent];
@@ -170,11 +182,20 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
         env.set_command(agent, Some(&[3.0 * share, FRAC_PI_2 * (2.0 * share - 1.0)])).unwrap();
     }
     env.reset(Some(5), &mut out.obs).unwrap();
+    let model = agent(ID).unwrap().model().unwrap();
     let mut actions = vec![0.0; AGENTS * env.spec().act];
     let mut over = [false; AGENTS];
     let mut directions: Vec<f64> = (0..AGENTS).map(|agent| heading(&env.state(agent).unwrap())).collect();
     let mut info = vec![0.0f32; AGENTS * 2];
-    let (mut checked, mut behind) = (0, 0.0f64);
+    let (mut checked, mut behind, mut reached) = (0, 0.0f64, 0);
+    // what the agents are to have, in the world
+    let mut targets: Vec<[f64; 2]> = (0..AGENTS)
+        .map(|agent| {
+            let (sin, cos) = directions[agent].sin_cos();
+            let [x, y] = [0, 1].map(|i| f64::from(out.obs[agent * n + TARGET + i]));
+            [cos * x - sin * y, sin * x + cos * y]
+        })
+        .collect();
     for decision in 0..60 {
         for (agent, row) in actions.chunks_exact_mut(21).enumerate() {
             action(agent, decision, 0.1, row);
@@ -192,22 +213,87 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             let expected = (off(directions[agent] - own) + was[1] * dt).clamp(-MOST_BEHIND, MOST_BEHIND);
             directions[agent] = own + expected;
             assert!((angle - expected).abs() < 1e-5, "agent {agent}: {angle}, expected {expected}");
-            let [e, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
+            let [off_command, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
             assert!((a - angle.abs()).abs() < 1e-5);
-            let gait = gaits().moment(is[79].atan2(is[78]) / TAU, is[77], 0.0);
-            let (mut apart, mut total) = (0.0, 0.0);
+            // the target follows the commanded velocity by 4 m/s^2, but no sharper turn than one of 2.5 m/s^2
+            let (direction, target) = (own + expected, &mut targets[agent]);
+            let at = |speed: f64| [speed * direction.cos(), speed * direction.sin()];
+            let (told, able) = (at(was[0]), at(was[0].min(2.5 / was[1].abs())));
+            let missing = [able[0] - target[0], able[1] - target[1]];
+            let share = (4.0 * dt / missing[0].hypot(missing[1])).min(1.0);
+            *target = [target[0] + share * missing[0], target[1] + share * missing[1]];
+            reached += usize::from(share == 1.0);
+            let seen = [is[TARGET], is[TARGET + 1]];
+            let expected =
+                [own.cos() * target[0] + own.sin() * target[1], own.cos() * target[1] - own.sin() * target[0]];
+            assert!((seen[0] - expected[0]).hypot(seen[1] - expected[1]) < 1e-4, "{seen:?}, expected {expected:?}");
+            let velocity = center_velocity(&model, &env.state(agent).unwrap());
+            let off = |v: [f64; 2]| (velocity[0] - v[0]).hypot(velocity[1] - v[1]);
+            assert!((off(told) - off_command).abs() < 1e-4, "{} {off_command}", off(told));
+            let e = off(*target).powi(2);
+            let gait = |lead: f64| gaits().moment(is[GAIT + 2].atan2(is[GAIT + 1]) / TAU, is[GAIT], lead);
+            let (mut apart, mut faster, mut total) = (0.0, 0.0, 0.0);
             for (joint, weight) in weights().into_iter().enumerate() {
-                apart += weight * (gaits().angle(&gait, joint) - is[17 + joint]).powi(2);
+                let [now, led] = [0.0, 1e-6].map(|lead| gaits().angle(&gait(lead), joint));
+                apart += weight * (now - is[ANGLES + joint]).powi(2);
+                faster += weight * ((led - now) / 1e-6 - is[ANGLES + 21 + joint]).powi(2);
                 total += weight;
             }
-            let worth = 0.35 * (-5.0 * e * e).exp()
-                + 0.25 * (-0.5 * e * e).exp()
+            let worth = 0.3 * (-5.0 * e).exp()
+                + 0.2 * (-0.5 * e).exp()
+                + 0.05 * (-100.0 * e).exp()
                 + 0.2 * (-4.0 * a * a).exp()
-                + 0.2 * (-5.0 * apart / total).exp();
+                + 0.2 * (-5.0 * apart / total).exp()
+                + 0.05 * (-faster / total).exp();
             assert!((f64::from(out.reward[agent]) - worth).abs() < 1e-5, "{} {worth}", out.reward[agent]);
             checked += 1;
             over[agent] = out.terminated[agent] || out.truncated[agent];
         }
     }
-    assert!(checked > 20 * AGENTS && behind > 0.5, "{checked} {behind}");
+    assert!(checked > 20 * AGENTS && behind > 0.5 && reached > 50, "{checked} {behind} {reached}");
+}
+
+/// Agents that have just begun, and speeds of theirs: forward, and as commanded.
+fn starts(start: &str, seed: u64) -> (VecEnv, Vec<[f64; 2]>) {
+    const MANY: usize = 512;
+    let options = [("start".to_string(), start.into())].into_iter().collect();
+    let mut env = VecEnv::new(ID, &VecEnvOptions { agents: MANY, options, ..VecEnvOptions::default() }).unwrap();
+    let mut out = env.buffers();
+    env.reset(Some(seed), &mut out.obs).unwrap();
+    let n = env.spec().obs;
+    let speeds = (0..MANY).map(|agent| row(&out.obs, agent, n)).map(|obs| [obs[VELOCITY], obs[0]]).collect();
+    (env, speeds)
+}
+
+#[test]
+fn adaptive_starts_fit_the_command_and_try_again() {
+    let run = |speeds: &[[f64; 2]], fast: bool| {
+        let of: Vec<bool> = speeds.iter().filter(|s| (s[1] > 2.0) == fast).map(|s| s[0] > 2.0).collect();
+        of.iter().filter(|run| **run).count() as f64 / of.len() as f64
+    };
+    let (_, random) = starts("random", 3);
+    assert!((run(&random, true) - 0.2).abs() < 0.1 && (run(&random, false) - 0.2).abs() < 0.1);
+    // half of them fit, one of five of the others runs
+    let (mut env, adaptive) = starts("adaptive", 3);
+    assert!((run(&adaptive, true) - 0.6).abs() < 0.12, "{}", run(&adaptive, true));
+    assert!((run(&adaptive, false) - 0.1).abs() < 0.06, "{}", run(&adaptive, false));
+
+    // the gait alone does not keep him on his feet; half of the episodes after begin in the same pose but for the noise
+    let (agents, act) = (env.agents(), env.spec().act);
+    let first: Vec<AgentState> = (0..agents).map(|agent| env.state(agent).unwrap()).collect();
+    let mut out = env.buffers();
+    let (mut again, mut ended) = (0, vec![false; agents]);
+    for _ in 0..80 {
+        env.step(&vec![0.0; agents * act], &mut out.as_mut()).unwrap();
+        for agent in (0..agents).filter(|agent| out.terminated[*agent]) {
+            if !std::mem::replace(&mut ended[agent], true) {
+                let state = env.state(agent).unwrap();
+                let joints = state.qpos[7..].iter().zip(&first[agent].qpos[7..]);
+                again += usize::from(joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 0.021);
+            }
+        }
+    }
+    let ended = ended.iter().filter(|ended| **ended).count();
+    let share = again as f64 / ended as f64;
+    assert!(ended > 100 && (share - 0.5).abs() < 0.12, "{again} of {ended}");
 }

@@ -24,6 +24,12 @@ fn velocities(model: &Model, env: &VecEnv, agent: usize) -> Vec<[f64; 3]> {
     (1..model.bodies.len()).map(|i| motion.velocity[i].to_array()).collect()
 }
 
+/// Height of the torso, m.
+fn height(model: &Model, env: &VecEnv, agent: usize) -> f64 {
+    let state = env.state(agent).unwrap();
+    Motion::of(model, &state.qpos, &state.qvel, &vec![0.0; model.nv]).com[1].z
+}
+
 #[test]
 fn observations_are_the_originals_and_the_command() {
     // numbers of the original: 34 and 46 with buttons, of which one is the jump
@@ -49,7 +55,7 @@ fn the_reward_is_its_formula() {
         let mut env = env(id, input);
         let model = agent(id).unwrap().model().unwrap();
         let (n, act, k) = (env.spec().obs, env.spec().act, env.spec().reward_terms.len());
-        assert_eq!(env.spec().reward_terms[..5], ["velocity", "uprightness", "jump", "still", "effort"]);
+        assert_eq!(env.spec().reward_terms[..6], ["velocity", "uprightness", "jump", "still", "height", "effort"]);
         let commands = env.spec().command.len();
         let mut told = vec![vec![0.0; commands]; AGENTS];
         for (agent, command) in told.iter_mut().enumerate() {
@@ -93,8 +99,9 @@ fn the_reward_is_its_formula() {
                 let speed2 = moving.iter().map(square).sum::<f64>() / moving.len() as f64;
                 let still = if command == 0.0 && jump == 0.0 { 0.5 * (-speed2 / 0.04).exp() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
-                let expected =
-                    [(1.0 - 0.3 * off).clamp(-1.0, 1.0), 0.5 - tilt / PI, jump * leap, still, -EFFORT * effort];
+                let low = (1.1 - height(&model, &env, agent)).clamp(0.0, 1.1);
+                let velocity = (1.0 - 0.3 * off).clamp(-1.0, 1.0);
+                let expected = [velocity, 0.5 - tilt / PI, jump * leap, still, -low, -EFFORT * effort];
                 for (i, expected) in expected.into_iter().enumerate() {
                     let got = f64::from(out.terms[agent * k + i]);
                     assert!((got - expected).abs() < 2e-3, "agent {agent}, term {i}: {got}, expected {expected}");
@@ -108,4 +115,4 @@ fn the_reward_is_its_formula() {
 }
 
 /// Price of the effort.
-const EFFORT: f64 = 0.3;
+const EFFORT: f64 = 0.05;

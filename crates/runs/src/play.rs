@@ -113,6 +113,14 @@ impl<'a> Play<'a> {
         Ok(self.env.push(agent, body, force, [0.0; 3])?)
     }
 
+    /// Feet of an agent that touched the ground during its last decision, a bit each, as [`VecEnv::feet`] tells.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn feet(&self, agent: usize) -> Result<u32, RunError> {
+        Ok(self.env.feet(agent)?)
+    }
+
     /// Generalized positions of the clip that an agent follows, where it is now; none if the task follows no clip.
     ///
     /// # Errors

@@ -12,20 +12,25 @@ use std::sync::Arc;
 /// A cart of 2 kg on a rail.
 const MODEL: &str = r#"
 <mujoco model="cart">
-  <option timestep="0.01" gravity="0 0 0"/>
+  <option timestep="0.01" gravity="0 0 -10"/>
   <worldbody>
-    <body name="cart">
+    <geom name="ground" type="plane" size="0 0 1" contype="0" conaffinity="1"/>
+    <body name="cart" pos="0 0 0.1">
       <joint name="rail" type="slide" axis="1 0 0"/>
-      <geom name="cart" size="0.1" mass="2" contype="0" conaffinity="0"/>
+      <joint name="lift" type="slide" axis="0 0 1"/>
+      <geom name="cart" size="0.1" mass="2" contype="1" conaffinity="0" friction="0 0 0" condim="1"/>
     </body>
   </worldbody>
   <actuator>
     <motor name="rail" joint="rail"/>
+    <motor name="lift" joint="lift"/>
   </actuator>
 </mujoco>"#;
 
 /// Time in which the cart makes 63 % of a change, s.
 const LAG: f64 = 0.4;
+/// Upward acceleration while it thrusts, m/s^2.
+const THRUST: f64 = 2.0;
 /// Slower than the commanded speed by this, m/s.
 const SLACK: f64 = 0.25;
 
@@ -43,7 +48,9 @@ impl Agent for Cart {
             model: MODEL.into(),
             frame_skip: 1,
             reward_terms: names(["nothing"]),
-            command: vec![CommandRange::new("velocity", -2.0..=2.0, "m/s")],
+            command: vec![CommandRange::new("velocity", -2.0..=2.0, "m/s"), CommandRange::new("jump", 0.0..=1.0, "")],
+            feet: names(["cart"]),
+            memory: 1,
             ..Facts::default()
         }
     }
@@ -52,6 +59,7 @@ impl Agent for Cart {
 
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
         out[0] = random.around_zero(1.0);
+        out[1] = 0.0;
         500
     }
 
@@ -59,6 +67,9 @@ impl Agent for Cart {
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         let slack = c.command[0].min(T::lit(SLACK)).max(T::lit(-SLACK));
         c.ctrl[0] = (c.command[0] - slack - c.qvel[0]) * T::lit(2.0 / LAG);
+        // thrusts for as long as it is told, from 0.2 s on
+        c.memory[0] = (c.memory[0] + T::lit(0.01)) * c.command[1];
+        c.ctrl[1] = T::select(T::lit(0.2).lt(c.memory[0]), T::lit(2.0 * (10.0 + THRUST)), T::zero());
     }
 
     #[inline(always)]
@@ -122,6 +133,13 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
     }
     assert_eq!((got.stand.still, got.stand.falls), (20, 0));
     assert!(got.stand.drift.unwrap() < 1e-3 && got.stand.speed.unwrap() < 1e-3 && got.turns.is_empty());
+    // it thrusts from 0.2 s to 1 s, and flies on
+    let jump = got.jump.as_ref().expect("it has the button");
+    assert_eq!((jump.agents, jump.prompt, jump.falls), (20, 20, 0));
+    let (latency, height) = (jump.latency.unwrap(), jump.height.unwrap());
+    assert!((0.2..0.3).contains(&latency), "{latency}");
+    let (way, speed) = (0.5 * THRUST * 0.8 * 0.8, THRUST * 0.8);
+    assert!((height - (way + speed * speed / 20.0)).abs() < 0.05, "{height}");
     let times: Vec<f64> = got.pushes.iter().map(|push| push.recovery.expect("it recovers")).collect();
     for (push, time) in got.pushes.iter().zip(&times) {
         // it recovers while it is pushed, too

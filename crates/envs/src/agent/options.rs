@@ -159,6 +159,25 @@ pub trait OptionValue: Sized {
     fn read(value: &Value) -> Option<Self>;
 }
 
+/// A type with a few values, each with a name: that is how an argument of it is given.
+pub trait Choice: Copy + PartialEq + 'static {
+    /// The names, for error messages.
+    const EXPECTED: &'static str;
+    /// All values with their names.
+    const NAMED: &'static [(Self, &'static str)];
+}
+
+impl<T: Choice> OptionValue for T {
+    const EXPECTED: &'static str = <T as Choice>::EXPECTED;
+    fn value(&self) -> Value {
+        let known = Self::NAMED.iter().find(|(choice, _)| choice == self);
+        known.map_or(Value::Text(String::new()), |(_, name)| (*name).into())
+    }
+    fn read(value: &Value) -> Option<Self> {
+        Self::NAMED.iter().find(|(_, name)| Value::from(*name) == *value).map(|(choice, _)| *choice)
+    }
+}
+
 impl OptionValue for bool {
     const EXPECTED: &'static str = "true or false";
     fn value(&self) -> Value {

@@ -79,15 +79,31 @@ fn alive(x: f32) -> f32 {
     ((x.abs() - DEAD) / (1.0 - DEAD)).clamp(0.0, 1.0) * x.signum()
 }
 
-/// The command of a deflection: the first number by up and down, the second by left and right. A released stick means rest,
-/// the ends of a stick those of the range.
+/// The command of a deflection, ahead and to the left. A released stick means rest, the ends of a stick those of the range.
+///
+/// * Up and down are the speed of whoever turns; left and right are the turn.
+/// * For whoever does not turn, such as a figure in a plane, right and left are the speed. Up is the button, if the command has
+///   one: a number from 0 to 1 without a unit. Otherwise up and down are the speed, too.
+/// * Where no number is in m/s, up and down are the first number, left and right the second.
 fn told(ranges: &[CommandRange], deflection: [f32; 2]) -> Vec<f64> {
-    let deflection = deflection.into_iter().map(f64::from).chain(std::iter::repeat(0.0));
+    let [ahead, left] = deflection.map(f64::from);
+    let with = |unit: &str| ranges.iter().position(|range| range.unit == unit);
+    let button = ranges.iter().position(|range| range.unit.is_empty() && range.low == 0.0 && range.high == 1.0);
+    let mut pushed = vec![0.0; ranges.len()];
+    match (with("m/s"), with("rad/s"), button) {
+        (Some(speed), None, Some(button)) => {
+            pushed[speed] = -left;
+            pushed[button] = f64::from(u8::from(ahead > 0.5));
+        }
+        (Some(speed), None, None) => pushed[speed] = if left.abs() > ahead.abs() { -left } else { ahead },
+        (Some(speed), Some(turn), _) => (pushed[speed], pushed[turn]) = (ahead, left),
+        _ => pushed.iter_mut().zip([ahead, left]).for_each(|(number, x)| *number = x),
+    }
     let number = |(range, x): (&CommandRange, f64)| {
         let end = if x > 0.0 { range.high } else { range.low };
         (range.rest() + (end - range.rest()) * x.abs()).clamp(range.low, range.high)
     };
-    ranges.iter().zip(deflection).map(number).collect()
+    ranges.iter().zip(pushed).map(number).collect()
 }
 
 #[cfg(test)]
@@ -113,6 +129,26 @@ mod tests {
         // a range without zero rests at its nearer end
         assert_eq!(told(&ranges[2..], [-1.0, 0.0]), [0.5]);
         assert_eq!(told(&ranges[2..], [1.0, 0.0]), [1.0]);
+    }
+
+    #[test]
+    fn a_figure_in_a_plane_goes_where_the_stick_points_and_jumps_when_it_is_up() {
+        let velocity = CommandRange::new("velocity", -4.0..=4.0, "m/s");
+        let jump = CommandRange::new("jump", 0.0..=1.0, "");
+        for (deflection, expected) in [
+            ([0.0, 0.0], [0.0, 0.0]),
+            // to the right is forward
+            ([0.0, -1.0], [4.0, 0.0]),
+            ([0.4, 0.5], [-2.0, 0.0]),
+            ([1.0, -0.5], [2.0, 1.0]),
+            ([-1.0, 0.0], [0.0, 0.0]),
+        ] {
+            assert_eq!(told(&[velocity.clone(), jump.clone()], deflection), expected, "{deflection:?}");
+        }
+        for (deflection, expected) in [([1.0, 0.0], 4.0), ([0.0, -1.0], 4.0), ([-0.5, 0.25], -2.0), ([0.25, 0.5], -2.0)]
+        {
+            assert_eq!(told(std::slice::from_ref(&velocity), deflection), [expected], "{deflection:?}");
+        }
     }
 
     #[test]

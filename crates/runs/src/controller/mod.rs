@@ -1,4 +1,4 @@
-//! How well a policy obeys commands: minutes of random ones, steps from one velocity to another, turns, standing, pushes.
+//! How well a policy obeys commands: minutes of random ones, steps from one velocity to another, turns, standing, jumps, pushes.
 //!
 //! Velocities are those of the center of mass from one decision to the next. Forward is where the root's x axis points along
 //! the ground, or +x for figures in a plane. A command is observed at the end of the decision in which it is given, so that a
@@ -31,6 +31,9 @@ const STANDING: f64 = 10.0;
 /// What counts as standing still: way of the center of mass, m, and mean speed of the parts, m/s.
 const DRIFT: f64 = 0.1;
 const RESTLESS: f64 = 0.05;
+/// How long a button is held, s, and in what time a figure that jumps at once is off the ground, s.
+const PRESSED: f64 = 1.0;
+const PROMPT: f64 = 0.35;
 /// Pushes: what they would add to the velocity of a rigid body of the figure's mass, m/s, and how long they last, s.
 const PUSHES: [f64; 3] = [0.25, 0.5, 1.0];
 const PUSH: f64 = 0.1;
@@ -54,6 +57,8 @@ pub struct Obedience {
     pub turns: Vec<Turn>,
     /// Told to stand.
     pub stand: Stand,
+    /// Told to jump from a stand; none for tasks without such a button.
+    pub jump: Option<Jump>,
     /// Pushed at half of the highest speed.
     pub pushes: Vec<Push>,
 }
@@ -104,6 +109,21 @@ pub struct Stand {
     pub speed: Option<f64>,
 }
 
+/// A button that is held for a second, and let go.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Jump {
+    /// Agents that had not fallen before.
+    pub agents: u64,
+    /// Those of them that were off the ground within 0.35 s.
+    pub prompt: u64,
+    /// Those of them that fell within 4 s.
+    pub falls: u64,
+    /// Median time until no foot is on the ground, s; none if fewer than half of them jumped.
+    pub latency: Option<f64>,
+    /// Median of how far the center of mass rises above where it was, m; none if nobody was left.
+    pub height: Option<f64>,
+}
+
 /// A push from any side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Push {
@@ -124,6 +144,8 @@ struct Commands {
     speed: usize,
     range: [f64; 2],
     turn: Option<(usize, f64)>,
+    /// Number from 0 to 1 without a unit.
+    button: Option<usize>,
 }
 
 impl Commands {
@@ -138,6 +160,7 @@ impl Commands {
             speed,
             range: [spec.command[speed].low, spec.command[speed].high],
             turn: unit("rad/s").map(|i| (i, spec.command[i].high)),
+            button: spec.command.iter().position(|r| r.unit.is_empty() && r.low == 0.0 && r.high == 1.0),
         })
     }
 
@@ -187,6 +210,10 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
             turns.push(turn(trial()?, &commands, speed, sharpest)?);
         }
     }
+    let jump = match commands.button {
+        Some(button) => Some(jump(trial()?, &commands, button)?),
+        None => None,
+    };
     let half = 0.5 * commands.range[1];
     let pushes = PUSHES.into_iter().map(|velocity| push(trial()?, &commands, half, velocity));
     Ok(Obedience {
@@ -197,6 +224,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
         responses,
         turns,
         stand: stand(trial()?, &commands)?,
+        jump,
         pushes: pushes.collect::<Result<_, RunError>>()?,
     })
 }
@@ -291,6 +319,46 @@ fn still(moments: &[Moment]) -> [f64; 2] {
     [moments.iter().map(way).fold(0.0, f64::max), speed.get()]
 }
 
+/// A jump from a stand.
+fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump, RunError> {
+    let dt = trial.dt();
+    trial.command(|_| commands.rest.clone())?;
+    let before = trial.play(BEFORE)?;
+    let mut pressed = commands.rest.clone();
+    pressed[button] = 1.0;
+    trial.command(|_| pressed.clone())?;
+    let mut tracks = trial.play(PRESSED)?;
+    trial.command(|_| commands.rest.clone())?;
+    join(&mut tracks, trial.play(AFTER - PRESSED)?);
+    let start = |agent| before.iter().find(|track| track.agent == agent).and_then(|track| track.moments.last());
+    let time = |track: &Track| {
+        let off = track.moments.iter().position(|moment| !moment.grounded);
+        off.map_or(f64::INFINITY, |i| (i + 1) as f64 * dt)
+    };
+    let rise = |track: &Track| {
+        let start = start(track.agent)?.height;
+        Some(track.moments.iter().map(|moment| moment.height - start).fold(0.0, f64::max))
+    };
+    let times: Vec<f64> = tracks.iter().map(time).collect();
+    Ok(Jump {
+        agents: tracks.len() as u64,
+        prompt: times.iter().filter(|time| **time <= PROMPT + 1e-9).count() as u64,
+        falls: falls(&tracks),
+        latency: response::median(times).filter(|time| time.is_finite()),
+        height: response::median(tracks.iter().filter_map(rise).collect()),
+    })
+}
+
+/// Goes on with tracks.
+fn join(tracks: &mut [Track], mut later: Vec<Track>) {
+    for track in tracks {
+        if let Some(more) = later.iter_mut().find(|more| more.agent == track.agent) {
+            track.moments.append(&mut more.moments);
+            track.fallen = more.fallen;
+        }
+    }
+}
+
 /// A push at a speed.
 fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) -> Result<Push, RunError> {
     let dt = trial.dt();
@@ -302,13 +370,7 @@ fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) ->
         Some(last.iter().map(|moment| moment.speed).sum::<f64>() / last.len() as f64)
     };
     let mut tracks = trial.pushed(PUSH, velocity, |agent| agent as f64 * GOLDEN)?;
-    let mut late = trial.play(AFTER)?;
-    for track in &mut tracks {
-        if let Some(more) = late.iter_mut().find(|more| more.agent == track.agent) {
-            track.moments.append(&mut more.moments);
-            track.fallen = more.fallen;
-        }
-    }
+    join(&mut tracks, trial.play(AFTER)?);
     let window = (0.25 / dt).round().max(1.0) as usize;
     let times = tracks.iter().map(|track| {
         let usual = usual(track.agent).filter(|_| !track.fallen)?;

@@ -53,6 +53,17 @@ impl Obedience {
                 t.turn, t.speed, t.reached_turn, t.reached_speed, t.falls, t.agents
             );
         }
+        if let Some(j) = &self.jump {
+            let _ = write!(
+                out,
+                "\ntold to jump: {} of {} are off the ground within 0.35 s, half of them within {}; {} high, {} fall",
+                j.prompt,
+                j.agents,
+                seconds(&j.latency),
+                number(&j.height, "m"),
+                j.falls
+            );
+        }
         for p in &self.pushes {
             let _ = write!(
                 out,

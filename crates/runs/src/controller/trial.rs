@@ -18,6 +18,10 @@ const ERROR: &str = "velocity_error";
 pub struct Moment {
     /// Where its center of mass is along the ground, m.
     pub at: [f64; 2],
+    /// Height of its center of mass, m.
+    pub height: f64,
+    /// Whether a foot touched the ground.
+    pub grounded: bool,
     /// Direction of the root's x axis along the ground, rad, without jumps; 0 for figures in a plane.
     pub heading: f64,
     /// Forward speed of the center of mass, m/s.
@@ -153,6 +157,8 @@ impl<'a> Trial<'a> {
         let told = self.error.map(|i| f64::from(self.play.last().info[agent * infos + i]));
         let moment = Moment {
             at: [now.com.x, now.com.y],
+            height: now.com.z,
+            grounded: self.play.feet(agent)? != 0,
             heading: now.heading,
             speed,
             parts,

@@ -10,8 +10,8 @@
 
 use marathon_physics::lanes::Real;
 
-use crate::agent::options::OptionValue;
-use crate::agent::{Following, Obs, Part, Senses, Start, Terms, Value};
+use crate::agent::options::Choice;
+use crate::agent::{Following, Obs, Part, Senses, Start, Terms};
 
 /// Memory of a figure that follows a clip.
 pub(super) const MEMORY: usize = BEGUN + 1;
@@ -67,18 +67,10 @@ pub enum StartAt {
     Adaptive,
 }
 
-const STARTS: [(StartAt, &str); 3] =
-    [(StartAt::Random, "random"), (StartAt::First, "first"), (StartAt::Adaptive, "adaptive")];
-
-impl OptionValue for StartAt {
+impl Choice for StartAt {
     const EXPECTED: &'static str = "random, first or adaptive";
-    fn value(&self) -> Value {
-        let known = STARTS.into_iter().find(|(start, _)| start == self);
-        known.map_or("random", |(_, name)| name).into()
-    }
-    fn read(value: &Value) -> Option<Self> {
-        STARTS.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(start, _)| start)
-    }
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(StartAt::Random, "random"), (StartAt::First, "first"), (StartAt::Adaptive, "adaptive")];
 }
 
 impl StartAt {

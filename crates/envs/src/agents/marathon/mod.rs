@@ -27,8 +27,8 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(humanoid::HumanoidV1),
         Arc::new(ant::AntV0),
         Arc::new(ant::AntV1),
-        Arc::new(controller::hopper::HopperController::default()),
-        Arc::new(controller::walker::WalkerController::default()),
+        Arc::new(controller::HopperController::default()),
+        Arc::new(controller::WalkerController::default()),
     ];
     out.extend(marathon_man::all());
     out.extend(in_style::all());

@@ -35,7 +35,7 @@ pub(super) const RIGHT_FOOT: Part = Part::named(&PARTS, "right_foot");
 const FEET: [&str; 4] = ["right_leg", "left_leg", "right_foot", "left_foot"];
 
 /// Height of the torso's center below which the walker pays, m; standing it is 1.3.
-const HEIGHT: f64 = 1.1;
+pub(super) const HEIGHT: f64 = 1.1;
 /// Price of the effort.
 const EFFORT: f64 = -0.1;
 

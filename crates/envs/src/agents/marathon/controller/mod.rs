@@ -10,18 +10,24 @@
 //! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
 //!
 //! r = clamp(1 - 0.3 abs(commanded - mean velocity), -1, 1) + forward bonus + jump - effort + still. The first three terms and
-//! the price of the effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not
-//! stand still.
+//! the form of the effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not
+//! stand still. The Walker also pays for a low torso.
 
-pub mod hopper;
+mod figures;
 pub mod schedule;
-pub mod walker;
+
+pub use figures::Figure;
 
 use marathon_physics::lanes::Real;
 
-use crate::agent::options::OptionValue;
+use super::hopper::HopperV0;
+use super::walker2d::Walker2dV1;
+use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
-use crate::agent::{CommandRange, Obs, Part, Senses, Terms, Value};
+use crate::agent::{
+    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, Senses, Terms, names,
+};
+use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
 
 /// Fastest that a figure is told to go, m/s: what the original calls 1.
@@ -35,6 +41,11 @@ const PRICE: f64 = 1.2 / FASTEST;
 const STILL: f64 = 0.5;
 const RESTLESS: f64 = 0.04;
 
+/// The Hopper told how fast to go.
+pub type HopperController = Controller<HopperV0>;
+/// The Walker told how fast to go.
+pub type WalkerController = Controller<Walker2dV1>;
+
 /// What a player has in hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
@@ -44,16 +55,9 @@ pub enum Input {
     Continuous,
 }
 
-const INPUTS: [(Input, &str); 2] = [(Input::Discrete, "discrete"), (Input::Continuous, "continuous")];
-
-impl OptionValue for Input {
+impl Choice for Input {
     const EXPECTED: &'static str = "discrete or continuous";
-    fn value(&self) -> Value {
-        INPUTS.into_iter().find(|(input, _)| input == self).map_or("discrete", |(_, name)| name).into()
-    }
-    fn read(value: &Value) -> Option<Self> {
-        INPUTS.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(input, _)| input)
-    }
+    const NAMED: &'static [(Self, &'static str)] = &[(Input::Discrete, "discrete"), (Input::Continuous, "continuous")];
 }
 
 crate::options! {
@@ -66,64 +70,114 @@ crate::options! {
     }
 }
 
-impl ControllerArguments {
-    /// Ranges of the command.
-    fn command(&self) -> Vec<CommandRange> {
-        let mut command = vec![CommandRange::new("velocity", -FASTEST..=FASTEST, "m/s")];
-        if self.input == Input::Discrete {
-            command.push(CommandRange::new("jump", 0.0..=1.0, ""));
-        }
-        command
-    }
+/// A figure in a plane that is told how fast to go.
+#[derive(Clone, Debug, Default)]
+pub struct Controller<F> {
+    figure: F,
+    arguments: ControllerArguments,
+}
 
+impl<F: Figure> Controller<F> {
     /// Whether it is told to jump, 0 or 1.
     #[inline(always)]
     fn jump<T: Real>(&self, s: &Senses<T>) -> T {
-        match self.input {
+        match self.arguments.input {
             Input::Discrete => s.command(1),
             Input::Continuous => T::zero(),
         }
     }
 
-    /// Observes the command and the mean velocity.
+    /// Worth of standing still, 0 to 1.
+    #[inline(always)]
+    fn still<T: Real>(&self, s: &Senses<T>) -> T {
+        let mut speed2 = T::zero();
+        for part in (0..F::PARTS.len()).map(Part) {
+            let [x, y, z] = s.linear_velocity(part);
+            speed2 += x.mul_add(x, y.mul_add(y, z * z));
+        }
+        (speed2 * T::lit(-1.0 / (RESTLESS * F::PARTS.len() as f64))).exp()
+    }
+}
+
+impl<F: Figure> Agent for Controller<F> {
+    fn facts(&self) -> Facts {
+        let own = self.figure.facts();
+        let mut command = vec![CommandRange::new("velocity", -FASTEST..=FASTEST, "m/s")];
+        if self.arguments.input == Input::Discrete {
+            command.push(CommandRange::new("jump", 0.0..=1.0, ""));
+        }
+        Facts {
+            id: F::ID.into(),
+            summary: F::SUMMARY.into(),
+            observation: own.observation.map(|n| n + command.len() + 1),
+            reward_terms: names(["velocity", "uprightness", "jump", "still", "height", "effort"]),
+            info: names(["velocity_error"]),
+            metrics: names(["forward", "velocity_error"]),
+            parts: names(F::PARTS),
+            command,
+            memory: MEMORY,
+            ..own
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.arguments.infos()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(Controller { figure: self.figure.clone(), arguments: self.arguments.with(options) })
+    }
+
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        self.arguments.schedule.draw(self.arguments.input, random, step, out)
+    }
+
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        memory[..MEMORY].fill(s.linear_velocity(F::TORSO)[0]);
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        memory.copy_within(0..MEMORY - 1, 1);
+        memory[0] = s.linear_velocity(F::TORSO)[0];
+    }
+
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        self.figure.observe(s, out);
         out.group("command");
         out.scalar(s.command(0));
-        if self.input == Input::Discrete {
+        if self.arguments.input == Input::Discrete {
             out.scalar(s.command(1));
         }
         out.group("mean_velocity");
         out.scalar(mean_velocity(s));
     }
 
-    /// Adds the terms that all figures have. `foot` is the height of its lowest foot if all feet are off the ground, or else
-    /// nothing.
     #[inline(always)]
-    fn reward<T: Real>(
-        &self,
-        s: &Senses<T>,
-        torso: Part,
-        parts: impl Iterator<Item = Part>,
-        leap: T,
-        terms: &mut Terms<T>,
-    ) {
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let (zero, one) = (T::zero(), T::lit(1.0));
         let off = (s.command(0) - mean_velocity(s)).abs();
         terms.add("velocity", 1.0, clamp(off.neg_mul_add(T::lit(PRICE), one), -1.0, 1.0));
-        terms.add("uprightness", 1.0, s.forward_bonus(torso));
-        terms.add("jump", 1.0, self.jump(s) * leap);
-        let (mut speed2, mut count) = (zero, 0.0);
-        for part in parts {
-            let [x, y, z] = s.linear_velocity(part);
-            speed2 += x.mul_add(x, y.mul_add(y, z * z));
-            count += 1.0;
-        }
-        let still = (speed2 * T::lit(-1.0 / (RESTLESS * count))).exp();
+        terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
+        let jump = self.jump(s);
+        terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
-        let told = s.command(0).abs().max(self.jump(s));
-        let rest = (one - told * T::lit(10.0)).max(zero);
-        terms.add("still", STILL, rest * still);
+        let rest = (one - s.command(0).abs().max(jump) * T::lit(10.0)).max(zero);
+        terms.add("still", STILL, rest * self.still(s));
+        terms.add("height", -1.0, F::low(s));
+        terms.add("effort", F::EFFORT, s.effort(Motors::NONE));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        self.figure.terminated(s)
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.scalar((s.command(0) - mean_velocity(s)).abs());
     }
 }
 
@@ -131,17 +185,4 @@ impl ControllerArguments {
 #[inline(always)]
 fn mean_velocity<T: Real>(s: &Senses<T>) -> T {
     (s.memory(0) + s.memory(1) + s.memory(2)) * T::lit(1.0 / 3.0)
-}
-
-/// An episode begins: there have been no other velocities.
-#[inline(always)]
-fn begin<T: Real>(s: &Senses<T>, torso: Part, memory: &mut [T]) {
-    memory[..MEMORY].fill(s.linear_velocity(torso)[0]);
-}
-
-/// A decision has been made.
-#[inline(always)]
-fn remember<T: Real>(s: &Senses<T>, torso: Part, memory: &mut [T]) {
-    memory.copy_within(0..MEMORY - 1, 1);
-    memory[0] = s.linear_velocity(torso)[0];
 }

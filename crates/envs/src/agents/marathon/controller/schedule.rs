@@ -4,8 +4,7 @@
 //! A command holds for 40 to 239 decisions, each as likely; with `toggle`, for 100.
 
 use super::{FASTEST, Input};
-use crate::agent::Value;
-use crate::agent::options::OptionValue;
+use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
 /// Decisions for which a command holds, at least and at most.
@@ -32,22 +31,15 @@ pub enum Schedule {
     Uniform,
 }
 
-const SCHEDULES: [(Schedule, &str); 5] = [
-    (Schedule::Repeats, "repeats"),
-    (Schedule::Anew, "anew"),
-    (Schedule::Thirds, "thirds"),
-    (Schedule::Toggle, "toggle"),
-    (Schedule::Uniform, "uniform"),
-];
-
-impl OptionValue for Schedule {
+impl Choice for Schedule {
     const EXPECTED: &'static str = "repeats, anew, thirds, toggle or uniform";
-    fn value(&self) -> Value {
-        SCHEDULES.into_iter().find(|(schedule, _)| schedule == self).map_or("repeats", |(_, name)| name).into()
-    }
-    fn read(value: &Value) -> Option<Self> {
-        SCHEDULES.into_iter().find(|(_, name)| Value::from(*name) == *value).map(|(schedule, _)| schedule)
-    }
+    const NAMED: &'static [(Self, &'static str)] = &[
+        (Schedule::Repeats, "repeats"),
+        (Schedule::Anew, "anew"),
+        (Schedule::Thirds, "thirds"),
+        (Schedule::Toggle, "toggle"),
+        (Schedule::Uniform, "uniform"),
+    ];
 }
 
 impl Schedule {
@@ -139,8 +131,8 @@ mod tests {
 
     #[test]
     fn a_stick_has_no_jump() {
-        for (schedule, _) in SCHEDULES {
-            let ([.., jump, _], _) = shares(schedule, Input::Continuous);
+        for (schedule, _) in Schedule::NAMED {
+            let ([.., jump, _], _) = shares(*schedule, Input::Continuous);
             assert_eq!(jump, 0.0);
         }
     }

@@ -3,8 +3,8 @@
 use marathon_physics::Model;
 
 use super::super::imitation::Anatomy;
-use crate::agent::options::OptionValue;
-use crate::agent::{Part, Value};
+use crate::agent::Part;
+use crate::agent::options::Choice;
 
 /// The figure with motors.
 const MODEL: &str = include_str!("../../../../../../assets/agents/marathon_man.xml");
@@ -146,20 +146,10 @@ pub enum Control {
     Servo,
 }
 
-impl OptionValue for Control {
+impl Choice for Control {
     const EXPECTED: &'static str = "pd, pd_range, torque or servo";
-    fn value(&self) -> Value {
-        let name = match self {
-            Control::Pd => "pd",
-            Control::PdRange => "pd_range",
-            Control::Torque => "torque",
-            Control::Servo => "servo",
-        };
-        name.into()
-    }
-    fn read(value: &Value) -> Option<Self> {
-        [Control::Pd, Control::PdRange, Control::Torque, Control::Servo].into_iter().find(|c| c.value() == *value)
-    }
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(Control::Pd, "pd"), (Control::PdRange, "pd_range"), (Control::Torque, "torque"), (Control::Servo, "servo")];
 }
 
 /// The model with the actuators of a way to move.

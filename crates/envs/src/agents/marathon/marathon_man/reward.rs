@@ -14,9 +14,9 @@ use marathon_physics::lanes::Real;
 use super::super::imitation::{self, TERMS, angle2, norm2, sub};
 use super::body::{ANATOMY, BUTT, PAPER_END_EFFECTORS, TOUCH, parts};
 use super::sparse;
-use crate::agent::options::OptionValue;
+use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
-use crate::agent::{Senses, Terms, Value};
+use crate::agent::{Senses, Terms};
 
 /// Which reward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,18 +29,10 @@ pub enum Reward {
     Sparse,
 }
 
-impl OptionValue for Reward {
+impl Choice for Reward {
     const EXPECTED: &'static str = "deepmimic, paper or sparse";
-    fn value(&self) -> Value {
-        match self {
-            Reward::DeepMimic => "deepmimic".into(),
-            Reward::Paper => "paper".into(),
-            Reward::Sparse => "sparse".into(),
-        }
-    }
-    fn read(value: &Value) -> Option<Self> {
-        [Reward::DeepMimic, Reward::Paper, Reward::Sparse].into_iter().find(|reward| reward.value() == *value)
-    }
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(Reward::DeepMimic, "deepmimic"), (Reward::Paper, "paper"), (Reward::Sparse, "sparse")];
 }
 
 /// Terms of the paper's reward that a distance makes: name, weight, most of the distance.

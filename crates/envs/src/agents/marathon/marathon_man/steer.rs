@@ -4,20 +4,22 @@
 //! |---|---|
 //! | 0..2 | commanded speed, m/s, and turn, rad/s |
 //! | 2..4 | sine and cosine of the angle from his heading to the commanded direction |
-//! | 4 | height of the butt, m |
-//! | 5..11 | forward and up axis of the butt |
-//! | 11..17 | velocity of the butt, m/s, and its angular velocity, rad/s |
-//! | 17..38, 38..59 | angles of the 21 joints, rad, and their velocities, rad/s |
-//! | 59..71 | feet and hands as seen from the butt, m |
-//! | 71..77 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
-//! | 77..80 | pace, m/s, cosine and sine of the gait's phase |
-//! | 80..101 | how far the gait's next angles are from his own, rad |
+//! | 4..6 | target velocity, m/s |
+//! | 6 | height of the butt, m |
+//! | 7..13 | forward and up axis of the butt |
+//! | 13..19 | velocity of the butt, m/s, and its angular velocity, rad/s |
+//! | 19..40, 40..61 | angles of the 21 joints, rad, and their velocities, rad/s |
+//! | 61..73 | feet and hands as seen from the butt, m |
+//! | 73..79 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
+//! | 79..82 | pace, m/s, cosine and sine of the gait's phase |
+//! | 82..103 | how far the gait's next angles are from his own, rad |
 //!
 //! Vectors are in his heading, the direction along the ground in which the butt faces. The commanded direction turns as the
-//! command says; where he cannot follow, it stays within [`MOST_BEHIND`] of his heading.
+//! command says; where he cannot follow, it stays within [`MOST_BEHIND`] of his heading. The target velocity follows the commanded
+//! one as fast as a person can.
 //!
 //! No clip leads him through the world. His [gait](super::gait) goes round as fast as his pace asks for, and the pace follows the
-//! command. An action of `pd` is a deviation from the gait.
+//! target velocity. An action of `pd` is a deviation from the gait.
 //!
 //! The task's reward is for velocity, heading and the gait. The style comes from a discriminator that learns from his clips
 //! ([`STYLE`]): the task's [demonstrations](crate::ShardFactory::demonstrations) are what he would observe in them.
@@ -28,13 +30,13 @@ use std::sync::LazyLock;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::super::imitation::{observe_body, sub, turned_to};
+use super::super::imitation::{StartAt, observe_body, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
 };
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
-use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
+use super::{DECISION, FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start,
@@ -48,7 +50,7 @@ pub const STYLE: [&str; 7] =
 /// What he moves like.
 const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
 /// Numbers that he observes.
-const OBSERVATION: usize = 80 + JOINTS.len();
+const OBSERVATION: usize = 82 + JOINTS.len();
 /// Fastest that he is told to go, m/s.
 const FASTEST: f64 = 3.0;
 /// Sharpest that he is told to turn, rad/s.
@@ -63,12 +65,22 @@ const STRAIGHT: f64 = 0.4;
 
 /// Slots of the memory: cosine and sine of the commanded direction.
 const DIRECTION: usize = Following::SLOTS;
+/// Slots of the velocity along the ground that he is to have now, m/s.
+const TARGET: usize = DIRECTION + 2;
 /// Slots of the gait: the share of its cycle that is over, and the speed that it is for, m/s.
-const PHASE: usize = DIRECTION + 2;
+const PHASE: usize = TARGET + 2;
 const PACE: usize = PHASE + 1;
-/// How fast the pace changes, m/s^2, and how far it is from his speed at most, m/s: a run does not lead who stands.
+/// Slots that count the episode's decisions, and that hold the row of the clips where it started.
+const MADE: usize = PACE + 1;
+const BEGUN: usize = MADE + 1;
+/// How fast the target velocity and the pace change, m/s^2, and how far the pace is from his speed at most, m/s: a run does not
+/// lead who stands.
 const ACCELERATION: f64 = 4.0;
 const LEAD: f64 = 0.8;
+/// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
+const SIDEWAYS: f64 = 2.5;
+/// An episode that fails in less time may have failed because of where it started, s.
+const EARLY: f64 = 2.0;
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
 
@@ -80,6 +92,9 @@ crate::options! {
         control: Control = Control::Pd,
         /// Most that an action of `pd` moves a target, rad.
         reach: Scale = Scale(1.0),
+        /// Where an episode starts: at `random` decisions of the clips, at the `first` of one, or `adaptive`: half of those that
+        /// follow an early failure where that episode did, half of the others in a clip that fits the command.
+        start: StartAt = StartAt::Random,
     }
 }
 
@@ -88,6 +103,18 @@ fn beginnings() -> &'static [f64; CLIPS.len()] {
     static BEGINNINGS: LazyLock<[f64; CLIPS.len()]> =
         LazyLock::new(|| CLIPS.map(|name| clips::shipped(name).map_or(0.0, |clip| beginning(&clip))));
     &BEGINNINGS
+}
+
+/// The clip in which someone moves most nearly as told.
+fn fitting_clip(command: &[f64]) -> usize {
+    let name = match (command[0], command[1]) {
+        (speed, _) if speed > 2.0 => "run",
+        (speed, turn) if speed < 0.4 && turn == 0.0 => STAND,
+        (_, turn) if turn > 0.3 => "walk_left",
+        (_, turn) if turn < -0.3 => "walk_right",
+        _ => "walk",
+    };
+    CLIPS.iter().position(|clip| *clip == name).unwrap_or(0)
 }
 
 /// Marathon Man told where to go.
@@ -117,18 +144,24 @@ impl Steer {
         hypot(x, y)
     }
 
-    /// Mean square of the joints' distances from the gait, by DeepMimic's weights, rad^2.
+    /// Mean squares of the joints' distances from the gait, rad^2, and of the differences of their velocities from the gait's,
+    /// rad^2/s^2, by DeepMimic's weights.
     #[inline(always)]
-    fn out_of_step<T: Real>(s: &Senses<T>) -> T {
-        let gaits = gaits();
-        let now = gaits.moment(s.memory(PHASE), s.memory(PACE), 0.0);
-        let (mut sum, mut total) = (T::zero(), 0.0);
+    fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
+        let (gaits, r) = (gaits(), s.readings());
+        let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
+        // angles lead by their velocity times the lead, so a lead of 1 s gives the velocity
+        let (now, led) = (gaits.moment(phase, pace, 0.0), gaits.moment(phase, pace, 1.0));
+        let (mut sums, mut total) = ([T::zero(); 2], 0.0);
         for (i, joint) in JOINTS.iter().enumerate() {
-            let off = gaits.angle(&now, i) - s.readings().qpos(FIRST_QPOS + i);
-            sum = (off * off).mul_add(T::lit(joint.weight), sum);
+            let angle = gaits.angle(&now, i);
+            let off = [r.qpos(FIRST_QPOS + i) - angle, r.qvel(FIRST_QPOS - 1 + i) - (gaits.angle(&led, i) - angle)];
+            for (sum, off) in sums.iter_mut().zip(off) {
+                *sum = (off * off).mul_add(T::lit(joint.weight), *sum);
+            }
             total += joint.weight;
         }
-        sum * T::lit(1.0 / total)
+        sums.map(|sum| sum * T::lit(1.0 / total))
     }
 
     /// Where the gait will be after `dt` seconds.
@@ -138,11 +171,11 @@ impl Steer {
         next - next.floor()
     }
 
-    /// How far the velocity of the center of mass along the ground is from the commanded one, m/s.
+    /// How far the velocity of the center of mass along the ground is from another, m/s.
     #[inline(always)]
-    fn slip<T: Real>(s: &Senses<T>) -> T {
-        let ([vx, vy, _], [x, y], speed) = (s.center_of_mass_velocity(), Self::direction(s), s.command(0));
-        hypot(speed.neg_mul_add(x, vx), speed.neg_mul_add(y, vy))
+    fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
+        let [vx, vy, _] = s.center_of_mass_velocity();
+        hypot(vx - x, vy - y)
     }
 }
 
@@ -156,7 +189,7 @@ impl Agent for Steer {
             max_episode_steps: MAX_EPISODE_STEPS,
             observation: Some(OBSERVATION),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
-            reward_terms: names(["velocity", "pace", "heading", "gait"]),
+            reward_terms: names(["velocity", "pace", "drift", "heading", "gait", "tempo"]),
             info: names(["velocity_error", "heading_error"]),
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
@@ -167,7 +200,7 @@ impl Agent for Steer {
             ],
             clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: PACE + 1,
+            memory: BEGUN + 1,
             termination_reward: None,
             ..Facts::default()
         }
@@ -186,12 +219,24 @@ impl Agent for Steer {
     }
 
     fn reset(&self, start: &mut Start) {
-        let clips: Vec<_> = start.clips().collect();
-        let clip = start.random.whole(0, clips.len() - 1);
-        let rows = clips[clip].clone();
-        let row = start.random.whole(rows.start, rows.end - 1);
+        let adaptive = self.arguments.start == StartAt::Adaptive;
+        let [made, begun] = [MADE, BEGUN].map(|slot| start.previous[slot]);
+        let early = made > 0.0 && made * DECISION < EARLY;
+        let row = if adaptive && early && start.random.whole(0, 1) == 0 {
+            begun as usize
+        } else {
+            let fitting = adaptive && start.random.whole(0, 1) == 0;
+            let clip = if fitting { fitting_clip(start.scheduled) } else { start.random.whole(0, CLIPS.len() - 1) };
+            let rows = start.clips().nth(clip).expect("a row of clips for each clip");
+            match self.arguments.start {
+                StartAt::First => rows.start,
+                _ => start.random.whole(rows.start, rows.end - 1),
+            }
+        };
+        let clip = start.clips().position(|rows| rows.contains(&row)).expect("the row is a clip's");
         start.start_in_clip(row);
         start.memory[PHASE] = (start.phase(row) - beginnings()[clip]).rem_euclid(1.0);
+        start.memory[BEGUN] = row as f64;
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -221,7 +266,9 @@ impl Agent for Steer {
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&s.heading(BUTT));
-        memory[PACE] = Self::speed(s).min(T::lit(FASTEST));
+        let [x, y, _] = s.center_of_mass_velocity();
+        memory[TARGET..TARGET + 2].copy_from_slice(&[x, y]);
+        memory[PACE] = hypot(x, y).min(T::lit(FASTEST));
     }
 
     #[inline(always)]
@@ -232,8 +279,17 @@ impl Agent for Steer {
         memory[DIRECTION] = d.neg_mul_add(sin, c * cos);
         memory[DIRECTION + 1] = d.mul_add(cos, c * sin);
         memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
+        memory[MADE] += T::lit(1.0);
+        // nobody changes a velocity of 3 m/s at once, or turns sharply at it
         let (speed, most) = (Self::speed(s), ACCELERATION * s.dt());
-        let asked = s.command(0).max(s.command(1).abs() * T::lit(TURNING_RADIUS));
+        let sharpest = T::lit(SIDEWAYS).div(s.command(1).abs().max(T::lit(SIDEWAYS / FASTEST)));
+        let told = s.command(0).min(sharpest);
+        let missing = [0, 1].map(|i| told.mul_add(memory[DIRECTION + i], -memory[TARGET + i]));
+        let share = T::lit(most).div(hypot(missing[0], missing[1]).max(T::lit(most)));
+        for i in 0..2 {
+            memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
+        }
+        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(s.command(1).abs() * T::lit(TURNING_RADIUS));
         let asked = speed + clamp(asked - speed, -LEAD, LEAD);
         memory[PACE] += clamp(asked - memory[PACE], -most, most);
     }
@@ -248,6 +304,9 @@ impl Agent for Steer {
         out.scalar(s.command(1));
         out.scalar(cos.mul_add(y, -(sin * x)));
         out.scalar(cos.mul_add(x, sin * y));
+        let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
+        out.scalar(x);
+        out.scalar(y);
         observe_body(s, &ANATOMY, &turned, out);
         out.group("ends");
         for part in END_EFFECTORS {
@@ -270,12 +329,15 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        let slip = Self::slip(s);
+        let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
         let angle = Self::off(s, Self::direction(s));
-        terms.add("velocity", 0.35, (slip * slip * T::lit(-5.0)).exp());
-        terms.add("pace", 0.25, (slip * slip * T::lit(-0.5)).exp());
+        let [pose, tempo] = Self::out_of_step(s);
+        terms.add("velocity", 0.3, (slip * slip * T::lit(-5.0)).exp());
+        terms.add("pace", 0.2, (slip * slip * T::lit(-0.5)).exp());
+        terms.add("drift", 0.05, (slip * slip * T::lit(-100.0)).exp());
         terms.add("heading", 0.2, (angle * angle * T::lit(-4.0)).exp());
-        terms.add("gait", 0.2, (Self::out_of_step(s) * T::lit(-5.0)).exp());
+        terms.add("gait", 0.2, (pose * T::lit(-5.0)).exp());
+        terms.add("tempo", 0.05, (tempo * T::lit(-1.0)).exp());
     }
 
     #[inline(always)]
@@ -291,8 +353,9 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar(Self::slip(s));
-        let angle = Self::off(s, Self::direction(s));
+        let direction = Self::direction(s);
+        out.scalar(Self::slip(s, direction.map(|x| x * s.command(0))));
+        let angle = Self::off(s, direction);
         out.scalar(angle.abs());
     }
 }
