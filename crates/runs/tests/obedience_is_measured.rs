@@ -107,6 +107,7 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
     let got = measured("StrongCart-v0", 1);
     assert_eq!(got, measured("StrongCart-v0", 3));
     assert_eq!((got.agents, got.minutes.without_fall, got.minutes.falls_per_minute), (20, 20, 0.0));
+    assert_eq!(got.minutes.early_falls, 0);
     // half of the commands are below the slack, where it stands still
     let settled = got.minutes.settled_error;
     assert!((0.15..SLACK).contains(&settled) && got.minutes.velocity_error > settled, "{:?}", got.minutes);

@@ -20,6 +20,8 @@ use trial::{Moment, Track, Trial};
 
 /// Length of a sequence of random commands, s.
 const MINUTE: f64 = 60.0;
+/// Time in which a fall may come from the start, s.
+const EARLY: f64 = 2.0;
 /// Time after a change of command from which on the command counts as obeyed, s.
 const SETTLED: f64 = 1.5;
 /// Time at the old command before a new one, s, and time at the new one.
@@ -68,6 +70,8 @@ pub struct Obedience {
 pub struct Minutes {
     /// Minutes without a fall.
     pub without_fall: u64,
+    /// Falls within 2 s of the start: what a start cannot help is among them.
+    pub early_falls: u64,
     /// Falls by the time that was played, 1/min.
     pub falls_per_minute: f64,
     /// Mean distance of the velocity from the commanded one, m/s: what the task reports as `velocity_error`, or else that of
@@ -248,10 +252,12 @@ fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError>
         let frames: Vec<Vec<f64>> = track.moments.iter().map(|moment| moment.qpos.clone()).collect();
         slides.extend(tracking.slides(&frames, dt));
     }
-    let falls = tracks.iter().filter(|track| track.fallen).count();
+    let fallen = || tracks.iter().filter(|track| track.fallen);
+    let (falls, early) = (fallen().count(), fallen().filter(|track| (track.moments.len() as f64) * dt < EARLY).count());
     let played: usize = tracks.iter().map(|track| track.moments.len()).sum();
     Ok(Minutes {
         without_fall: (tracks.len() - falls) as u64,
+        early_falls: early as u64,
         falls_per_minute: falls as f64 / (played as f64 * dt / 60.0),
         velocity_error: all.get(),
         settled_error: late.get(),

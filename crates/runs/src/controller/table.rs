@@ -10,12 +10,13 @@ impl Obedience {
     /// As a few tables.
     pub fn table(&self) -> String {
         let Obedience { agents, minutes, stand, .. } = self;
-        let Minutes { without_fall, falls_per_minute, velocity_error, settled_error, slide } = minutes;
+        let Minutes { without_fall, early_falls, falls_per_minute, velocity_error, settled_error, slide } = minutes;
         let Stand { still, falls, drift, speed } = stand;
         let number = |x: &Option<f64>, unit: &str| x.map_or("-".into(), |x| format!("{x:.2} {unit}"));
         let seconds = |time: &Option<f64>| number(time, "s");
         let mut out = format!(
-            "a minute of random commands: {without_fall} of {agents} without a fall, {falls_per_minute:.2} falls per minute\n  \
+            "a minute of random commands: {without_fall} of {agents} without a fall, {falls_per_minute:.2} falls per minute, \
+             {early_falls} in the first 2 s\n  \
              velocity {velocity_error:.2} m/s off, {settled_error:.2} from 1.5 s after a command on; soles slide {:.1} cm\n",
             1e2 * slide
         );
