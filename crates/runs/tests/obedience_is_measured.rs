@@ -14,7 +14,7 @@ const MODEL: &str = r#"
 <mujoco model="cart">
   <option timestep="0.01" gravity="0 0 -10"/>
   <worldbody>
-    <geom name="ground" type="plane" size="0 0 1" contype="0" conaffinity="1"/>
+    <geom name="ground" type="plane" size="0 0 1" contype="0" conaffinity="1" friction="0 0 0" condim="1"/>
     <body name="cart" pos="0 0 0.1">
       <joint name="rail" type="slide" axis="1 0 0"/>
       <joint name="lift" type="slide" axis="0 0 1"/>

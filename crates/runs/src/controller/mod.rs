@@ -239,7 +239,7 @@ fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError>
     let (model, settled) = (registry::agent(&setting.agent)?.model()?, (SETTLED / dt).ceil() as usize);
     let tracking = Tracking::new(&model);
     let tracks = trial.play(MINUTE)?;
-    let (mut all, mut late, mut slides) = (Mean::default(), Mean::default(), Vec::new());
+    let (mut all, mut late, mut slides) = (Mean::default(), Mean::default(), Mean::default());
     for track in &tracks {
         let mut since = 0;
         for (i, moment) in track.moments.iter().enumerate() {
@@ -250,7 +250,7 @@ fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError>
             }
         }
         let frames: Vec<Vec<f64>> = track.moments.iter().map(|moment| moment.qpos.clone()).collect();
-        slides.extend(tracking.slides(&frames, dt));
+        tracking.slides(&frames, dt).into_iter().for_each(|slide| slides.add(slide));
     }
     let fallen = || tracks.iter().filter(|track| track.fallen);
     let (falls, early) = (fallen().count(), fallen().filter(|track| (track.moments.len() as f64) * dt < EARLY).count());
@@ -261,7 +261,7 @@ fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError>
         falls_per_minute: falls as f64 / (played as f64 * dt / 60.0),
         velocity_error: all.get(),
         settled_error: late.get(),
-        slide: slides.iter().sum::<f64>() / slides.len().max(1) as f64,
+        slide: slides.get(),
     })
 }
 
