@@ -86,7 +86,7 @@ fn the_reward_is_its_formula() {
                 assert!((obs[n - 1] - mean).abs() < 1e-4, "{} {mean}", obs[n - 1]);
                 over[agent] = out.terminated[agent];
                 if over[agent] {
-                    assert_eq!(out.reward[agent], -1.0);
+                    assert_eq!(out.reward[agent], -40.0);
                     continue;
                 }
                 let (command, jump) = (told[agent][0], told[agent].get(1).copied().unwrap_or(0.0));
@@ -100,7 +100,7 @@ fn the_reward_is_its_formula() {
                 let still = if command == 0.0 && jump == 0.0 { 0.5 * (-speed2 / 0.04).exp() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
                 let low = (1.1 - height(&model, &env, agent)).clamp(0.0, 1.1);
-                let velocity = (1.0 - 0.4 * off).clamp(-1.0, 1.0);
+                let velocity = (1.0 - 0.8 * off).clamp(-1.0, 1.0);
                 let expected = [velocity, 0.5 - tilt / PI, jump * leap, still, -low, -EFFORT * effort];
                 for (i, expected) in expected.into_iter().enumerate() {
                     let got = f64::from(out.terms[agent * k + i]);

@@ -51,7 +51,8 @@ fn every_step_is_sound() {
     for id in marathon_envs::ids() {
         let mut env = make(&id, 24, 1, None, Autoreset::SameStep);
         let n = env.spec().reward_terms.len();
-        let priced = marathon_envs::agent(&id).unwrap().facts().termination_reward.is_some();
+        let price = marathon_envs::agent(&id).unwrap().facts().termination_reward;
+        let priced = price.is_some();
         assert_eq!(env.spec().reward_terms[n - 1] == TERMINATION_TERM, priced, "{id}");
         let mut failed = 0;
         play(&mut env, 150, 1.5, |t, step| {
@@ -64,7 +65,7 @@ fn every_step_is_sound() {
                 assert!(!step.diverged[i]);
                 if priced {
                     assert_eq!(terms[n - 1] != 0.0, step.terminated[i]);
-                    assert!(!step.terminated[i] || step.reward[i] == -1.0);
+                    assert!(!step.terminated[i] || price.is_some_and(|price| f64::from(step.reward[i]) == price));
                 }
                 failed += usize::from(step.terminated[i]);
             }

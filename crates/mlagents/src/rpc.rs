@@ -51,6 +51,12 @@ mod flag {
     pub const PADDED: u8 = 8;
 }
 
+/// Reasons for which a peer ends a connection.
+mod code {
+    pub const NO_ERROR: u32 = 0;
+    pub const INTERNAL_ERROR: u32 = 2;
+}
+
 /// Identifiers of settings.
 mod setting {
     pub const ENABLE_PUSH: u16 = 2;
@@ -81,6 +87,13 @@ pub enum RpcError {
     /// What the peer sent is not HTTP/2, or not a gRPC reply.
     #[error("the peer does not speak ML-Agents' protocol: {0}")]
     Protocol(&'static str),
+}
+
+impl RpcError {
+    /// Whether the peer has closed. gRPC's server says NO_ERROR when it ends in order, and INTERNAL_ERROR when it stops amid a call.
+    pub fn is_farewell(&self) -> bool {
+        matches!(self, RpcError::GoAway(code::NO_ERROR | code::INTERNAL_ERROR))
+    }
 }
 
 /// A connection to a server.
@@ -239,7 +252,7 @@ impl<S: Read + Write> Channel<S> {
             frame::PING if flags & flag::ACK == 0 => put_frame(&mut answer, frame::PING, flag::ACK, 0, payload),
             frame::GOAWAY => {
                 let (last, code) = (number(payload)? & WINDOW, number(payload.get(4..).unwrap_or_default())?);
-                if code != 0 || last < self.call {
+                if code != code::NO_ERROR || last < self.call {
                     return Err(RpcError::GoAway(code));
                 }
                 // a peer that leaves in order answers this call before
@@ -445,6 +458,15 @@ mod tests {
         for (frames, expected) in cases {
             let error = answering(frames).call(b"abc", &mut Vec::new()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error} / {expected}");
+        }
+    }
+
+    #[test]
+    fn a_peer_that_closes_amid_a_call_is_no_failure() {
+        for (code, expected) in [(0, true), (2, true), (11, false)] {
+            let left = [(frame::GOAWAY, 0, 0, &[0, 0, 0, 0, 0, 0, 0, code][..])];
+            let error = answering(&left).call(b"abc", &mut Vec::new()).unwrap_err();
+            assert_eq!(error.is_farewell(), expected, "{error}");
         }
     }
 

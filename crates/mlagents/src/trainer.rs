@@ -5,7 +5,7 @@
 //! answer says what to do next.
 
 use crate::error::PlayerError;
-use crate::rpc::{Channel, RpcError};
+use crate::rpc::Channel;
 use crate::wire::{Capabilities, Header, RlInitializationOutput, RlInput, UnityMessage, UnityOutput};
 use prost::Message;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
@@ -95,8 +95,8 @@ impl Trainer {
     /// If the trainer is gone, or refuses the message.
     pub fn exchange(&mut self, output: &UnityMessage) -> Result<Option<RlInput>, PlayerError> {
         let answer = match self.call(output) {
-            // it has left in order, without waiting for this call
-            Err(PlayerError::Rpc(RpcError::GoAway(0))) => return Ok(None),
+            // it has left without waiting for this call
+            Err(PlayerError::Rpc(e)) if e.is_farewell() => return Ok(None),
             answer => answer?,
         };
         if answer.header.is_none_or(|header| header.status != Header::OK) {

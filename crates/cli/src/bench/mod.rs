@@ -41,7 +41,7 @@ pub enum What {
     Train(train::TrainArgs),
     /// Processor seconds of training until the agent runs at --speed and hardly falls, for each of --seeds.
     Gait(gait::GaitArgs),
-    /// How well a policy obeys commands: a minute of random ones, steps of the speed, turns, standing, pushes.
+    /// How well a policy obeys commands: a minute of random ones, steps of the speed, turns, standing, jumps, pushes.
     Controller(controller::ControllerArgs),
 }
 

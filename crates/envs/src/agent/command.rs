@@ -25,6 +25,21 @@ impl CommandRange {
         CommandRange { name: name.into(), low: *range.start(), high: *range.end(), unit: unit.into() }
     }
 
+    /// Whether it is a speed, which a stick pushed ahead commands.
+    pub fn is_speed(&self) -> bool {
+        self.unit == "m/s"
+    }
+
+    /// Whether it is a turn.
+    pub fn is_turn(&self) -> bool {
+        self.unit == "rad/s"
+    }
+
+    /// Whether it is a button: a number from 0 to 1 without a unit.
+    pub fn is_button(&self) -> bool {
+        self.unit.is_empty() && self.low == 0.0 && self.high == 1.0
+    }
+
     /// The value nearest to zero: what an agent is told before anybody tells it anything.
     pub fn rest(&self) -> f64 {
         0.0_f64.max(self.low).min(self.high)

@@ -87,16 +87,16 @@ fn alive(x: f32) -> f32 {
 /// * Where no number is in m/s, up and down are the first number, left and right the second.
 fn told(ranges: &[CommandRange], deflection: [f32; 2]) -> Vec<f64> {
     let [ahead, left] = deflection.map(f64::from);
-    let with = |unit: &str| ranges.iter().position(|range| range.unit == unit);
-    let button = ranges.iter().position(|range| range.unit.is_empty() && range.low == 0.0 && range.high == 1.0);
+    let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
+    let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
     let mut pushed = vec![0.0; ranges.len()];
-    match (with("m/s"), with("rad/s"), button) {
-        (Some(speed), None, Some(button)) => {
+    match kinds {
+        [Some(speed), None, Some(button)] => {
             pushed[speed] = -left;
             pushed[button] = f64::from(u8::from(ahead > 0.5));
         }
-        (Some(speed), None, None) => pushed[speed] = if left.abs() > ahead.abs() { -left } else { ahead },
-        (Some(speed), Some(turn), _) => (pushed[speed], pushed[turn]) = (ahead, left),
+        [Some(speed), None, None] => pushed[speed] = if left.abs() > ahead.abs() { -left } else { ahead },
+        [Some(speed), Some(turn), _] => (pushed[speed], pushed[turn]) = (ahead, left),
         _ => pushed.iter_mut().zip([ahead, left]).for_each(|(number, x)| *number = x),
     }
     let number = |(range, x): (&CommandRange, f64)| {

@@ -10,7 +10,7 @@ mod trial;
 
 use crate::error::RunError;
 use crate::setting::Setting;
-use marathon_envs::registry;
+use marathon_envs::{CommandRange, registry};
 use marathon_learn::{EvalOptions, Policy};
 use marathon_motion::Tracking;
 pub use response::Response;
@@ -148,23 +148,22 @@ struct Commands {
     speed: usize,
     range: [f64; 2],
     turn: Option<(usize, f64)>,
-    /// Number from 0 to 1 without a unit.
     button: Option<usize>,
 }
 
 impl Commands {
     fn of(policy: &Policy, setting: &Setting) -> Result<Self, RunError> {
         let spec = setting.factory()?.spec().clone();
-        let unit = |unit: &str| spec.command.iter().position(|range| range.unit == unit);
-        let Some(speed) = unit("m/s") else {
+        let number_of = |is: fn(&CommandRange) -> bool| spec.command.iter().position(is);
+        let Some(speed) = number_of(CommandRange::is_speed) else {
             return Err(RunError::NoSpeed { task: policy.meta().agent.clone(), others: obedient() });
         };
         Ok(Commands {
             rest: spec.command.iter().map(|range| range.rest()).collect(),
             speed,
             range: [spec.command[speed].low, spec.command[speed].high],
-            turn: unit("rad/s").map(|i| (i, spec.command[i].high)),
-            button: spec.command.iter().position(|r| r.unit.is_empty() && r.low == 0.0 && r.high == 1.0),
+            turn: number_of(CommandRange::is_turn).map(|i| (i, spec.command[i].high)),
+            button: number_of(CommandRange::is_button),
         })
     }
 
@@ -187,8 +186,7 @@ impl Commands {
 
 /// Tasks that can be told a speed.
 fn obedient() -> Vec<String> {
-    let told =
-        |id: &String| registry::agent(id).is_ok_and(|a| a.facts().command.iter().any(|range| range.unit == "m/s"));
+    let told = |id: &String| registry::agent(id).is_ok_and(|a| a.facts().command.iter().any(CommandRange::is_speed));
     registry::ids().into_iter().filter(told).collect()
 }
 
@@ -199,7 +197,7 @@ fn obedient() -> Vec<String> {
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
     let setting = Setting::of(policy.meta());
     let commands = Commands::of(policy, &setting)?;
-    let trial = || Trial::new(&setting, policy, options);
+    let trial = || Trial::new(&setting, policy, options, commands.speed);
     let levels = commands.levels();
     let mut responses = Vec::new();
     for from in levels {
@@ -224,7 +222,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
         task: policy.meta().agent.clone(),
         agents: options.episodes as u64,
         dt: policy.meta().control_dt,
-        minutes: minutes(trial()?, &setting)?,
+        minutes: minutes(trial()?)?,
         responses,
         turns,
         stand: stand(trial()?, &commands)?,
@@ -234,11 +232,11 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
 }
 
 /// A minute of each agent's own schedule.
-fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError> {
+fn minutes(mut trial: Trial<'_>) -> Result<Minutes, RunError> {
     let dt = trial.dt();
-    let (model, settled) = (registry::agent(&setting.agent)?.model()?, (SETTLED / dt).ceil() as usize);
-    let tracking = Tracking::new(&model);
+    let settled = (SETTLED / dt).ceil() as usize;
     let tracks = trial.play(MINUTE)?;
+    let tracking = Tracking::new(trial.model());
     let (mut all, mut late, mut slides) = (Mean::default(), Mean::default(), Mean::default());
     for track in &tracks {
         let mut since = 0;
@@ -252,11 +250,11 @@ fn minutes(mut trial: Trial<'_>, setting: &Setting) -> Result<Minutes, RunError>
         let frames: Vec<Vec<f64>> = track.moments.iter().map(|moment| moment.qpos.clone()).collect();
         tracking.slides(&frames, dt).into_iter().for_each(|slide| slides.add(slide));
     }
-    let fallen = || tracks.iter().filter(|track| track.fallen);
-    let (falls, early) = (fallen().count(), fallen().filter(|track| (track.moments.len() as f64) * dt < EARLY).count());
+    let falls = falls(&tracks);
+    let early = tracks.iter().filter(|track| track.fallen && (track.moments.len() as f64) * dt < EARLY).count();
     let played: usize = tracks.iter().map(|track| track.moments.len()).sum();
     Ok(Minutes {
-        without_fall: (tracks.len() - falls) as u64,
+        without_fall: tracks.len() as u64 - falls,
         early_falls: early as u64,
         falls_per_minute: falls as f64 / (played as f64 * dt / 60.0),
         velocity_error: all.get(),
@@ -350,7 +348,7 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump
         agents: tracks.len() as u64,
         prompt: times.iter().filter(|time| **time <= PROMPT + 1e-9).count() as u64,
         falls: falls(&tracks),
-        latency: response::median(times).filter(|time| time.is_finite()),
+        latency: response::median_time(times),
         height: response::median(tracks.iter().filter_map(rise).collect()),
     })
 }
@@ -388,12 +386,7 @@ fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) ->
         (settled < speeds.len()).then_some(settled as f64 * dt)
     });
     let times: Vec<f64> = times.map(|time| time.unwrap_or(f64::INFINITY)).collect();
-    Ok(Push {
-        velocity,
-        agents: tracks.len() as u64,
-        falls: falls(&tracks),
-        recovery: response::median(times).filter(|time| time.is_finite()),
-    })
+    Ok(Push { velocity, agents: tracks.len() as u64, falls: falls(&tracks), recovery: response::median_time(times) })
 }
 
 /// Agents that fell.

@@ -42,7 +42,7 @@ impl Response {
                 let first = speeds.iter().position(|speed| made(*speed) >= share);
                 first.map_or(f64::INFINITY, |i| (i + 1) as f64 * dt)
             };
-            median(speeds.iter().map(time).collect()).filter(|time| time.is_finite())
+            median_time(speeds.iter().map(time).collect())
         };
         let longest = speeds.iter().map(Vec::len).max().unwrap_or(0);
         let middle: Vec<f64> = (0..longest)
@@ -69,6 +69,11 @@ impl Response {
 pub fn median(mut numbers: Vec<f64>) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len().saturating_sub(1) / 2).copied()
+}
+
+/// The median of some times, of which those that never came are infinite; none if fewer than half of them came.
+pub fn median_time(times: Vec<f64>) -> Option<f64> {
+    median(times).filter(|time| time.is_finite())
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Obedience as lines for a person, and as a picture.
 
-use super::{Minutes, Obedience, Stand};
+use super::{EARLY, Minutes, Obedience, PROMPT, SETTLED, STANDING, Stand};
 use crate::error::RunError;
 use crate::report::chart::Chart;
 use std::fmt::Write;
@@ -16,13 +16,13 @@ impl Obedience {
         let seconds = |time: &Option<f64>| number(time, "s");
         let mut out = format!(
             "a minute of random commands: {without_fall} of {agents} without a fall, {falls_per_minute:.2} falls per minute, \
-             {early_falls} in the first 2 s\n  \
-             velocity {velocity_error:.2} m/s off, {settled_error:.2} from 1.5 s after a command on; soles slide {:.1} cm\n",
+             {early_falls} in the first {EARLY} s\n  \
+             velocity {velocity_error:.2} m/s off, {settled_error:.2} from {SETTLED} s after a command on; soles slide {:.1} cm\n",
             1e2 * slide
         );
         let _ = write!(
             out,
-            "told to stand for 10 s: {still} of {agents} are still, {falls} fall; drift {}, parts {}\n\n\
+            "told to stand for {STANDING} s: {still} of {agents} are still, {falls} fall; drift {}, parts {}\n\n\
              {:>14} {:>8} {:>8} {:>10} {:>10} {:>9}\n",
             number(drift, "m"),
             number(speed, "m/s"),
@@ -57,7 +57,7 @@ impl Obedience {
         if let Some(j) = &self.jump {
             let _ = write!(
                 out,
-                "\ntold to jump: {} of {} are off the ground within 0.35 s, half of them within {}; {} high, {} fall",
+                "\ntold to jump: {} of {} are off the ground within {PROMPT} s, half of them within {}; {} high, {} fall",
                 j.prompt,
                 j.agents,
                 seconds(&j.latency),

@@ -55,8 +55,10 @@ struct Place {
 pub struct Trial<'a> {
     play: Play<'a>,
     model: Model,
+    /// The body that moves freely in space; none for figures in a plane.
+    root: Option<usize>,
     /// Number of the command that is a speed.
-    speed: Option<usize>,
+    speed: usize,
     /// Number of the task's own report of the error.
     error: Option<usize>,
     /// Where each agent was last; none of those that fell.
@@ -64,8 +66,8 @@ pub struct Trial<'a> {
 }
 
 impl<'a> Trial<'a> {
-    /// Agents at the start of an episode that only a fall ends.
-    pub fn new(setting: &Setting, policy: &'a Policy, options: &EvalOptions) -> Result<Self, RunError> {
+    /// Agents at the start of an episode that only a fall ends; `speed` is the number of the command that is a speed.
+    pub fn new(setting: &Setting, policy: &'a Policy, options: &EvalOptions, speed: usize) -> Result<Self, RunError> {
         let vec_options = VecEnvOptions {
             agents: options.episodes,
             seed: options.seed,
@@ -75,18 +77,22 @@ impl<'a> Trial<'a> {
             ..VecEnvOptions::default()
         };
         let play = Play::of(setting, policy, &vec_options)?;
-        let spec = play.spec();
-        let speed = spec.command.iter().position(|range| range.unit == "m/s");
-        let error = spec.info.iter().position(|name| name == ERROR);
+        let error = play.spec().info.iter().position(|name| name == ERROR);
         let model = registry::agent(&setting.agent)?.model()?;
-        let place = |agent| Ok(Some(Place::of(&model, &play.qpos(agent)?, 0.0)));
+        let root = free(&model);
+        let place = |agent| Ok(Some(Place::of(&model, root, &play.qpos(agent)?, 0.0)));
         let places = (0..options.episodes).map(place).collect::<Result<_, RunError>>()?;
-        Ok(Trial { play, model, speed, error, places })
+        Ok(Trial { play, model, root, speed, error, places })
     }
 
     /// Seconds between decisions.
     pub fn dt(&self) -> f64 {
         self.play.spec().dt
+    }
+
+    /// The figure.
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
     /// How many there are.
@@ -129,15 +135,15 @@ impl<'a> Trial<'a> {
         direction: impl Fn(usize) -> f64,
     ) -> Result<Vec<Track>, RunError> {
         let mass: f64 = self.model.bodies.iter().map(|body| body.mass).sum();
-        let planar = free(&self.model).is_none();
+        let (planar, body) = (self.root.is_none(), self.root.unwrap_or(1));
         for agent in 0..self.agents() {
             let angle = if planar { (agent % 2) as f64 * PI } else { direction(agent) };
             let force = mass * velocity / seconds;
             let force = [force * libm::cos(angle), if planar { 0.0 } else { force * libm::sin(angle) }, 0.0];
-            self.play.push(agent, free(&self.model).unwrap_or(1), force)?;
+            self.play.push(agent, body, force)?;
         }
         let tracks = self.play(seconds)?;
-        (0..self.agents()).try_for_each(|agent| self.play.push(agent, free(&self.model).unwrap_or(1), [0.0; 3]))?;
+        (0..self.agents()).try_for_each(|agent| self.play.push(agent, body, [0.0; 3]))?;
         Ok(tracks)
     }
 
@@ -145,14 +151,14 @@ impl<'a> Trial<'a> {
     fn look(&mut self, agent: usize) -> Result<Moment, RunError> {
         let (qpos, dt) = (self.play.qpos(agent)?, self.dt());
         let before = self.places[agent].as_ref();
-        let now = Place::of(&self.model, &qpos, before.map_or(0.0, |place| place.heading));
+        let now = Place::of(&self.model, self.root, &qpos, before.map_or(0.0, |place| place.heading));
         let old = before.unwrap_or(&now);
         let velocity = (now.com - old.com) / dt;
         let speed = velocity.x * libm::cos(now.heading) + velocity.y * libm::sin(now.heading);
         let ways = now.centers.iter().zip(&old.centers).map(|(a, b)| a.distance(*b));
         let parts = ways.sum::<f64>() / (now.centers.len() as f64 * dt);
         let command = self.play.command(agent)?;
-        let asked = self.speed.map_or(0.0, |i| command[i]);
+        let asked = command[self.speed];
         let infos = self.play.spec().info.len();
         let told = self.error.map(|i| f64::from(self.play.last().info[agent * infos + i]));
         let moment = Moment {
@@ -180,8 +186,8 @@ fn free(model: &Model) -> Option<usize> {
 }
 
 impl Place {
-    /// Of a configuration; the heading is the angle nearest to another one.
-    fn of(model: &Model, qpos: &[f64], near: f64) -> Place {
+    /// Of a configuration of a model with this root; the heading is the angle nearest to another one.
+    fn of(model: &Model, root: Option<usize>, qpos: &[f64], near: f64) -> Place {
         let pose = Pose::of(model, qpos);
         let (mut com, mut mass, mut centers) = (DVec3::ZERO, 0.0, Vec::new());
         for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass > 0.0 && body.weld_id != 0) {
@@ -190,7 +196,7 @@ impl Place {
             mass += body.mass;
             centers.push(center);
         }
-        let heading = free(model).map_or(0.0, |root| {
+        let heading = root.map_or(0.0, |root| {
             let forward = pose.quat[root] * DVec3::X;
             let angle = libm::atan2(forward.y, forward.x);
             angle + TAU * ((near - angle) / TAU).round()

@@ -22,7 +22,7 @@ const BEGUN: usize = MADE + 1;
 /// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
 const LYING: f64 = 0.16;
 /// An episode that fails in less time has failed because of where it started, s.
-const EARLY: f64 = 2.0;
+pub(super) const EARLY: f64 = 2.0;
 /// How long before a later failure episodes start, s.
 const BEFORE: f64 = 1.0;
 

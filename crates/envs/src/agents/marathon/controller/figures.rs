@@ -18,6 +18,9 @@ pub trait Figure: Agent + Clone + Default {
     const TORSO: Part;
     /// Price of the effort; the original takes 0.3.
     const EFFORT: f64;
+    /// Worth of a fall. At the original's -1, a figure that is told to run backward lets itself fall that way: its velocity is
+    /// right until it lies, and a fall is cheaper than to stand there.
+    const FALL: f64;
     /// What a jump is worth now: nothing while a foot is on the ground, or else 1 and the height of the lowest foot, m.
     fn leap<T: Real>(s: &Senses<T>) -> T;
     /// How far the torso is lower than it may be, m.
@@ -30,6 +33,7 @@ impl Figure for HopperV0 {
     const PARTS: &'static [&'static str] = &["torso", "foot", "nose", "pelvis", "thigh", "calf"];
     const TORSO: Part = hopper::TORSO;
     const EFFORT: f64 = -0.1;
+    const FALL: f64 = -60.0;
 
     #[inline(always)]
     fn leap<T: Real>(s: &Senses<T>) -> T {
@@ -50,6 +54,7 @@ impl Figure for Walker2dV1 {
     const TORSO: Part = walker2d::TORSO;
     // at 0.3, walking costs more than it earns
     const EFFORT: f64 = -0.05;
+    const FALL: f64 = -40.0;
 
     #[inline(always)]
     fn leap<T: Real>(s: &Senses<T>) -> T {

@@ -9,9 +9,9 @@
 //! | `command` | commanded velocity, m/s; with `discrete` also the jump, 0 or 1 |
 //! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
 //!
-//! r = clamp(1 - 0.4 abs(commanded - mean velocity), -1, 1) + forward bonus + jump - effort + still. The forms of the first three
+//! r = clamp(1 - 0.8 abs(commanded - mean velocity), -1, 1) + forward bonus + jump - effort + still. The forms of the first three
 //! terms and of the effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not
-//! stand still. The Walker also pays for a low torso.
+//! stand still. The Walker also pays for a low torso. A fall costs 60 or 40.
 
 mod figures;
 pub mod schedule;
@@ -37,7 +37,7 @@ pub const FASTEST: f64 = 4.0;
 const MEMORY: usize = 3;
 /// Price of a difference of 1 m/s. The original's is 1.2 per 4 m/s, with which standing upright is worth something to a figure
 /// that is told to run, so that it stands.
-const PRICE: f64 = 1.6 / FASTEST;
+const PRICE: f64 = 3.2 / FASTEST;
 /// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
 const STILL: f64 = 0.5;
 const RESTLESS: f64 = 0.04;
@@ -117,6 +117,7 @@ impl<F: Figure> Agent for Controller<F> {
             parts: names(F::PARTS),
             command,
             memory: MEMORY,
+            termination_reward: Some(F::FALL),
             ..own
         }
     }

@@ -30,7 +30,7 @@ use std::sync::LazyLock;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::super::imitation::{StartAt, observe_body, sub, turned_to};
+use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
 };
@@ -79,8 +79,6 @@ const ACCELERATION: f64 = 4.0;
 const LEAD: f64 = 0.8;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
 const SIDEWAYS: f64 = 2.5;
-/// An episode that fails in less time may have failed because of where it started, s.
-const EARLY: f64 = 2.0;
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
 
