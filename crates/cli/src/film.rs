@@ -227,6 +227,9 @@ impl<'a> Stage<'a> {
             ghost: cast.ghost,
             errors: cast.ghost.map(|_| Errors::new(&model)),
         };
+        let fields = model.hfields.len();
+        let grounds = (0..cast.agents).map(|agent| stage.play.grounds(agent, fields)).collect::<Result<_, _>>()?;
+        stage.scene.set_grounds(grounds);
         stage.compare()?;
         Ok(stage)
     }

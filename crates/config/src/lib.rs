@@ -36,6 +36,9 @@ const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../..
 /// For figures in a plane that are told how fast to go.
 const CONTROLLER: (&str, &str) = ("controller-fast.yaml", include_str!("../../../assets/configs/controller-fast.yaml"));
 
+/// For figures that run over uneven ground.
+const TERRAIN: (&str, &str) = ("terrain-fast.yaml", include_str!("../../../assets/configs/terrain-fast.yaml"));
+
 /// For Marathon Man and his clips.
 const MARATHON_MAN: (&str, &str) =
     ("marathon_man-fast.yaml", include_str!("../../../assets/configs/marathon_man-fast.yaml"));
@@ -48,7 +51,7 @@ const MARATHON_MAN_STEER: (&str, &str) =
 const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 43] = [
+const FAST: [(&str, (&str, &str)); 45] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -69,6 +72,8 @@ const FAST: [(&str, (&str, &str)); 43] = [
     ("Ant", ("ant-fast.yaml", include_str!("../../../assets/configs/ant-fast.yaml"))),
     ("HopperController", CONTROLLER),
     ("WalkerController", CONTROLLER),
+    ("TerrainHopper", TERRAIN),
+    ("TerrainWalker2d", TERRAIN),
     ("MarathonMan", MARATHON_MAN),
     ("MarathonManWalk", MARATHON_MAN),
     ("MarathonManWalkLeft", MARATHON_MAN),

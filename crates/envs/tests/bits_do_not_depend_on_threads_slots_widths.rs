@@ -83,6 +83,12 @@ fn walker_controller() {
     check("WalkerController-v0");
 }
 
+/// Each has a course of its own.
+#[test]
+fn hopper_on_courses() {
+    check("TerrainHopper-v0");
+}
+
 /// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
 #[test]
 fn gymnasiums_ant() {

@@ -113,10 +113,10 @@ fn no_observation_is_constant() {
         let quaternions =
             |first: usize, joints: usize| (0..joints).flat_map(move |j| [first + 4 * j, first + 4 * j + 2]);
         let planar: Vec<usize> = match id.as_str() {
-            "Hopper-v0" | "Hopper-v1" | "HopperController-v0" => {
+            "Hopper-v0" | "Hopper-v1" | "HopperController-v0" | "TerrainHopper-v0" => {
                 [1, 4, 7].into_iter().chain(quaternions(10, 4)).collect()
             }
-            "Walker2d-v0" | "Walker2d-v1" | "WalkerController-v0" => {
+            "Walker2d-v0" | "Walker2d-v1" | "WalkerController-v0" | "TerrainWalker2d-v0" => {
                 [1, 4, 7].into_iter().chain(quaternions(11, 6)).collect()
             }
             // hips turn about z; ankles about an axis in the horizontal plane

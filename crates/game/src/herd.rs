@@ -144,6 +144,8 @@ pub(crate) struct Resident {
     pub command: Option<Vec<f64>>,
     pub restart: Restart,
     pub episode: Episode,
+    /// Elevations of its model's height fields.
+    pub grounds: Arc<Vec<Vec<f32>>>,
     /// States that frames are drawn from, oldest first.
     pub trail: VecDeque<Still>,
     /// What has happened since it was last asked.
@@ -194,6 +196,7 @@ impl Resident {
             controls: None,
             command: None,
             episode: Episode::default(),
+            grounds: Arc::default(),
             trail: VecDeque::new(),
             events: Vec::new(),
             pushes: Vec::new(),
@@ -355,8 +358,11 @@ impl Pen {
 
     /// Appends the state of a lane to its trail, and notes what it is told.
     fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
+        let mut grounds = Vec::new();
         let (qpos, qvel, command, reference) = match self.engine.get() {
             Engine::Env(env) => {
+                // lanes and fields exist
+                grounds.extend((0..self.model.hfields.len()).filter_map(|field| env.ground(lane, field).ok()));
                 let command = env.context(lane).map(|context| context.command()).unwrap_or_default();
                 let reference = env.reference(lane).unwrap_or_default();
                 env.state(lane).map(|s| (s.qpos, s.qvel, command, reference)).unwrap_or_default()
@@ -365,6 +371,9 @@ impl Pen {
         };
         if let Some(resident) = &mut self.lanes[lane] {
             resident.episode.command = command;
+            if *resident.grounds != grounds {
+                resident.grounds = Arc::new(grounds);
+            }
             resident.trail.push_back(Still { time, qpos, qvel, reference, fresh });
         }
     }

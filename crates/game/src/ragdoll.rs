@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Its life depends on the character, `seed`, `number` and what acts on it: not on the frame rate, and not on the other
 /// ragdolls of the world.
 #[derive(Component, Clone, Debug)]
-#[require(Transform, Episode, Restart)]
+#[require(Transform, Episode, Restart, OwnGround)]
 pub struct Ragdoll {
     /// What it is.
     pub character: Character,
@@ -119,6 +119,11 @@ impl Default for Restart {
         Restart { after_fall: 0.0, on_time_up: true }
     }
 }
+
+/// The ground that a [`Ragdoll`] stands on: elevations of each height field of its model, m above the field's zero, by rows. Written
+/// by the plugin whenever it changes; empty without height fields.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct OwnGround(pub Arc<Vec<Vec<f32>>>);
 
 /// The present episode of a [`Ragdoll`]. Written by the plugin after every decision.
 #[derive(Component, Clone, Debug, Default, PartialEq)]

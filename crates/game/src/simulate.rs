@@ -6,8 +6,8 @@ use crate::ground::Ground;
 use crate::herd::{Event, Herd, Pen, Resident, Shove};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
-    AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Part, Physique, Policy, Push,
-    Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
+    AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, OwnGround, Part, Physique,
+    Policy, Push, Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
 };
 use crate::stage;
 use bevy::asset::LoadState;
@@ -354,12 +354,12 @@ pub(crate) fn simulate(mut marathon: ResMut<Marathon>, time: Res<Time<Fixed>>) {
 /// Tells the world what has happened.
 pub(crate) fn report(
     mut marathon: ResMut<Marathon>,
-    mut ragdolls: Query<(Entity, &Seat, &mut Episode)>,
+    mut ragdolls: Query<(Entity, &Seat, &mut Episode, &mut OwnGround)>,
     mut contacts: MessageWriter<FootContact>,
     mut ended: MessageWriter<EpisodeEnded>,
     mut began: MessageWriter<EpisodeBegan>,
 ) {
-    for (ragdoll, seat, mut episode) in &mut ragdolls {
+    for (ragdoll, seat, mut episode, mut ground) in &mut ragdolls {
         let Some(resident) = marathon.resident_mut(*seat) else { continue };
         for event in resident.events.drain(..) {
             match event {
@@ -376,6 +376,9 @@ pub(crate) fn report(
         }
         if *episode != resident.episode {
             episode.clone_from(&resident.episode);
+        }
+        if !Arc::ptr_eq(&ground.0, &resident.grounds) {
+            ground.0 = resident.grounds.clone();
         }
     }
 }

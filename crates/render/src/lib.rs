@@ -37,6 +37,7 @@ mod render;
 mod scene;
 mod shade;
 mod shape;
+mod terrain;
 mod view;
 
 pub use animation::GifWriter;

@@ -8,6 +8,7 @@ use crate::ground::Marks;
 use crate::kinematics::{self, Pose};
 use crate::palette::{self, Side};
 use crate::shape::{Plane, Shape, Solid};
+use crate::terrain::Terrain;
 
 /// MuJoCo's default color, which says that nobody chose one.
 const UNCHOSEN: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
@@ -22,12 +23,16 @@ pub struct Scene {
     model: Model,
     shown: Vec<Shown>,
     planes: Vec<ShownPlane>,
+    /// Geoms that are height fields.
+    fields: Vec<usize>,
     /// The runner's geoms all have the same color.
     one_color: bool,
     spacing: f64,
     radius: f64,
     height: f64,
     marks: Marks,
+    /// Ground of the agents' own, by agent and height field.
+    grounds: Vec<Vec<Vec<f32>>>,
 }
 
 /// A geom that will be drawn, with what does not change between frames.
@@ -80,7 +85,7 @@ pub struct AgentView {
 impl Scene {
     /// Collects the visible geoms of `model`.
     ///
-    /// Left out are geoms with alpha 0, height fields and meshes (which the simulator refuses), and MuJoCo's hidden
+    /// Left out are geoms with alpha 0, meshes (which the simulator refuses), and MuJoCo's hidden
     /// groups 3 and up unless every geom of the moving bodies is in one of those.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
@@ -93,9 +98,12 @@ impl Scene {
         let rest = kinematics::pose(model, &model.qpos0, 0).ok();
         let mut shown = Vec::new();
         let mut planes = Vec::new();
+        let mut fields = Vec::new();
         for (index, geom) in model.geoms.iter().enumerate().filter(|(_, geom)| visible(geom)) {
             if geom.kind == GeomType::Plane {
                 planes.push(ShownPlane { geom: index, half: [geom.size[0], geom.size[1]] });
+            } else if geom.kind == GeomType::Hfield {
+                fields.push(index);
             } else if let Some(shape) = shape_of(geom) {
                 let color = (geom.rgba != UNCHOSEN).then(|| {
                     let [r, g, b, _] = geom.rgba.map(f64::from);
@@ -126,13 +134,25 @@ impl Scene {
         };
         let spacing = 2.0 * half_width + 0.6 * radius;
         let marks = Marks::new(radius, half_width);
-        Self { model: model.clone(), shown, planes, one_color, spacing, radius, height, marks }
+        Self { model: model.clone(), shown, planes, fields, one_color, spacing, radius, height, marks, grounds: Vec::new() }
     }
 
     /// The same scene with agents of a row `spacing` meters apart along y; 0 overlays them in one place.
     pub fn with_spacing(mut self, spacing: f64) -> Self {
         self.spacing = spacing;
         self
+    }
+
+    /// Gives agents ground of their own from the next frame on: per agent, the elevations of each of the model's height fields,
+    /// by rows, m above the field's center. Those of whom nothing is said have the model's.
+    ///
+    /// # Panics
+    /// If there are not as many elevations as a field has points.
+    pub fn set_grounds(&mut self, grounds: Vec<Vec<Vec<f32>>>) {
+        for (own, field) in grounds.iter().flat_map(|own| own.iter().zip(&self.model.hfields)) {
+            assert_eq!(own.len(), field.nrow * field.ncol, "one elevation per point of the grid");
+        }
+        self.grounds = grounds;
     }
 
     /// The same scene with or without numbers and lines on the ground.
@@ -195,12 +215,27 @@ impl Scene {
         for (agent, qpos) in qpos.iter().enumerate() {
             let pose = kinematics::pose(&self.model, qpos.as_ref(), agent)?;
             self.add_agent(&mut frame, agent, self.lane(lanes * agent), &pose);
+            self.add_fields(&mut frame, agent, self.lane(lanes * agent), &pose);
         }
         for (agent, qpos) in ghosts.iter().enumerate() {
             let pose = kinematics::pose(&self.model, qpos.as_ref(), agent)?;
             self.add_ghost(&mut frame, self.lane(lanes * agent + lanes - 1), &pose, place);
         }
         Ok(frame)
+    }
+
+    fn add_fields(&self, frame: &mut Frame, agent: usize, offset: DVec3, pose: &Pose) {
+        let own = self.grounds.get(agent);
+        for geom in &self.fields {
+            let Some(number) = self.model.geoms[*geom].hfield else { continue };
+            let (pos, rot) = placed(pose, *geom);
+            let elevations = own.and_then(|own| own.get(number)).map(Vec::as_slice);
+            let colors = palette::CHECKER.map(palette::linear);
+            let field = &self.model.hfields[number];
+            // strips beside each other do not overlap
+            let half_width = if self.grounds.len() > 1 && self.spacing > 0.0 { 0.5 * self.spacing } else { f64::INFINITY };
+            Terrain { field, elevations, pos: pos + offset, rot, half_width, colors }.add_to(&mut frame.solids, pose.com[0]);
+        }
     }
 
     /// Offset of a lane of the row.

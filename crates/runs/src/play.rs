@@ -89,6 +89,14 @@ impl<'a> Play<'a> {
         self.env.spec()
     }
 
+    /// Ground of an agent: elevations of each of the model's height fields, as [`VecEnv::ground`] has them.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn grounds(&mut self, agent: usize, fields: usize) -> Result<Vec<Vec<f32>>, RunError> {
+        (0..fields).map(|field| Ok(self.env.ground(agent, field)?)).collect()
+    }
+
     /// The command that an agent observed last.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use crate::clips::{self, Clips};
 use crate::error::RunError;
 use marathon_envs::options::Value;
+use marathon_envs::shard::task_of_role;
 use marathon_envs::{Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
 use marathon_learn::policy::options;
@@ -54,9 +55,9 @@ impl Setting {
         Ok(Setting { agent: registry::agent(name)?.facts().id, ..Setting::default() })
     }
 
-    /// The task that a policy is for.
+    /// The task that a policy is for; of a role's policy, that in which it has the role.
     pub fn of(policy: &PolicyMeta) -> Self {
-        Setting { agent: policy.agent.clone(), options: policy.options.clone(), clips: policy.clips.clone() }
+        Setting { agent: task_of_role(&policy.agent).into(), options: policy.options.clone(), clips: policy.clips.clone() }
     }
 
     /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds their names.

@@ -2,9 +2,11 @@
 //! command, the version and the processor, so that somebody else can make it again.
 
 mod agreement;
+mod assault_course;
 mod concurrency;
 mod decision_period;
 mod headless;
+mod kept;
 mod multi_env;
 mod peers;
 mod record;
@@ -68,6 +70,22 @@ pub enum What {
         #[arg(long)]
         kept_only: bool,
     },
+    /// Runners that learned on flat, random, ever harder and adversarial ground, with and without seeing it, on courses that none
+    /// of them knows. Keeps its runs in runs/assault-course, unless --keep names another folder, and a small file beside each,
+    /// which is enough for the page.
+    AssaultCourse {
+        #[command(flatten)]
+        options: Options,
+        /// TerrainHopper, TerrainWalker2d, or both with a comma between them [default: both].
+        #[arg(long, value_name = "TASKS", value_delimiter = ',')]
+        tasks: Vec<String>,
+        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded [default: all].
+        #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
+        grounds: Vec<String>,
+        /// Only what is kept: a page of the runs that are there, without training any.
+        #[arg(long)]
+        kept_only: bool,
+    },
 }
 
 /// What all studies have.
@@ -76,7 +94,7 @@ pub struct Options {
     /// Seeds of each row.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// Agent-steps of each run [default: 1,000,000; in style-transfer what the configuration says]; in table1, of an agent
+    /// Agent-steps of each run [default: 1,000,000; in style-transfer and assault-course what the configuration says]; in table1, of an agent
     /// with a network of the paper's usual size.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: Option<u64>,
@@ -136,6 +154,9 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::MultiEnv(options) => (multi_env::run(options)?, options),
         What::StyleTransfer { options, clips, kept_only } => {
             (style_transfer::run(options, clips, *kept_only)?, options)
+        }
+        What::AssaultCourse { options, tasks, grounds, kept_only } => {
+            (assault_course::run(options, tasks, grounds, *kept_only)?, options)
         }
     };
     let page = record.save(options)?;

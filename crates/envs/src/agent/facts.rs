@@ -231,6 +231,11 @@ impl Motors {
         Motors(set)
     }
 
+    /// The motor of a number, less than 128.
+    pub const fn number(motor: usize) -> Motors {
+        Motors(1 << motor)
+    }
+
     /// Whether motor `i` belongs to the set.
     #[inline(always)]
     pub fn contains(self, i: usize) -> bool {

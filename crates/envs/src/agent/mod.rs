@@ -14,6 +14,7 @@ mod outputs;
 pub mod reference;
 mod role;
 pub mod senses;
+mod site;
 mod start;
 pub mod tolerance;
 
@@ -30,6 +31,7 @@ pub use outputs::{Obs, Terms};
 pub use reference::{Following, Frame};
 pub use role::RoleFacts;
 pub use senses::Senses;
+pub use site::Site;
 pub use start::Start;
 pub use tolerance::{Sigmoid, Tolerance};
 
@@ -80,6 +82,19 @@ pub trait Agent: Send + Sync + 'static {
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         c.ctrl.copy_from_slice(c.action);
+    }
+
+    /// Lanes whose ground changes before the next decision is carried out: those that [`Agent::build`] is called for. It is
+    /// asked once per decision, with what the agent remembers.
+    #[inline(always)]
+    fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
+        let _ = memory;
+        T::none()
+    }
+
+    /// Changes an agent's ground in mid-episode. It is a function of the site alone.
+    fn build(&self, site: &mut Site) {
+        let _ = site;
     }
 
     /// Lanes in which a role, numbered as in [`Facts::roles`], decides next. It is asked once per decision, with the state that

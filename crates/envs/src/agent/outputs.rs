@@ -82,7 +82,7 @@ impl<'a, T: Real> Obs<'a, T> {
     /// Appends the velocity of every actuated joint (`JointVelocity`), see [`Senses::joint_velocity`].
     #[inline(always)]
     pub fn joint_velocities(&mut self, s: &Senses<T>) {
-        for i in 0..s.action_count() {
+        for i in 0..s.motor_count() {
             self.scalar(s.joint_velocity(i));
         }
     }
@@ -113,5 +113,15 @@ impl<'a, T: Real> Terms<'a, T> {
         if let Some(names) = &mut self.names {
             names.push(name);
         }
+    }
+
+    /// Sum of the terms that have been added: what an opponent's reward may be the inverse of.
+    #[inline(always)]
+    pub fn sum(&self) -> T {
+        let mut sum = T::zero();
+        for term in &self.values[..self.len.min(self.values.len())] {
+            sum += *term;
+        }
+        sum
     }
 }

@@ -140,7 +140,13 @@ impl<T: Real> Senses<'_, T> {
         [T::select(flip, x, -x), T::select(flip, y, -y), T::select(flip, z, -z), T::select(flip, -w, w)]
     }
 
-    /// Velocity of the joint that motor `i` drives: rad/s divided by pi (half turns per second) for a hinge, m/s for a
+    /// Number of motors that drive a joint.
+    #[inline(always)]
+    pub fn motor_count(&self) -> usize {
+        self.bindings.motors.len()
+    }
+
+    /// Velocity of the joint that motor `i` of these drives: rad/s divided by pi (half turns per second) for a hinge, m/s for a
     /// slide. (The original differentiated an Euler angle that wrapped; this is what it meant.)
     #[inline(always)]
     pub fn joint_velocity(&self, i: usize) -> T {

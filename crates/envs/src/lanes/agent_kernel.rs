@@ -6,7 +6,7 @@ use marathon_physics::{Group, Model, Readings, Work};
 
 use super::group::LaneGroup;
 use super::task::Task;
-use crate::agent::{Agent, Ctrl, Obs, Senses, Start, Terms};
+use crate::agent::{Agent, Ctrl, Obs, Senses, Site, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
 /// An [`Agent`] for lanes of one kind.
@@ -19,6 +19,10 @@ pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize;
     /// Turns the group's actions into controls, see [`Agent::ctrl`].
     fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>);
+    /// Lanes whose ground changes now, a bit each, see [`Agent::builds`].
+    fn builds(&self, group: &LaneGroup<T>) -> u32;
+    /// Changes an agent's ground, see [`Agent::build`].
+    fn build(&self, site: &mut Site);
     /// Begins or remembers, observes, rewards, reports and terminates, all in one kernel: an agent's code is compiled into it
     /// once per instruction set.
     fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived;
@@ -72,8 +76,30 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
         T::enter(Drive { agent: self, task, group });
     }
 
+    fn builds(&self, group: &LaneGroup<T>) -> u32 {
+        T::enter(Ask { agent: self, memory: &group.memory })
+    }
+
+    fn build(&self, site: &mut Site) {
+        Agent::build(self, site);
+    }
+
     fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived {
         T::enter(Perceive { agent: self, task, group, work, occasion })
+    }
+}
+
+/// What [`AgentKernel::builds`] runs.
+struct Ask<'a, T: Real, A> {
+    agent: &'a A,
+    memory: &'a [T],
+}
+
+impl<T: Real, A: Agent> Kernel<T> for Ask<'_, T, A> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self) -> u32 {
+        T::bits(self.agent.builds(self.memory))
     }
 }
 

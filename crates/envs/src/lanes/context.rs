@@ -4,6 +4,7 @@
 
 use marathon_physics::Variation;
 use marathon_physics::lanes::Real;
+use marathon_physics::model::HField;
 
 use super::group::LaneGroup;
 use super::task::Task;
@@ -148,6 +149,15 @@ pub(crate) struct LaneContext<'a, T: Real> {
     pub lane: usize,
 }
 
+impl<T: Real> LaneContext<'_, T> {
+    /// A height field of the model.
+    fn grid(&self, field: usize) -> Result<&HField, EnvError> {
+        let fields = &self.task.blueprint.model.hfields;
+        let none = || refuse("field", field, "less than the number of the model's height fields");
+        fields.get(field).map_or_else(none, Ok)
+    }
+}
+
 fn refuse<X>(option: &'static str, found: impl ToString, expected: &'static str) -> Result<X, EnvError> {
     Err(EnvError::Option { option, found: found.to_string(), expected })
 }
@@ -209,10 +219,13 @@ impl<T: Real> AgentContext for LaneContext<'_, T> {
         Ok(())
     }
 
+    fn ground(&self, field: usize) -> Result<Vec<f32>, EnvError> {
+        self.grid(field)?;
+        Ok(self.group.physics.elevations(&self.task.sim, self.lane, field))
+    }
+
     fn set_ground(&mut self, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
-        let Some(grid) = self.task.blueprint.model.hfields.get(field) else {
-            return refuse("field", field, "less than the number of the model's height fields");
-        };
+        let grid = self.grid(field)?;
         check_length("elevations [nrow][ncol]", elevations.len(), grid.nrow * grid.ncol)?;
         if let Some(x) = elevations.iter().find(|x| !x.is_finite()) {
             return refuse("elevations", x, "finite numbers");

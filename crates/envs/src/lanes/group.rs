@@ -7,7 +7,7 @@ use super::agent_kernel::{Named, Occasion, Perceived};
 use super::context::Commands;
 use super::saved::{Body, Whole};
 use super::task::{EpisodeStart, Task};
-use crate::agent::Controls;
+use crate::agent::{Controls, Site};
 use crate::episode_rng::EpisodeId;
 use crate::shard::{BLOCK, BlockStep};
 
@@ -197,6 +197,7 @@ impl<T: Real> LaneGroup<T> {
         let along_x = &task.bindings.along_x;
         let clip = task.facts.controls == Controls::Nominal;
         let unsound = T::enter(TakeActions { group: self, along_x, action, first, clip });
+        self.build(task);
         task.agent.control(task, self);
         task.sim.advance(work, &mut self.physics, task.facts.frame_skip);
         task.sim.measure(work, &self.physics, &task.bindings.measure);
@@ -206,6 +207,27 @@ impl<T: Real> LaneGroup<T> {
         let ended = Ended { terminated: perceived.failed, truncated: perceived.over, diverged: unsound };
         let (termination_reward, of_first) = (task.facts.termination_reward, task.terms_of_first());
         T::enter(SumReward { group: self, termination_reward, of_first, ended })
+    }
+
+    /// Changes the ground of the agents that ask for it.
+    fn build(&mut self, task: &Task<T>) {
+        let lanes = task.agent.builds(self);
+        for lane in (0..T::LANES).filter(|lane| lanes >> lane & 1 == 1) {
+            let LaneGroup { physics, memory, action, .. } = self;
+            let read = |v: &[T]| -> Vec<f64> { v.iter().map(|x| T::widen(x.get(lane))).collect() };
+            let fields = 0..task.blueprint.model.hfields.len();
+            let before: Vec<Vec<f32>> = fields.map(|field| physics.elevations(&task.sim, lane, field)).collect();
+            let (action, mut own, mut grounds) = (read(action), read(memory), before.clone());
+            task.agent.build(&mut Site { action: &action, memory: &mut own, grounds: &mut grounds });
+            for (v, x) in memory.iter_mut().zip(own) {
+                v.set(lane, T::scalar(x));
+            }
+            for (field, (before, now)) in before.iter().zip(&grounds).enumerate() {
+                if now != before && now.len() == before.len() && now.iter().all(|z| z.is_finite()) {
+                    physics.set_ground(&task.sim, lane, field, now);
+                }
+            }
+        }
     }
 
     /// Writes the results of a decision into a block's arrays.

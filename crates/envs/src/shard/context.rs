@@ -29,6 +29,11 @@ pub trait AgentContext {
     /// # Errors
     /// If a length is wrong, or a number makes no sense.
     fn vary(&mut self, variation: &Variation) -> Result<(), EnvError>;
+    /// The agent's ground: elevations of the model's height field `field`, as [`AgentContext::set_ground`] takes them.
+    ///
+    /// # Errors
+    /// If there is no such field.
+    fn ground(&self, field: usize) -> Result<Vec<f32>, EnvError>;
     /// Gives the agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
     /// first of which has the smallest y. It lasts until changed, over all resets, unless the agent draws ground of its own
     /// ([`Start::set_ground`](crate::Start::set_ground)); starts that take physics are found on the model's own.

@@ -15,7 +15,7 @@ mod spec;
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
 pub use demonstrations::Demonstrations;
-pub use role::{Role, role_id};
+pub use role::{Role, role_id, task_of_role};
 pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
 use crate::error::EnvError;

@@ -24,6 +24,11 @@ pub fn role_id(task: &str, role: &str) -> String {
     format!("{task}/{role}")
 }
 
+/// The task that an id of [`role_id`] is about, or the id itself.
+pub fn task_of_role(id: &str) -> &str {
+    id.split_once('/').map_or(id, |(task, _)| task)
+}
+
 impl Spec {
     /// All who decide in the task: [`Spec::roles`], or one who has it all.
     pub fn deciders(&self) -> Vec<Role> {

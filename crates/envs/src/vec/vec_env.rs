@@ -222,6 +222,14 @@ impl VecEnv {
         self.context(agent)?.vary(variation)
     }
 
+    /// An agent's ground, see [`AgentContext::ground`].
+    ///
+    /// # Errors
+    /// If there is no such agent or field.
+    pub fn ground(&mut self, agent: usize, field: usize) -> Result<Vec<f32>, EnvError> {
+        self.context(agent)?.ground(field)
+    }
+
     /// Gives an agent ground of its own, see [`AgentContext::set_ground`].
     ///
     /// # Errors

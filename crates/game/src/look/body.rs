@@ -2,8 +2,9 @@
 
 use crate::axes::{place_to_game, to_game};
 use crate::look::{TINTS, ground};
-use crate::ragdoll::{Anatomy, Part, Ragdoll};
+use crate::ragdoll::{Anatomy, OwnGround, Part, Ragdoll};
 use bevy::asset::RenderAssetUsages;
+use bevy::camera::visibility::NoFrustumCulling;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
@@ -31,7 +32,7 @@ impl Plugin for LookPlugin {
         app.init_resource::<Wardrobe>();
         app.register_required_components::<Ragdoll, Visibility>();
         app.register_required_components::<Part, Visibility>();
-        app.add_systems(Update, dress);
+        app.add_systems(Update, (dress, lay).chain());
     }
 }
 
@@ -86,18 +87,17 @@ fn dress(
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut images: ResMut<Assets<Image>>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    new: Query<(Entity, &Anatomy, &Transform, Option<&Tint>), Added<Anatomy>>,
+    new: Query<(Entity, &Anatomy, &Transform, &OwnGround, Option<&Tint>), Added<Anatomy>>,
 ) {
-    for (ragdoll, anatomy, track, tint) in &new {
+    for (ragdoll, anatomy, track, own, tint) in &new {
         let model = &*anatomy.model;
         let main = main_color(model);
         for (number, geom) in visible(model) {
             let (mesh, material) = match geom.kind {
                 GeomType::Plane | GeomType::Mesh => continue,
                 GeomType::Hfield => {
-                    let Some(field) = geom.hfield.and_then(|i| model.hfields.get(i)) else { continue };
-                    let corner = track.translation + to_game(geom.pos);
-                    (meshes.add(terrain(field, corner)), wardrobe.soil(&mut materials, &mut images, adapter.as_deref()))
+                    let Some(surface) = surface(model, geom, track, own) else { continue };
+                    (meshes.add(surface), wardrobe.soil(&mut materials, &mut images, adapter.as_deref()))
                 }
                 kind => {
                     let stuff = stuff(model, geom, main, tint);
@@ -110,6 +110,10 @@ fn dress(
             let shape = Shape { ragdoll, geom: number, own: material.clone() };
             let looks = (Mesh3d(mesh), MeshMaterial3d(material), place, name);
             let mut shape = commands.spawn((looks, shape, ChildOf(anatomy.parts[geom.body])));
+            if geom.kind == GeomType::Hfield {
+                // its bounds change with each course
+                shape.insert(NoFrustumCulling);
+            }
             if model.bodies[geom.body].weld_id != 0 {
                 shape.insert(BodyMesh(ragdoll));
             }
@@ -125,6 +129,31 @@ fn dress(
             commands.spawn((looks, BodyMesh(ragdoll), ChildOf(anatomy.parts[body])));
         }
     }
+}
+
+/// Draws ground that has changed.
+fn lay(
+    changed: Query<(Entity, &Anatomy, &Transform, &OwnGround), Changed<OwnGround>>,
+    shapes: Query<(&Shape, &Mesh3d)>,
+    mut meshes: ResMut<Assets<Mesh>>,
+) {
+    for (ragdoll, anatomy, track, own) in &changed {
+        for (shape, mesh) in shapes.iter().filter(|(shape, _)| shape.ragdoll == ragdoll) {
+            let geom = &anatomy.model.geoms[shape.geom];
+            if let Some(surface) = surface(&anatomy.model, geom, track, own)
+                && let Some(mut mesh) = meshes.get_mut(&mesh.0)
+            {
+                *mesh = surface;
+            }
+        }
+    }
+}
+
+/// The surface of a geom, if it is a height field, as its agent has it.
+fn surface(model: &Model, geom: &Geom, track: &Transform, own: &OwnGround) -> Option<Mesh> {
+    let number = geom.hfield?;
+    let field = model.hfields.get(number)?;
+    Some(terrain(field, own.0.get(number).map(Vec::as_slice), track.translation + to_game(geom.pos)))
 }
 
 /// Geoms that are drawn, and their numbers: opaque ones that MuJoCo's viewer would show, or all of a body that has none of these.
@@ -254,15 +283,19 @@ fn shape(kind: GeomType, [x, y, z]: [f32; 3]) -> Mesh {
     }
 }
 
-/// The surface of a height field at a place; its checker continues that of the ground around it.
-fn terrain(field: &HField, place: Vec3) -> Mesh {
+/// The surface of a height field at a place, with elevations of an agent's own or the model's; its checker continues that of the ground around it.
+fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
     let (rows, columns) = (field.nrow, field.ncol);
     let [half_x, half_y, height, _] = field.size;
     let along = |i: usize, n: usize, half: f64| half * (2.0 * i as f64 / (n.max(2) - 1) as f64 - 1.0);
     let points = (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c)));
     let positions: Vec<Vec3> = points
         .map(|(r, c)| {
-            let z = height * f64::from(field.data.get(r * columns + c).copied().unwrap_or_default());
+            let i = r * columns + c;
+            let z = match own.and_then(|own| own.get(i)) {
+                Some(z) => f64::from(*z),
+                None => height * f64::from(field.data.get(i).copied().unwrap_or_default()),
+            };
             to_game([along(c, columns, half_x), along(r, rows, half_y), z])
         })
         .collect();

@@ -1,6 +1,7 @@
 //! Ground, sky and sun.
 
 use crate::look::{FollowCamera, ground, meters};
+use crate::ragdoll::Anatomy;
 use bevy::asset::RenderAssetUsages;
 use bevy::light::{
     CascadeShadowConfig, CascadeShadowConfigBuilder, DirectionalLightShadowMap, NotShadowCaster, NotShadowReceiver,
@@ -9,6 +10,7 @@ use bevy::math::Affine2;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
+use marathon_physics::model::GeomType;
 use std::f32::consts::PI;
 
 /// How much a frame may cost.
@@ -38,6 +40,8 @@ const ZENITH: [f32; 3] = [0.25, 0.48, 0.78];
 const SUN: Vec3 = Vec3::new(-0.45, 0.80, 0.55);
 /// Half the side of the ground, m; it follows the camera.
 const REACH: f32 = 320.0;
+/// Depth of the ground below figures that run on height fields alone, m: more than a course goes down.
+const DEEP: f32 = 6.0;
 /// Radius of the sky, m.
 const SKY: f32 = 600.0;
 
@@ -57,9 +61,14 @@ impl Plugin for SceneryPlugin {
     }
 }
 
-/// What stays around the camera; sideways in steps of this, so that textures stand still.
-#[derive(Component)]
-struct Around(f32);
+/// What stays around the camera.
+#[derive(Component, Default)]
+struct Around {
+    /// Sideways in steps of this, so that textures stand still.
+    step: f32,
+    /// Far below figures that have no level floor.
+    floor: bool,
+}
 
 fn build(
     mut commands: Commands,
@@ -80,7 +89,7 @@ fn build(
     };
     commands.spawn((
         Name::new("ground"),
-        Around(ground::PERIOD),
+        Around { step: ground::PERIOD, floor: true },
         Mesh3d(meshes.add(Plane3d::default().mesh().size(2.0 * REACH, 2.0 * REACH))),
         MeshMaterial3d(materials.add(floor)),
         NotShadowCaster,
@@ -88,7 +97,7 @@ fn build(
     let sky = StandardMaterial { unlit: true, fog_enabled: false, cull_mode: None, ..default() };
     commands.spawn((
         Name::new("sky"),
-        Around(0.0),
+        Around::default(),
         Mesh3d(meshes.add(dome())),
         MeshMaterial3d(materials.add(sky)),
         NotShadowCaster,
@@ -174,11 +183,15 @@ fn dome() -> Mesh {
 fn follow(
     camera: Query<&Transform, (With<Camera3d>, Without<Around>)>,
     mut around: Query<(&Around, &mut Transform), Without<Camera3d>>,
+    figures: Query<&Anatomy>,
 ) {
     let Some(camera) = camera.iter().next() else { return };
     let at = camera.translation;
+    let stands = |anatomy: &Anatomy| anatomy.model.geoms.iter().any(|geom| geom.kind == GeomType::Plane);
+    let level = figures.is_empty() || figures.iter().any(stands);
     for (around, mut transform) in &mut around {
-        let step = |x: f32| if around.0 > 0.0 { (x / around.0).round() * around.0 } else { x };
-        transform.translation = Vec3::new(step(at.x), 0.0, step(at.z));
+        let step = |x: f32| if around.step > 0.0 { (x / around.step).round() * around.step } else { x };
+        let y = if around.floor && !level { -DEEP } else { 0.0 };
+        transform.translation = Vec3::new(step(at.x), y, step(at.z));
     }
 }

@@ -27,7 +27,7 @@ use crate::nets::activation::Activation;
 use crate::nets::mlp::Mlp;
 use crate::nets::normalize::Normalizer;
 use evaluation::Evaluation;
-use marathon_envs::shard::scale_action;
+use marathon_envs::shard::{scale_action, task_of_role};
 use marathon_envs::{Options, Spec};
 use marathon_physics::lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -225,14 +225,15 @@ impl Policy {
         self.meta.action_range.get(i).map_or(nominal, |range| scale_action(*range, nominal))
     }
 
-    /// Whether the policy fits a task.
+    /// Whether the policy fits a task: its own, or, if it is that of a role, the task of the same name in which one has it all.
     ///
     /// # Errors
     /// Names what differs.
     pub fn check(&self, spec: &Spec) -> Result<(), Error> {
         let meta = &self.meta;
+        let agent = if spec.roles.is_empty() && task_of_role(&meta.agent) == spec.id { &spec.id } else { &meta.agent };
         let pairs = [
-            ("agent", meta.agent.clone(), spec.id.clone()),
+            ("agent", agent.clone(), spec.id.clone()),
             ("observation length", meta.obs.to_string(), spec.obs.to_string()),
             ("action length", meta.act.to_string(), spec.act.to_string()),
             ("seconds between decisions", meta.control_dt.to_string(), spec.dt.to_string()),

@@ -127,6 +127,14 @@ impl<T: Real> Group<T> {
         self.grounds[field * T::LANES + lane] = Some(Arc::new(own));
     }
 
+    /// Elevations of a height field for an agent, as [`Group::set_ground`] takes them.
+    ///
+    /// # Panics
+    /// If there is no such field.
+    pub fn elevations(&self, sim: &Sim<T>, lane: usize, field: usize) -> Vec<f32> {
+        self.ground(sim, lane, field).heights.iter().map(|z| T::widen(*z) as f32).collect()
+    }
+
     /// Highest elevation of a height field for every agent.
     #[inline(always)]
     pub(crate) fn ground_top(&self, sim: &Sim<T>, field: usize) -> T {

@@ -1,23 +1,20 @@
 //! Style transfer: Marathon Man learns each motion clip, with the configuration that comes with him.
 
-mod kept;
+mod findings;
 
-use super::Options;
+use super::kept::{self, median};
 use super::record::Record;
+use super::Options;
 use crate::error::CliError;
 use crate::interrupt;
-use kept::Found;
-use marathon_config::{Loaded, default_for};
+use findings::Found;
 use marathon_envs::{nearest, registry};
-use marathon_learn::{Control, EvalOptions, IterationStats};
+use marathon_learn::EvalOptions;
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::report::csv::History;
 use marathon_runs::text::thousands;
-use marathon_runs::{
-    LearnOptions, PolicySource, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions,
-    imitation,
-};
+use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskOptions, imitation};
 use std::path::{Path, PathBuf};
 
 /// Folder that keeps the runs unless another is named.
@@ -42,6 +39,13 @@ struct Job {
     longest: f64,
 }
 
+impl Job {
+    /// Its training with a seed; each policy on the way is looked at afterwards.
+    fn training(&self, seed: u64) -> kept::Job {
+        kept::Job { task: self.task.clone(), arguments: TaskOptions::default(), seed, all_policies: true }
+    }
+}
+
 /// Trains and measures; with `kept_only`, tells of what is kept without training anything.
 ///
 /// # Errors
@@ -56,15 +60,14 @@ pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Recor
         for seed in 1..=options.seeds {
             let folder = keep.join(format!("{}-{seed}", job.task));
             let file = kept::file(&folder);
-            let (new, loaded) = new_run(job, seed, options);
-            let known = Session::open(Some(Task::named(&job.task)?), &new, Some(loaded), true)?.0.run;
-            match Found::read(&file, job, &known)? {
+            let training = job.training(seed);
+            match Found::read(&file, job, &training.expected(options)?)? {
                 Some(kept) => found.push(kept),
                 None if kept_only => {}
                 None => {
-                    train(job, seed, &folder, options)?;
+                    training.train(&folder, options)?;
                     let made = measured(job, &folder)?;
-                    made.write(&file)?;
+                    kept::write(&file, &made)?;
                     found.push(made);
                 }
             }
@@ -161,43 +164,6 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
     Ok(all)
 }
 
-/// Options and configuration of a new run.
-fn new_run(job: &Job, seed: u64, options: &Options) -> (RunOptions, Loaded) {
-    let learn = LearnOptions {
-        steps: options.steps,
-        seed: Some(seed),
-        threads: Some(options.threads),
-        ..LearnOptions::default()
-    };
-    // each is looked at afterwards
-    let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&job.task) };
-    (RunOptions { learn, ..RunOptions::default() }, loaded)
-}
-
-/// Makes the run that is to be in a folder, or what is missing of it.
-fn train(job: &Job, seed: u64, folder: &Path, options: &Options) -> Result<(), CliError> {
-    let opened = if folder.join("run.json").exists() {
-        let mut run = RunOptions { resume: Some(folder.into()), ..RunOptions::default() };
-        run.learn.steps = options.steps;
-        Session::open(None, &run, None, false)
-    } else {
-        let (run, loaded) = new_run(job, seed, options);
-        let run = RunOptions { out: Some(folder.into()), ..run };
-        Session::open(Some(Task::named(&job.task)?), &run, Some(loaded), false)
-    };
-    let session = match opened {
-        Ok((session, _)) => session,
-        Err(RunError::Complete { .. }) => return Ok(()),
-        Err(error) => return Err(error.into()),
-    };
-    let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
-    let outcome = session.carry_out(true, &mut { stop })?;
-    match outcome.evaluation {
-        Some(_) => Ok(()),
-        None => Err(CliError::Interrupted("what is done is kept; the same command goes on from there".into())),
-    }
-}
-
 /// Reads a finished run, and judges the policies that it has left on the way.
 fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
@@ -234,27 +200,14 @@ fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
         curve.extend(followed.first().map(|clip| [steps as f64, seconds, clip.seconds / job.longest]));
     }
     let Summary { steps, cpu_seconds, .. } = summary;
-    Ok(Found { run, clip: kept::clip(job), steps, cpu_seconds, imitation, curve })
-}
-
-/// The middle one of some numbers.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);
-    Some((values[low] + values[high]) / 2.0)
+    Ok(Found { run, clip: findings::clip(job), steps, cpu_seconds, imitation, curve })
 }
 
 /// A line of the table.
 fn row(job: &Job, found: &[Found]) -> Vec<String> {
     let cell = |text: &dyn Fn(f64) -> String, of: &dyn Fn(&Found) -> Option<f64>| {
         let values: Vec<Option<f64>> = found.iter().map(of).collect();
-        let known: Vec<f64> = values.iter().flatten().copied().collect();
-        // what some seeds never reach has no median
-        let middle = if known.len() == values.len() { median(known) } else { None };
-        let middle = middle.map_or("-".into(), text);
-        let each: Vec<String> = values.iter().map(|value| value.map_or("-".into(), text)).collect();
-        let differ = each.iter().any(|text| *text != middle);
-        if differ { format!("{middle} ({})", each.join(", ")) } else { middle }
+        kept::cell(&values, text)
     };
     let whole = |x: f64| thousands(x.round() as u64);
     let once = |found: &Found, i: usize| {
@@ -297,13 +250,6 @@ fn middle(found: &[Found]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn medians_are_in_the_middle() {
-        assert_eq!(median(vec![]), None);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
-    }
 
     #[test]
     fn every_clip_has_a_task_and_unknown_ones_are_refused() {

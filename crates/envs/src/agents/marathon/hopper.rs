@@ -70,18 +70,7 @@ impl Agent for HopperV0 {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.group("velocity");
-        out.vector(s.linear_velocity(TORSO));
-        out.group("forward");
-        out.vector(s.forward(TORSO));
-        out.group("up");
-        out.vector(s.up(TORSO));
-        out.group("touch");
-        out.touch_sensors(s);
-        out.group("joint_rotations");
-        out.joint_rotations(s);
-        out.group("joint_velocities");
-        out.joint_velocities(s);
+        observe_body(s, out);
         out.group("foot_height");
         out.scalar(s.height(FOOT));
     }
@@ -98,6 +87,23 @@ impl Agent for HopperV0 {
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
         s.terminate_on_non_foot_contact()
     }
+}
+
+/// Writes what the Hopper observes but for the height of its foot.
+#[inline(always)]
+pub(super) fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    out.group("velocity");
+    out.vector(s.linear_velocity(TORSO));
+    out.group("forward");
+    out.vector(s.forward(TORSO));
+    out.group("up");
+    out.vector(s.up(TORSO));
+    out.group("touch");
+    out.touch_sensors(s);
+    out.group("joint_rotations");
+    out.joint_rotations(s);
+    out.group("joint_velocities");
+    out.joint_velocities(s);
 }
 
 /// Hopper as of the paper's Table 1: the same senses, a reward between 0 and 1.

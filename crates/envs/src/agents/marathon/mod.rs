@@ -10,6 +10,7 @@ pub mod humanoid;
 mod imitation;
 pub mod in_style;
 pub mod marathon_man;
+pub mod terrain;
 pub mod walker2d;
 
 use std::sync::Arc;
@@ -29,6 +30,8 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(ant::AntV1),
         Arc::new(controller::HopperController::default()),
         Arc::new(controller::WalkerController::default()),
+        Arc::new(terrain::TerrainHopper::default()),
+        Arc::new(terrain::TerrainWalker2d::default()),
     ];
     out.extend(marathon_man::all());
     out.extend(in_style::all());

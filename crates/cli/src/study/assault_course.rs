@@ -1,0 +1,252 @@
+//! Assault courses: figures learn on level, random, ever harder and adversarial ground, with and without seeing it, and are judged
+//! on courses that none of them has trained on.
+
+use super::Options;
+use super::kept::{self, cell, median};
+use super::record::{EPISODES, Record};
+use crate::error::CliError;
+use crate::interrupt;
+use marathon_envs::nearest;
+use marathon_envs::options::Value;
+use marathon_learn::{EvalOptions, evaluate};
+use marathon_physics::lanes::Isa;
+use marathon_runs::report::chart::Chart;
+use marathon_runs::text::thousands;
+use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskOptions};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Folder that keeps the runs unless another is named.
+const KEEP: &str = "runs/assault-course";
+/// The figures.
+const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
+
+/// Ground to learn on: its name and the arguments that make it.
+type Ground = (&'static str, &'static [(&'static str, &'static str)]);
+
+/// Grounds to learn on.
+const GROUNDS: [Ground; 5] = [
+    ("flat", &[("course", "flat"), ("levels", "fixed")]),
+    ("random", &[("course", "mixed"), ("levels", "random"), ("difficulty", "1")]),
+    ("curriculum", &[("course", "mixed"), ("levels", "curriculum"), ("difficulty", "1")]),
+    ("adversary", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1")]),
+    ("bounded", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")]),
+];
+
+/// Courses that policies are judged on: what the table calls them, kind, difficulty.
+const COURSES: [(&str, &str, &str); 5] = [
+    ("flat", "flat", "0"),
+    ("bumps", "bumps", "1"),
+    ("blocks", "blocks", "1"),
+    ("mixed", "mixed", "1"),
+    ("meters", "meters", "0.5"),
+];
+
+/// What a finished run has found.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Found {
+    /// What was trained.
+    run: RunFile,
+    /// Agent-steps done.
+    steps: u64,
+    /// Processor seconds of the training.
+    cpu_seconds: f64,
+    /// On each course: the mean way of an episode, m, and how many episodes ended with a fall.
+    courses: Vec<Judged>,
+}
+
+/// A policy on a course.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Judged {
+    course: String,
+    difficulty: f64,
+    distance: f64,
+    falls: u64,
+}
+
+/// Trains and measures; with `kept_only`, tells of what is kept without training anything.
+///
+/// # Errors
+/// If a name is unknown, or a run cannot be trained or read, or was made with another configuration.
+pub fn run(options: &Options, tasks: &[String], grounds: &[String], kept_only: bool) -> Result<Record, CliError> {
+    let tasks = chosen("--tasks", tasks, &TASKS)?;
+    let grounds = chosen("--grounds", grounds, &GROUNDS.map(|(name, _)| name))?;
+    interrupt::install("finishing this iteration; the same command goes on from there")?;
+    let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
+    let (mut rows, mut bars) = (Vec::new(), Vec::new());
+    for task in &tasks {
+        for (ground, arguments) in GROUNDS.iter().filter(|(name, _)| grounds.contains(name)) {
+            for heights in [true, false] {
+                let mut found = Vec::new();
+                for seed in 1..=options.seeds {
+                    let sight = if heights { "heights" } else { "blind" };
+                    let folder = keep.join(format!("{task}-{ground}-{sight}-{seed}"));
+                    found.extend(one(task, arguments, heights, seed, &folder, options, kept_only)?);
+                }
+                if found.is_empty() {
+                    continue;
+                }
+                let held_out = |f: &Found| f.courses[1..3].iter().map(|c| 0.5 * c.distance).sum();
+                let name = format!("{}, {ground}{}", &task["Terrain".len()..], if heights { "" } else { ", blind" });
+                bars.push((name, median(found.iter().map(held_out).collect()).unwrap_or(0.0)));
+                rows.push(row(task, ground, heights, &found));
+            }
+        }
+    }
+    if rows.is_empty() {
+        return Err(CliError::file(&keep, "runs", "none of these", "what an earlier study has kept"));
+    }
+    let mut columns = vec!["figure", "learned on", "sees the ground", "seeds", "decisions", "processor seconds"];
+    columns.extend(COURSES.iter().map(|(name, ..)| *name));
+    let list = |flag: &str, given: &[&str], all: usize| {
+        if given.len() == all { String::new() } else { format!(" {flag} {}", given.join(",")) }
+    };
+    let mut words = list("--tasks", &tasks, TASKS.len()) + &list("--grounds", &grounds, GROUNDS.len());
+    if kept_only {
+        words.push_str(" --kept-only");
+    }
+    Ok(Record {
+        name: "assault-course",
+        title: "Assault courses",
+        about: about(),
+        columns,
+        rows,
+        words,
+        versions: Vec::new(),
+        chart: Chart::Bars("mean way on the two courses made by hand, m, median of the seeds", bars),
+    })
+}
+
+fn about() -> String {
+    format!(
+        "Figures learn to run by PPO with `terrain-fast.yaml` on five kinds of [ground](../environments/terrain.md): *flat*; *random*, \
+         mixed courses of any difficulty; *curriculum*, mixed courses that become harder; *adversary*, built ahead by a second \
+         learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter. Each learns with \
+         and without seeing the ground ahead.\n\n\
+         The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
+         courses of full difficulty, and on the original's meters, of up to 0.5 m. The courses made by hand and the meters are \
+         nobody's training ground. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
+         fall: medians over the seeds, and each seed's number in brackets if they differ. The picture has the mean of both \
+         courses made by hand."
+    )
+}
+
+/// Those of `all` that are asked for; all without any.
+fn chosen(flag: &str, asked: &[String], all: &[&'static str]) -> Result<Vec<&'static str>, CliError> {
+    for name in asked {
+        if !all.contains(&name.as_str()) {
+            let near = nearest(name, all.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
+            let (near, known) = (near.unwrap_or_default(), all.join(", "));
+            return Err(CliError::Usage(format!("{flag}: found '{name}', expected some of {known}{near}")));
+        }
+    }
+    Ok(all.iter().copied().filter(|name| asked.is_empty() || asked.iter().any(|a| a == name)).collect())
+}
+
+/// What a run has found; none if it is not there and none is to be made.
+fn one(
+    task: &str,
+    ground: &[(&str, &str)],
+    heights: bool,
+    seed: u64,
+    folder: &Path,
+    options: &Options,
+    kept_only: bool,
+) -> Result<Option<Found>, CliError> {
+    let mut arguments = arguments(ground);
+    arguments.given.push(("heights".into(), Value::Bool(heights)));
+    let job = kept::Job { task: task.into(), arguments, seed, all_policies: false };
+    let (file, expected) = (kept::file(folder), job.expected(options)?);
+    if let Some(found) = kept::read::<Found>(&file)? {
+        kept::check(&file, &found.run, &expected)?;
+        return Ok(Some(found));
+    }
+    if kept_only {
+        return Ok(None);
+    }
+    job.train(folder, options)?;
+    let found = judged(folder, options)?;
+    kept::write(&file, &found)?;
+    Ok(Some(found))
+}
+
+/// Arguments of a task from names and values.
+fn arguments(list: &[(&str, &str)]) -> TaskOptions {
+    let read = |text: &str| text.parse().unwrap_or_else(|never| match never {});
+    TaskOptions { given: list.iter().map(|(name, value)| ((*name).into(), read(value))).collect() }
+}
+
+/// Plays a finished run's policy on all courses.
+fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
+    let (folder, run): (_, RunFile) = RunFolder::open(path)?;
+    let file = folder.summary();
+    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
+    let summary: Summary =
+        serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))?;
+    let judge = EvalOptions { episodes: EPISODES, threads: options.threads, ..EvalOptions::default() };
+    let mut courses = Vec::new();
+    for (_, course, difficulty) in COURSES {
+        let task = arguments(&[("course", course), ("difficulty", difficulty), ("levels", "fixed")]);
+        let (policy, factory) = PolicySource { policy: folder.policy(), agent: None, task }.load()?;
+        let result = evaluate(&*factory, Isa::best(), &policy, &judge)?;
+        courses.push(Judged {
+            course: course.into(),
+            difficulty: difficulty.parse().unwrap_or_default(),
+            distance: result.distance_mean,
+            falls: result.falls,
+        });
+    }
+    let Summary { steps, cpu_seconds, .. } = summary;
+    Ok(Found { run, steps, cpu_seconds, courses })
+}
+
+/// A line of the table.
+fn row(task: &str, ground: &str, heights: bool, found: &[Found]) -> Vec<String> {
+    let of = |value: &dyn Fn(&Found) -> f64, text: &dyn Fn(f64) -> String| {
+        let values: Vec<Option<f64>> = found.iter().map(|f| Some(value(f))).collect();
+        cell(&values, text)
+    };
+    let whole = |x: f64| thousands(x.round() as u64);
+    let mut out = vec![
+        task["Terrain".len()..].to_string(),
+        ground.into(),
+        if heights { "yes" } else { "no" }.into(),
+        found.len().to_string(),
+        of(&|f| f.steps as f64, &whole),
+        of(&|f| f.cpu_seconds, &whole),
+    ];
+    for i in 0..COURSES.len() {
+        let way = of(&|f| f.courses[i].distance, &|x| format!("{x:.1}"));
+        let falls = of(&|f| f.courses[i].falls as f64, &whole);
+        out.push(format!("{way} m; {falls} fall"));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use marathon_envs::registry;
+
+    #[test]
+    fn grounds_and_courses_are_arguments_of_the_tasks() {
+        let all = COURSES.map(|(_, course, difficulty)| vec![("course", course), ("difficulty", difficulty)]);
+        let all = all.into_iter().chain(GROUNDS.map(|(_, list)| list.to_vec()));
+        for list in all {
+            for task in TASKS {
+                let options = arguments(&list).given.into_iter().collect();
+                registry::agent(task).unwrap().with_options(&options).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn unknown_names_are_refused() {
+        assert_eq!(chosen("--tasks", &[], &TASKS).unwrap(), TASKS);
+        assert_eq!(chosen("--tasks", &["TerrainHopper".into()], &TASKS).unwrap(), ["TerrainHopper"]);
+        let error = chosen("--tasks", &["TerrainHoper".into()], &TASKS).unwrap_err().to_string();
+        assert!(error.contains("did you mean 'TerrainHopper'?"), "{error}");
+    }
+}

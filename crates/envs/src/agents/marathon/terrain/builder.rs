@@ -1,0 +1,125 @@
+//! The adversary: a second role that builds the ground ahead of the runner, a meter at a time, and earns what the runner loses.
+//!
+//! It decides whenever the runner reaches a new meter, and its action is one of the original's 21 steps: the next meter is up to
+//! 1 m times the difficulty higher or lower than the last.
+
+use marathon_physics::lanes::Real;
+
+use super::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
+use super::runners::Runner;
+use super::{BUILT, DUE, SINCE, STEP};
+use crate::agent::{Obs, RoleFacts, Senses, Site, names};
+
+/// Names of the roles.
+pub(super) const RUNNER: &str = "runner";
+pub(super) const BUILDER: &str = "builder";
+/// The builder's actuator, part of the observation, and term of the reward.
+pub(super) const ACTION: &str = "ground";
+pub(super) const SEEN: &str = "site";
+pub(super) const EARNED: &str = "inverse";
+/// Steps up, and as many down.
+const STEPS: f64 = 10.0;
+/// How many points of the ground the builder sees, and how far one is from the next and the first from the torso, m.
+const POINTS_SEEN: usize = 12;
+const SPACING: f64 = 0.5;
+
+/// An actuator that moves nothing, with a tendon that pulls at nothing.
+pub(super) const ACTUATOR: &str = "<tendon><fixed name=\"ground\"><joint joint=\"rootx\" coef=\"0\"/></fixed></tendon>\n\
+     <actuator><motor name=\"ground\" tendon=\"ground\" ctrllimited=\"true\" ctrlrange=\"-1 1\"/></actuator>\n";
+
+/// The two roles: the figure with its own actions, observations and terms, and the builder.
+pub(super) fn roles(actions: Vec<String>, observations: &[&str], terms: &[String]) -> Vec<RoleFacts> {
+    let runner = RoleFacts {
+        name: RUNNER.into(),
+        observations: names(observations),
+        actions,
+        reward_terms: terms.to_vec(),
+        intermittent: false,
+    };
+    let builder = RoleFacts {
+        name: BUILDER.into(),
+        observations: names([SEEN]),
+        actions: names([ACTION]),
+        reward_terms: names([EARNED]),
+        intermittent: true,
+    };
+    vec![runner, builder]
+}
+
+/// What the builder sees: the ground from the torso to the end of what is built, as seen from the ground below the torso; the
+/// torso's height above it, velocity, forward axis; the last step, m; seconds since the last meter.
+#[inline(always)]
+pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    let ([x, y, z], [vx, _, vz], [fx, _, fz]) =
+        (s.position(F::TORSO), s.linear_velocity(F::TORSO), s.forward(F::TORSO));
+    let below = s.ground_height(x, y);
+    out.group(SEEN);
+    for i in 1..=POINTS_SEEN {
+        out.scalar(s.ground_height(x + T::lit(i as f64 * SPACING), y) - below);
+    }
+    [z - below, vx, vz, fx, fz, s.memory(STEP), s.memory(SINCE) * T::lit(s.dt())].into_iter().for_each(|x| out.scalar(x));
+}
+
+/// Builds the next meter, and goes on level behind it.
+pub(super) fn build(site: &mut Site, difficulty: f64) {
+    let wanted = site.action.last().copied().unwrap_or(0.0);
+    // the runner reaches its next meter before it sees what is not built yet
+    let start = ((LEVEL_TO + site.memory[BUILT] - FROM) / CELL).round() as usize;
+    let per_meter = (1.0 / CELL).round() as usize;
+    for ground in site.grounds.iter_mut().take(1) {
+        let Some(from) = ground.get(start.min(POINTS - 1)).copied() else { continue };
+        let step = 0.1 * libm::round(STEPS * wanted) * difficulty;
+        let to = (f64::from(from) + step).clamp(-FARTHEST, FARTHEST);
+        site.memory[STEP] = to - f64::from(from);
+        for row in ground.chunks_exact_mut(POINTS) {
+            for (i, z) in row.iter_mut().enumerate().skip(start + 1) {
+                let share = ((i - start) as f64 / per_meter as f64).min(1.0);
+                *z = (f64::from(from) + share * (to - f64::from(from))) as f32;
+            }
+        }
+    }
+    site.memory[BUILT] += 1.0;
+    site.memory[DUE] = 0.0;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MEMORY;
+    use super::*;
+
+    fn after(actions: &[f64], difficulty: f64) -> (Vec<f64>, Vec<Vec<f32>>) {
+        let (mut memory, mut grounds) = (vec![0.0; MEMORY], vec![vec![0.0; 2 * POINTS]]);
+        for action in actions {
+            memory[DUE] = 1.0;
+            build(&mut Site { action: &[0.3, *action], memory: &mut memory, grounds: &mut grounds }, difficulty);
+            assert_eq!(memory[DUE], 0.0);
+        }
+        (memory, grounds)
+    }
+
+    fn height(ground: &[f32], x: f64) -> f64 {
+        f64::from(ground[((x - FROM) / CELL).round() as usize])
+    }
+
+    #[test]
+    fn meters_follow_each_other() {
+        let (memory, grounds) = after(&[1.0, -0.32, 0.04], 0.5);
+        let ground = &grounds[0];
+        // steps of 0.5, -0.15 and 0 m
+        let heights = [(4.0, 0.0), (5.0, 0.0), (5.5, 0.25), (6.0, 0.5), (7.0, 0.35), (8.0, 0.35), (100.0, 0.35)];
+        for (x, expected) in heights {
+            assert!((height(ground, x) - expected).abs() < 1e-6, "{x}: {}", height(ground, x));
+        }
+        assert_eq!(ground[..POINTS], ground[POINTS..]);
+        assert!(memory[STEP].abs() < 1e-6 && memory[BUILT] == 3.0);
+    }
+
+    #[test]
+    fn ground_stays_within_its_bounds_and_within_the_field() {
+        let (memory, grounds) = after(&[1.0; 150], 1.0);
+        let most = grounds[0].iter().copied().fold(0.0, f32::max);
+        assert!((f64::from(most) - FARTHEST).abs() < 1e-6 && memory[STEP] == 0.0);
+        let (_, level) = after(&[1.0; 3], 0.0);
+        assert!(level[0].iter().all(|z| *z == 0.0));
+    }
+}

@@ -1,0 +1,276 @@
+//! Courses: profiles of the ground along x, the same at every y.
+//!
+//! A course is level for some meters around the start. What follows comes in pieces, each with chance of its own, until the end.
+//! Everything that makes a piece hard grows with the difficulty, 0 to 1: at 0, every course is level.
+
+use crate::agent::options::Choice;
+use crate::episode_rng::EpisodeRng;
+
+/// Distance between the points of a course, m.
+pub const CELL: f64 = 0.1;
+/// Where it begins, m.
+pub const FROM: f64 = -6.0;
+/// Where it ends, m.
+pub const TO: f64 = 106.0;
+/// Points of a course.
+pub const POINTS: usize = ((TO - FROM) / CELL) as usize + 1;
+/// Where the level ground of the start ends, m. The original's first six meters are level.
+pub const LEVEL_TO: f64 = 5.0;
+/// Farthest from the start's height that the ground gets, but for gaps and single obstacles, m.
+pub const FARTHEST: f64 = 4.0;
+/// Depth of a gap, m.
+const DEPTH: f64 = 0.6;
+
+/// What a course is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Level ground.
+    Flat,
+    /// Slopes of up to 19 degrees, 1 to 4 m long.
+    Slopes,
+    /// Single steps up and down of up to 25 cm.
+    Steps,
+    /// Flights of three to eight stairs up to 16 cm high, up and down again.
+    Stairs,
+    /// Gaps of up to 90 cm.
+    Gaps,
+    /// Fields of stones of up to 12 cm, one every 20 cm.
+    Rubble,
+    /// Boxes across the way, up to 35 cm high.
+    Boxes,
+    /// Pieces of all those above.
+    Mixed,
+    /// The original's: each meter is up to 1 m higher or lower than the one before, by one of 21 steps of 0.1 m.
+    Meters,
+    /// Made by hand for experiment 001: bumps of up to 77 cm.
+    Bumps,
+    /// Made by hand for experiment 002: blocks.
+    Blocks,
+    /// Built by an adversary while the figure runs.
+    Adversary,
+}
+
+impl Choice for Kind {
+    const EXPECTED: &'static str =
+        "flat, slopes, steps, stairs, gaps, rubble, boxes, mixed, meters, bumps, blocks or adversary";
+    const NAMED: &'static [(Self, &'static str)] = &[
+        (Kind::Flat, "flat"),
+        (Kind::Slopes, "slopes"),
+        (Kind::Steps, "steps"),
+        (Kind::Stairs, "stairs"),
+        (Kind::Gaps, "gaps"),
+        (Kind::Rubble, "rubble"),
+        (Kind::Boxes, "boxes"),
+        (Kind::Mixed, "mixed"),
+        (Kind::Meters, "meters"),
+        (Kind::Bumps, "bumps"),
+        (Kind::Blocks, "blocks"),
+        (Kind::Adversary, "adversary"),
+    ];
+}
+
+/// Kinds of the pieces of a mixed course.
+const MIX: [Kind; 6] = [Kind::Slopes, Kind::Steps, Kind::Stairs, Kind::Gaps, Kind::Rubble, Kind::Boxes];
+/// Lengths of the bumps, their heights, and the ways to the next ones, m. The original's terrain is a sculpture of which no
+/// numbers are known but the greatest height.
+const BUMPS: [[f64; 3]; 6] =
+    [[2.0, 0.15, 1.0], [3.0, 0.4, 0.0], [1.5, 0.2, 2.0], [4.0, 0.77, 1.0], [1.0, 0.1, 0.0], [1.0, 0.15, 1.5]];
+/// The same of blocks.
+const BLOCKS: [[f64; 3]; 5] = [[0.6, 0.1, 3.0], [1.2, 0.2, 2.0], [0.4, 0.3, 4.0], [2.0, 0.25, 1.5], [0.8, 0.15, 2.5]];
+
+impl Kind {
+    /// Elevations of a course's points, m above the start.
+    pub fn elevations(self, difficulty: f64, random: &mut EpisodeRng) -> Vec<f64> {
+        let mut course = Course { points: Vec::with_capacity(POINTS), height: 0.0, difficulty, random };
+        course.level(LEVEL_TO - FROM);
+        let mut piece = 0;
+        while course.points.len() < POINTS {
+            course.add(self, piece);
+            piece += 1;
+        }
+        course.points.truncate(POINTS);
+        course.points
+    }
+}
+
+/// A course in the making.
+struct Course<'a> {
+    points: Vec<f64>,
+    /// Height where it ends as yet.
+    height: f64,
+    difficulty: f64,
+    random: &'a mut EpisodeRng,
+}
+
+impl Course<'_> {
+    /// Adds a piece, the first of which has number 0.
+    fn add(&mut self, kind: Kind, piece: usize) {
+        let hard = self.difficulty;
+        match kind {
+            Kind::Flat | Kind::Adversary => self.level(10.0),
+            Kind::Slopes => {
+                let length = self.random.uniform(1.0, 4.0);
+                let slope = self.signed(0.0, 0.35 * hard);
+                self.slope(length, slope * length);
+                self.pause(0.0, 1.0);
+            }
+            Kind::Steps => {
+                self.height += self.signed(0.075 * hard, 0.25 * hard);
+                self.pause(0.6, 2.0);
+            }
+            Kind::Stairs => {
+                let (count, rise) = (self.random.whole(3, 8), self.random.uniform(0.06, 0.16) * hard);
+                let (tread, first) = (self.random.uniform(0.3, 0.5), self.signed(1.0, 1.0).signum());
+                for side in [first, -first] {
+                    for _ in 0..count {
+                        self.height += side * rise;
+                        self.level(tread);
+                    }
+                    self.pause(1.0, 2.0);
+                }
+            }
+            Kind::Gaps => {
+                let width = self.random.uniform(0.3, 0.9) * hard;
+                self.beside(width, -DEPTH);
+                self.pause(1.5, 4.0);
+            }
+            Kind::Rubble => {
+                for _ in 0..self.random.whole(10, 20) {
+                    let height = self.random.uniform(0.0, 0.12) * hard;
+                    self.beside(0.2, height);
+                }
+                self.pause(0.5, 1.5);
+            }
+            Kind::Boxes => {
+                let (height, length) = (self.random.uniform(0.1, 0.35) * hard, self.random.uniform(0.3, 1.0));
+                self.beside(length, height);
+                self.pause(1.5, 4.0);
+            }
+            Kind::Mixed => {
+                let kind = MIX[self.random.whole(0, MIX.len() - 1)];
+                self.add(kind, piece);
+            }
+            Kind::Meters => {
+                let steps = self.random.whole(0, 20) as f64 - 10.0;
+                let rise = (self.height + 0.1 * steps * hard).clamp(-FARTHEST, FARTHEST) - self.height;
+                self.slope(1.0, rise);
+            }
+            Kind::Bumps => {
+                let [length, height, pause] = BUMPS[piece % BUMPS.len()];
+                self.bump(length, height * hard);
+                self.level(pause);
+            }
+            Kind::Blocks => {
+                let [length, height, pause] = BLOCKS[piece % BLOCKS.len()];
+                self.beside(length, height * hard);
+                self.level(pause);
+            }
+        }
+    }
+
+    /// Level ground.
+    fn level(&mut self, length: f64) {
+        self.slope(length, 0.0);
+    }
+
+    /// Level ground of any length in a range.
+    fn pause(&mut self, least: f64, most: f64) {
+        let length = self.random.uniform(least, most);
+        self.level(length);
+    }
+
+    /// A slope, at least a point long.
+    fn slope(&mut self, length: f64, rise: f64) {
+        let points = (length / CELL).round();
+        for i in 1..=points as usize {
+            self.points.push(self.height + rise * i as f64 / points);
+        }
+        self.height += if points > 0.0 { rise } else { 0.0 };
+    }
+
+    /// Ground that is higher or lower than what comes before and after it.
+    fn beside(&mut self, length: f64, height: f64) {
+        self.height += height;
+        self.level(length);
+        self.height -= height;
+    }
+
+    /// A smooth bump: u^2 (1 - u)^2, whose slope is 0 where it begins and ends.
+    fn bump(&mut self, length: f64, height: f64) {
+        let points = (length / CELL).round();
+        for i in 1..=points as usize {
+            let u = i as f64 / points;
+            let half = u * (1.0 - u);
+            self.points.push(self.height + 16.0 * height * half * half);
+        }
+    }
+
+    /// A number whose absolute value is in a range, with either sign; far from the start's height, with the one that leads back.
+    fn signed(&mut self, least: f64, most: f64) -> f64 {
+        let size = self.random.uniform(least, most);
+        let up = match self.height {
+            high if high > FARTHEST - 1.5 => false,
+            low if low < 1.5 - FARTHEST => true,
+            _ => self.random.uniform(0.0, 1.0) < 0.5,
+        };
+        if up { size } else { -size }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::episode_rng::EpisodeId;
+
+    /// Kinds that begin as level ground, whatever becomes of it.
+    const LEVEL: [Kind; 2] = [Kind::Flat, Kind::Adversary];
+
+    fn elevations(kind: Kind, difficulty: f64, episode: u64) -> Vec<f64> {
+        kind.elevations(difficulty, &mut EpisodeRng::new(EpisodeId { seed: 1, agent: 0, episode }))
+    }
+
+    #[test]
+    fn courses_begin_level_and_end_where_they_should() {
+        for (kind, name) in Kind::NAMED {
+            for episode in 0..20 {
+                let points = elevations(*kind, 1.0, episode);
+                assert_eq!(points.len(), POINTS, "{name}");
+                let level = ((LEVEL_TO - FROM) / CELL) as usize;
+                assert!(points[..level].iter().all(|z| *z == 0.0), "{name}");
+                let most = points.iter().fold(0.0f64, |most, z| most.max(z.abs()));
+                assert!(most <= FARTHEST + DEPTH, "{name} {most}");
+                assert_eq!(most > 0.0, !LEVEL.contains(kind), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn difficulty_makes_courses_rough() {
+        let roughness = |kind: Kind, difficulty: f64| {
+            let of = |episode| {
+                let points = elevations(kind, difficulty, episode);
+                points.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>()
+            };
+            (0..20).map(of).sum::<f64>()
+        };
+        for (kind, name) in Kind::NAMED.iter().filter(|(kind, _)| !LEVEL.contains(kind)) {
+            let [none, some, all] = [0.0, 0.5, 1.0].map(|difficulty| roughness(*kind, difficulty));
+            assert_eq!(none, 0.0, "{name}");
+            // a gap is as deep at any width
+            let least = match kind {
+                Kind::Gaps => 0.9,
+                Kind::Mixed => 1.2,
+                _ => 1.5,
+            };
+            assert!(all > least * some && some > 0.0, "{name}: {some}, {all}");
+        }
+    }
+
+    #[test]
+    fn only_courses_made_by_hand_repeat() {
+        for (kind, name) in Kind::NAMED {
+            let by_hand = LEVEL.contains(kind) || [Kind::Bumps, Kind::Blocks].contains(kind);
+            assert_eq!(elevations(*kind, 1.0, 1) == elevations(*kind, 1.0, 2), by_hand, "{name}");
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! Figures that run over uneven ground: the paper's assault courses.
+//!
+//! Each agent has ground of its own, drawn anew for every episode: a [course] of some kind and difficulty.
+//!
+//! | observation | content |
+//! |---|---|
+//! | what the figure's own task observes | but for the heights of its feet |
+//! | `foot_heights` | height of each foot's center above the ground below it, m |
+//! | `ground_ahead` | with `heights`: how far the ground is above the Hopper's foot or the Walker's torso, at 25 points every 0.2 m from 2 m behind it on, m |
+//! | `phase` | with `heights`: share of the present 0.2 m that lies behind, 0 to 1 |
+//!
+//! `full`: r = v/4 + forward bonus - effort - 4 (joints at limit) - pain, of the torso; experiment 004 of the original.
+//! `velocity`: r = clamp(v / 8 m/s, 0, 1), that of the Marathon Environments 2.
+//! `sparse`: r = way / 20 m at the end of the episode, 0 before.
+//!
+//! With the course `adversary` the task has two roles: the figure, and a [builder] who earns -r.
+
+mod builder;
+pub mod course;
+mod runners;
+
+pub use runners::Runner;
+
+use std::fmt::Write;
+
+use marathon_physics::lanes::Real;
+
+use super::FASTEST;
+use super::hopper::HopperV0;
+use super::walker2d::Walker2dV0;
+use crate::agent::options::Choice;
+use crate::agent::{
+    Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Site, Start, Terms, names,
+};
+use course::{FROM, Kind, POINTS, TO};
+
+/// Points at which the ground is seen, and how far one is from the next and the first behind the figure, m.
+const SEEN: usize = 25;
+const SPACING: f64 = 0.2;
+const BEHIND: f64 = 2.0;
+/// Farthest below or above the figure that ground is seen, m.
+const SIGHT: f64 = 3.0;
+
+/// Slots of the memory: the level of a course, 0 to 1, and its difficulty.
+const LEVEL: usize = 0;
+const DIFFICULTY: usize = 1;
+/// Where the torso is, was farthest, and the last full meter that was new, along x, m.
+const AT: usize = 2;
+const FARTHEST: usize = 3;
+const MARK: usize = 4;
+/// Decisions since that meter.
+const SINCE: usize = 5;
+/// Whether anything but the feet touches the ground, whether it did not before, and whether it has in this episode.
+const LIES: usize = 6;
+const HIT: usize = 7;
+const HURT: usize = 8;
+/// Whether the adversary is to build, how many meters it has built, and its last step, m.
+const DUE: usize = 9;
+const BUILT: usize = 10;
+const STEP: usize = 11;
+const MEMORY: usize = 12;
+
+/// Way that makes the next course harder, and way that makes it easier, m, and by how much.
+const FAR: f64 = 16.0;
+const NEAR: f64 = 8.0;
+const RUNG: f64 = 0.05;
+/// Time without a new meter that ends an episode, s.
+const PATIENCE: f64 = 5.0;
+/// Falls before here end the episode even of a figure that may fall, m.
+const TOO_EARLY: f64 = 4.0;
+/// Price of the joints driven at their limit: 0.8 for each.
+const JOINTS_AT_LIMIT: f64 = -4.0;
+/// Worth of a fall that ends the episode, where an adversary builds.
+const FALL: f64 = -1.0;
+/// Price of a fall that ends nothing.
+const PAIN: f64 = -5.0;
+/// Way that earns 1 with the sparse reward, m.
+const WAY: f64 = 20.0;
+/// Half the width of a course, m: tracks beside each other do not overlap in a picture.
+const HALF_WIDTH: f64 = 0.4;
+/// Thickness of the ground below the start's height, m.
+const BASE: f64 = 8.0;
+
+/// The Hopper on courses.
+pub type TerrainHopper = Terrain<HopperV0>;
+/// The Walker on courses.
+pub type TerrainWalker2d = Terrain<Walker2dV0>;
+
+/// What a figure is rewarded for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reward {
+    /// Speed and posture less effort.
+    Full,
+    /// Speed.
+    Velocity,
+    /// The way, at the end.
+    Sparse,
+}
+
+impl Choice for Reward {
+    const EXPECTED: &'static str = "full, velocity or sparse";
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(Reward::Full, "full"), (Reward::Velocity, "velocity"), (Reward::Sparse, "sparse")];
+}
+
+/// What a fall does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Falls {
+    /// It ends the episode.
+    End,
+    /// It hurts, and from then on neither posture nor effort counts.
+    Hurt,
+}
+
+impl Choice for Falls {
+    const EXPECTED: &'static str = "end or hurt";
+    const NAMED: &'static [(Self, &'static str)] = &[(Falls::End, "end"), (Falls::Hurt, "hurt")];
+}
+
+/// How difficult each course is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Levels {
+    /// As difficult as the option says.
+    Fixed,
+    /// Anything up to that.
+    Random,
+    /// At first level, then harder after a long way and easier after a short one.
+    Curriculum,
+}
+
+impl Choice for Levels {
+    const EXPECTED: &'static str = "fixed, random or curriculum";
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(Levels::Fixed, "fixed"), (Levels::Random, "random"), (Levels::Curriculum, "curriculum")];
+}
+
+crate::options! {
+    /// Arguments of a figure that runs over uneven ground.
+    pub struct TerrainArguments {
+        /// What the ground is made of: `flat`, `slopes`, `steps`, `stairs`, `gaps`, `rubble`, `boxes`, `mixed` of these, the
+        /// original's `meters`, made by hand: `bumps`, `blocks`, or built by an `adversary` that learns, too.
+        course: Kind = Kind::Mixed,
+        /// How difficult the most difficult courses are, from 0 to 1.
+        difficulty: Scale = Scale(0.5),
+        /// How difficult each course is: `fixed`, `random` up to the difficulty, or `curriculum`: 5 % harder after 16 m, 5 %
+        /// easier after less than 8 m.
+        levels: Levels = Levels::Fixed,
+        /// Whether it sees the ground ahead.
+        heights: bool = true,
+        /// What a fall does: `end` the episode, or `hurt`.
+        falls: Falls = Falls::End,
+        /// What it is rewarded for: `full`, `velocity`, or `sparse`.
+        reward: Reward = Reward::Full,
+    }
+}
+
+/// A figure that runs over uneven ground.
+#[derive(Clone, Debug, Default)]
+pub struct Terrain<F> {
+    figure: F,
+    arguments: TerrainArguments,
+}
+
+impl<F: Runner> Terrain<F> {
+    /// The figure's model with a height field in place of the floor.
+    fn model(&self) -> String {
+        const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
+        let own = self.figure.facts().model;
+        let text = own.text().expect("the figures' models are texts");
+        let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
+        let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
+        let mut out = text.replacen(FLOOR, &course, 1).trim_end().trim_end_matches("</mujoco>").to_owned();
+        // writing to a string cannot fail
+        let extra = if self.built() { builder::ACTUATOR } else { "" };
+        let _ = write!(
+            out,
+            "{extra}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {HALF_WIDTH} 1 {BASE}\"/></asset>\n\
+             </mujoco>\n"
+        );
+        out
+    }
+
+    /// Whether an adversary builds the ground.
+    fn built(&self) -> bool {
+        self.arguments.course == Kind::Adversary
+    }
+
+    /// Motors that count as effort: all but the adversary's.
+    #[inline(always)]
+    fn ignored(&self) -> Motors {
+        if self.built() { F::GROUND } else { Motors::NONE }
+    }
+
+    /// Level of the next course after an episode that has left its memory; 0 for the first one.
+    fn next_level(previous: &[f64]) -> f64 {
+        let change = match previous[FARTHEST] {
+            far if far >= FAR => RUNG,
+            near if near < NEAR => -RUNG,
+            _ => 0.0,
+        };
+        (previous[LEVEL] + change).clamp(0.0, 1.0)
+    }
+
+    /// Writes what the figure sees of the ground.
+    #[inline(always)]
+    fn observe_ahead<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        let [x, y, z] = s.position(F::EYES);
+        out.group("ground_ahead");
+        for i in 0..SEEN {
+            let ground = s.ground_height(x + T::lit(i as f64 * SPACING - BEHIND), y);
+            out.scalar((ground - z).max(T::lit(-SIGHT)).min(T::lit(SIGHT)));
+        }
+        out.group("phase");
+        let cells = x * T::lit(1.0 / SPACING);
+        out.scalar(cells - cells.floor());
+    }
+
+    /// Lanes that have made no new meter for too long.
+    #[inline(always)]
+    fn stuck<T: Real>(s: &Senses<T>) -> T::Mask {
+        T::lit(PATIENCE / s.dt()).lt(s.memory(SINCE))
+    }
+
+    /// Lanes that have come to the end of the course.
+    #[inline(always)]
+    fn through<T: Real>(s: &Senses<T>) -> T::Mask {
+        T::lit(TO - 1.0).lt(s.memory(AT))
+    }
+}
+
+impl<F: Runner> Agent for Terrain<F> {
+    fn facts(&self) -> Facts {
+        let own = self.figure.facts();
+        let reward = self.arguments.reward;
+        let mut terms = match reward {
+            Reward::Full => names(["velocity", "uprightness", "effort", "joints_at_limit", "pain"]),
+            Reward::Velocity => names(["velocity"]),
+            Reward::Sparse => names(["distance"]),
+        };
+        let (mut actions, mut roles, mut price) = (own.actions.clone(), Vec::new(), None);
+        if reward == Reward::Full {
+            price = own.termination_reward;
+        }
+        if self.built() {
+            if price.take().is_some() {
+                terms.push("fall".into());
+            }
+            let ahead: &[&str] = if self.arguments.heights { &["ground_ahead", "phase"] } else { &[] };
+            let seen = [F::BODY, &["foot_heights"], ahead].concat();
+            roles = builder::roles(actions.clone(), &seen, &terms);
+            actions.push(builder::ACTION.into());
+            terms.push(builder::EARNED.into());
+        }
+        Facts {
+            id: F::ID.into(),
+            summary: F::SUMMARY.into(),
+            model: self.model().into(),
+            observation: None,
+            actions,
+            reward_terms: terms,
+            roles,
+            info: names(["distance", "difficulty"]),
+            metrics: names(["forward", "difficulty"]),
+            memory: MEMORY,
+            termination_reward: price,
+            ..own
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.arguments.infos()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(Terrain { figure: self.figure.clone(), arguments: self.arguments.with(options) })
+    }
+
+    fn reset(&self, start: &mut Start) {
+        let TerrainArguments { course, difficulty: Scale(most), levels, .. } = self.arguments;
+        let level = match levels {
+            Levels::Fixed => 1.0,
+            Levels::Random => start.random.uniform(0.0, 1.0),
+            Levels::Curriculum => Self::next_level(start.previous),
+        };
+        let difficulty = level * most.min(1.0);
+        start.memory[LEVEL] = level;
+        start.memory[DIFFICULTY] = difficulty;
+        let profile = course.elevations(difficulty, start.random);
+        let row = profile.iter().map(|z| *z as f32);
+        start.set_ground(0, row.clone().chain(row).collect());
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let [x, ..] = s.position(F::TORSO);
+        for slot in [AT, FARTHEST, MARK] {
+            memory[slot] = x;
+        }
+        memory[DUE] = T::lit(1.0);
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let (zero, one) = (T::zero(), T::lit(1.0));
+        let [x, ..] = s.position(F::TORSO);
+        memory[AT] = x;
+        memory[FARTHEST] = memory[FARTHEST].max(x);
+        let new = (memory[MARK] + one).lt(x);
+        memory[MARK] = T::select(new, memory[MARK] + one, memory[MARK]);
+        memory[DUE] = T::masked(new, one);
+        memory[SINCE] = T::select(new, zero, memory[SINCE] + one);
+        let lies = T::masked(s.terminate_on_non_foot_contact(), one);
+        memory[HIT] = (lies - memory[LIES]).max(zero);
+        memory[LIES] = lies;
+        memory[HURT] = memory[HURT].max(lies);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        F::observe_body(s, out);
+        out.group("foot_heights");
+        for foot in F::SOLES {
+            let [x, y, z] = s.position(*foot);
+            out.scalar(z - s.ground_height(x, y));
+        }
+        if self.arguments.heights {
+            Self::observe_ahead(s, out);
+        }
+        if self.built() {
+            builder::observe::<F, T>(s, out);
+        }
+    }
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        match self.arguments.reward {
+            Reward::Full => {
+                let (whole, own) = (T::lit(1.0) - s.memory(HURT), self.ignored());
+                terms.add("velocity", 1.0, s.velocity(F::TORSO));
+                terms.add("uprightness", 1.0, whole * s.forward_bonus(F::TORSO));
+                terms.add("effort", F::EFFORT, whole * s.effort(own));
+                terms.add("joints_at_limit", JOINTS_AT_LIMIT, s.joints_at_limit_penalty(own));
+                terms.add("pain", PAIN, s.memory(HIT));
+                if self.built() {
+                    terms.add("fall", FALL, T::masked(self.terminated(s), T::lit(1.0)));
+                }
+            }
+            Reward::Velocity => terms.add("velocity", 1.0, s.normalized_velocity(F::TORSO, FASTEST)),
+            Reward::Sparse => {
+                let over = T::or(self.terminated(s), T::or(self.truncated(s), s.time_is_up()));
+                terms.add("distance", 1.0, T::masked(over, s.memory(FARTHEST) * T::lit(1.0 / WAY)));
+            }
+        }
+        if self.built() {
+            let earned = terms.sum();
+            terms.add(builder::EARNED, -1.0, earned);
+        }
+    }
+
+    fn build(&self, site: &mut Site) {
+        let difficulty = site.memory[DIFFICULTY];
+        builder::build(site, difficulty);
+    }
+
+    #[inline(always)]
+    fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
+        if self.built() { T::lit(0.5).lt(memory[DUE]) } else { T::none() }
+    }
+
+    #[inline(always)]
+    fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
+        if role == 0 { T::not(T::none()) } else { T::lit(0.5).lt(s.memory(DUE)) }
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let lies = T::lit(0.5).lt(s.memory(LIES));
+        match self.arguments.falls {
+            Falls::End => lies,
+            Falls::Hurt => T::and(lies, s.memory(AT).lt(T::lit(TOO_EARLY))),
+        }
+    }
+
+    #[inline(always)]
+    fn truncated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        T::or(Self::stuck(s), Self::through(s))
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.scalar(s.memory(FARTHEST));
+        out.scalar(s.memory(DIFFICULTY));
+    }
+}

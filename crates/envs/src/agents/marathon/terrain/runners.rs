@@ -1,0 +1,64 @@
+//! What the runners differ in.
+
+use marathon_physics::lanes::Real;
+
+use super::super::hopper::{self, FOOT, HopperV0};
+use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
+use crate::agent::{Agent, Motors, Obs, Part, Senses};
+
+/// What both observe of their bodies.
+const BODY: [&str; 6] = ["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities"];
+
+/// A figure that runs over uneven ground.
+pub trait Runner: Agent + Clone + Default {
+    /// Registry name of its task on courses.
+    const ID: &'static str;
+    /// One line for listings.
+    const SUMMARY: &'static str;
+    /// The torso.
+    const TORSO: Part;
+    /// What the ground ahead is seen from.
+    const EYES: Part;
+    /// Its feet, in the order in which it observes their heights.
+    const SOLES: &'static [Part];
+    /// Price of the effort.
+    const EFFORT: f64;
+    /// What it observes of its body, by name.
+    const BODY: &'static [&'static str];
+    /// The motor behind its own: the adversary's.
+    const GROUND: Motors;
+    /// Writes what it observes of its body.
+    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
+}
+
+impl Runner for HopperV0 {
+    const ID: &'static str = "TerrainHopper-v0";
+    const SUMMARY: &'static str = "one leg in a plane: run over slopes, steps, gaps and boxes that it sees coming";
+    const TORSO: Part = hopper::TORSO;
+    const EYES: Part = FOOT;
+    const SOLES: &'static [Part] = &[FOOT];
+    const EFFORT: f64 = -0.3;
+    const BODY: &'static [&'static str] = &BODY;
+    const GROUND: Motors = Motors::number(4);
+
+    #[inline(always)]
+    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        hopper::observe_body(s, out);
+    }
+}
+
+impl Runner for Walker2dV0 {
+    const ID: &'static str = "TerrainWalker2d-v0";
+    const SUMMARY: &'static str = "two legs in a plane: run over slopes, steps, gaps and boxes that it sees coming";
+    const TORSO: Part = walker2d::TORSO;
+    const EYES: Part = walker2d::TORSO;
+    const SOLES: &'static [Part] = &[LEFT_FOOT, RIGHT_FOOT];
+    const EFFORT: f64 = -0.1;
+    const BODY: &'static [&'static str] = &BODY;
+    const GROUND: Motors = Motors::number(6);
+
+    #[inline(always)]
+    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        Walker2dV0.observe(s, out);
+    }
+}

@@ -1,0 +1,404 @@
+//! The assault courses: each agent has ground of its own in each episode, it sees that ground and stands on it, a curriculum
+//! rises with the way that it comes, and the reward is the formula on the page.
+
+mod common;
+
+use common::{action, go_on};
+use marathon_envs::{AgentState, Autoreset, Options, Step, VecEnv, VecEnvOptions, agent};
+use marathon_motion::kinematics::Pose;
+use marathon_physics::Model;
+use std::f64::consts::PI;
+
+const AGENTS: usize = 20;
+/// First and last point of a course, and the distance of its points, m.
+const FROM: f64 = -6.0;
+const CELL: f64 = 0.1;
+/// Slots of `info`.
+const DISTANCE: usize = 0;
+const DIFFICULTY: usize = 1;
+
+fn env(id: &str, options: &[(&str, &str)], autoreset: Autoreset) -> VecEnv {
+    let mut given = Options::new();
+    for (name, value) in options {
+        given.set(name, value.parse::<marathon_envs::Value>().unwrap_or_else(|e| match e {}));
+    }
+    let options = VecEnvOptions { agents: AGENTS, seed: 3, options: given, autoreset, ..Default::default() };
+    VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Where the center of a geom is, m.
+fn center(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
+    let pose = Pose::of(model, &state.qpos);
+    let geom = model.geoms.iter().find(|g| g.name == geom).unwrap();
+    let mut local = pose.pos[0];
+    [local.x, local.y, local.z] = geom.pos;
+    (pose.quat[geom.body] * local + pose.pos[geom.body]).to_array()
+}
+
+/// Height of a course at a place, m.
+fn height(ground: &[f32], x: f64) -> f64 {
+    let course = &ground[..ground.len() / 2];
+    let at = ((x - FROM) / CELL).clamp(0.0, (course.len() - 1) as f64);
+    let (i, part) = ((at as usize).min(course.len() - 2), at - (at as usize).min(course.len() - 2) as f64);
+    f64::from(course[i]) * (1.0 - part) + f64::from(course[i + 1]) * part
+}
+
+#[test]
+fn a_figure_sees_the_ground_that_it_has() {
+    for (id, own, eyes, feet) in [
+        ("TerrainHopper-v0", 30, "foot", &["foot"][..]),
+        ("TerrainWalker2d-v0", 41, "torso", &["left_foot", "right_foot"][..]),
+    ] {
+        let model = agent(id).unwrap().model().unwrap();
+        let mut blind = env(id, &[("heights", "false"), ("difficulty", "1")], Autoreset::Disabled);
+        assert_eq!(blind.spec().obs, own + feet.len(), "{id}");
+        let mut env = env(id, &[("difficulty", "1")], Autoreset::Disabled);
+        // 57 and 69 numbers, as the original's
+        let n = env.spec().obs;
+        assert_eq!(n, own + feet.len() + 26, "{id}");
+        let mut out = env.buffers();
+        env.reset(Some(1), &mut out.obs).unwrap();
+        let grounds: Vec<Vec<f32>> = (0..AGENTS).map(|i| env.ground(i, 0).unwrap()).collect();
+        assert!((1..AGENTS).all(|i| grounds[i] != grounds[0] && grounds[i].iter().any(|z| *z != 0.0)), "{id}");
+        // somewhere on the course, so high that nothing touches it
+        for (i, ground) in grounds.iter().enumerate() {
+            let mut state = env.state(i).unwrap();
+            state.qpos[0] += 5.0 + 4.9 * i as f64;
+            state.qpos[1] += 1.0 + height(ground, state.qpos[0]);
+            env.set_state(i, &state).unwrap();
+        }
+        env.observe(&[true; AGENTS], &mut out.obs).unwrap();
+        for (i, (ground, obs)) in grounds.iter().zip(out.obs.chunks_exact(n)).enumerate() {
+            let state = env.state(i).unwrap();
+            let mut expected: Vec<f64> = Vec::new();
+            for foot in feet {
+                let [x, _, z] = center(&model, &state, foot);
+                expected.push(z - height(ground, x));
+            }
+            let [x, _, z] = center(&model, &state, eyes);
+            expected.extend((0..25).map(|k| (height(ground, x - 2.0 + 0.2 * f64::from(k)) - z).clamp(-3.0, 3.0)));
+            expected.push((x / 0.2).rem_euclid(1.0));
+            for (k, (expected, seen)) in expected.iter().zip(&obs[own..]).enumerate() {
+                let off = (expected - f64::from(*seen)).abs();
+                // single precision at 100 m, where the ground may rise by 6 m per m; the phase jumps from 1 to 0
+                let jumps = k == feet.len() + 25 && off > 0.999;
+                assert!(off < 1e-3 || jumps, "{id}, agent {i}, number {k}: {expected} {seen}");
+            }
+        }
+        // what a figure does not see does not change what it observes of itself
+        let mut step = blind.buffers();
+        blind.reset(Some(1), &mut step.obs).unwrap();
+        env.reset(Some(1), &mut out.obs).unwrap();
+        for (all, some) in out.obs.chunks_exact(n).zip(step.obs.chunks_exact(own + feet.len())) {
+            assert_eq!(all[..some.len()], *some, "{id}");
+        }
+    }
+}
+
+/// Ground is drawn for each episode: by seed, agent and episode, and as the options say.
+#[test]
+fn each_episode_has_its_course() {
+    let id = "TerrainHopper-v0";
+    let mut first = env(id, &[], Autoreset::SameStep);
+    let mut out = first.buffers();
+    first.reset(Some(7), &mut out.obs).unwrap();
+    let before: Vec<_> = (0..AGENTS).map(|i| first.ground(i, 0).unwrap()).collect();
+    let mut ended = [false; AGENTS];
+    go_on(&mut first, &mut out, 0, 200, 1.0, |_, step| {
+        ended.iter_mut().zip(&step.terminated).for_each(|(ended, now)| *ended |= now);
+    });
+    assert!(ended.iter().all(|ended| *ended), "wild actions make a Hopper fall");
+    assert!((0..AGENTS).all(|i| first.ground(i, 0).unwrap() != before[i]));
+    first.reset(Some(7), &mut out.obs).unwrap();
+    assert!((0..AGENTS).all(|i| first.ground(i, 0).unwrap() == before[i]));
+
+    let mut flat = env(id, &[("course", "flat")], Autoreset::SameStep);
+    flat.reset(Some(7), &mut out.obs).unwrap();
+    assert!(flat.ground(0, 0).unwrap().iter().all(|z| *z == 0.0));
+    let mut random = env(id, &[("levels", "random"), ("difficulty", "0.8")], Autoreset::SameStep);
+    random.reset(Some(7), &mut out.obs).unwrap();
+    let n = random.spec().info.len();
+    let mut info = vec![0.0; AGENTS * n];
+    random.info(&mut info).unwrap();
+    let difficulties: Vec<f32> = info.chunks_exact(n).map(|row| row[DIFFICULTY]).collect();
+    let [least, most] = [f32::min as fn(f32, f32) -> f32, f32::max]
+        .map(|pick| difficulties.iter().copied().reduce(pick).unwrap());
+    assert!(least < 0.25 && most > 0.55 && most <= 0.8, "{least} to {most}");
+}
+
+/// Puts agents `x` meters ahead, lying, and lets their episodes end there.
+fn fall_at(env: &mut VecEnv, out: &mut Step, x: &[f64]) {
+    for (i, x) in x.iter().enumerate() {
+        let mut state = env.state(i).unwrap();
+        let ground = env.ground(i, 0).unwrap();
+        state.qpos[0] += x;
+        // on its side: nothing but feet may touch the ground
+        state.qpos[1] += height(&ground, state.qpos[0]) - 0.8;
+        state.qpos[2] += 0.5 * PI;
+        env.set_state(i, &state).unwrap();
+    }
+    let actions = vec![0.0; AGENTS * env.spec().act];
+    env.step(&actions, &mut out.as_mut()).unwrap();
+    assert!(out.terminated.iter().all(|over| *over), "who lies has fallen");
+}
+
+#[test]
+fn a_curriculum_rises_and_falls_with_the_way() {
+    let mut env = env("TerrainHopper-v0", &[("levels", "curriculum"), ("difficulty", "0.5")], Autoreset::SameStep);
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).unwrap();
+    assert!(env.ground(3, 0).unwrap().iter().all(|z| *z == 0.0), "it begins with level ground");
+    let n = env.spec().info.len();
+    let (mut levels, mut rounds, mut changes) = ([0.0f64; AGENTS], [0; AGENTS], [0; 3]);
+    let (actions, mut info) = (vec![0.0; AGENTS * env.spec().act], vec![0.0; AGENTS * n]);
+    let weight = agent("TerrainHopper-v0").unwrap().model().unwrap().bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
+    for _ in 0..400 {
+        for i in 0..AGENTS {
+            // carried as far as its turn says, then down
+            let far = [20.0, 20.0, 12.0, 4.0][(i + rounds[i]) % 4];
+            let x = env.state(i).unwrap().qpos[0];
+            let force = if x < far { [20.0 * weight / 9.81, 0.0, weight] } else { [0.0, 0.0, -20.0 * weight] };
+            env.push(i, 1, force, [0.0; 3]).unwrap();
+        }
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.info(&mut info).unwrap();
+        for i in (0..AGENTS).filter(|i| out.terminated[*i]) {
+            // 5 % of the difficulty more after 16 m, less after less than 8 m, the same between
+            let far = f64::from(out.info[n * i + DISTANCE]);
+            let change = if far >= 16.0 { 2 } else { usize::from(far >= 8.0) };
+            changes[change] += 1;
+            levels[i] = (levels[i] + [-0.05, 0.0, 0.05][change]).clamp(0.0, 1.0);
+            rounds[i] += 1;
+            let difficulty = f64::from(info[n * i + DIFFICULTY]);
+            assert!((difficulty - 0.5 * levels[i]).abs() < 1e-6, "agent {i}, {far} m: {difficulty} {levels:?}");
+        }
+    }
+    assert!(changes.iter().all(|n| *n >= AGENTS / 2) && levels.iter().any(|level| *level > 0.05), "{changes:?}");
+    let rough = (0..AGENTS).filter(|i| env.ground(*i, 0).unwrap().iter().any(|z| *z != 0.0)).count();
+    assert_eq!(rough, levels.iter().filter(|level| **level > 0.0).count());
+    // a reset by hand begins again
+    env.reset(Some(1), &mut out.obs).unwrap();
+    assert!(env.ground(0, 0).unwrap().iter().all(|z| *z == 0.0));
+}
+
+#[test]
+fn a_figure_stands_on_its_ground() {
+    for id in ["TerrainHopper-v0", "TerrainWalker2d-v0"] {
+        let model = agent(id).unwrap().model().unwrap();
+        let options = [("course", "bumps"), ("difficulty", "1"), ("falls", "hurt")];
+        let mut env = env(id, &options, Autoreset::Disabled);
+        let mut out = env.buffers();
+        env.reset(Some(1), &mut out.obs).unwrap();
+        let ground = env.ground(0, 0).unwrap();
+        for i in 0..AGENTS {
+            let mut state = env.state(i).unwrap();
+            state.qpos[0] += 5.0 + i as f64;
+            state.qpos[1] += 0.3 + height(&ground, state.qpos[0]);
+            env.set_state(i, &state).unwrap();
+        }
+        let actions = vec![0.0; AGENTS * env.spec().act];
+        for _ in 0..150 {
+            env.step(&actions, &mut out.as_mut()).unwrap();
+        }
+        for i in 0..AGENTS {
+            let state = env.state(i).unwrap();
+            let [x, _, z] = center(&model, &state, "torso");
+            let above = z - height(&ground, x);
+            // it has fallen, and lies on the ground and not in it
+            assert!((0.03..1.4).contains(&above), "{id}, agent {i}: {above} at {x}");
+        }
+    }
+}
+
+#[test]
+fn rewards_are_their_formulas() {
+    let ids = [("TerrainHopper-v0", 0.3), ("TerrainWalker2d-v0", 0.1)];
+    for (id, effort) in ids {
+        for reward in ["full", "velocity", "sparse"] {
+            let model = agent(id).unwrap().model().unwrap();
+            let options = [("reward", reward), ("falls", "hurt"), ("difficulty", "1")];
+            let mut env = env(id, &options, Autoreset::Disabled);
+            let mut out = env.buffers();
+            env.reset(Some(2), &mut out.obs).unwrap();
+            let (act, n, k) = (env.spec().act, env.spec().obs, env.spec().reward_terms.len());
+            let mut actions = vec![0.0; AGENTS * act];
+            let (mut hurt, mut lay, mut over, mut hits) = ([false; AGENTS], [false; AGENTS], [false; AGENTS], 0);
+            for decision in 0..120 {
+                for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
+                    action(agent, decision, 1.3, row);
+                }
+                if decision == 0 {
+                    // beyond the first meters a fall is no end
+                    for i in 0..AGENTS {
+                        let mut state = env.state(i).unwrap();
+                        state.qpos[0] += 4.8;
+                        env.set_state(i, &state).unwrap();
+                    }
+                }
+                env.step(&actions, &mut out.as_mut()).unwrap();
+                for i in 0..AGENTS {
+                    let obs = &out.obs[n * i..n * (i + 1)];
+                    let (state, a) = (env.state(i).unwrap(), &actions[act * i..act * (i + 1)]);
+                    let terms = &out.terms[k * i..k * (i + 1)];
+                    let distance = f64::from(out.info[env.spec().info.len() * i + DISTANCE]);
+                    over[i] |= out.terminated[i];
+                    if over[i] {
+                        continue;
+                    }
+                    let expected = match reward {
+                        "velocity" => vec![f64::from(obs[0] / 8.0).clamp(0.0, 1.0)],
+                        "sparse" => vec![0.0],
+                        _ => {
+                            let hit = terms[4] != 0.0;
+                            // who begins to lie had not lain
+                            assert!(!(hit && lay[i]));
+                            hurt[i] |= hit;
+                            lay[i] = hit;
+                            hits += usize::from(hit);
+                            let whole = f64::from(u8::from(!hurt[i]));
+                            let pitch = state.qpos[2].rem_euclid(2.0 * PI);
+                            let tilt = pitch.min(2.0 * PI - pitch);
+                            let clipped = || a.iter().map(|a| f64::from(a.clamp(-1.0, 1.0)));
+                            let at_limit = clipped().filter(|a| a.abs() >= 1.0).count() as f64;
+                            let spent: f64 = clipped().map(|a| a * a).sum();
+                            let posture = whole * (0.5 - tilt / PI);
+                            let pain = if hit { -5.0 } else { 0.0 };
+                            vec![f64::from(obs[0]) / 4.0, posture, -effort * whole * spent, -0.8 * at_limit, pain]
+                        }
+                    };
+                    for (term, expected) in terms.iter().zip(&expected) {
+                        let off = (f64::from(*term) - expected).abs();
+                        assert!(off < 1e-4, "{id} {reward}, agent {i}, {decision}: {terms:?} {expected:?}");
+                    }
+                    assert!(distance >= center(&model, &state, "torso")[0] - 1e-3);
+                }
+            }
+            assert!(reward != "full" || hits > AGENTS, "{id}: {hits} falls");
+        }
+    }
+}
+
+/// With the sparse reward, the way is paid when the episode ends, whatever ends it.
+#[test]
+fn the_way_is_paid_at_the_end() {
+    let mut env = env("TerrainHopper-v0", &[("reward", "sparse")], Autoreset::SameStep);
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).unwrap();
+    let ways: Vec<f64> = (0..AGENTS).map(|i| 5.0 + i as f64).collect();
+    fall_at(&mut env, &mut out, &ways);
+    for (way, paid) in ways.iter().zip(&out.reward) {
+        assert!((f64::from(*paid) - way / 20.0).abs() < 0.02, "{way} {paid}");
+    }
+}
+
+/// Who makes no new meter for five seconds, or comes to the end of the course, is out of it without having failed.
+#[test]
+fn an_episode_ends_where_nothing_happens_any_more() {
+    let mut env = env("TerrainHopper-v0", &[("falls", "hurt"), ("course", "flat")], Autoreset::Disabled);
+    let mut out = env.buffers();
+    env.reset(Some(1), &mut out.obs).unwrap();
+    for i in 0..AGENTS {
+        let mut state = env.state(i).unwrap();
+        state.qpos[0] = if i == 0 { 105.5 } else { 20.0 };
+        env.set_state(i, &state).unwrap();
+    }
+    let actions = vec![0.0; AGENTS * env.spec().act];
+    let mut ends = [None; AGENTS];
+    for decision in 1..=300 {
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        for (end, (truncated, terminated)) in ends.iter_mut().zip(out.truncated.iter().zip(&out.terminated)) {
+            assert!(!terminated);
+            *end = end.or(truncated.then_some(decision));
+        }
+    }
+    assert_eq!(ends[0], Some(1));
+    // it may fall forward by a meter, and lie five seconds there
+    assert!(ends[1..].iter().all(|end| end.is_some_and(|at| (251..=300).contains(&at))), "{ends:?}");
+}
+
+/// The adversary builds a meter whenever the runner reaches one, and earns what the runner loses.
+#[test]
+fn an_adversary_builds_ahead_of_the_runner() {
+    for id in ["TerrainHopper-v0", "TerrainWalker2d-v0"] {
+        let plain = env(id, &[], Autoreset::Disabled).spec().clone();
+        let options = [("course", "adversary"), ("difficulty", "1"), ("falls", "hurt")];
+        let mut env = env(id, &options, Autoreset::Disabled);
+        let spec = env.spec().clone();
+        let [runner, builder] = &spec.roles[..] else { panic!("two roles: {:?}", spec.roles) };
+        // a runner's policy runs on any course
+        assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id}");
+        assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..5], &["fall".into()]].concat());
+        assert_eq!((spec.act, builder.act.clone()), (plain.act + 1, plain.act..plain.act + 1));
+        assert!(builder.intermittent && spec.reward_terms[builder.terms.clone()] == ["inverse"]);
+
+        let mut out = env.buffers();
+        env.reset(Some(1), &mut out.obs).unwrap();
+        let (n, act, k) = (spec.obs, spec.act, spec.reward_terms.len());
+        let mut actions = vec![0.0; AGENTS * act];
+        for i in 0..AGENTS {
+            assert!(env.ground(i, 0).unwrap().iter().all(|z| *z == 0.0));
+            // up, or down, by a step of its own
+            actions[act * i + act - 1] = 0.1 * (i as f32 - 10.0);
+        }
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        for i in 0..AGENTS {
+            let ground = env.ground(i, 0).unwrap();
+            let step = 0.1 * (i as f64 - 10.0);
+            assert!((height(&ground, 6.0) - step).abs() < 1e-6 && height(&ground, 5.0) == 0.0, "{id}, agent {i}");
+            assert!((height(&ground, 50.0) - step).abs() < 1e-6);
+            let terms = &out.terms[k * i..k * (i + 1)];
+            assert_eq!(terms[k - 1], -terms[..k - 1].iter().sum::<f32>());
+            assert_eq!(out.reward[i], terms[..k - 1].iter().sum::<f32>());
+        }
+        // it does not decide again before the next meter
+        let before: Vec<_> = (0..AGENTS).map(|i| env.ground(i, 0).unwrap()).collect();
+        actions.iter_mut().for_each(|a| *a = 0.0);
+        actions.chunks_exact_mut(act).for_each(|row| row[act - 1] = 1.0);
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        assert!((0..AGENTS).all(|i| env.ground(i, 0).unwrap() == before[i]), "{id}");
+        // carried on by more than a meter
+        let weight = agent(id).unwrap().model().unwrap().bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
+        for i in 0..AGENTS {
+            env.push(i, 1, [2.0 * weight, 0.0, weight], [0.0; 3]).unwrap();
+        }
+        for _ in 0..(0.5 / spec.dt) as usize {
+            env.step(&actions, &mut out.as_mut()).unwrap();
+        }
+        let site = n - 19..n;
+        for i in 0..AGENTS {
+            let state = env.state(i).unwrap();
+            let (ground, obs) = (env.ground(i, 0).unwrap(), &out.obs[n * i..n * (i + 1)]);
+            let x = center(&agent(id).unwrap().model().unwrap(), &state, "torso")[0];
+            let [six, seven] = [6.0, 7.0].map(|x| height(&ground, x));
+            assert!(x > 1.0 && seven > six + 0.5, "{id}, agent {i} at {x}: {six} {seven}");
+            for (point, seen) in obs[site.clone()].iter().take(12).enumerate() {
+                let expected = height(&ground, x + 0.5 * (point + 1) as f64) - height(&ground, x);
+                assert!((expected - f64::from(*seen)).abs() < 1e-3, "{id}, agent {i}: {expected} {seen}");
+            }
+        }
+    }
+}
+
+/// What an adversary has built belongs to snapshots, and depends neither on threads nor on other agents.
+#[test]
+fn built_ground_is_saved_and_restored() {
+    let id = "TerrainHopper-v0";
+    let options = [("course", "adversary"), ("falls", "hurt")];
+    let mut first = env(id, &options, Autoreset::SameStep);
+    let mut out = first.buffers();
+    first.reset(Some(4), &mut out.obs).unwrap();
+    go_on(&mut first, &mut out, 0, 60, 1.0, |_, _| {});
+    let saved = first.save();
+    let mut on = Vec::new();
+    go_on(&mut first, &mut out, 60, 160, 1.0, |_, step| on.push(step.clone()));
+
+    let given: Options =
+        options.iter().map(|(name, value)| (name.to_string(), marathon_envs::Value::from(*value))).collect();
+    let threads = VecEnvOptions { agents: AGENTS, seed: 9, threads: 2, options: given, ..Default::default() };
+    let mut other = VecEnv::new(id, &threads).unwrap();
+    other.load(&saved).unwrap();
+    let mut again = Vec::new();
+    go_on(&mut other, &mut out, 60, 160, 1.0, |_, step| again.push(step.clone()));
+    assert!(on == again);
+    assert!((0..AGENTS).all(|i| first.ground(i, 0).unwrap() == other.ground(i, 0).unwrap()));
+}
