@@ -60,6 +60,30 @@ fn a_study_of_clips_makes_no_run_twice() {
     assert!(error.contains("did you mean 'walk'?"), "{error}");
 }
 
+/// A study of courses trains on each ground, an adversary's too, and judges the runners on courses that are nobody's.
+#[test]
+fn a_study_of_courses_judges_every_runner() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["study", "assault-course", "--tasks", "TerrainHopper", "--grounds", "flat,adversary", "--seeds", "1"];
+    let study = |more: &[&str]| {
+        succeed(folder.path(), &[&words[..], &["--steps", "8192", "--keep", "kept", "--out", "pages"], more].concat())
+    };
+    let page = study(&[]);
+    assert!(page.contains("--tasks TerrainHopper --grounds flat,adversary"), "{page}");
+    let rows = std::fs::read_to_string(folder.path().join("pages/assault-course.csv")).unwrap();
+    let lines: Vec<&str> = rows.lines().skip(1).collect();
+    for (line, start) in
+        lines.iter().zip(["Hopper,flat,yes", "Hopper,flat,no", "Hopper,adversary,yes", "Hopper,adversary,no"])
+    {
+        assert!(line.starts_with(start) && line.matches(" m; ").count() == 5, "{rows}");
+    }
+    assert_eq!(lines.len(), 4, "{rows}");
+    assert!(folder.path().join("kept/TerrainHopper-adversary-heights-1/policy-builder.safetensors").is_file());
+    assert_eq!(study(&["--kept-only"]).replace(" --kept-only", ""), page);
+    let error = fail(folder.path(), 2, &["study", "assault-course", "--grounds", "flt"]);
+    assert!(error.contains("did you mean 'flat'?"), "{error}");
+}
+
 #[test]
 fn json_is_all_that_is_printed_if_it_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();

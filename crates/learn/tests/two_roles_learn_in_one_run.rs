@@ -266,6 +266,13 @@ fn each_role_has_a_policy_with_its_own_settings() {
         (name.as_str(), opponents.agent.as_str(), opponents.obs, opponents.act),
         ("opponent", "Tag-v0/opponent", 8, 2)
     );
+    // it also plays where one has it all, but no task of another name, and not as another role
+    let whole = tag(false, Isa::best()).spec().clone();
+    let alone = Spec { id: "Tag-v0".into(), ..whole.of_role(&whole.roles[0]) };
+    assert!(output.policy.check(&alone).is_ok() && output.policy.check(&whole.of_role(&whole.roles[0])).is_ok());
+    let others = [Spec { id: "Catch-v0".into(), ..alone.clone() }, Spec { obs: 8, ..alone }, whole.clone()];
+    assert!(others.iter().all(|spec| output.policy.check(spec).is_err()));
+    assert!(output.policy.check(&whole.of_role(&whole.roles[1])).is_err());
     assert_eq!((&meta.hidden[..], &opponents.hidden[..]), (&[13, 8][..], &[9][..]));
     let last = output.last.unwrap();
     let [(_, learned)] = &last.others[..] else { panic!("one other role") };

@@ -5,7 +5,6 @@ use crate::app::args::Mode;
 use crate::app::puppets::{self, Kind};
 use crate::app::show::{Actor, Show, place};
 use crate::app::{Given, Pace};
-use crate::ground::Ground;
 use crate::look::{FollowCamera, Quality};
 use crate::ragdoll::{Anatomy, Episode, Part};
 use crate::simulate::Seat;
@@ -75,7 +74,7 @@ impl Feed {
 pub fn set_stage(mut commands: Commands, feed: Option<ResMut<Feed>>, mut cameras: Query<&mut FollowCamera>) {
     let Some(mut feed) = feed.filter(|f| !f.staged) else { return };
     feed.staged = true;
-    let places = (0..feed.agents).map(|i| place(i, feed.kind.spacing(), Ground::Level));
+    let places = (0..feed.agents).map(|i| place(i, feed.kind.spacing(), feed.kind.level()));
     puppets::stage(&mut commands, &feed.kind, places, &mut cameras);
     info!("on stage: {} from outside", feed.agents);
 }

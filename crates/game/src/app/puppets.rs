@@ -34,6 +34,11 @@ impl Kind {
     pub fn spacing(&self) -> f32 {
         self.size[1]
     }
+
+    /// Whether it runs on level ground.
+    pub fn level(&self) -> bool {
+        self.model.hfields.is_empty()
+    }
 }
 
 /// Puts puppets at their places.

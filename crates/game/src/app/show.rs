@@ -245,9 +245,9 @@ pub fn shipped_agents() -> Vec<String> {
         .collect()
 }
 
-/// Where character `i` stands: in rows, or side by side where hills must be at the same place for all.
-pub fn place(i: usize, spacing: f32, ground: Ground) -> Vec3 {
-    if ground != Ground::Level {
+/// Where character `i` stands: in rows, or side by side on tracks that are not level.
+pub fn place(i: usize, spacing: f32, level: bool) -> Vec3 {
+    if !level {
         return Vec3::new(0.0, 0.0, -spacing * i as f32);
     }
     Vec3::new(-ROW_SPACING * (i / ROW) as f32, 0.0, -spacing * (i % ROW) as f32)
@@ -314,13 +314,14 @@ pub fn set_stage(
     }
     let scene = Scene::new(&model);
     let (spacing, radius) = (scene.spacing() as f32, scene.radius() as f32);
+    let level = show.ground == Ground::Level && model.hfields.is_empty();
     let after_fall = if show.mode == Mode::Learn { 0.0 } else { LIE };
     for i in 0..if testbed { 1 } else { show.agents } {
         let mut actor = commands.spawn((
             Actor(i),
             ragdoll.clone().with_seed(show.seed, i as u64),
             Restart { after_fall, on_time_up: true },
-            Transform::from_translation(place(i, spacing, show.ground)),
+            Transform::from_translation(place(i, spacing, level)),
             Marks::default(),
         ));
         if i > 0 {

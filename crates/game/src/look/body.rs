@@ -87,7 +87,7 @@ fn dress(
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut images: ResMut<Assets<Image>>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    new: Query<(Entity, &Anatomy, &Transform, &OwnGround, Option<&Tint>), Added<Anatomy>>,
+    new: Query<(Entity, &Anatomy, &Transform, Option<&OwnGround>, Option<&Tint>), Added<Anatomy>>,
 ) {
     for (ragdoll, anatomy, track, own, tint) in &new {
         let model = &*anatomy.model;
@@ -140,7 +140,7 @@ fn lay(
     for (ragdoll, anatomy, track, own) in &changed {
         for (shape, mesh) in shapes.iter().filter(|(shape, _)| shape.ragdoll == ragdoll) {
             let geom = &anatomy.model.geoms[shape.geom];
-            if let Some(surface) = surface(&anatomy.model, geom, track, own)
+            if let Some(surface) = surface(&anatomy.model, geom, track, Some(own))
                 && let Some(mut mesh) = meshes.get_mut(&mesh.0)
             {
                 *mesh = surface;
@@ -149,11 +149,11 @@ fn lay(
     }
 }
 
-/// The surface of a geom, if it is a height field, as its agent has it.
-fn surface(model: &Model, geom: &Geom, track: &Transform, own: &OwnGround) -> Option<Mesh> {
+/// The surface of a geom, if it is a height field, as its agent has it, or else its model.
+fn surface(model: &Model, geom: &Geom, track: &Transform, own: Option<&OwnGround>) -> Option<Mesh> {
     let number = geom.hfield?;
     let field = model.hfields.get(number)?;
-    Some(terrain(field, own.0.get(number).map(Vec::as_slice), track.translation + to_game(geom.pos)))
+    Some(terrain(field, own.and_then(|own| own.0.get(number)).map(Vec::as_slice), track.translation + to_game(geom.pos)))
 }
 
 /// Geoms that are drawn, and their numbers: opaque ones that MuJoCo's viewer would show, or all of a body that has none of these.
