@@ -13,7 +13,7 @@
 //! `velocity`: r = clamp(v / 8 m/s, 0, 1), that of the Marathon Environments 2.
 //! `sparse`: r = way / 20 m at the end of the episode, 0 before.
 //!
-//! With the course `adversary` the task has two roles: the figure, and a [builder] who earns -r.
+//! With the course `adversary` the task has two roles: the figure, and a builder who earns -r.
 
 mod builder;
 pub mod course;
