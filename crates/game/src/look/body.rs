@@ -80,6 +80,7 @@ struct Stuff {
     alpha: f32,
 }
 
+#[expect(clippy::type_complexity, reason = "a query names what it reads")]
 fn dress(
     mut commands: Commands,
     mut wardrobe: ResMut<Wardrobe>,
