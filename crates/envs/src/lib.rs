@@ -37,8 +37,8 @@ mod vec;
 
 pub use agent::{
     Agent, Body, CommandRange, Controls, Ctrl, Facts, Following, Frame, ModelSource, Motors, Obs, OptionInfo, Options,
-    Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View, memory, names, options, senses,
-    tolerance,
+    Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View, memory, names, options,
+    senses, tolerance,
 };
 pub use any_agent::{AnyAgent, Elsewhere};
 pub use episode_rng::EpisodeRng;

@@ -121,8 +121,8 @@ fn each_episode_has_its_course() {
     let mut info = vec![0.0; AGENTS * n];
     random.info(&mut info).unwrap();
     let difficulties: Vec<f32> = info.chunks_exact(n).map(|row| row[DIFFICULTY]).collect();
-    let [least, most] = [f32::min as fn(f32, f32) -> f32, f32::max]
-        .map(|pick| difficulties.iter().copied().reduce(pick).unwrap());
+    let [least, most] =
+        [f32::min as fn(f32, f32) -> f32, f32::max].map(|pick| difficulties.iter().copied().reduce(pick).unwrap());
     assert!(least < 0.25 && most > 0.55 && most <= 0.8, "{least} to {most}");
 }
 

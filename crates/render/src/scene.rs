@@ -134,7 +134,18 @@ impl Scene {
         };
         let spacing = 2.0 * half_width + 0.6 * radius;
         let marks = Marks::new(radius, half_width);
-        Self { model: model.clone(), shown, planes, fields, one_color, spacing, radius, height, marks, grounds: Vec::new() }
+        Self {
+            model: model.clone(),
+            shown,
+            planes,
+            fields,
+            one_color,
+            spacing,
+            radius,
+            height,
+            marks,
+            grounds: Vec::new(),
+        }
     }
 
     /// The same scene with agents of a row `spacing` meters apart along y; 0 overlays them in one place.
@@ -233,8 +244,10 @@ impl Scene {
             let colors = palette::CHECKER.map(palette::linear);
             let field = &self.model.hfields[number];
             // strips beside each other do not overlap
-            let half_width = if self.grounds.len() > 1 && self.spacing > 0.0 { 0.5 * self.spacing } else { f64::INFINITY };
-            Terrain { field, elevations, pos: pos + offset, rot, half_width, colors }.add_to(&mut frame.solids, pose.com[0]);
+            let half_width =
+                if self.grounds.len() > 1 && self.spacing > 0.0 { 0.5 * self.spacing } else { f64::INFINITY };
+            Terrain { field, elevations, pos: pos + offset, rot, half_width, colors }
+                .add_to(&mut frame.solids, pose.com[0]);
         }
     }
 

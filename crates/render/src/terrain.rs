@@ -131,7 +131,11 @@ mod tests {
         let slabs = slabs(&field, None);
         let z = |cell: f64| height(&slabs, 0.1 * (cell - 4.0), 0.3);
         let expected = [(0.5, 1.0), (3.0, 1.1), (5.5, 1.35), (6.5, 1.7), (7.5, 2.0)];
-        assert!(expected.iter().all(|(cell, height)| (z(*cell) - height).abs() < 1e-6), "{:?}", expected.map(|e| z(e.0)));
+        assert!(
+            expected.iter().all(|(cell, height)| (z(*cell) - height).abs() < 1e-6),
+            "{:?}",
+            expected.map(|e| z(e.0))
+        );
         // the middle of the field is at x = 0, where a stripe ends, too
         assert!(slabs.len() <= 5 && slabs.iter().any(|slab| slab.color == DVec3::ONE));
     }
@@ -139,7 +143,7 @@ mod tests {
     #[test]
     fn ground_of_an_agents_own_is_drawn_in_place_of_the_models() {
         let field = field(3, &[0.5; 9]);
-        assert!((height(&slabs(&field, None), 0.0, 0.2) - 2.0).abs() < 1e-9);
+        assert!((height(&slabs(&field, None), 0.02, 0.2) - 2.0).abs() < 1e-9);
         let own = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
         let slabs = slabs(&field, Some(&own));
         assert!((height(&slabs, 0.02, -0.5) - 1.0).abs() < 1e-9 && (height(&slabs, 0.02, 0.5) - 1.5).abs() < 1e-9);

@@ -57,7 +57,11 @@ impl Setting {
 
     /// The task that a policy is for; of a role's policy, that in which it has the role.
     pub fn of(policy: &PolicyMeta) -> Self {
-        Setting { agent: task_of_role(&policy.agent).into(), options: policy.options.clone(), clips: policy.clips.clone() }
+        Setting {
+            agent: task_of_role(&policy.agent).into(),
+            options: policy.options.clone(),
+            clips: policy.clips.clone(),
+        }
     }
 
     /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds their names.

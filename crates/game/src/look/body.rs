@@ -154,7 +154,11 @@ fn lay(
 fn surface(model: &Model, geom: &Geom, track: &Transform, own: Option<&OwnGround>) -> Option<Mesh> {
     let number = geom.hfield?;
     let field = model.hfields.get(number)?;
-    Some(terrain(field, own.and_then(|own| own.0.get(number)).map(Vec::as_slice), track.translation + to_game(geom.pos)))
+    Some(terrain(
+        field,
+        own.and_then(|own| own.0.get(number)).map(Vec::as_slice),
+        track.translation + to_game(geom.pos),
+    ))
 }
 
 /// Geoms that are drawn, and their numbers: opaque ones that MuJoCo's viewer would show, or all of a body that has none of these.

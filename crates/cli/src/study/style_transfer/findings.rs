@@ -1,8 +1,8 @@
 //! What the study keeps of a finished run.
 
 use super::Job;
-use crate::study::kept;
 use crate::error::CliError;
+use crate::study::kept;
 use marathon_learn::checksum;
 use marathon_runs::{Imitation, RunFile};
 use serde::{Deserialize, Serialize};

@@ -2,9 +2,9 @@
 
 mod findings;
 
+use super::Options;
 use super::kept::{self, median};
 use super::record::Record;
-use super::Options;
 use crate::error::CliError;
 use crate::interrupt;
 use findings::Found;

@@ -57,7 +57,9 @@ pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     for i in 1..=POINTS_SEEN {
         out.scalar(s.ground_height(x + T::lit(i as f64 * SPACING), y) - below);
     }
-    [z - below, vx, vz, fx, fz, s.memory(STEP), s.memory(SINCE) * T::lit(s.dt())].into_iter().for_each(|x| out.scalar(x));
+    [z - below, vx, vz, fx, fz, s.memory(STEP), s.memory(SINCE) * T::lit(s.dt())]
+        .into_iter()
+        .for_each(|x| out.scalar(x));
 }
 
 /// Builds the next meter, and goes on level behind it.
