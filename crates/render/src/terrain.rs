@@ -24,7 +24,7 @@ pub(crate) struct Terrain<'a> {
     pub pos: DVec3,
     /// Columns are its axes in the world.
     pub rot: DMat3,
-    /// What is farther from its middle along y is not drawn, m.
+    /// Cells that are farther from its middle along y are not drawn, m.
     pub half_width: f64,
     /// Light and dark stripes.
     pub colors: [DVec3; 2],
@@ -34,8 +34,7 @@ impl Terrain<'_> {
     /// Appends what is near `x` in the world.
     pub fn add_to(&self, solids: &mut Vec<Solid>, x: f64) {
         for row in 0..self.field.nrow.saturating_sub(1) {
-            // a row of cells that lies beyond the half width has none
-            if self.point(row, 0).y == self.point(row + 1, 0).y {
+            if self.point(row, 0).y >= self.half_width || self.point(row + 1, 0).y <= -self.half_width {
                 continue;
             }
             let mut from = 0;
@@ -66,7 +65,9 @@ impl Terrain<'_> {
             Some(own) => f64::from(own[i]),
             None => f64::from(self.field.data[i]) * top,
         };
-        let y = (row as f64 * dy - half_y).clamp(-self.half_width, self.half_width);
+        let y = row as f64 * dy - half_y;
+        // a profile is the same at every y
+        let y = if self.field.nrow == 2 { y.clamp(-self.half_width, self.half_width) } else { y };
         DVec3::new(col as f64 * dx - half_x, y, z)
     }
 
