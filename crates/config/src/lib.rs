@@ -36,6 +36,10 @@ const DM_CONTROL: (&str, &str) = ("dm_control-fast.yaml", include_str!("../../..
 /// For figures in a plane that are told how fast to go.
 const CONTROLLER: (&str, &str) = ("controller-fast.yaml", include_str!("../../../assets/configs/controller-fast.yaml"));
 
+/// File of the Ant told where to go.
+const ANT_CONTROLLER: (&str, &str) =
+    ("ant_controller-fast.yaml", include_str!("../../../assets/configs/ant_controller-fast.yaml"));
+
 /// For figures that run over uneven ground.
 const TERRAIN: (&str, &str) = ("terrain-fast.yaml", include_str!("../../../assets/configs/terrain-fast.yaml"));
 
@@ -51,7 +55,7 @@ const MARATHON_MAN_STEER: (&str, &str) =
 const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 45] = [
+const FAST: [(&str, (&str, &str)); 47] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -72,8 +76,10 @@ const FAST: [(&str, (&str, &str)); 45] = [
     ("Ant", ("ant-fast.yaml", include_str!("../../../assets/configs/ant-fast.yaml"))),
     ("HopperController", CONTROLLER),
     ("WalkerController", CONTROLLER),
+    ("AntController", ANT_CONTROLLER),
     ("TerrainHopper", TERRAIN),
     ("TerrainWalker2d", TERRAIN),
+    ("TerrainAnt", TERRAIN),
     ("MarathonMan", MARATHON_MAN),
     ("MarathonManWalk", MARATHON_MAN),
     ("MarathonManWalkLeft", MARATHON_MAN),

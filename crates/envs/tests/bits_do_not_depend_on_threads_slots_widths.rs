@@ -83,7 +83,19 @@ fn walker_controller() {
     check("WalkerController-v0");
 }
 
+/// The direction that it remembers is its own.
+#[test]
+fn ant_controller() {
+    check("AntController-v0");
+}
+
 /// Each has a course of its own.
+#[test]
+fn ant_on_courses() {
+    check("TerrainAnt-v0");
+}
+
+/// The same in a plane.
 #[test]
 fn hopper_on_courses() {
     check("TerrainHopper-v0");

@@ -5,6 +5,7 @@
 
 pub mod ant;
 pub mod controller;
+mod heading;
 pub mod hopper;
 pub mod humanoid;
 mod imitation;
@@ -30,8 +31,10 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(ant::AntV1),
         Arc::new(controller::HopperController::default()),
         Arc::new(controller::WalkerController::default()),
+        Arc::new(controller::AntController),
         Arc::new(terrain::TerrainHopper::default()),
         Arc::new(terrain::TerrainWalker2d::default()),
+        Arc::new(terrain::TerrainAnt::default()),
     ];
     out.extend(marathon_man::all());
     out.extend(in_style::all());

@@ -1,4 +1,5 @@
-//! Figures in a plane that are told how fast to go, and to jump: the paper's player controllers.
+//! Figures in a plane that are told how fast to go, and to jump: the paper's player controllers. And the [Ant](AntController), which
+//! is told where to go in space.
 //!
 //! A command is a velocity from -4 to 4 m/s, and with the input `discrete` also a jump, 0 or 1. `input` says what a player has
 //! in hand: buttons for left, right and jump, or a stick. What nobody commands, the task's own [schedule] does.
@@ -13,9 +14,11 @@
 //! terms and of the effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not
 //! stand still. The Walker also pays for a low torso. A fall costs 60 or 40.
 
+mod ant;
 mod figures;
 pub mod schedule;
 
+pub use ant::AntController;
 pub use figures::Figure;
 
 use marathon_physics::lanes::Real;
@@ -87,17 +90,17 @@ impl<F: Figure> Controller<F> {
             Input::Continuous => T::zero(),
         }
     }
+}
 
-    /// Worth of standing still, 0 to 1.
-    #[inline(always)]
-    fn still<T: Real>(&self, s: &Senses<T>) -> T {
-        let mut speed2 = T::zero();
-        for part in (0..F::PARTS.len()).map(Part) {
-            let [x, y, z] = s.linear_velocity(part);
-            speed2 += x.mul_add(x, y.mul_add(y, z * z));
-        }
-        (speed2 * T::lit(-1.0 / (RESTLESS * F::PARTS.len() as f64))).exp()
+/// Worth of standing still, 0 to 1: 1/e where the mean square of the velocities of the first `parts` parts is `restless`, m^2/s^2.
+#[inline(always)]
+fn stillness<T: Real>(s: &Senses<T>, parts: usize, restless: f64) -> T {
+    let mut speed2 = T::zero();
+    for part in (0..parts).map(Part) {
+        let [x, y, z] = s.linear_velocity(part);
+        speed2 += x.mul_add(x, y.mul_add(y, z * z));
     }
+    (speed2 * T::lit(-1.0 / (restless * parts as f64))).exp()
 }
 
 impl<F: Figure> Agent for Controller<F> {
@@ -167,7 +170,7 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
         let rest = (one - s.command(0).abs().max(jump) * T::lit(10.0)).max(zero);
-        terms.add("still", STILL, rest * self.still(s));
+        terms.add("still", STILL, rest * stillness(s, F::PARTS.len(), RESTLESS));
         terms.add("height", -1.0, F::low(s));
         terms.add("effort", F::EFFORT, s.effort(Motors::NONE));
     }

@@ -30,6 +30,7 @@ use std::sync::LazyLock;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
+use super::super::heading;
 use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
@@ -37,6 +38,7 @@ use super::body::{
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
 use super::{DECISION, FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
+use crate::agent::options::Choice;
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start,
@@ -49,6 +51,8 @@ pub const STYLE: [&str; 7] =
     ["height", "orientation", "velocity", "angular_velocity", "joint_positions", "joint_velocities", "ends"];
 /// What he moves like.
 const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
+/// Number of the clip in which he stands.
+const STANDS: usize = 4;
 /// Numbers that he observes.
 const OBSERVATION: usize = 82 + JOINTS.len();
 /// Fastest that he is told to go, m/s.
@@ -62,6 +66,8 @@ const HOLDS: [usize; 2] = [40, 240];
 /// Share of commands that are to stand, and of those that are to go straight on.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
+/// Speeds from this share of the fastest on are extremes.
+const EXTREME: f64 = 0.7;
 
 /// Slots of the memory: cosine and sine of the commanded direction.
 const DIRECTION: usize = Following::SLOTS;
@@ -82,6 +88,20 @@ const SIDEWAYS: f64 = 2.5;
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
 
+/// What Marathon Man is told where nobody commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Commands {
+    /// Speeds and turns, each as likely.
+    Even,
+    /// Half of the time, shorter, the extremes: to stand, to run, and the sharpest turns.
+    Sharp,
+}
+
+impl Choice for Commands {
+    const EXPECTED: &'static str = "even or sharp";
+    const NAMED: &'static [(Self, &'static str)] = &[(Commands::Even, "even"), (Commands::Sharp, "sharp")];
+}
+
 crate::options! {
     /// Arguments of Marathon Man told where to go.
     pub struct SteerArguments {
@@ -90,9 +110,13 @@ crate::options! {
         control: Control = Control::Pd,
         /// Most that an action of `pd` moves a target, rad.
         reach: Scale = Scale(1.0),
-        /// Where an episode starts: at `random` decisions of the clips, at the `first` of one, or `adaptive`: half of those that
+        /// Where an episode starts: at `random` decisions of the clips, standing: `first`, or `adaptive`: half of those that
         /// follow an early failure where that episode did, half of the others in a clip that fits the command.
         start: StartAt = StartAt::Random,
+        /// What he is told where nobody commands: anything, `even`, or half of the time the extremes, `sharp`.
+        commands: Commands = Commands::Even,
+        /// What a fall costs.
+        price: Scale = Scale(0.0),
     }
 }
 
@@ -124,9 +148,8 @@ pub struct Steer {
 impl Steer {
     /// Angle from his heading to a direction, rad.
     #[inline(always)]
-    fn off<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
-        let [c, d] = s.heading(BUTT);
-        c.mul_add(y, -(d * x)).atan2(c.mul_add(x, d * y))
+    fn off<T: Real>(s: &Senses<T>, direction: [T; 2]) -> T {
+        heading::off(s.heading(BUTT), direction)
     }
 
     /// Commanded direction.
@@ -199,7 +222,7 @@ impl Agent for Steer {
             clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
             memory: BEGUN + 1,
-            termination_reward: None,
+            termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
     }
@@ -224,12 +247,13 @@ impl Agent for Steer {
             begun as usize
         } else {
             let fitting = adaptive && start.random.whole(0, 1) == 0;
-            let clip = if fitting { fitting_clip(start.scheduled) } else { start.random.whole(0, CLIPS.len() - 1) };
+            let clip = match self.arguments.start {
+                StartAt::First => STANDS,
+                _ if fitting => fitting_clip(start.scheduled),
+                _ => start.random.whole(0, CLIPS.len() - 1),
+            };
             let rows = start.clips().nth(clip).expect("a row of clips for each clip");
-            match self.arguments.start {
-                StartAt::First => rows.start,
-                _ => start.random.whole(rows.start, rows.end - 1),
-            }
+            start.random.whole(rows.start, rows.end - 1)
         };
         let clip = start.clips().position(|rows| rows.contains(&row)).expect("the row is a clip's");
         start.start_in_clip(row);
@@ -239,6 +263,11 @@ impl Agent for Steer {
     }
 
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
+        if self.arguments.commands == Commands::Sharp && random.whole(0, 1) == 0 {
+            out[0] = [0.0, FASTEST, random.uniform(EXTREME * FASTEST, FASTEST)][random.whole(0, 2)];
+            out[1] = [0.0, SHARPEST, -SHARPEST, random.around_zero(SHARPEST)][random.whole(0, 3)];
+            return random.whole(HOLDS[0], HOLDS[1] / 2);
+        }
         out[0] = if random.uniform(0.0, 1.0) < STANDING { 0.0 } else { random.uniform(0.0, FASTEST) };
         out[1] = if random.uniform(0.0, 1.0) < STRAIGHT { 0.0 } else { random.around_zero(SHARPEST) };
         random.whole(HOLDS[0], HOLDS[1])
@@ -271,11 +300,10 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        let angle = Self::off(s, [memory[DIRECTION], memory[DIRECTION + 1]]);
-        let turned = clamp(s.command(1).mul_add(T::lit(s.dt()), angle), -MOST_BEHIND, MOST_BEHIND);
-        let ((sin, cos), [c, d]) = (turned.sin_cos(), s.heading(BUTT));
-        memory[DIRECTION] = d.neg_mul_add(sin, c * cos);
-        memory[DIRECTION + 1] = d.mul_add(cos, c * sin);
+        let turn = |angle: T| s.command(1).mul_add(T::lit(s.dt()), angle);
+        let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
+        let direction = heading::turned(s.heading(BUTT), direction, turn, MOST_BEHIND);
+        memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
         memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
         memory[MADE] += T::lit(1.0);
         // nobody changes a velocity of 3 m/s at once, or turns sharply at it

@@ -26,6 +26,7 @@ use std::fmt::Write;
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
+use super::ant::AntV0;
 use super::hopper::HopperV0;
 use super::walker2d::Walker2dV0;
 use crate::agent::options::Choice;
@@ -76,8 +77,8 @@ const FALL: f64 = -1.0;
 const PAIN: f64 = -5.0;
 /// Way that earns 1 with the sparse reward, m.
 const WAY: f64 = 20.0;
-/// Half the width of a course, m: tracks beside each other do not overlap in a picture.
-const HALF_WIDTH: f64 = 0.4;
+/// How near to the edge of a course an episode ends, m.
+const EDGE: f64 = 0.2;
 /// Thickness of the ground below the start's height, m.
 const BASE: f64 = 8.0;
 
@@ -85,6 +86,8 @@ const BASE: f64 = 8.0;
 pub type TerrainHopper = Terrain<HopperV0>;
 /// The Walker on courses.
 pub type TerrainWalker2d = Terrain<Walker2dV0>;
+/// The Ant on courses.
+pub type TerrainAnt = Terrain<AntV0>;
 
 /// What a figure is rewarded for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,10 +174,10 @@ impl<F: Runner> Terrain<F> {
         let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
         let mut out = text.replacen(FLOOR, &course, 1).trim_end().trim_end_matches("</mujoco>").to_owned();
         // writing to a string cannot fail
-        let extra = if self.built() { builder::ACTUATOR } else { "" };
+        let (extra, width) = (if self.built() { builder::actuator(F::JOINT) } else { String::new() }, F::HALF_WIDTH);
         let _ = write!(
             out,
-            "{extra}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {HALF_WIDTH} 1 {BASE}\"/></asset>\n\
+            "{extra}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n\
              </mujoco>\n"
         );
         out
@@ -221,10 +224,11 @@ impl<F: Runner> Terrain<F> {
         T::lit(PATIENCE / s.dt()).lt(s.memory(SINCE))
     }
 
-    /// Lanes that have come to the end of the course.
+    /// Lanes that have come to the end of the course, or to within 0.2 m of its edge.
     #[inline(always)]
     fn through<T: Real>(s: &Senses<T>) -> T::Mask {
-        T::lit(TO - 1.0).lt(s.memory(AT))
+        let aside = s.position(F::TORSO)[1].abs();
+        T::or(T::lit(TO - 1.0).lt(s.memory(AT)), T::lit(F::HALF_WIDTH - EDGE).lt(aside))
     }
 }
 
@@ -310,7 +314,7 @@ impl<F: Runner> Agent for Terrain<F> {
         memory[MARK] = T::select(new, memory[MARK] + one, memory[MARK]);
         memory[DUE] = T::masked(new, one);
         memory[SINCE] = T::select(new, zero, memory[SINCE] + one);
-        let lies = T::masked(s.terminate_on_non_foot_contact(), one);
+        let lies = T::masked(self.figure.terminated(s), one);
         memory[HIT] = (lies - memory[LIES]).max(zero);
         memory[LIES] = lies;
         memory[HURT] = memory[HURT].max(lies);

@@ -2,11 +2,12 @@
 
 use marathon_physics::lanes::Real;
 
+use super::super::ant::{self, AntV0};
 use super::super::hopper::{self, FOOT, HopperV0};
 use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
 use crate::agent::{Agent, Motors, Obs, Part, Senses};
 
-/// What both observe of their bodies.
+/// What all observe of their bodies.
 const BODY: [&str; 6] = ["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities"];
 
 /// A figure that runs over uneven ground.
@@ -27,6 +28,10 @@ pub trait Runner: Agent + Clone + Default {
     const BODY: &'static [&'static str];
     /// The motor behind its own: the adversary's.
     const GROUND: Motors;
+    /// One of its joints: the adversary's motor needs one that it does not move.
+    const JOINT: &'static str;
+    /// Half the width of its courses, m: tracks of figures in a plane that are beside each other do not overlap in a picture.
+    const HALF_WIDTH: f64;
     /// Writes what it observes of its body.
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
 }
@@ -40,6 +45,8 @@ impl Runner for HopperV0 {
     const EFFORT: f64 = -0.3;
     const BODY: &'static [&'static str] = &BODY;
     const GROUND: Motors = Motors::number(4);
+    const JOINT: &'static str = "rootx";
+    const HALF_WIDTH: f64 = 0.4;
 
     #[inline(always)]
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
@@ -56,9 +63,30 @@ impl Runner for Walker2dV0 {
     const EFFORT: f64 = -0.1;
     const BODY: &'static [&'static str] = &BODY;
     const GROUND: Motors = Motors::number(6);
+    const JOINT: &'static str = "rootx";
+    const HALF_WIDTH: f64 = 0.4;
 
     #[inline(always)]
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         Walker2dV0.observe(s, out);
+    }
+}
+
+impl Runner for AntV0 {
+    const ID: &'static str = "TerrainAnt-v0";
+    const SUMMARY: &'static str = "four legs: run over slopes, steps, gaps and boxes that it sees coming";
+    const TORSO: Part = ant::TORSO;
+    const EYES: Part = ant::TORSO;
+    const SOLES: &'static [Part] = &ant::SOLES;
+    const EFFORT: f64 = -0.5;
+    const BODY: &'static [&'static str] = &BODY;
+    const GROUND: Motors = Motors::number(8);
+    const JOINT: &'static str = "hip_1";
+    // it may stray from its line
+    const HALF_WIDTH: f64 = 8.0;
+
+    #[inline(always)]
+    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        AntV0.observe(s, out);
     }
 }

@@ -1,0 +1,188 @@
+//! The Ant told where to go: forward and to the side, and to turn.
+//!
+//! Vectors are in axes of which x is the heading of the torso and z is up.
+//!
+//! | observation | content |
+//! |---|---|
+//! | 0..3 | commanded speed and speed to the left, m/s, and turn, rad/s |
+//! | 3, 4 | sine and cosine of the angle from the heading to the commanded direction |
+//! | 5 | height of the torso, m |
+//! | 6..9 | up axis of the torso |
+//! | 9..12, 12..15 | velocity of the torso, m/s, and its angular velocity, rad/s |
+//! | 15..19 | feet on the ground, 0 or 1 |
+//! | 19..27, 27..35 | angles of the joints, rad, and their velocities, rad/s |
+//!
+//! The commanded direction is the heading at the start, and turns as told; where the Ant cannot follow, it waits. With e the
+//! distance of the velocity from the commanded one, and a the angle to the commanded direction:
+//! r = exp(-4 e^2) - 0.5 e + 0.5 exp(-4 a^2) - 0.5 abs(a) + 0.5 still - 0.05 effort. Lying on the back is a failure.
+
+use std::f64::consts::FRAC_PI_2;
+
+use marathon_physics::lanes::Real;
+
+use super::super::ant::AntV0;
+use super::super::heading;
+use super::RESTLESS;
+use crate::agent::senses::hypot;
+use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Start, Terms, names};
+use crate::episode_rng::EpisodeRng;
+
+/// All geoms, the torso and the feet as the Ant's own task has them.
+const PARTS: [&str; 13] = [
+    "torso_geom",
+    "left_ankle_geom",
+    "right_ankle_geom",
+    "third_ankle_geom",
+    "fourth_ankle_geom",
+    "aux_1_geom",
+    "left_leg_geom",
+    "aux_2_geom",
+    "right_leg_geom",
+    "aux_3_geom",
+    "back_leg_geom",
+    "aux_4_geom",
+    "rightback_leg_geom",
+];
+const TORSO: Part = Part::named(&PARTS, "torso_geom");
+/// Where the hinges begin in `qpos` and in `qvel`, and how many there are.
+const QPOS: usize = 7;
+const QVEL: usize = 6;
+const HINGES: usize = 8;
+/// Numbers that it observes.
+const OBSERVATION: usize = 19 + 2 * HINGES;
+/// 20 seconds.
+const MAX_EPISODE_STEPS: usize = 2000;
+/// Fastest that it is told to go ahead or back, and to a side, m/s, and sharpest that it is told to turn, rad/s.
+const FASTEST: f64 = 3.0;
+const SIDEWAYS: f64 = 2.0;
+const SHARPEST: f64 = FRAC_PI_2;
+/// Most that the commanded direction is off the heading, rad.
+const MOST_BEHIND: f64 = 1.0;
+/// How long a command holds, decisions.
+const HOLDS: [usize; 2] = [100, 400];
+/// Shares of commands: to stand; of the others, to go straight ahead or back, and not to turn.
+const STANDING: f64 = 0.15;
+const STRAIGHT: f64 = 0.4;
+
+/// The Ant told where to go.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AntController;
+
+impl AntController {
+    /// Velocity of the center of mass along the ground less the commanded one, m/s.
+    #[inline(always)]
+    fn slip<T: Real>(s: &Senses<T>) -> T {
+        let ([c, d], [x, y, _]) = ([s.memory(0), s.memory(1)], s.center_of_mass_velocity());
+        let [ahead, left] = [c.mul_add(x, d * y), c.mul_add(y, -(d * x))];
+        hypot(ahead - s.command(0), left - s.command(1))
+    }
+
+    /// Angle from the heading to the commanded direction, rad.
+    #[inline(always)]
+    fn off<T: Real>(s: &Senses<T>) -> T {
+        heading::off(s.heading(TORSO), [s.memory(0), s.memory(1)])
+    }
+}
+
+impl Agent for AntController {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: "AntController-v0".into(),
+            summary: "four legs: go ahead, back and sideways, and turn, as told".into(),
+            max_episode_steps: MAX_EPISODE_STEPS,
+            observation: Some(OBSERVATION),
+            reward_terms: names(["velocity", "pace", "heading", "off", "still", "effort"]),
+            info: names(["velocity_error", "heading_error"]),
+            metrics: names(["forward", "velocity_error", "heading_error"]),
+            parts: names(PARTS),
+            command: vec![
+                CommandRange::new("speed", -FASTEST..=FASTEST, "m/s"),
+                CommandRange::new("left", -SIDEWAYS..=SIDEWAYS, "m/s"),
+                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+            ],
+            memory: 2,
+            ..AntV0.facts()
+        }
+    }
+
+    fn reset(&self, start: &mut Start) {
+        start.add_noise(crate::agent::ResetNoise::MARATHON);
+    }
+
+    fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
+        let moves = random.uniform(0.0, 1.0) >= STANDING;
+        let [sideways, turns] = [(); 2].map(|()| moves && random.uniform(0.0, 1.0) >= STRAIGHT);
+        out[0] = if moves { random.around_zero(FASTEST) } else { 0.0 };
+        out[1] = if sideways { random.around_zero(SIDEWAYS) } else { 0.0 };
+        out[2] = if turns { random.around_zero(SHARPEST) } else { 0.0 };
+        random.whole(HOLDS[0], HOLDS[1])
+    }
+
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        memory.copy_from_slice(&s.heading(TORSO));
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let turn = |angle: T| s.command(2).mul_add(T::lit(s.dt()), angle);
+        let direction = heading::turned(s.heading(TORSO), [memory[0], memory[1]], turn, MOST_BEHIND);
+        memory.copy_from_slice(&direction);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let [cos, sin] = s.heading(TORSO);
+        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), cos.mul_add(y, -(sin * x)), z];
+        let [x, y] = [s.memory(0), s.memory(1)];
+        out.group("command");
+        for i in 0..3 {
+            out.scalar(s.command(i));
+        }
+        out.scalar(cos.mul_add(y, -(sin * x)));
+        out.scalar(cos.mul_add(x, sin * y));
+        out.group("height");
+        out.scalar(s.height(TORSO));
+        out.group("up");
+        out.vector(turned(s.up(TORSO)));
+        out.group("velocity");
+        out.vector(turned(s.linear_velocity(TORSO)));
+        out.group("angular_velocity");
+        out.vector(turned(s.angular_velocity(TORSO)));
+        out.group("touch");
+        out.touch_sensors(s);
+        out.group("joint_positions");
+        for i in 0..HINGES {
+            out.scalar(s.readings().qpos(QPOS + i));
+        }
+        out.group("joint_velocities");
+        for i in 0..HINGES {
+            out.scalar(s.readings().qvel(QVEL + i));
+        }
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let (slip, angle) = (Self::slip(s), Self::off(s));
+        terms.add("velocity", 1.0, (slip * slip * T::lit(-4.0)).exp());
+        terms.add("pace", -0.5, slip);
+        terms.add("heading", 0.5, (angle * angle * T::lit(-4.0)).exp());
+        terms.add("off", -0.5, angle.abs());
+        // told to go nowhere and not to turn
+        let told = s.command(0).abs().max(s.command(1).abs()).max(s.command(2).abs());
+        let rest = told.neg_mul_add(T::lit(10.0), T::lit(1.0)).max(T::zero());
+        terms.add("still", 0.5, rest * super::stillness(s, PARTS.len(), RESTLESS));
+        terms.add("effort", -0.05, s.effort_mean(Motors::NONE));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        s.up(TORSO)[2].lt(T::zero())
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        out.scalar(Self::slip(s));
+        out.scalar(Self::off(s).abs());
+    }
+}

@@ -1,0 +1,19 @@
+//! Where a figure in space is told to face: a direction along the ground that turns as commanded, and waits for who cannot follow.
+
+use marathon_physics::lanes::Real;
+
+use crate::agent::senses::clamp;
+
+/// Angle from a heading to a direction, rad; both are cosine and sine.
+#[inline(always)]
+pub(super) fn off<T: Real>([c, d]: [T; 2], [x, y]: [T; 2]) -> T {
+    c.mul_add(y, -(d * x)).atan2(c.mul_add(x, d * y))
+}
+
+/// The direction after a decision: turned by an angle, but no farther off the heading than `most`, rad.
+#[inline(always)]
+pub(super) fn turned<T: Real>(heading: [T; 2], direction: [T; 2], by: impl FnOnce(T) -> T, most: f64) -> [T; 2] {
+    let angle = clamp(by(off(heading, direction)), -most, most);
+    let ((sin, cos), [c, d]) = (angle.sin_cos(), heading);
+    [d.neg_mul_add(sin, c * cos), d.mul_add(cos, c * sin)]
+}
