@@ -297,3 +297,53 @@ fn adaptive_starts_fit_the_command_and_try_again() {
     let share = again as f64 / ended as f64;
     assert!(ended > 100 && (share - 0.5).abs() < 0.12, "{again} of {ended}");
 }
+
+/// Sixty-four of them with some arguments, and what they observe at first.
+fn begun(options: &[(&str, &str)]) -> (VecEnv, Vec<f32>) {
+    let mut given = marathon_envs::Options::new();
+    for (name, value) in options {
+        given.set(name, value.parse::<marathon_envs::Value>().unwrap_or_else(|e| match e {}));
+    }
+    let options = VecEnvOptions { agents: 64, options: given, autoreset: Autoreset::Disabled, ..Default::default() };
+    let mut env = VecEnv::new(ID, &options).unwrap();
+    let mut obs = env.buffers().obs;
+    env.reset(Some(3), &mut obs).unwrap();
+    (env, obs)
+}
+
+#[test]
+fn sharp_commands_are_extremes_half_of_the_time() {
+    let share = |commands: &str| {
+        let (env, obs) = begun(&[("commands", commands)]);
+        let sharp = |row: &&[f32]| f64::from(row[1].abs()) > 0.999 * FRAC_PI_2 || row[0] > 2.999;
+        obs.chunks_exact(env.spec().obs).filter(sharp).count() as f64 / 64.0
+    };
+    // of the extremes, two thirds of a third and half of the turns
+    let (sharp, even) = (share("sharp"), share("even"));
+    assert!((0.2..0.55).contains(&sharp) && even < 0.05, "{sharp} {even}");
+}
+
+#[test]
+fn he_may_begin_standing_and_a_fall_may_have_a_price() {
+    let (mut env, obs) = begun(&[("start", "first"), ("price", "20")]);
+    let n = env.spec().obs;
+    for row in obs.chunks_exact(n) {
+        // at rest but for the noise and the sway of who stands, upright
+        assert!(
+            row[VELOCITY..VELOCITY + 3].iter().all(|v| v.abs() < 0.2) && row[6] > 0.8,
+            "{:?}",
+            &row[..VELOCITY + 3]
+        );
+    }
+    let mut out = env.buffers();
+    let actions = vec![1.0; 64 * env.spec().act];
+    let mut felled = 0;
+    for _ in 0..80 {
+        env.step(&actions, &mut out.as_mut()).unwrap();
+        for (down, reward) in out.terminated.iter().zip(&out.reward) {
+            felled += usize::from(*down);
+            assert!(!down || *reward == -20.0);
+        }
+    }
+    assert!(felled > 0);
+}

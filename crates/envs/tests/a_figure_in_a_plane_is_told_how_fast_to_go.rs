@@ -116,3 +116,64 @@ fn the_reward_is_its_formula() {
 
 /// Price of the effort.
 const EFFORT: f64 = 0.05;
+
+/// With an adversary, its action is what the figure is told from the next decision on, the figure observes and earns what it does
+/// without one, and the adversary earns what is not obeyed.
+#[test]
+fn an_adversary_commands() {
+    for (id, fall) in [("HopperController-v0", -60.0), ("WalkerController-v0", -40.0)] {
+        for input in ["discrete", "continuous"] {
+            let plain = env(id, input).spec().clone();
+            let given = Options::new().with("input", input).with("commander", "adversary");
+            let options =
+                VecEnvOptions { agents: AGENTS, options: given, autoreset: Autoreset::Disabled, ..Default::default() };
+            let mut env = VecEnv::new(id, &options).unwrap();
+            let spec = env.spec().clone();
+            let [runner, commander] = &spec.roles[..] else { panic!("two roles: {:?}", spec.roles) };
+            let buttons = usize::from(input == "discrete");
+            assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id} {input}");
+            assert_eq!(commander.act, plain.act..plain.act + 1 + buttons);
+            assert!(commander.intermittent && spec.command.is_empty());
+            assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..6], &["fall".into()]].concat());
+            assert_eq!(spec.reward_terms[commander.terms.clone()], ["disobedience", "felled"]);
+
+            let (n, act, k) = (spec.obs, spec.act, spec.reward_terms.len());
+            let mut out = env.buffers();
+            env.reset(Some(1), &mut out.obs).unwrap();
+            let (mut told, mut fallen) = ([[0.0; 2]; AGENTS], [false; AGENTS]);
+            let mut actions = vec![0.0; AGENTS * act];
+            for decision in 0..80 {
+                for (i, row) in actions.chunks_exact_mut(act).enumerate() {
+                    action(i, decision, 1.0, &mut row[..plain.act]);
+                    row[plain.act..].fill([0.1, 0.5, -0.3, -1.0][(i + decision / 7) % 4]);
+                }
+                env.step(&actions, &mut out.as_mut()).unwrap();
+                for i in 0..AGENTS {
+                    let (obs, terms) = (&out.obs[n * i..n * (i + 1)], &out.terms[k * i..k * (i + 1)]);
+                    let said = f64::from(actions[act * i + plain.act]);
+                    let pressed = f64::from(u8::from(said > 0.2));
+                    let next = match input {
+                        "discrete" => [4.0 * (pressed - f64::from(u8::from(said < -0.2))), pressed],
+                        _ => [4.0 * said, 0.0],
+                    };
+                    let (own, mean) = (plain.obs - buttons - 2, f64::from(obs[plain.obs - 1]));
+                    let off = (told[i][0] - mean).abs();
+                    let near = |got: f32, expected: f64| (f64::from(got) - expected).abs() < 1e-4;
+                    if !fallen[i] {
+                        assert!(near(obs[own], next[0]) && (buttons == 0 || near(obs[own + 1], next[1])));
+                        assert!(near(obs[plain.obs], next[0]) && near(obs[plain.obs + 1], next[1]));
+                        assert!(near(terms[0], (1.0 - 0.8 * off).clamp(-1.0, 1.0)), "{id} {input}, agent {i}");
+                        assert!(near(terms[7], off / 4.0) && near(out.info[i], off));
+                        let down = out.terminated[i];
+                        let expected = if down { [fall as f32, 10.0] } else { [0.0; 2] };
+                        assert_eq!([terms[6], terms[8]], expected, "{id} {input}, agent {i}");
+                        assert!(near(out.reward[i], terms[..7].iter().map(|x| f64::from(*x)).sum()));
+                    }
+                    told[i] = next;
+                    fallen[i] |= out.terminated[i];
+                }
+            }
+            assert!(fallen.iter().any(|f| *f), "{id}: nobody has fallen");
+        }
+    }
+}

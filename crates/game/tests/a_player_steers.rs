@@ -207,6 +207,90 @@ fn stick_and_arrow_keys_steer_the_character_in_focus() {
     assert!(!told[0].1 && told[0].0 != 2.0 && told[1] == (2.0, true), "{told:?}");
 }
 
+/// Each gamepad has a character: the first one that in focus, as the keys, the second one the next.
+#[test]
+fn a_second_gamepad_leads_the_next_character() {
+    let mut app = game(&["--agents", "3"]);
+    let [first, second] = [pad(&mut app), pad(&mut app)];
+    push(&mut app, second, GamepadAxis::LeftStickY, -1.0);
+    frames(&mut app, 3);
+    let told = commands(&mut app);
+    assert!(!told[0].1 && told[1] == (-2.0, true) && !told[2].1, "{told:?}");
+    push(&mut app, first, GamepadAxis::LeftStickY, 1.0);
+    frames(&mut app, 3);
+    let told = commands(&mut app);
+    assert!(told[0] == (2.0, true) && told[1] == (-2.0, true) && !told[2].1, "{told:?}");
+    // the keys are the first player's
+    push(&mut app, first, GamepadAxis::LeftStickY, 0.0);
+    key(&mut app, KeyCode::ArrowDown, ButtonState::Pressed);
+    frames(&mut app, 3);
+    let told = commands(&mut app);
+    assert!(told[0] == (-2.0, true) && told[1] == (-2.0, true), "{told:?}");
+    // with the focus on the last one, the second player has the first one
+    key(&mut app, KeyCode::ArrowDown, ButtonState::Released);
+    for _ in 0..2 {
+        key(&mut app, KeyCode::Tab, ButtonState::Pressed);
+        key(&mut app, KeyCode::Tab, ButtonState::Released);
+    }
+    frames(&mut app, 4);
+    let told = commands(&mut app);
+    assert!(told[0] == (-2.0, true) && !told[1].1, "{told:?}");
+}
+
+/// The Ant goes where the stick, the triggers and the keys A and D say; the mapping is what the command line says.
+#[test]
+fn who_can_step_aside_does_so_by_triggers_and_keys() {
+    let mut app = game_of("AntController", &["--curve", "2", "--smoothing", "0.1", "--key-smoothing", "0.2"]);
+    let pad = pad(&mut app);
+    let command = |app: &mut App| {
+        let mut query = app.world_mut().query::<&Episode>();
+        query.iter(app.world()).next().expect("one Ant").command.clone()
+    };
+    let arrived = |told: &[f64], expected: [f64; 3]| told.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
+    for (pushed, button, expected) in
+        [(1.0, GamepadButton::LeftTrigger2, 2.0), (1.0, GamepadButton::RightTrigger2, -2.0)]
+    {
+        let trigger = |app: &mut App, value| {
+            let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
+            app.world_mut().write_message(RawGamepadEvent::Button(event));
+            app.update();
+        };
+        trigger(&mut app, pushed);
+        // 0.1 s in frames of 20 ms: two thirds of it, and some frames until it is observed
+        frames(&mut app, 5);
+        let told = command(&mut app)[1] / expected;
+        assert!((0.45..0.9).contains(&told), "{told}");
+        frames(&mut app, 60);
+        let told = command(&mut app);
+        assert!(arrived(&told, [0.0, expected, 0.0]), "{told:?}");
+        trigger(&mut app, 0.0);
+        frames(&mut app, 60);
+    }
+    // a square behind the dead zone: half of the way says a quarter
+    push(&mut app, pad, GamepadAxis::LeftStickY, 0.56);
+    frames(&mut app, 60);
+    let told = command(&mut app);
+    assert!(arrived(&told, [0.75, 0.0, 0.0]), "{told:?}");
+    push(&mut app, pad, GamepadAxis::LeftStickY, 0.0);
+    frames(&mut app, 60);
+    key(&mut app, KeyCode::KeyD, ButtonState::Pressed);
+    frames(&mut app, 100);
+    let told = command(&mut app);
+    assert!(arrived(&told, [0.0, -2.0, 0.0]), "{told:?}");
+}
+
+#[test]
+fn a_mapping_that_makes_no_sense_is_refused() {
+    for (words, expected) in [
+        (["--dead-zone", "1"], "a number from 0 to below 1"),
+        (["--curve", "0"], "a number above 0, up to 10"),
+        (["--smoothing", "nan"], "seconds from 0 to 10"),
+    ] {
+        let error = Args::try_parse_from([&["marathon-game", "AntController"][..], &words].concat()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
 #[test]
 fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
     LazyLock::force(&ROVER);

@@ -43,7 +43,7 @@ fn half_angle_slope(fovy: f64) -> f64 {
     libm::tan(fovy.clamp(1.0, 150.0).to_radians() / 2.0)
 }
 
-/// Tracks the agents along x from the side, slightly elevated.
+/// Tracks the agents along x from the side, slightly elevated, and along y those who stray far from where they were first.
 ///
 /// The tracker is a critically damped second-order filter on position and velocity: it ignores the bobbing of a gait
 /// and has no lag at constant speed.
@@ -60,15 +60,22 @@ pub struct Follow {
     aspect: f64,
     radius: f64,
     row: f64,
+    /// Where the agents were first, along y, m.
+    first: Option<f64>,
     state: Option<State>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct State {
     x: Tracker,
+    /// How far beyond [`STRAYED`] the agents are from where they were first, m.
+    y: Tracker,
     z: Tracker,
     spread: Tracker,
 }
+
+/// Way along y up to which the camera stays where it is, m: runners sway.
+const STRAYED: f64 = 1.0;
 
 #[derive(Clone, Copy, Debug)]
 struct Tracker {
@@ -112,6 +119,7 @@ impl Follow {
             aspect: width.max(1) as f64 / height.max(1) as f64,
             radius: scene.radius(),
             row,
+            first: None,
             state: None,
         }
     }
@@ -121,16 +129,19 @@ impl Follow {
     /// The first call jumps to the agents, and so does one after more than a second or back in time.
     pub fn update(&mut self, frame: &Frame, dt: f64) -> Camera {
         let agents = frame.agents();
-        let (mut low, mut high, mut z) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        let (mut low, mut high, mut y, mut z) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
         for agent in agents {
             low = low.min(agent.com[0]);
             high = high.max(agent.com[0]);
+            y += agent.com[1] / agents.len() as f64;
             z += agent.com[2] / agents.len() as f64;
         }
         if agents.is_empty() {
             (low, high, z) = (0.0, 0.0, self.radius);
         }
         let (x, spread) = (0.5 * (low + high), high - low);
+        let strayed = if agents.is_empty() { 0.0 } else { y - *self.first.get_or_insert(y) };
+        let aside = (strayed.abs() - STRAYED).max(0.0).copysign(strayed);
 
         if !(0.0..=1.0).contains(&dt) {
             self.state = None;
@@ -138,18 +149,20 @@ impl Follow {
         let state = match &mut self.state {
             Some(state) => {
                 state.x.advance(x, 4.0, dt);
+                state.y.advance(aside, 4.0, dt);
                 state.z.advance(z, 0.8, dt);
                 state.spread.advance(spread, 1.0, dt);
                 *state
             }
             None => {
-                *self.state.insert(State { x: Tracker::start(x), z: Tracker::start(z), spread: Tracker::start(spread) })
+                let [x, y, z, spread] = [x, aside, z, spread].map(Tracker::start);
+                *self.state.insert(State { x, y, z, spread })
             }
         };
-        self.look(state.x.value, state.z.value, state.spread.value)
+        self.look([state.x.value, state.y.value, state.z.value], state.spread.value)
     }
 
-    fn look(&self, x: f64, z: f64, spread: f64) -> Camera {
+    fn look(&self, [x, y, z]: [f64; 3], spread: f64) -> Camera {
         // far enough that the agent fills about two thirds of the height, and the group fits the width
         let slope = half_angle_slope(self.fovy);
         let high = 1.5 * self.radius / slope;
@@ -158,7 +171,7 @@ impl Follow {
 
         let (elevation, azimuth) = (self.elevation.to_radians(), self.azimuth.to_radians());
         let flat = distance * libm::cos(elevation);
-        let target = [x, 0.4 * self.row, z - 0.05 * self.radius];
+        let target = [x, 0.4 * self.row + y, z - 0.05 * self.radius];
         let eye = [
             target[0] + flat * libm::sin(azimuth),
             target[1] - flat * libm::cos(azimuth),

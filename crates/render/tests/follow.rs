@@ -34,6 +34,31 @@ fn follows_a_steady_run_without_lag_and_ignores_the_bobbing() {
 }
 
 #[test]
+fn who_turns_aside_stays_in_the_picture_and_who_sways_does_not_move_it() {
+    let model = common::model("shapes.xml");
+    let scene = Scene::new(&model);
+    let mut follow = Follow::new(&scene, 1, 640, 360);
+    let dt = 1.0 / 30.0;
+    let mut at = |y: f64, dt: f64| {
+        let mut qpos = model.qpos0.clone();
+        qpos[1] += y;
+        follow.update(&scene.frame(&[&qpos]).unwrap(), dt).target[1]
+    };
+    let first = at(0.0, dt);
+    for i in 0..60 {
+        assert_eq!(at(0.9 * (f64::from(i) * 0.3).sin(), dt), first);
+    }
+    let mut last = first;
+    for i in 0..300 {
+        last = at(-0.1 * f64::from(i), dt);
+    }
+    assert!((last - first + 28.9).abs() < 0.2, "{last}");
+    // after a jump in time, too, it knows where he began
+    assert!((at(8.0, 5.0) - first - 7.0).abs() < 1e-9);
+    assert!((at(0.0, 5.0) - first).abs() < 1e-9);
+}
+
+#[test]
 fn first_frame_and_odd_time_steps_are_sane() {
     let model = common::model("shapes.xml");
     let scene = Scene::new(&model);

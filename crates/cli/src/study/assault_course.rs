@@ -25,12 +25,13 @@ const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// Grounds to learn on.
-const GROUNDS: [Ground; 5] = [
+const GROUNDS: [Ground; 6] = [
     ("flat", &[("course", "flat"), ("levels", "fixed")]),
     ("random", &[("course", "mixed"), ("levels", "random"), ("difficulty", "1")]),
     ("curriculum", &[("course", "mixed"), ("levels", "curriculum"), ("difficulty", "1")]),
     ("adversary", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1")]),
     ("bounded", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")]),
+    ("rising", &[("course", "adversary"), ("levels", "curriculum"), ("difficulty", "1")]),
 ];
 
 /// Courses that policies are judged on: what the table calls them, kind, difficulty.
@@ -121,10 +122,11 @@ pub fn run(options: &Options, tasks: &[String], grounds: &[String], kept_only: b
 
 fn about() -> String {
     format!(
-        "Figures learn to run by PPO with `terrain-fast.yaml` on five kinds of [ground](../environments/terrain.md): *flat*; *random*, \
+        "Figures learn to run by PPO with `terrain-fast.yaml` on six kinds of [ground](../environments/terrain.md): *flat*; *random*, \
          mixed courses of any difficulty; *curriculum*, mixed courses that become harder; *adversary*, built ahead by a second \
-         learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter. Each learns with \
-         and without seeing the ground ahead.\n\n\
+         learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter; *rising*, the same \
+         with steps whose bound rises with the runner's way, from level ground on. Each learns with and without seeing the ground \
+         ahead.\n\n\
          The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
          courses of full difficulty, and on the original's meters, of up to 0.5 m. The courses made by hand and the meters are \
          nobody's training ground. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \

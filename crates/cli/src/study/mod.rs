@@ -79,7 +79,8 @@ pub enum What {
         /// TerrainHopper, TerrainWalker2d, or both with a comma between them [default: both].
         #[arg(long, value_name = "TASKS", value_delimiter = ',')]
         tasks: Vec<String>,
-        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded [default: all].
+        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded, rising
+        /// [default: all].
         #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
         grounds: Vec<String>,
         /// Only what is kept: a page of the runs that are there, without training any.

@@ -236,6 +236,11 @@ impl Motors {
         Motors(1 << motor)
     }
 
+    /// All motors from a number on, at most 127.
+    pub const fn from(first: usize) -> Motors {
+        Motors(!0 << first)
+    }
+
     /// Whether motor `i` belongs to the set.
     #[inline(always)]
     pub fn contains(self, i: usize) -> bool {
@@ -280,5 +285,6 @@ mod tests {
         assert_eq!(FOOT, Part(1));
         const SOME: Motors = Motors::named(&PARTS, &["torso", "toe"]);
         assert!(SOME.contains(0) && !SOME.contains(1) && SOME.contains(2) && !SOME.contains(200));
+        assert!(!Motors::from(3).contains(2) && Motors::from(3).contains(3) && Motors::from(3).contains(127));
     }
 }

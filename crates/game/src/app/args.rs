@@ -1,6 +1,7 @@
 //! The command line of `marathon-game`.
 
 use crate::app::cues::Cue;
+use crate::app::steer::{Mapping, Mappings};
 use crate::ground::Ground;
 use crate::look::{CameraMode, Quality};
 use clap::{Parser, ValueEnum};
@@ -67,6 +68,19 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["mode", "policy", "replay", "record"])]
     pub watch_stream: bool,
 
+    /// Deflection up to which sticks and triggers that steer count as released, from 0 to below 1.
+    #[arg(long, value_name = "SHARE", default_value_t = Mappings::default().pad.dead_zone, value_parser = dead_zone)]
+    pub dead_zone: f32,
+    /// Power that the rest of a deflection is raised to: above 1, a small deflection says less.
+    #[arg(long, value_name = "POWER", default_value_t = Mappings::default().pad.curve, value_parser = curve)]
+    pub curve: f32,
+    /// Time in which what sticks and triggers say arrives but for a third, s.
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = smoothing)]
+    pub smoothing: f32,
+    /// The same of the keys that steer.
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = smoothing)]
+    pub key_smoothing: f32,
+
     /// Do at a time what a key does, such as 2.5:throw or 4:next-agent; may be given again.
     #[arg(long, value_name = "S:DEED")]
     pub press: Vec<Cue>,
@@ -108,7 +122,31 @@ const SIZE: (u32, u32) = (1280, 720);
 const SECONDS: f64 = 8.0;
 const FPS: f64 = 30.0;
 
+/// A number of the command line within a range.
+fn within(text: &str, fits: impl Fn(f32) -> bool, expected: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x| fits(*x)).ok_or_else(|| format!("expected {expected}"))
+}
+
+fn dead_zone(text: &str) -> Result<f32, String> {
+    within(text, |x| (0.0..1.0).contains(&x), "a number from 0 to below 1")
+}
+
+fn curve(text: &str) -> Result<f32, String> {
+    within(text, |x| x > 0.0 && x <= 10.0, "a number above 0, up to 10")
+}
+
+fn smoothing(text: &str) -> Result<f32, String> {
+    within(text, |x| (0.0..=10.0).contains(&x), "seconds from 0 to 10")
+}
+
 impl Args {
+    /// What becomes of what gamepads and keys say.
+    pub fn mappings(&self) -> Mappings {
+        let Args { dead_zone, curve, smoothing, key_smoothing, .. } = *self;
+        let keys = Mapping { smoothing: key_smoothing, ..Mappings::default().keys };
+        Mappings { pad: Mapping { dead_zone, curve, smoothing }, keys }
+    }
+
     /// Size of the window or film, pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size.unwrap_or(SIZE)

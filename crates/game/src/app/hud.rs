@@ -375,7 +375,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
                     ui.label(text(
                         12.0,
                         FAINT,
-                        "left stick or arrow keys, which do nothing else here: tell it what to do",
+                        "left stick, triggers or arrow keys, A and D, which do nothing else here: tell it what to do",
                     ));
                 }
             });

@@ -33,7 +33,7 @@ pub use learn::{Lesson, Teaching};
 pub use notes::{Note, Notes};
 pub use replay::{Playback, Recorder, Recording};
 pub use show::{Actor, Focus, Show, Source};
-pub use steer::Steering;
+pub use steer::{Mapping, Mappings, Steering};
 pub use weather::{Ball, Weather, WeatherPlugin};
 
 use crate::look::{
@@ -223,6 +223,7 @@ impl Plugin for GamePlugin {
         .init_resource::<show::Script>()
         .init_resource::<Imitation>()
         .init_resource::<Steering>()
+        .insert_resource(args.mappings())
         .init_resource::<notes::Notes>()
         .init_resource::<menu::Menu>()
         .init_resource::<hud::Monitor>()

@@ -29,7 +29,7 @@ const WATCH: f32 = 0.5;
 const LIE: f64 = 1.2;
 
 /// Policies that come with the game.
-const SHIPPED: [&[u8]; 8] = [
+const SHIPPED: [&[u8]; 9] = [
     include_bytes!("../../../../assets/policies/hopper.safetensors"),
     include_bytes!("../../../../assets/policies/walker2d.safetensors"),
     include_bytes!("../../../../assets/policies/humanoid.safetensors"),
@@ -38,6 +38,7 @@ const SHIPPED: [&[u8]; 8] = [
     include_bytes!("../../../../assets/policies/MarathonManRun.safetensors"),
     include_bytes!("../../../../assets/policies/MarathonManBackflip.safetensors"),
     include_bytes!("../../../../assets/policies/MarathonManSteer.safetensors"),
+    include_bytes!("../../../../assets/policies/AntController.safetensors"),
 ];
 
 /// What is on stage. Who changes it calls [`Show::again`].
@@ -445,7 +446,8 @@ pub struct Shown {
 pub fn show_marks(shown: Res<Shown>, focus: Res<Focus>, mut actors: Query<(&Actor, &mut Marks), With<Anatomy>>) {
     for (actor, mut marks) in &mut actors {
         let on = actor.0 == focus.0;
-        let wanted = Marks { contacts: on && shown.contacts, joints: on && shown.joints, ring: marks.ring };
+        let Shown { contacts, joints } = *shown;
+        let wanted = Marks { contacts: on && contacts, joints: on && joints, ring: marks.ring, command: on };
         if *marks != wanted {
             *marks = wanted;
         }

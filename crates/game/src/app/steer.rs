@@ -1,4 +1,6 @@
-//! Sticks and arrow keys tell the character in focus what to do, if its agent takes commands.
+//! Sticks, triggers and keys tell the character in focus what to do, if its agent takes commands.
+//!
+//! What a device says goes through its [mapping](Mapping): dead zone, curve, smoothing.
 
 use crate::app::keys::{Deed, Do};
 use crate::app::show::{Actor, Focus};
@@ -9,42 +11,129 @@ use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
 use marathon_envs::CommandRange;
 
-/// Deflection of a stick up to which it counts as released.
-const DEAD: f32 = 0.12;
+/// Keys that steer, forward and back, to the left and to the right, and a step aside to the left and to the right; they do
+/// nothing else meanwhile.
+pub(super) const KEYS: [KeyCode; 6] =
+    [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::KeyA, KeyCode::KeyD];
 
-/// Keys that steer; they do nothing else meanwhile.
-pub(super) const ARROWS: [KeyCode; 4] = [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight];
+/// How far ahead, to the left, and aside to the left somebody pushes, in [-1, 1].
+type Deflection = [f32; 3];
+
+/// What becomes of a device's deflections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapping {
+    /// Deflection up to which a stick or trigger counts as released, 0 to 1. Beyond it a deflection begins at 0.
+    pub dead_zone: f32,
+    /// Power that the rest is raised to: above 1, a small deflection says less.
+    pub curve: f32,
+    /// Time in which a change arrives but for 1/e of it, s; 0: at once.
+    pub smoothing: f32,
+}
+
+/// The mappings of gamepads and of the keyboard, whose keys have neither a dead zone nor a curve.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct Mappings {
+    /// Of gamepads.
+    pub pad: Mapping,
+    /// Of the keyboard.
+    pub keys: Mapping,
+}
+
+impl Default for Mappings {
+    fn default() -> Self {
+        let at_once = Mapping { dead_zone: 0.0, curve: 1.0, smoothing: 0.0 };
+        Mappings { pad: Mapping { dead_zone: 0.12, ..at_once }, keys: at_once }
+    }
+}
+
+impl Mapping {
+    /// What a deflection says.
+    fn map(&self, x: f32) -> f32 {
+        let beyond = ((x.abs() - self.dead_zone) / (1.0 - self.dead_zone)).clamp(0.0, 1.0);
+        beyond.powf(self.curve) * x.signum()
+    }
+
+    /// What is said `dt` seconds after `before` was.
+    fn smooth(&self, before: f32, now: f32, dt: f32) -> f32 {
+        // below what anybody sees, so that a released stick comes to rest
+        if self.smoothing <= 0.0 || (now - before).abs() < 1e-3 {
+            return now;
+        }
+        now + (before - now) * (-dt / self.smoothing).exp()
+    }
+}
+
+/// What gamepads, in the order in which they were connected, and keyboard have said last.
+#[derive(Default)]
+pub struct Said {
+    pads: Vec<(Entity, Deflection)>,
+    keys: Deflection,
+}
+
+impl Said {
+    /// Takes in what is said now.
+    fn hear(&mut self, pads: &Query<(Entity, &Gamepad)>, keys: Deflection, mappings: &Mappings, dt: f32) {
+        let hear = |said: &mut Deflection, now: Deflection, mapping: &Mapping| {
+            *said = [0, 1, 2].map(|i| mapping.smooth(said[i], now[i], dt));
+        };
+        self.pads.retain(|(pad, _)| pads.contains(*pad));
+        for (entity, pad) in pads {
+            let at = self.pads.iter().position(|(known, _)| *known == entity).unwrap_or_else(|| {
+                self.pads.push((entity, [0.0; 3]));
+                self.pads.len() - 1
+            });
+            hear(&mut self.pads[at].1, of_pad(pad, &mappings.pad), &mappings.pad);
+        }
+        hear(&mut self.keys, keys, &mappings.keys);
+    }
+
+    /// How many play.
+    fn players(&self) -> usize {
+        self.pads.len().max(1)
+    }
+
+    /// What a player says: the first one by keyboard and gamepad, whichever is pushed farther, each other by a gamepad.
+    fn of(&self, player: usize) -> Deflection {
+        let pad = self.pads.get(player).map_or([0.0; 3], |(_, said)| *said);
+        if player > 0 { pad } else { [0, 1, 2].map(|i| farthest(pad[i], self.keys[i])) }
+    }
+}
 
 /// Whether the character in focus takes commands: the left stick and the arrow keys are its own then.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steering(pub bool);
 
-/// Tells the character in focus what left stick and arrow keys say. Once it has been told something, it stays under command
-/// until [`Deed::Release`], or until another is in focus.
+/// Tells the character in focus what the first gamepad and the keys say, and those behind it what the other gamepads say. Once a
+/// character has been told something, it stays under command until [`Deed::Release`], or until it is nobody's.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 pub fn steer(
     mut commands: Commands,
     keys: Res<ButtonInput<KeyCode>>,
-    pads: Query<&Gamepad>,
+    pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
     mut deeds: MessageReader<Do>,
     focus: Res<Focus>,
     mut steering: ResMut<Steering>,
+    mappings: Res<Mappings>,
+    time: Res<Time<Real>>,
+    mut said: Local<Said>,
     actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>), With<RagdollState>>,
 ) {
     let released = deeds.read().filter(|deed| deed.0 == Deed::Release).count() > 0;
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
-    let deflection = deflection(&pads, (!typing).then_some(&*keys));
-    let mut on = false;
+    said.hear(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
+    let (mut on, count) = (false, actors.iter().count());
     for (entity, actor, anatomy, command) in &actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
-        let mine = actor.0 == focus.0 && !ranges.is_empty();
-        on |= mine;
-        if !mine || released {
+        let player = (actor.0 + count).saturating_sub(focus.0) % count;
+        let led = player < said.players() && !ranges.is_empty();
+        let deflection = said.of(player);
+        on |= led && player == 0;
+        if !led || released {
             if command.is_some() {
                 commands.entity(entity).remove::<AgentCommand>();
             }
-        } else if command.is_some() || deflection != [0.0; 2] {
+        } else if command.is_some() || deflection != [0.0; 3] {
             let wanted = AgentCommand(Some(told(ranges, deflection)));
             if command != Some(&wanted) {
                 commands.entity(entity).insert(wanted);
@@ -54,39 +143,35 @@ pub fn steer(
     steering.set_if_neq(Steering(on));
 }
 
-/// How far ahead and to the left sticks and arrow keys are pushed, in [-1, 1]: the farthest of all.
-fn deflection(pads: &Query<&Gamepad>, keys: Option<&ButtonInput<KeyCode>>) -> [f32; 2] {
-    let key = |[plus, minus]: [KeyCode; 2]| {
-        let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
-        pressed(plus) - pressed(minus)
-    };
-    let [up, down, left, right] = ARROWS;
-    let mut most = [key([up, down]), key([left, right])];
-    for pad in pads {
-        let axes = [(GamepadAxis::LeftStickY, 1.0), (GamepadAxis::LeftStickX, -1.0)];
-        for (most, (axis, sign)) in most.iter_mut().zip(axes) {
-            let x = sign * alive(pad.get(axis).unwrap_or(0.0));
-            if x.abs() > most.abs() {
-                *most = x;
-            }
-        }
-    }
-    most
+/// What is farther from 0.
+fn farthest(a: f32, b: f32) -> f32 {
+    if b.abs() > a.abs() { b } else { a }
 }
 
-/// A stick's deflection without its dead zone, beyond which it begins at 0.
-fn alive(x: f32) -> f32 {
-    ((x.abs() - DEAD) / (1.0 - DEAD)).clamp(0.0, 1.0) * x.signum()
+/// How far a gamepad is pushed.
+fn of_pad(pad: &Gamepad, mapping: &Mapping) -> Deflection {
+    let axis = |axis| mapping.map(pad.get(axis).unwrap_or(0.0));
+    let trigger = |button| mapping.map(pad.get(button).unwrap_or(0.0));
+    let [left, right] = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(trigger);
+    [axis(GamepadAxis::LeftStickY), -axis(GamepadAxis::LeftStickX), left - right]
 }
 
-/// The command of a deflection, ahead and to the left. A released stick means rest, the ends of a stick those of the range.
+/// How far the keyboard is.
+fn of_keys(keys: Option<&ButtonInput<KeyCode>>) -> Deflection {
+    let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
+    let [up, down, left, right, aside_left, aside_right] = KEYS.map(pressed);
+    [up - down, left - right, aside_left - aside_right]
+}
+
+/// The command of a deflection, ahead, to the left, and aside. A released stick means rest, the ends of a stick those of the range.
 ///
 /// * Up and down are the speed of whoever turns; left and right are the turn.
 /// * For whoever does not turn, such as a figure in a plane, right and left are the speed. Up is the button, if the command has
 ///   one: a number from 0 to 1 without a unit. Otherwise up and down are the speed, too.
 /// * Where no number is in m/s, up and down are the first number, left and right the second.
-fn told(ranges: &[CommandRange], deflection: [f32; 2]) -> Vec<f64> {
-    let [ahead, left] = deflection.map(f64::from);
+/// * The second number in m/s of whoever turns is a step aside: the triggers, or A and D.
+fn told(ranges: &[CommandRange], deflection: Deflection) -> Vec<f64> {
+    let [ahead, left, aside] = deflection.map(f64::from);
     let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
     let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
     let mut pushed = vec![0.0; ranges.len()];
@@ -96,7 +181,12 @@ fn told(ranges: &[CommandRange], deflection: [f32; 2]) -> Vec<f64> {
             pushed[button] = f64::from(u8::from(ahead > 0.5));
         }
         [Some(speed), None, None] => pushed[speed] = if left.abs() > ahead.abs() { -left } else { ahead },
-        [Some(speed), Some(turn), _] => (pushed[speed], pushed[turn]) = (ahead, left),
+        [Some(speed), Some(turn), _] => {
+            (pushed[speed], pushed[turn]) = (ahead, left);
+            if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
+                pushed[speed + 1 + second] = aside;
+            }
+        }
         _ => pushed.iter_mut().zip([ahead, left]).for_each(|(number, x)| *number = x),
     }
     let number = |(range, x): (&CommandRange, f64)| {
@@ -118,17 +208,17 @@ mod tests {
             CommandRange::new("height", 0.5..=1.0, "m"),
         ];
         for (deflection, expected) in [
-            ([0.0, 0.0], [0.0, 0.0, 0.5]),
-            ([1.0, -1.0], [3.0, -2.0, 0.5]),
-            ([-1.0, 1.0], [-1.0, 2.0, 0.5]),
-            ([0.5, 0.25], [1.5, 0.5, 0.5]),
-            ([-0.5, 0.0], [-0.5, 0.0, 0.5]),
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
+            ([1.0, -1.0, 0.0], [3.0, -2.0, 0.5]),
+            ([-1.0, 1.0, 0.0], [-1.0, 2.0, 0.5]),
+            ([0.5, 0.25, 1.0], [1.5, 0.5, 0.5]),
+            ([-0.5, 0.0, 0.0], [-0.5, 0.0, 0.5]),
         ] {
             assert_eq!(told(&ranges, deflection), expected);
         }
         // a range without zero rests at its nearer end
-        assert_eq!(told(&ranges[2..], [-1.0, 0.0]), [0.5]);
-        assert_eq!(told(&ranges[2..], [1.0, 0.0]), [1.0]);
+        assert_eq!(told(&ranges[2..], [-1.0, 0.0, 0.0]), [0.5]);
+        assert_eq!(told(&ranges[2..], [1.0, 0.0, 0.0]), [1.0]);
     }
 
     #[test]
@@ -143,17 +233,55 @@ mod tests {
             ([1.0, -0.5], [2.0, 1.0]),
             ([-1.0, 0.0], [0.0, 0.0]),
         ] {
+            let [ahead, left] = deflection;
+            let deflection = [ahead, left, 0.0];
             assert_eq!(told(&[velocity.clone(), jump.clone()], deflection), expected, "{deflection:?}");
         }
         for (deflection, expected) in [([1.0, 0.0], 4.0), ([0.0, -1.0], 4.0), ([-0.5, 0.25], -2.0), ([0.25, 0.5], -2.0)]
         {
+            let [ahead, left] = deflection;
+            let deflection = [ahead, left, 0.0];
             assert_eq!(told(std::slice::from_ref(&velocity), deflection), [expected], "{deflection:?}");
         }
     }
 
     #[test]
+    fn who_turns_may_step_aside() {
+        let ranges = [
+            CommandRange::new("speed", -3.0..=3.0, "m/s"),
+            CommandRange::new("left", -2.0..=2.0, "m/s"),
+            CommandRange::new("turn", -1.5..=1.5, "rad/s"),
+        ];
+        for (deflection, expected) in [
+            ([0.5, -1.0, 0.0], [1.5, 0.0, -1.5]),
+            ([0.0, 0.0, 1.0], [0.0, 2.0, 0.0]),
+            ([0.0, 0.0, -0.5], [0.0, -1.0, 0.0]),
+        ] {
+            assert_eq!(told(&ranges, deflection), expected, "{deflection:?}");
+        }
+    }
+
+    #[test]
     fn what_a_released_stick_still_says_is_not_heard() {
-        assert_eq!([0.0, 0.1, -0.12].map(alive).map(f32::abs), [0.0; 3]);
-        assert!([1.0, -1.0] == [1.0, -1.0].map(alive) && alive(0.13) > 0.0 && alive(0.13) < 0.02);
+        let pad = Mappings::default().pad;
+        assert_eq!([0.0, 0.1, -0.12].map(|x| pad.map(x).abs()), [0.0; 3]);
+        assert!([1.0, -1.0] == [1.0, -1.0].map(|x| pad.map(x)) && pad.map(0.13) > 0.0 && pad.map(0.13) < 0.02);
+    }
+
+    #[test]
+    fn a_curve_leaves_the_ends_and_a_smoothed_stick_arrives() {
+        let mapping = Mapping { dead_zone: 0.0, curve: 2.0, smoothing: 0.1 };
+        assert_eq!([-1.0, -0.5, 0.0, 0.5, 1.0].map(|x| mapping.map(x)), [-1.0, -0.25, 0.0, 0.25, 1.0]);
+        // 63 % after the time of the smoothing, whatever the frames; all of it in the end
+        for frames in [6u8, 25] {
+            let mut said = 0.0;
+            for _ in 0..frames {
+                said = mapping.smooth(said, 1.0, 0.1 / f32::from(frames));
+            }
+            assert!((said - (1.0 - (-1.0f32).exp())).abs() < 1e-3, "{said}");
+        }
+        let arrived = (0..100).fold(0.0, |said, _| mapping.smooth(said, 1.0, 1.0 / 60.0));
+        assert_eq!(arrived, 1.0);
+        assert_eq!(Mappings::default().keys.smooth(0.0, 1.0, 1.0 / 60.0), 1.0);
     }
 }

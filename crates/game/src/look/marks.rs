@@ -1,11 +1,12 @@
-//! Marks for those who want to know: contacts and their forces, joints and their limits, axes, targets.
+//! Marks for those who want to know: contacts and their forces, joints and their limits, axes, targets, and what one is told.
 
 use crate::axes::to_game;
 use crate::look::joint_places;
-use crate::ragdoll::{Anatomy, Part, Target};
+use crate::ragdoll::{Anatomy, Episode, Part, Target};
 use crate::simulate::{Marathon, Seat};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
+use marathon_envs::CommandRange;
 use marathon_physics::lanes::Isa;
 use marathon_physics::model::{JointType, Sensor, SensorObject, SensorType};
 use marathon_physics::{Batch, BatchOptions, Model};
@@ -23,6 +24,13 @@ const FORCE: Color = Color::srgb(1.0, 0.75, 0.1);
 const JOINT: Color = Color::srgb(0.2, 0.95, 0.95);
 const LIMIT: Color = Color::srgb(1.0, 0.35, 0.75);
 const TARGET: Color = Color::srgb(0.3, 1.0, 0.4);
+const TOLD: Color = Color::srgb(0.35, 0.8, 1.0);
+const OWN: Color = Color::srgb(0.8, 0.8, 0.8);
+/// Length of the arrow of a meter per second, m, and radius of the arc of a turn, m.
+const SPEED_ARROW: f64 = 0.5;
+const TURN_ARC: f64 = 0.7;
+/// Time of a turn that its arc shows, s.
+const TURN_TIME: f64 = 0.5;
 
 /// Draws what the [`Marks`] of a ragdoll ask for, and [`Target`]s.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,7 +40,7 @@ impl Plugin for MarksPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Probe>()
             .add_systems(Startup, in_front)
-            .add_systems(PostUpdate, (contacts, joints, targets).after(TransformSystems::Propagate));
+            .add_systems(PostUpdate, (contacts, joints, told, targets).after(TransformSystems::Propagate));
     }
 }
 
@@ -45,6 +53,8 @@ pub struct Marks {
     pub joints: bool,
     /// A ring around it on the ground.
     pub ring: bool,
+    /// The velocity that it is told to have, beside its own, and how far it is to turn in half a second: on the ground.
+    pub command: bool,
 }
 
 /// One more simulation of a ragdoll, which tells forces: those of the real one are not kept between steps.
@@ -161,11 +171,90 @@ fn joints(
     }
 }
 
+/// Angle along the ground of the forward axis of a model's free body, rad; 0 for a figure in a plane.
+fn heading(model: &Model, qpos: &[f64]) -> f64 {
+    let Some(free) = model.joints.iter().find(|joint| joint.kind == JointType::Free) else { return 0.0 };
+    let [w, x, y, z] = [3, 4, 5, 6].map(|i| qpos[free.qpos_adr + i]);
+    (2.0 * (x * y + w * z)).atan2(1.0 - 2.0 * (y * y + z * z))
+}
+
+/// What a command says: velocity ahead and to the left, m/s, and turn, rad/s. None if it says nothing about velocities.
+fn velocity_told(ranges: &[CommandRange], command: &[f64]) -> Option<[f64; 3]> {
+    let mut speeds = ranges.iter().zip(command).filter(|(range, _)| range.is_speed()).map(|(_, x)| *x);
+    let ahead = speeds.next()?;
+    let turn = ranges.iter().zip(command).find(|(range, _)| range.is_turn()).map_or(0.0, |(_, x)| *x);
+    Some([ahead, speeds.next().unwrap_or(0.0), turn])
+}
+
+fn told(
+    marathon: Res<Marathon>,
+    mut gizmos: Gizmos,
+    ragdolls: Query<(&Seat, &Anatomy, &Marks, &Episode, &GlobalTransform)>,
+) {
+    for (seat, anatomy, _, episode, track) in ragdolls.iter().filter(|(_, _, marks, ..)| marks.command) {
+        let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
+        let Some([ahead, left, turn]) = velocity_told(ranges, &episode.command) else { continue };
+        let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
+        let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &still.qpos) else { continue };
+        let heading = heading(&anatomy.model, &still.qpos);
+        let point = |[x, y]: [f64; 2]| {
+            let at = to_game([pose.com[0] + x, pose.com[1] + y, 0.0]) * Vec3::new(1.0, 0.0, 1.0);
+            track.transform_point(at) + Vec3::Y * 0.02
+        };
+        let turned = |[ahead, left]: [f64; 2]| {
+            let (sin, cos) = heading.sin_cos();
+            [ahead * cos - left * sin, ahead * sin + left * cos].map(|x| x * SPEED_ARROW)
+        };
+        let free = anatomy.model.joints.first().filter(|joint| joint.kind == JointType::Free);
+        let own = [still.qvel[0], free.map_or(0.0, |_| still.qvel[1])].map(|x| x * SPEED_ARROW);
+        for (end, color) in [(own, OWN), (turned([ahead, left]), TOLD)] {
+            if end[0].hypot(end[1]) > 0.05 {
+                gizmos.arrow(point([0.0; 2]), point(end), color).with_tip_length(0.12);
+            }
+        }
+        if turn != 0.0 {
+            let arc = (0..=16).map(|i| {
+                let angle = heading + turn * TURN_TIME * f64::from(i) / 16.0;
+                point([angle.cos(), angle.sin()].map(|x| x * TURN_ARC))
+            });
+            gizmos.linestrip(arc, TOLD);
+        }
+    }
+}
+
 fn targets(mut gizmos: Gizmos, targets: Query<&Target>) {
     for target in &targets {
         let at = target.place * Vec3::new(1.0, 0.0, 1.0) + Vec3::Y * 0.02;
         let flat = Quat::from_rotation_x(TAU / 4.0);
         gizmos.circle(Isometry3d::new(at, flat), target.radius, TARGET);
         gizmos.line(at, at + Vec3::Y * 1.5, TARGET);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_read_by_its_units() {
+        let ranges = [
+            CommandRange::new("jump", 0.0..=1.0, ""),
+            CommandRange::new("speed", -3.0..=3.0, "m/s"),
+            CommandRange::new("turn", -2.0..=2.0, "rad/s"),
+            CommandRange::new("left", -1.0..=1.0, "m/s"),
+        ];
+        assert_eq!(velocity_told(&ranges, &[1.0, 2.0, 0.5, -1.0]), Some([2.0, -1.0, 0.5]));
+        assert_eq!(velocity_told(&ranges[..2], &[1.0, 2.0]), Some([2.0, 0.0, 0.0]));
+        assert_eq!(velocity_told(&ranges[..1], &[1.0]), None);
+    }
+
+    #[test]
+    fn a_heading_is_that_of_the_free_body() {
+        let text = "<mujoco><worldbody><body><freejoint/><geom size=\".1\"/></body></worldbody></mujoco>";
+        let model = Model::from_xml_str(text, "ball").unwrap();
+        let (sin, cos) = 0.6f64.sin_cos();
+        assert!((heading(&model, &[1.0, 2.0, 3.0, cos, 0.0, 0.0, sin]) - 1.2).abs() < 1e-12);
+        let text = "<mujoco><worldbody><body><joint type=\"slide\" axis=\"1 0 0\"/><geom size=\".1\"/></body></worldbody></mujoco>";
+        assert_eq!(heading(&Model::from_xml_str(text, "slider").unwrap(), &[1.0]), 0.0);
     }
 }

@@ -4,10 +4,17 @@ use marathon_physics::lanes::Real;
 
 use crate::agent::senses::clamp;
 
-/// Angle from a heading to a direction, rad; both are cosine and sine.
+/// Sine and cosine of the angle from a heading to a direction; both are cosine and sine.
 #[inline(always)]
-pub(super) fn off<T: Real>([c, d]: [T; 2], [x, y]: [T; 2]) -> T {
-    c.mul_add(y, -(d * x)).atan2(c.mul_add(x, d * y))
+pub(super) fn beside<T: Real>([c, d]: [T; 2], [x, y]: [T; 2]) -> [T; 2] {
+    [c.mul_add(y, -(d * x)), c.mul_add(x, d * y)]
+}
+
+/// That angle, rad.
+#[inline(always)]
+pub(super) fn off<T: Real>(heading: [T; 2], direction: [T; 2]) -> T {
+    let [sin, cos] = beside(heading, direction);
+    sin.atan2(cos)
 }
 
 /// The direction after a decision: turned by an angle, but no farther off the heading than `most`, rad.

@@ -8,6 +8,7 @@ pub mod controller;
 mod heading;
 pub mod hopper;
 pub mod humanoid;
+mod idle;
 mod imitation;
 pub mod in_style;
 pub mod marathon_man;

@@ -22,6 +22,7 @@ use marathon_physics::lanes::Real;
 
 use super::super::ant::AntV0;
 use super::super::heading;
+use super::super::imitation::turned_to;
 use super::RESTLESS;
 use crate::agent::senses::hypot;
 use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Start, Terms, names};
@@ -132,15 +133,15 @@ impl Agent for AntController {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        let [cos, sin] = s.heading(TORSO);
-        let turned = |[x, y, z]: [T; 3]| [sin.mul_add(y, cos * x), cos.mul_add(y, -(sin * x)), z];
-        let [x, y] = [s.memory(0), s.memory(1)];
+        let facing = s.heading(TORSO);
+        let turned = turned_to(facing);
         out.group("command");
         for i in 0..3 {
             out.scalar(s.command(i));
         }
-        out.scalar(cos.mul_add(y, -(sin * x)));
-        out.scalar(cos.mul_add(x, sin * y));
+        for x in heading::beside(facing, [s.memory(0), s.memory(1)]) {
+            out.scalar(x);
+        }
         out.group("height");
         out.scalar(s.height(TORSO));
         out.group("up");

@@ -16,6 +16,10 @@ pub trait Figure: Agent + Clone + Default {
     const PARTS: &'static [&'static str];
     /// The torso.
     const TORSO: Part;
+    /// How many motors it has.
+    const MOTORS: usize;
+    /// What it observes in its own task, by name.
+    const OBSERVED: &'static [&'static str];
     /// Price of the effort; the original takes 0.3.
     const EFFORT: f64;
     /// Worth of a fall. At the original's -1, a figure that is told to run backward lets itself fall that way: its velocity is
@@ -32,6 +36,9 @@ impl Figure for HopperV0 {
     const SUMMARY: &'static str = "one leg in a plane: go left and right as told, jump, stand still";
     const PARTS: &'static [&'static str] = &["torso", "foot", "nose", "pelvis", "thigh", "calf"];
     const TORSO: Part = hopper::TORSO;
+    const MOTORS: usize = 4;
+    const OBSERVED: &'static [&'static str] =
+        &["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities", "foot_height"];
     const EFFORT: f64 = -0.1;
     const FALL: f64 = -60.0;
 
@@ -52,6 +59,9 @@ impl Figure for Walker2dV1 {
     const PARTS: &'static [&'static str] =
         &["torso", "left_foot", "right_foot", "left_thigh", "left_leg", "right_thigh", "right_leg"];
     const TORSO: Part = walker2d::TORSO;
+    const MOTORS: usize = 6;
+    const OBSERVED: &'static [&'static str] =
+        &["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities", "foot_heights"];
     // at 0.3, walking costs more than it earns
     const EFFORT: f64 = -0.05;
     const FALL: f64 = -40.0;

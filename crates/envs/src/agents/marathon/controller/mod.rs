@@ -15,6 +15,7 @@
 //! stand still. The Walker also pays for a low torso. A fall costs 60 or 40.
 
 mod ant;
+mod commander;
 mod figures;
 pub mod schedule;
 
@@ -24,6 +25,7 @@ pub use figures::Figure;
 use marathon_physics::lanes::Real;
 
 use super::hopper::HopperV0;
+use super::idle;
 use super::walker2d::Walker2dV1;
 use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
@@ -38,6 +40,8 @@ pub const FASTEST: f64 = 4.0;
 /// Slots of the memory: the torso's velocity along x at the last three decisions, m/s. The original takes the mean of nine
 /// physics steps.
 const MEMORY: usize = 3;
+/// Terms of the reward.
+const TERMS: [&str; 6] = ["velocity", "uprightness", "jump", "still", "height", "effort"];
 /// Price of a difference of 1 m/s. The original's is 1.2 per 4 m/s, with which standing upright is worth something to a figure
 /// that is told to run, so that it stands.
 const PRICE: f64 = 3.2 / FASTEST;
@@ -64,6 +68,21 @@ impl Choice for Input {
     const NAMED: &'static [(Self, &'static str)] = &[(Input::Discrete, "discrete"), (Input::Continuous, "continuous")];
 }
 
+/// Who commands where no caller does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Commander {
+    /// The task's own schedule.
+    Schedule,
+    /// A second role, which earns what the figure does not obey.
+    Adversary,
+}
+
+impl Choice for Commander {
+    const EXPECTED: &'static str = "schedule or adversary";
+    const NAMED: &'static [(Self, &'static str)] =
+        &[(Commander::Schedule, "schedule"), (Commander::Adversary, "adversary")];
+}
+
 crate::options! {
     /// Arguments of a figure in a plane that is told how fast to go.
     pub struct ControllerArguments {
@@ -71,6 +90,8 @@ crate::options! {
         input: Input = Input::Discrete,
         /// What it is told where nobody commands: `repeats`, `anew`, `thirds`, `toggle` or `uniform`.
         schedule: Schedule = Schedule::Repeats,
+        /// Who commands where no caller does: the `schedule`, or an `adversary` that learns, too.
+        commander: Commander = Commander::Schedule,
     }
 }
 
@@ -82,11 +103,28 @@ pub struct Controller<F> {
 }
 
 impl<F: Figure> Controller<F> {
+    /// Whether an adversary commands.
+    #[inline(always)]
+    fn is_opposed(&self) -> bool {
+        self.arguments.commander == Commander::Adversary
+    }
+
+    /// Number `i` of the command: to an observation, the one to obey from now on; otherwise the one that the decision was made
+    /// under.
+    #[inline(always)]
+    fn told<T: Real>(&self, s: &Senses<T>, i: usize, observing: bool) -> T {
+        match (self.is_opposed(), observing) {
+            (false, _) => s.command(i),
+            (true, true) => s.memory(commander::NEXT + i),
+            (true, false) => s.memory(commander::PRESENT + i),
+        }
+    }
+
     /// Whether it is told to jump, 0 or 1.
     #[inline(always)]
     fn jump<T: Real>(&self, s: &Senses<T>) -> T {
         match self.arguments.input {
-            Input::Discrete => s.command(1),
+            Input::Discrete => self.told(s, 1, false),
             Input::Continuous => T::zero(),
         }
     }
@@ -105,16 +143,16 @@ fn stillness<T: Real>(s: &Senses<T>, parts: usize, restless: f64) -> T {
 
 impl<F: Figure> Agent for Controller<F> {
     fn facts(&self) -> Facts {
-        let own = self.figure.facts();
+        let (own, input) = (self.figure.facts(), self.arguments.input);
         let mut command = vec![CommandRange::new("velocity", -FASTEST..=FASTEST, "m/s")];
-        if self.arguments.input == Input::Discrete {
+        if input == Input::Discrete {
             command.push(CommandRange::new("jump", 0.0..=1.0, ""));
         }
-        Facts {
+        let mut facts = Facts {
             id: F::ID.into(),
             summary: F::SUMMARY.into(),
             observation: own.observation.map(|n| n + command.len() + 1),
-            reward_terms: names(["velocity", "uprightness", "jump", "still", "height", "effort"]),
+            reward_terms: names(TERMS),
             info: names(["velocity_error"]),
             metrics: names(["forward", "velocity_error"]),
             parts: names(F::PARTS),
@@ -122,7 +160,20 @@ impl<F: Figure> Agent for Controller<F> {
             memory: MEMORY,
             termination_reward: Some(F::FALL),
             ..own
+        };
+        if self.is_opposed() {
+            let own = [&TERMS[..], &["fall"]].concat();
+            let seen = [F::OBSERVED, &["command", "mean_velocity"]].concat();
+            facts.roles = commander::roles(input, facts.actions.clone(), &seen, &own);
+            facts.actions.extend(names(commander::actions(input)));
+            facts.reward_terms = names(own.iter().chain(&commander::TERMS));
+            let model = facts.model.text().expect("the figures' models are texts");
+            let idle = idle::actuators("rootx", commander::actions(input));
+            facts.model = idle::extended(model, &idle).into();
+            (facts.observation, facts.termination_reward) = (None, None);
+            (facts.command, facts.memory) = (Vec::new(), commander::MEMORY);
         }
+        facts
     }
 
     fn options(&self) -> Vec<OptionInfo> {
@@ -140,39 +191,60 @@ impl<F: Figure> Agent for Controller<F> {
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory[..MEMORY].fill(s.linear_velocity(F::TORSO)[0]);
+        if self.is_opposed() {
+            commander::begin(memory);
+        }
     }
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory.copy_within(0..MEMORY - 1, 1);
         memory[0] = s.linear_velocity(F::TORSO)[0];
+        if self.is_opposed() {
+            commander::remember(self, s, memory);
+        }
     }
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         self.figure.observe(s, out);
         out.group("command");
-        out.scalar(s.command(0));
+        out.scalar(self.told(s, 0, true));
         if self.arguments.input == Input::Discrete {
-            out.scalar(s.command(1));
+            out.scalar(self.told(s, 1, true));
         }
         out.group("mean_velocity");
         out.scalar(mean_velocity(s));
+        if self.is_opposed() {
+            commander::observe::<F, T>(s, out);
+        }
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let (zero, one) = (T::zero(), T::lit(1.0));
-        let off = (s.command(0) - mean_velocity(s)).abs();
+        let target = self.told(s, 0, false);
+        let off = (target - mean_velocity(s)).abs();
         terms.add("velocity", 1.0, clamp(off.neg_mul_add(T::lit(PRICE), one), -1.0, 1.0));
         terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
         let jump = self.jump(s);
         terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
-        let rest = (one - s.command(0).abs().max(jump) * T::lit(10.0)).max(zero);
+        let rest = (one - target.abs().max(jump) * T::lit(10.0)).max(zero);
         terms.add("still", STILL, rest * stillness(s, F::PARTS.len(), RESTLESS));
         terms.add("height", -1.0, F::low(s));
-        terms.add("effort", F::EFFORT, s.effort(Motors::NONE));
+        let others = if self.is_opposed() { commander::ignored::<F>() } else { Motors::NONE };
+        terms.add("effort", F::EFFORT, s.effort(others));
+        if self.is_opposed() {
+            let fallen = self.figure.terminated(s);
+            terms.add("fall", F::FALL, T::masked(fallen, one));
+            commander::add_terms(off, fallen, terms);
+        }
+    }
+
+    #[inline(always)]
+    fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
+        if role == 0 || !self.is_opposed() { T::not(T::none()) } else { commander::decides(s) }
     }
 
     #[inline(always)]
@@ -182,7 +254,7 @@ impl<F: Figure> Agent for Controller<F> {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar((s.command(0) - mean_velocity(s)).abs());
+        out.scalar((self.told(s, 0, false) - mean_velocity(s)).abs());
     }
 }
 

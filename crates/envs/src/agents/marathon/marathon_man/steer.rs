@@ -324,12 +324,12 @@ impl Agent for Steer {
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let [cos, sin] = s.heading(BUTT);
         let turned = turned_to([cos, sin]);
-        let [x, y] = Self::direction(s);
         out.group("command");
         out.scalar(s.command(0));
         out.scalar(s.command(1));
-        out.scalar(cos.mul_add(y, -(sin * x)));
-        out.scalar(cos.mul_add(x, sin * y));
+        for x in heading::beside([cos, sin], Self::direction(s)) {
+            out.scalar(x);
+        }
         let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
         out.scalar(x);
         out.scalar(y);

@@ -23,14 +23,6 @@ const STEPS: f64 = 10.0;
 const POINTS_SEEN: usize = 12;
 const SPACING: f64 = 0.5;
 
-/// An actuator that moves nothing, with a tendon that does not pull at a joint.
-pub(super) fn actuator(joint: &str) -> String {
-    format!(
-        "<tendon><fixed name=\"ground\"><joint joint=\"{joint}\" coef=\"0\"/></fixed></tendon>\n\
-         <actuator><motor name=\"ground\" tendon=\"ground\" ctrllimited=\"true\" ctrlrange=\"-1 1\"/></actuator>\n"
-    )
-}
-
 /// The two roles: the figure with its own actions, observations and terms, and the builder.
 pub(super) fn roles(actions: Vec<String>, observations: &[&str], terms: &[String]) -> Vec<RoleFacts> {
     let runner = RoleFacts {

@@ -21,13 +21,12 @@ mod runners;
 
 pub use runners::Runner;
 
-use std::fmt::Write;
-
 use marathon_physics::lanes::Real;
 
 use super::FASTEST;
 use super::ant::AntV0;
 use super::hopper::HopperV0;
+use super::idle;
 use super::walker2d::Walker2dV0;
 use crate::agent::options::Choice;
 use crate::agent::{
@@ -172,15 +171,12 @@ impl<F: Runner> Terrain<F> {
         let text = own.text().expect("the figures' models are texts");
         let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
         let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
-        let mut out = text.replacen(FLOOR, &course, 1).trim_end().trim_end_matches("</mujoco>").to_owned();
-        // writing to a string cannot fail
-        let (extra, width) = (if self.built() { builder::actuator(F::JOINT) } else { String::new() }, F::HALF_WIDTH);
-        let _ = write!(
-            out,
-            "{extra}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n\
-             </mujoco>\n"
+        let idle = if self.built() { idle::actuators(F::JOINT, &[builder::ACTION]) } else { String::new() };
+        let width = F::HALF_WIDTH;
+        let field = format!(
+            "{idle}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n"
         );
-        out
+        idle::extended(&text.replacen(FLOOR, &course, 1), &field)
     }
 
     /// Whether an adversary builds the ground.
