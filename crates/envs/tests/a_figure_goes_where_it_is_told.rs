@@ -300,11 +300,8 @@ fn adaptive_starts_fit_the_command_and_try_again() {
 
 /// Sixty-four of them with some arguments, and what they observe at first.
 fn begun(options: &[(&str, &str)]) -> (VecEnv, Vec<f32>) {
-    let mut given = marathon_envs::Options::new();
-    for (name, value) in options {
-        given.set(name, value.parse::<marathon_envs::Value>().unwrap_or_else(|e| match e {}));
-    }
-    let options = VecEnvOptions { agents: 64, options: given, autoreset: Autoreset::Disabled, ..Default::default() };
+    let options = common::options(options);
+    let options = VecEnvOptions { agents: 64, options, autoreset: Autoreset::Disabled, ..Default::default() };
     let mut env = VecEnv::new(ID, &options).unwrap();
     let mut obs = env.buffers().obs;
     env.reset(Some(3), &mut obs).unwrap();

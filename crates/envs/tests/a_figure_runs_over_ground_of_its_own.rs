@@ -4,7 +4,7 @@
 mod common;
 
 use common::{action, go_on};
-use marathon_envs::{AgentState, Autoreset, Options, Step, VecEnv, VecEnvOptions, agent};
+use marathon_envs::{AgentState, Autoreset, Step, VecEnv, VecEnvOptions, agent};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 use std::f64::consts::PI;
@@ -18,11 +18,8 @@ const DISTANCE: usize = 0;
 const DIFFICULTY: usize = 1;
 
 fn env(id: &str, options: &[(&str, &str)], autoreset: Autoreset) -> VecEnv {
-    let mut given = Options::new();
-    for (name, value) in options {
-        given.set(name, value.parse::<marathon_envs::Value>().unwrap_or_else(|e| match e {}));
-    }
-    let options = VecEnvOptions { agents: AGENTS, seed: 3, options: given, autoreset, ..Default::default() };
+    let options = common::options(options);
+    let options = VecEnvOptions { agents: AGENTS, seed: 3, options, autoreset, ..Default::default() };
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -32,6 +29,11 @@ const ANKLES: [&str; 4] = ["left_ankle_geom", "right_ankle_geom", "third_ankle_g
 /// Whether a figure moves in space: the height is the third of its coordinates, not the second.
 fn in_space(id: &str) -> bool {
     id == "TerrainAnt-v0"
+}
+
+/// Name of its torso.
+fn torso(id: &str) -> &'static str {
+    if in_space(id) { "torso_geom" } else { "torso" }
 }
 
 fn up(id: &str) -> usize {
@@ -196,8 +198,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
 
 #[test]
 fn a_figure_stands_on_its_ground() {
-    for (id, torso) in [("TerrainHopper-v0", "torso"), ("TerrainWalker2d-v0", "torso"), ("TerrainAnt-v0", "torso_geom")]
-    {
+    for id in ["TerrainHopper-v0", "TerrainWalker2d-v0", "TerrainAnt-v0"] {
         let model = agent(id).unwrap().model().unwrap();
         let options = [("course", "bumps"), ("difficulty", "1"), ("falls", "hurt")];
         let mut env = env(id, &options, Autoreset::Disabled);
@@ -216,7 +217,7 @@ fn a_figure_stands_on_its_ground() {
         }
         for i in 0..AGENTS {
             let state = env.state(i).unwrap();
-            let [x, _, z] = center(&model, &state, torso);
+            let [x, _, z] = center(&model, &state, torso(id));
             let above = z - height(&ground, x);
             // it has fallen, and lies on the ground and not in it
             assert!((0.03..1.4).contains(&above), "{id}, agent {i}: {above} at {x}");
@@ -226,12 +227,7 @@ fn a_figure_stands_on_its_ground() {
 
 #[test]
 fn rewards_are_their_formulas() {
-    let ids = [
-        ("TerrainHopper-v0", 0.3, "torso"),
-        ("TerrainWalker2d-v0", 0.1, "torso"),
-        ("TerrainAnt-v0", 0.5, "torso_geom"),
-    ];
-    for (id, effort, torso) in ids {
+    for (id, effort) in [("TerrainHopper-v0", 0.3), ("TerrainWalker2d-v0", 0.1), ("TerrainAnt-v0", 0.5)] {
         for reward in ["full", "velocity", "sparse"] {
             let model = agent(id).unwrap().model().unwrap();
             let options = [("reward", reward), ("falls", "hurt"), ("difficulty", "1")];
@@ -293,7 +289,7 @@ fn rewards_are_their_formulas() {
                         let most = if in_space(id) { 5e-4 } else { 1e-4 };
                         assert!(off < most, "{id} {reward}, agent {i}, {decision}: {terms:?} {expected:?}");
                     }
-                    assert!(distance >= center(&model, &state, torso)[0] - 1e-3);
+                    assert!(distance >= center(&model, &state, torso(id))[0] - 1e-3);
                 }
             }
             assert!(reward != "full" || hits > AGENTS || in_space(id), "{id}: {hits} falls");
@@ -391,9 +387,7 @@ fn an_adversary_builds_ahead_of_the_runner() {
         for i in 0..AGENTS {
             let state = env.state(i).unwrap();
             let (ground, obs) = (env.ground(i, 0).unwrap(), &out.obs[n * i..n * (i + 1)]);
-            let x =
-                center(&agent(id).unwrap().model().unwrap(), &state, if in_space(id) { "torso_geom" } else { "torso" })
-                    [0];
+            let x = center(&agent(id).unwrap().model().unwrap(), &state, torso(id))[0];
             let [six, seven] = [6.0, 7.0].map(|x| height(&ground, x));
             assert!(x > 1.0 && seven > six + 0.5, "{id}, agent {i} at {x}: {six} {seven}");
             for (point, seen) in obs[site.clone()].iter().take(12).enumerate() {
@@ -417,8 +411,7 @@ fn built_ground_is_saved_and_restored() {
     let mut on = Vec::new();
     go_on(&mut first, &mut out, 60, 160, 1.0, |_, step| on.push(step.clone()));
 
-    let given: Options =
-        options.iter().map(|(name, value)| (name.to_string(), marathon_envs::Value::from(*value))).collect();
+    let given = common::options(&options);
     let threads = VecEnvOptions { agents: AGENTS, seed: 9, threads: 2, options: given, ..Default::default() };
     let mut other = VecEnv::new(id, &threads).unwrap();
     other.load(&saved).unwrap();

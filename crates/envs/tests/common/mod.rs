@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions};
 use marathon_physics::lanes::Isa;
 use serde_json::Value;
 
@@ -54,6 +54,12 @@ pub fn package(name: &str) -> PathBuf {
 pub fn own_agents() -> Vec<String> {
     let own = |id: &String| marathon_envs::agent(id).is_ok_and(|agent| agent.facts().termination_reward.is_some());
     marathon_envs::ids().into_iter().filter(own).collect()
+}
+
+/// Arguments of a task, as on a command line.
+pub fn options(list: &[(&str, &str)]) -> Options {
+    let read = |text: &str| text.parse::<marathon_envs::Value>().unwrap_or_else(|never| match never {});
+    list.iter().map(|(name, value)| (name.to_string(), read(value))).collect()
 }
 
 /// Instruction sets of this processor.

@@ -29,7 +29,12 @@ const ACTIONS: [&str; 8] = ["hip_4", "ankle_4", "hip_1", "ankle_1", "hip_2", "an
 const PARTS: [&str; 5] = ["torso_geom", "left_ankle_geom", "right_ankle_geom", "third_ankle_geom", "fourth_ankle_geom"];
 pub(super) const TORSO: Part = Part::named(&PARTS, "torso_geom");
 /// The feet, in the order of the touch sensors.
-pub(super) const SOLES: [Part; 4] = [Part(1), Part(2), Part(3), Part(4)];
+pub(super) const SOLES: [Part; 4] = [
+    Part::named(&PARTS, FEET[0]),
+    Part::named(&PARTS, FEET[1]),
+    Part::named(&PARTS, FEET[2]),
+    Part::named(&PARTS, FEET[3]),
+];
 const FEET: [&str; 4] = ["left_ankle_geom", "right_ankle_geom", "third_ankle_geom", "fourth_ankle_geom"];
 
 /// Price of the effort.

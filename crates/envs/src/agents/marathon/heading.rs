@@ -4,13 +4,14 @@ use marathon_physics::lanes::Real;
 
 use crate::agent::senses::clamp;
 
-/// Sine and cosine of the angle from a heading to a direction; both are cosine and sine.
+/// How far a vector along the ground points to the left of a heading, cosine and sine, and along it; of a direction, the sine and
+/// cosine of its angle from the heading.
 #[inline(always)]
 pub(super) fn beside<T: Real>([c, d]: [T; 2], [x, y]: [T; 2]) -> [T; 2] {
     [c.mul_add(y, -(d * x)), c.mul_add(x, d * y)]
 }
 
-/// That angle, rad.
+/// Angle from a heading to a direction, rad.
 #[inline(always)]
 pub(super) fn off<T: Real>(heading: [T; 2], direction: [T; 2]) -> T {
     let [sin, cos] = beside(heading, direction);

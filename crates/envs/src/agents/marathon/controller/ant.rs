@@ -25,7 +25,7 @@ use super::super::heading;
 use super::super::imitation::turned_to;
 use super::RESTLESS;
 use crate::agent::senses::hypot;
-use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Start, Terms, names};
+use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Terms, names};
 use crate::episode_rng::EpisodeRng;
 
 /// All geoms, the torso and the feet as the Ant's own task has them.
@@ -70,18 +70,24 @@ const STRAIGHT: f64 = 0.4;
 pub struct AntController;
 
 impl AntController {
+    /// Commanded direction.
+    #[inline(always)]
+    fn direction<T: Real>(s: &Senses<T>) -> [T; 2] {
+        [s.memory(0), s.memory(1)]
+    }
+
     /// Velocity of the center of mass along the ground less the commanded one, m/s.
     #[inline(always)]
     fn slip<T: Real>(s: &Senses<T>) -> T {
-        let ([c, d], [x, y, _]) = ([s.memory(0), s.memory(1)], s.center_of_mass_velocity());
-        let [ahead, left] = [c.mul_add(x, d * y), c.mul_add(y, -(d * x))];
+        let [x, y, _] = s.center_of_mass_velocity();
+        let [left, ahead] = heading::beside(Self::direction(s), [x, y]);
         hypot(ahead - s.command(0), left - s.command(1))
     }
 
     /// Angle from the heading to the commanded direction, rad.
     #[inline(always)]
     fn off<T: Real>(s: &Senses<T>) -> T {
-        heading::off(s.heading(TORSO), [s.memory(0), s.memory(1)])
+        heading::off(s.heading(TORSO), Self::direction(s))
     }
 }
 
@@ -104,10 +110,6 @@ impl Agent for AntController {
             memory: 2,
             ..AntV0.facts()
         }
-    }
-
-    fn reset(&self, start: &mut Start) {
-        start.add_noise(crate::agent::ResetNoise::MARATHON);
     }
 
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
@@ -139,7 +141,7 @@ impl Agent for AntController {
         for i in 0..3 {
             out.scalar(s.command(i));
         }
-        for x in heading::beside(facing, [s.memory(0), s.memory(1)]) {
+        for x in heading::beside(facing, Self::direction(s)) {
             out.scalar(x);
         }
         out.group("height");

@@ -7,11 +7,11 @@
 use marathon_physics::lanes::Real;
 
 use super::{Controller, FASTEST, Figure, Input};
-use crate::agent::{Motors, Obs, RoleFacts, Senses, names};
+use crate::agent::{Obs, RoleFacts, Senses, Terms, names};
 
 /// Names of the roles.
-pub(super) const RUNNER: &str = "runner";
-pub(super) const COMMANDER: &str = "commander";
+const RUNNER: &str = "runner";
+const COMMANDER: &str = "commander";
 /// Actuators of the commander, its part of the observation, and its terms of the reward.
 const ACTIONS: [&str; 2] = ["told_velocity", "told_jump"];
 const SEEN: &str = "obedience";
@@ -104,12 +104,7 @@ pub(super) fn observe<F: Figure, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
 
 /// What the commander earns: for how far the velocity is off, m/s, and for a fall.
 #[inline(always)]
-pub(super) fn add_terms<T: Real>(off: T, fallen: T::Mask, terms: &mut crate::agent::Terms<T>) {
+pub(super) fn add_terms<T: Real>(off: T, fallen: T::Mask, terms: &mut Terms<T>) {
     terms.add(TERMS[0], 1.0 / FASTEST, off);
     terms.add(TERMS[1], FELLED, T::masked(fallen, T::lit(1.0)));
-}
-
-/// Motors that are no effort of the figure's.
-pub(super) const fn ignored<F: Figure>() -> Motors {
-    Motors::from(F::MOTORS)
 }

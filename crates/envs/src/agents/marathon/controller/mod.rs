@@ -233,8 +233,8 @@ impl<F: Figure> Agent for Controller<F> {
         let rest = (one - target.abs().max(jump) * T::lit(10.0)).max(zero);
         terms.add("still", STILL, rest * stillness(s, F::PARTS.len(), RESTLESS));
         terms.add("height", -1.0, F::low(s));
-        let others = if self.is_opposed() { commander::ignored::<F>() } else { Motors::NONE };
-        terms.add("effort", F::EFFORT, s.effort(others));
+        // what an adversary does is no effort of the figure's
+        terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));
         if self.is_opposed() {
             let fallen = self.figure.terminated(s);
             terms.add("fall", F::FALL, T::masked(fallen, one));
