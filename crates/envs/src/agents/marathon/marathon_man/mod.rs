@@ -44,8 +44,10 @@ pub use reward::Reward;
 const FRAME_SKIP: usize = 5;
 /// Seconds between decisions.
 const DECISION: f64 = 1.0 / 40.0;
-/// 20 seconds.
-const MAX_EPISODE_STEPS: usize = 800;
+/// How long an episode is at most, s, unless an option says otherwise.
+const SECONDS: f64 = 20.0;
+/// The same in decisions.
+const MAX_EPISODE_STEPS: usize = (SECONDS / DECISION) as usize;
 /// How far ahead later frames of the clip are, decisions, and what their observations are called.
 const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
 /// Numbers of such a frame.
@@ -74,6 +76,9 @@ crate::options! {
         reach: Scale = Scale(1.0),
         /// How many later frames of the clip are observed: up to three, 4, 8 and 16 decisions ahead.
         future: usize = 0,
+        /// How long an episode is at most, s. Of several clips, those that are mastered take the less of the training, the
+        /// shorter it is.
+        seconds: Scale = Scale(SECONDS),
     }
 }
 
@@ -130,6 +135,13 @@ fn has_joints(model: &Model) -> Result<(), String> {
     }
 }
 
+impl MarathonMan {
+    /// Decisions after which an episode is truncated.
+    fn max_episode_steps(&self) -> usize {
+        (self.arguments.seconds.0 / DECISION).round().max(1.0) as usize
+    }
+}
+
 impl Agent for MarathonMan {
     fn facts(&self) -> Facts {
         let Arguments { clip, reward, control, future, .. } = &self.arguments;
@@ -138,7 +150,7 @@ impl Agent for MarathonMan {
             summary: self.summary.into(),
             model: model(*control).into(),
             frame_skip: FRAME_SKIP,
-            max_episode_steps: MAX_EPISODE_STEPS,
+            max_episode_steps: self.max_episode_steps(),
             observation: Some(89 + FUTURE_FRAME * future),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
             reward_terms: names(reward.terms()),
@@ -173,7 +185,7 @@ impl Agent for MarathonMan {
     }
 
     fn reset(&self, start: &mut Start) {
-        self.arguments.start.begin(start, DECISION, MAX_EPISODE_STEPS);
+        self.arguments.start.begin(start, DECISION, self.max_episode_steps());
         start.add_noise(ResetNoise::MARATHON);
     }
 
