@@ -5,6 +5,7 @@ use crate::film::Ghost;
 use crate::motion::MotionArgs;
 use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
+use marathon_runs::distill::DistillOptions;
 use marathon_runs::{FilmOptions, PolicySource, RunOptions, TaskOptions};
 use std::path::PathBuf;
 
@@ -40,6 +41,8 @@ pub struct Args {
 pub enum Command {
     /// Learn a policy and evaluate it.
     Train(TrainArgs),
+    /// Learn from policies: one that does what several do.
+    Distill(DistillArgs),
     /// Play whole episodes with a policy's best actions and report how it did.
     Eval(EvalArgs),
     /// Draw a policy in action: a strip of frames, an animation or a film.
@@ -91,6 +94,48 @@ pub struct TrainArgs {
     pub agent: Option<String>,
     #[command(flatten)]
     pub run: RunOptions,
+}
+
+const DISTILL_HELP: &str = "\
+Each teacher has agents of its own. The student plays, the teachers say what they would do where it gets to, and it
+learns that. If the agent takes a clip, a teacher's agents follow the clip that the teacher follows. A teacher may observe
+less than the student: the parts of its observation are looked up by their names.
+
+  marathon distill MarathonMan --option future=3 --out all.safetensors \\
+      --teacher runs/marathon_man_walk-1 --teacher runs/marathon_man_jump-1";
+
+/// Options of `distill`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = DISTILL_HELP)]
+pub struct DistillArgs {
+    /// Agent that the policy is for; see `marathon list`.
+    pub agent: String,
+    #[command(flatten)]
+    pub task: TaskOptions,
+    /// Policy to learn from, a file or the folder of a run; may be repeated.
+    #[arg(long = "teacher", value_name = "POLICY", required = true)]
+    pub teachers: Vec<PathBuf>,
+    /// File to write, .safetensors or .onnx.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Widths of the policy's hidden layers.
+    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = DistillOptions::default().hidden)]
+    pub hidden: Vec<usize>,
+    /// Decisions of all agents together.
+    #[arg(long, value_name = "N", default_value_t = DistillOptions::default().steps, value_parser = marathon_runs::options::parse_steps)]
+    pub steps: u64,
+    /// Agents of each teacher.
+    #[arg(long, value_name = "N", default_value_t = DistillOptions::default().agents)]
+    pub agents: usize,
+    /// Learning rate at the start; it falls to zero.
+    #[arg(long, value_name = "RATE", default_value_t = DistillOptions::default().lr)]
+    pub lr: f64,
+    /// Seed of everything random.
+    #[arg(long, value_name = "S", default_value_t = DistillOptions::default().seed)]
+    pub seed: u64,
+    /// Threads that play. The result does not depend on it.
+    #[arg(long, value_name = "T", default_value_t = 1)]
+    pub threads: usize,
 }
 
 /// Options of `eval`.

@@ -67,6 +67,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 fn dispatch(args: &Args) -> Result<(), CliError> {
     match &args.command {
         Command::Train(train) => commands::train::run(train, args.json),
+        Command::Distill(distill) => commands::distill::run(distill, args.json),
         Command::Eval(eval) => commands::eval::run(eval, args.json),
         Command::Render(render) => commands::render::run(render, args.json),
         Command::Export(export) => commands::convert::export(export, args.json),

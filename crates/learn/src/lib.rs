@@ -51,6 +51,7 @@
 //! ```
 
 pub mod algorithms;
+pub mod distill;
 mod error;
 mod files;
 pub mod lanes;
@@ -68,6 +69,7 @@ pub use algorithms::actor_critic::Deviations;
 pub use algorithms::ppo::Ppo;
 pub use algorithms::sac::Sac;
 pub use algorithms::schedule::{Moving, Schedule};
+pub use distill::{Distiller, Lessons};
 pub use error::Error;
 pub use files::{Upgrade, checksum, read_description, read_versions, write_atomic, write_description};
 pub use lanes::BLOCK;

@@ -9,6 +9,7 @@ pub mod clips;
 pub mod configuration;
 pub mod controller;
 pub mod demonstrations;
+pub mod distill;
 pub mod error;
 pub mod folder;
 pub mod imitation;

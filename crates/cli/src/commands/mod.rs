@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod convert;
+pub mod distill;
 pub mod eval;
 pub mod list;
 pub mod play;

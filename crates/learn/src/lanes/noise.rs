@@ -16,6 +16,8 @@ pub const SHUFFLES: u64 = 1 << 63;
 pub const PARAMETERS: u64 = 3 << 61;
 /// Batches from a replay.
 pub const SAMPLES: u64 = 1 << 61;
+/// Actions of a student that learns from others.
+pub const EXPLORATION: u64 = 3 << 60;
 /// Initial parameters of reward signals; two streams for each.
 pub const SIGNALS: u64 = PARAMETERS + 1;
 /// Demonstrations beside an update's samples.

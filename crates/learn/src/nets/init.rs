@@ -92,7 +92,7 @@ fn orthonormal(count: usize, length: usize, random: &mut SplitMix) -> Vec<Vec<f6
 }
 
 /// A standard normal number.
-fn normal(random: &mut SplitMix) -> f64 {
+pub(crate) fn normal(random: &mut SplitMix) -> f64 {
     let unit = |x: u64| (x >> 11) as f64 / (1u64 << 53) as f64;
     let (u, v) = (1.0 - unit(random.word()), unit(random.word()));
     (-2.0 * Real::ln(u)).sqrt() * Real::sin_cos(std::f64::consts::TAU * v).1

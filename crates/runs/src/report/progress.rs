@@ -53,17 +53,24 @@ impl Rate {
     }
 }
 
+/// A bar for so many steps, if stderr is a terminal.
+pub fn bar(total: u64) -> Option<ProgressBar> {
+    stderr().is_terminal().then(|| {
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+        let style = ProgressStyle::with_template("{wide_bar:.cyan/dim} {percent:>3}%  {msg}");
+        bar.set_style(style.expect("the template is a constant").progress_chars("━╸─"));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    })
+}
+
 impl Progress {
     /// For a run of `total` steps of which `done` are done.
     pub fn new(total: u64, done: u64, every: u64) -> Self {
-        let bar = stderr().is_terminal().then(|| {
-            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
-            let style = ProgressStyle::with_template("{wide_bar:.cyan/dim} {percent:>3}%  {msg}");
-            bar.set_style(style.expect("the template is a constant").progress_chars("━╸─"));
-            bar.enable_steady_tick(Duration::from_millis(200));
+        let bar = bar(total);
+        if let Some(bar) = &bar {
             bar.set_position(done);
-            bar
-        });
+        }
         let start = (Instant::now(), done);
         let rate = Rate { start, last: start, recent: None };
         let (shown, waiting) = Default::default();

@@ -1,0 +1,91 @@
+//! `marathon distill`: one policy that does what several do.
+
+use crate::args::DistillArgs;
+use crate::console::{note, print_json, say};
+use crate::error::CliError;
+use crate::interrupt;
+use crate::program;
+use marathon_learn::Control;
+use marathon_runs::distill::{DistillOptions, Distilled, distill};
+use marathon_runs::report::progress::bar;
+use marathon_runs::{Setting, policy_file, text};
+use cpu_time::ProcessTime;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Decisions between two lines where there is no terminal.
+const EVERY: u64 = 1_000_000;
+
+/// What has been learned.
+#[derive(Serialize)]
+struct Report {
+    #[serde(serialize_with = "text::path_json")]
+    out: PathBuf,
+    agent: String,
+    teachers: usize,
+    steps: u64,
+    cpu_seconds: f64,
+    loss: f64,
+    failures: f64,
+}
+
+/// Learns from teachers and writes the policy.
+///
+/// # Errors
+/// If a file is no policy, a teacher does not fit the task, or the policy cannot be written; [`CliError::Interrupted`] after
+/// Ctrl-C, with the policy as it was then.
+pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
+    let task = Setting::named(&args.agent)?.with(&args.task)?;
+    let options = DistillOptions {
+        hidden: args.hidden.clone(),
+        steps: args.steps,
+        agents: args.agents,
+        lr: args.lr,
+        seed: args.seed,
+        threads: args.threads,
+    };
+    interrupt::install("finishing this round and writing the policy")?;
+    note(format!(
+        "learning {} from {} teachers: {} decisions, seed {}",
+        task.agent,
+        args.teachers.len(),
+        text::thousands(args.steps),
+        args.seed
+    ));
+    let (progress, mut due, mut last) = (bar(args.steps), EVERY, None);
+    let start = ProcessTime::try_now().ok();
+    let policy = distill(task, &args.teachers, &options, &mut |now: &Distilled| {
+        last = Some(*now);
+        let line = format!("loss {:.5}  failures {:.3} % of decisions", now.loss, 100.0 * now.failures);
+        if let Some(bar) = &progress {
+            bar.set_position(now.steps);
+            bar.set_message(line);
+        } else if now.steps >= due {
+            due += EVERY;
+            note(format!("{:>12} of {} decisions  {line}", text::thousands(now.steps), text::thousands(args.steps)));
+        }
+        if interrupt::requested() { Control::Stop } else { Control::Continue }
+    })?;
+    if let Some(bar) = &progress {
+        bar.finish_and_clear();
+    }
+    let cpu_seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f64());
+    policy_file::save(&policy, &args.out)?;
+    let Distilled { steps, loss, failures } = last.unwrap_or(Distilled { steps: 0, loss: 0.0, failures: 0.0 });
+    let agent = policy.meta().agent.clone();
+    let report =
+        Report { out: args.out.clone(), agent, teachers: args.teachers.len(), steps, cpu_seconds, loss, failures };
+    if json {
+        print_json(&report);
+    }
+    if interrupt::requested() {
+        let (done, out) = (text::thousands(steps), text::path_word(&args.out));
+        return Err(CliError::Interrupted(format!("{done} decisions are done; {out} holds the policy as it is")));
+    }
+    if !json {
+        let out = text::path_word(&args.out);
+        say(format!("wrote {out}: {} decisions, loss {loss:.5}", text::thousands(steps)));
+        say(format!("measure it by    {} eval {out}", program::name()));
+    }
+    Ok(())
+}

@@ -1,0 +1,225 @@
+//! Learning to decide as other policies do: supervised, from observations and the actions that a teacher would take there.
+//!
+//! One network can so do what several have learned by themselves (policy distillation: Rusu et al., 2016), in a small part of
+//! the time that it would take by reinforcement. Whoever calls lets the student play and asks the teachers what they would do
+//! where it gets to (DAgger: Ross, Gordon and Bagnell, 2011): a student that has seen its teachers' states only does not know
+//! what to do in its own.
+//!
+//! The loss is half the squared distance from the teacher's best action, in the units of the network's output.
+
+use crate::error::Error;
+use crate::lanes::BLOCK;
+use crate::lanes::buffer::Blocks;
+use crate::lanes::noise::{EXPLORATION, PARAMETERS, SAMPLES, SplitMix};
+use crate::nets::init::{Init, normal};
+use crate::nets::mlp::{CHUNK, Mlp, Tape};
+use crate::nets::normalize::{Moments, Normalizer};
+use crate::optim::adam::Adam;
+use crate::policy::{Policy, PolicyMeta};
+use marathon_physics::lanes::Isa;
+
+/// Added to the root of Adam's second moment.
+const ADAM_EPSILON: f64 = 1e-5;
+/// Bound of the normalized observations.
+const OBSERVATION_CLIP: f32 = 10.0;
+
+/// Observations with what a teacher does there: the latest ones, up to a number.
+pub struct Lessons {
+    obs_len: usize,
+    act_len: usize,
+    room: usize,
+    obs: Vec<f32>,
+    actions: Vec<f32>,
+    /// Where the next row goes once the room is full.
+    next: usize,
+}
+
+impl Lessons {
+    /// Room for so many rows of such lengths.
+    pub fn new(room: usize, obs_len: usize, act_len: usize) -> Self {
+        Self { obs_len, act_len, room: room.max(1), obs: Vec::new(), actions: Vec::new(), next: 0 }
+    }
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.actions.len() / self.act_len
+    }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.actions.is_empty()
+    }
+    /// Observations of at most so many rows, those that came last, while there is room.
+    pub fn latest(&self, rows: usize) -> &[f32] {
+        &self.obs[(self.len() - rows.min(self.len())) * self.obs_len..]
+    }
+    /// Takes rows in, `[n][obs]` and `[n][act]`, in the place of the oldest if there is no more room.
+    ///
+    /// # Panics
+    /// If the lengths do not fit.
+    pub fn push(&mut self, obs: &[f32], actions: &[f32]) {
+        assert_eq!(obs.len() / self.obs_len, actions.len() / self.act_len, "an action for each observation");
+        for (obs, action) in obs.chunks_exact(self.obs_len).zip(actions.chunks_exact(self.act_len)) {
+            if self.len() < self.room {
+                self.obs.extend(obs);
+                self.actions.extend(action);
+            } else {
+                self.obs[self.next * self.obs_len..][..self.obs_len].copy_from_slice(obs);
+                self.actions[self.next * self.act_len..][..self.act_len].copy_from_slice(action);
+                self.next = (self.next + 1) % self.room;
+            }
+        }
+    }
+}
+
+/// A policy in the making.
+pub struct Distiller {
+    meta: PolicyMeta,
+    isa: Isa,
+    seed: u64,
+    net: Mlp,
+    /// Parameters, and zeros up to whole rows of sixteen.
+    params: Vec<f32>,
+    adam: Adam,
+    updates: u64,
+    noise: SplitMix,
+    moments: Moments,
+    normalizer: Normalizer,
+    log_std: Vec<f32>,
+    space: Space,
+}
+
+struct Space {
+    input: Blocks<f32>,
+    tape: Tape<f32>,
+    targets: Blocks<f32>,
+    chunk: Vec<f32>,
+    sum: Vec<f32>,
+}
+
+impl Distiller {
+    /// A policy that knows nothing yet. `log_std`: logarithms of the standard deviations of its actions, which it keeps.
+    ///
+    /// # Errors
+    /// If a width is zero.
+    pub fn new(mut meta: PolicyMeta, log_std: Vec<f32>, seed: u64, isa: Isa) -> Result<Self, Error> {
+        meta.observation_clip = OBSERVATION_CLIP;
+        if meta.hidden.contains(&0) {
+            return Err(Error::config("hidden", format!("{:?}", meta.hidden), "positive widths"));
+        }
+        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+        let net = Mlp::new(&sizes, meta.activation);
+        let mut params = vec![0.0; net.len().next_multiple_of(BLOCK)];
+        Init::Orthogonal.policy(&net, &mut params[..net.len()], &mut SplitMix::new(seed, PARAMETERS));
+        let space = Space {
+            input: net.input(),
+            tape: net.tape(),
+            targets: Blocks::new(CHUNK, meta.act),
+            chunk: vec![0.0; net.len()],
+            sum: vec![0.0; params.len()],
+        };
+        Ok(Self {
+            adam: Adam::new(params.len(), ADAM_EPSILON),
+            updates: 0,
+            noise: SplitMix::new(seed, EXPLORATION),
+            moments: Moments::new(meta.obs),
+            normalizer: Normalizer::identity(meta.obs, OBSERVATION_CLIP),
+            meta,
+            isa,
+            seed,
+            net,
+            params,
+            log_std,
+            space,
+        })
+    }
+
+    /// Lets observations, `[n][obs]`, count in the statistics that normalize all of them; before the first update only, since
+    /// what the network makes of an observation changes.
+    ///
+    /// # Panics
+    /// After the first update.
+    pub fn see(&mut self, obs: &[f32]) {
+        assert_eq!(self.updates, 0, "statistics are made before the first update");
+        let n = self.meta.obs;
+        let centers: Vec<f32> = self.moments.mean32();
+        let mut sums = vec![(0.0, 0.0); n];
+        for row in obs.chunks_exact(n) {
+            for ((sum, square), (x, center)) in sums.iter_mut().zip(row.iter().zip(&centers)) {
+                let d = f64::from(x - center);
+                *sum += d;
+                *square += d * d;
+            }
+        }
+        self.moments.merge((obs.len() / n) as f64, &sums, f64::INFINITY);
+        self.normalizer = Normalizer::new(self.moments.mean32(), self.moments.std(), OBSERVATION_CLIP);
+    }
+
+    /// One step of Adam on rows drawn from the lessons, a multiple of sixteen. Returns the mean squared distance of an action's
+    /// numbers from the teacher's.
+    ///
+    /// # Panics
+    /// If there are no lessons.
+    pub fn learn(&mut self, lessons: &Lessons, rows: usize, lr: f64) -> f64 {
+        assert!(!lessons.is_empty(), "there is something to learn from");
+        let mut random = SplitMix::new(SplitMix::new(self.seed, self.updates).word(), SAMPLES);
+        self.updates += 1;
+        let (blocks, act) = (rows.div_ceil(BLOCK), self.meta.act);
+        self.space.sum.fill(0.0);
+        let mut loss = 0.0;
+        for first in (0..blocks).step_by(CHUNK) {
+            let here = CHUNK.min(blocks - first);
+            for block in 0..here {
+                for lane in 0..BLOCK {
+                    self.place(lessons, random.below(lessons.len()), block, lane);
+                }
+            }
+            let Space { input, tape, targets, chunk, sum } = &mut self.space;
+            self.net.forward(self.isa, &self.params[..self.net.len()], input, tape, here);
+            let (output, delta) = tape.output_and_delta();
+            for block in 0..here {
+                let pairs = output.block(block).iter().zip(targets.block(block));
+                for ((mean, target), delta) in pairs.zip(delta.block_mut(block)) {
+                    *delta = mean - target;
+                    loss += f64::from(*delta * *delta);
+                }
+            }
+            self.net.backward(self.isa, &self.params[..self.net.len()], input, tape, chunk, here);
+            sum.iter_mut().zip(chunk).for_each(|(sum, x)| *sum += *x);
+        }
+        self.adam.advance();
+        let (all, scale) = (0..self.params.len(), 1.0 / (blocks * BLOCK) as f64);
+        self.adam.update(self.isa, &mut self.params, all, &self.space.sum, scale, lr);
+        loss * scale / act as f64
+    }
+
+    /// Puts a row of the lessons into a lane of the work space.
+    fn place(&mut self, lessons: &Lessons, row: usize, block: usize, lane: usize) {
+        let (obs, act) = (self.meta.obs, self.meta.act);
+        let input = self.space.input.block_mut(block);
+        for (i, x) in lessons.obs[row * obs..][..obs].iter().enumerate() {
+            input[i * BLOCK + lane] = self.normalizer.number(i, *x);
+        }
+        let targets = self.space.targets.block_mut(block);
+        for (i, action) in lessons.actions[row * act..][..act].iter().enumerate() {
+            targets[i * BLOCK + lane] = nominal(&self.meta.action_range, i, *action);
+        }
+    }
+
+    /// Fills a list with standard normal numbers, for actions as in training.
+    pub fn draw(&mut self, noise: &mut [f32]) {
+        noise.iter_mut().for_each(|x| *x = normal(&mut self.noise) as f32);
+    }
+
+    /// The policy as it is now.
+    pub fn policy(&self) -> Policy {
+        let params = self.params[..self.net.len()].to_vec();
+        Policy::assemble(self.meta.clone(), self.net.clone(), params, self.normalizer.clone(), self.log_std.clone())
+    }
+}
+
+/// What the network has to put out for an action of the environment's.
+fn nominal(ranges: &[[f32; 2]], i: usize, action: f32) -> f32 {
+    match ranges.get(i) {
+        Some([low, high]) => (2.0 * action - low - high) / (high - low),
+        None => action,
+    }
+}
