@@ -121,6 +121,9 @@ pub struct DistillArgs {
     /// Widths of the policy's hidden layers.
     #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = DistillOptions::default().hidden)]
     pub hidden: Vec<usize>,
+    /// Policy to start from in place of random weights, with no wider layers.
+    #[arg(long, value_name = "POLICY")]
+    pub initialize_from: Option<PathBuf>,
     /// Decisions of all agents together.
     #[arg(long, value_name = "N", default_value_t = DistillOptions::default().steps, value_parser = marathon_runs::options::parse_steps)]
     pub steps: u64,

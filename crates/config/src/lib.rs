@@ -50,6 +50,9 @@ const MARATHON_MAN: (&str, &str) =
 /// For Marathon Man told where to go.
 const MARATHON_MAN_STEER: (&str, &str) =
     ("marathon_man_steer-fast.yaml", include_str!("../../../assets/configs/marathon_man_steer-fast.yaml"));
+/// For Marathon Man in a player's hands.
+const MARATHON_MAN_CONTROLLER: (&str, &str) =
+    ("marathon_man_controller-fast.yaml", include_str!("../../../assets/configs/marathon_man_controller-fast.yaml"));
 
 /// For the paper's Humanoid and Walker in the style of a person.
 const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
@@ -99,6 +102,7 @@ const FAST: [(&str, (&str, &str)); 47] = [
     ("MarathonManGetUpFaceUp", MARATHON_MAN),
     ("MarathonManSparse", MARATHON_MAN),
     ("MarathonManSteer", MARATHON_MAN_STEER),
+    ("MarathonManController", MARATHON_MAN_CONTROLLER),
     ("HumanoidStyleWalk", IN_STYLE),
     ("HumanoidStyleRun", IN_STYLE),
     ("Walker2dStyleWalk", IN_STYLE),

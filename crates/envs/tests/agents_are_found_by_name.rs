@@ -30,7 +30,7 @@ fn an_unknown_name_gets_the_nearest_and_the_list() {
                  MarathonManRun-v0, MarathonManBackflip-v0, MarathonManSpinKick-v0, MarathonManSpin-v0, \
                  MarathonManCartwheel-v0, MarathonManRoll-v0, MarathonManJump-v0, MarathonManKick-v0, \
                  MarathonManPunch-v0, MarathonManDance-v0, MarathonManCrawl-v0, MarathonManGetUpFaceDown-v0, \
-                 MarathonManGetUpFaceUp-v0, MarathonManSparse-v0, MarathonManSteer-v0, HumanoidStyleWalk-v0, HumanoidStyleRun-v0, \
+                 MarathonManGetUpFaceUp-v0, MarathonManSparse-v0, MarathonManSteer-v0, MarathonManController-v0, HumanoidStyleWalk-v0, HumanoidStyleRun-v0, \
                  Walker2dStyleWalk-v0, Walker2dStyleRun-v0, \
                  Hopper-v5, Walker2d-v5, HalfCheetah-v5, Ant-v5, Humanoid-v5, HumanoidStandup-v5, Swimmer-v5, \
                  InvertedPendulum-v5, InvertedDoublePendulum-v5, hopper-stand-v0, hopper-hop-v0, walker-stand-v0, \

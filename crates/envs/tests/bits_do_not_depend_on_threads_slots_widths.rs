@@ -77,6 +77,12 @@ fn marathon_man_steered() {
     check("MarathonManSteer-v0");
 }
 
+/// What he does when is his own, and where his clip is.
+#[test]
+fn marathon_man_in_a_players_hands() {
+    check("MarathonManController-v0");
+}
+
 /// Its commands and the velocities that it remembers are its own.
 #[test]
 fn walker_controller() {

@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::noise::{EXPLORATION, PARAMETERS, SAMPLES, SplitMix};
+use crate::nets::graft::graft;
 use crate::nets::init::{Init, normal};
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
 use crate::nets::normalize::{Moments, Normalizer};
@@ -80,6 +81,8 @@ pub struct Distiller {
     params: Vec<f32>,
     adam: Adam,
     updates: u64,
+    /// Whether it started from a policy.
+    started: bool,
     noise: SplitMix,
     moments: Moments,
     normalizer: Normalizer,
@@ -119,6 +122,7 @@ impl Distiller {
         Ok(Self {
             adam: Adam::new(params.len(), ADAM_EPSILON),
             updates: 0,
+            started: false,
             noise: SplitMix::new(seed, EXPLORATION),
             moments: Moments::new(meta.obs),
             normalizer: Normalizer::identity(meta.obs, OBSERVATION_CLIP),
@@ -130,6 +134,19 @@ impl Distiller {
             log_std,
             space,
         })
+    }
+
+    /// Starts from a policy, whose number `i` of the observation is number `sees[i]` here.
+    ///
+    /// # Errors
+    /// If its network is wider, or of another kind.
+    pub fn start_from(&mut self, policy: &Policy, sees: &[usize]) -> Result<(), Error> {
+        let params = &mut self.params[..self.net.len()];
+        graft(&self.net, params, policy.net(), policy.params(), sees)?;
+        self.moments.assume(policy.normalizer(), sees);
+        self.started = true;
+        self.normalizer = Normalizer::new(self.moments.mean32(), self.moments.std(), OBSERVATION_CLIP);
+        Ok(())
     }
 
     /// Lets observations, `[n][obs]`, count in the statistics that normalize all of them; before the first update only, since
@@ -150,7 +167,12 @@ impl Distiller {
             }
         }
         self.moments.merge((obs.len() / n) as f64, &sums, f64::INFINITY);
+        let before = self.normalizer.clone();
         self.normalizer = Normalizer::new(self.moments.mean32(), self.moments.std(), OBSERVATION_CLIP);
+        // what the network has learned elsewhere it is to know still
+        if self.started {
+            self.net.follow(&mut self.params[..self.net.len()], &before, &self.normalizer);
+        }
     }
 
     /// One step of Adam on rows drawn from the lessons, a multiple of sixteen. Returns the mean squared distance of an action's

@@ -86,6 +86,7 @@ pub use rollout::statistics::StatisticsConfig;
 pub use trainer::checkpoint::Checkpoint;
 pub use trainer::config::{RoleConfig, RunConfig, TrainConfig};
 pub use trainer::evaluate::{EvalOptions, evaluate, evaluate_roles};
+pub use trainer::initialize::initialized;
 pub use trainer::observer::{Control, Observer, Snapshot};
 pub use trainer::remote::{Deliver, Player, Players};
 pub use trainer::stats::{IterationStats, Learned};

@@ -8,7 +8,7 @@ use crate::error::RunError;
 use crate::policy_file;
 use crate::setting::{Setting, TaskOptions};
 use marathon_envs::options::Value;
-use marathon_envs::{Spec, Step, VecEnv, VecEnvOptions, registry};
+use marathon_envs::{Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::{Activation, BlockPolicy, Control, Distiller, Lessons, Policy, PolicyMeta};
 use marathon_physics::lanes::Isa;
 use std::path::PathBuf;
@@ -43,11 +43,21 @@ pub struct DistillOptions {
     pub seed: u64,
     /// Threads that play. The result does not depend on it.
     pub threads: usize,
+    /// Policy to start from in place of random weights, if any: a file or the folder of a run.
+    pub initialize_from: Option<PathBuf>,
 }
 
 impl Default for DistillOptions {
     fn default() -> Self {
-        Self { hidden: vec![256, 256], steps: 20_000_000, agents: 32, lr: 1e-3, seed: 1, threads: 1 }
+        Self {
+            hidden: vec![256, 256],
+            steps: 20_000_000,
+            agents: 32,
+            lr: 1e-3,
+            seed: 1,
+            threads: 1,
+            initialize_from: None,
+        }
     }
 }
 
@@ -103,7 +113,7 @@ pub fn distill(
         let seed = options.seed.wrapping_add(1_000_003 * (1 + i as u64));
         let make = VecEnvOptions { agents: options.agents, threads: options.threads, seed, ..Default::default() };
         let mut env = own.vec_env(&make)?;
-        let sees = seen_by(&teacher, &path, &spec)?;
+        let sees = policy_file::seen_by(&teacher, &path, &spec)?;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
         classes.push(Class { env, step, teacher, sees });
@@ -113,6 +123,10 @@ pub fn distill(
     (meta.options, meta.clips) = (spec.options.clone(), whole.clips.clone());
     let log_std = (0..spec.act).map(|i| mean(classes.iter().map(|class| class.teacher.log_std()[i]))).collect();
     let mut student = Distiller::new(meta, log_std, options.seed, Isa::best())?;
+    if let Some(path) = &options.initialize_from {
+        let known = policy_file::read(path, None)?;
+        student.start_from(&known, &policy_file::seen_by(&known, path, &spec)?)?;
+    }
     let round = (classes.len() * options.agents * HORIZON) as u64;
     let mut lessons = Lessons::new(KEPT * round as usize, spec.obs, spec.act);
     let total = options.steps.max(round);
@@ -160,7 +174,8 @@ impl Class {
     ) -> Result<[usize; 2], RunError> {
         let Class { env, step, teacher, sees } = self;
         let (n, act, obs_len) = (env.agents(), teacher.meta().act, student.meta().obs);
-        let (mut teacher, mut student) = (BlockPolicy::new(&*teacher, Isa::best()), BlockPolicy::new(student, Isa::best()));
+        let (mut teacher, mut student) =
+            (BlockPolicy::new(&*teacher, Isa::best()), BlockPolicy::new(student, Isa::best()));
         let (mut best, mut actions, mut drawn) = (vec![0.0; n * act], vec![0.0; n * act], vec![0.0; n * act]);
         let mut counts = [0; 2];
         for _ in 0..HORIZON {
@@ -199,38 +214,6 @@ fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<String>, RunError
 /// A task whose agents follow these clips.
 fn follow(task: &Setting, clips: &str) -> Result<Setting, RunError> {
     task.clone().with(&TaskOptions { given: vec![(CLIP.into(), Value::Text(clips.into()))] })
-}
-
-/// Where the numbers that a teacher observes are in the student's observation.
-fn seen_by(teacher: &Policy, path: &std::path::Path, student: &Spec) -> Result<Vec<usize>, RunError> {
-    let of_teacher = Setting::of(teacher.meta()).factory()?.spec().clone();
-    teacher.check(&of_teacher)?;
-    let wrong = |place: &str, found: String, expected: String| Err(RunError::file(path, place, found, expected));
-    if of_teacher.act != student.act {
-        let expected = format!("{} as {} has", student.act, student.id);
-        return wrong("actions", of_teacher.act.to_string(), expected);
-    }
-    if of_teacher.dt != student.dt {
-        let expected = format!("{} as {} has", student.dt, student.id);
-        return wrong("seconds between decisions", of_teacher.dt.to_string(), expected);
-    }
-    if of_teacher.observations == student.observations {
-        return Ok((0..student.obs).collect());
-    }
-    let mut sees = Vec::new();
-    for group in &of_teacher.observations {
-        let known = student.observations.iter().find(|known| known.name == group.name);
-        match known {
-            Some(known) if known.range.len() == group.range.len() => sees.extend(known.range.clone()),
-            _ => {
-                let found = format!("'{}' of {} numbers", group.name, group.range.len());
-                let names = student.observations.iter().map(|group| format!("{} ({})", group.name, group.range.len()));
-                let expected = format!("parts that {} observes: {}", student.id, names.collect::<Vec<_>>().join(", "));
-                return wrong("observation", found, expected);
-            }
-        }
-    }
-    Ok(sees)
 }
 
 fn mean(of: impl ExactSizeIterator<Item = f32>) -> f32 {

@@ -43,6 +43,9 @@ pub struct RunFile {
     /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clips: BTreeMap<String, String>,
+    /// Policy that the run starts from, if not from random weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initialize_from: Option<PathBuf>,
     /// Steps between progress lines where there is no terminal.
     pub summary_freq: u64,
     /// Steps between checkpoints.
@@ -62,6 +65,7 @@ impl RunFile {
             agent: task.agent.clone(),
             options: task.options.clone(),
             clips: task.clips.iter().map(|(name, text)| (name.clone(), checksum(text.as_bytes()))).collect(),
+            initialize_from: None,
             summary_freq: loaded.summary_freq,
             checkpoint_interval: loaded.checkpoint_interval,
             keep_checkpoints: loaded.keep_checkpoints,

@@ -48,6 +48,10 @@ pub struct RunOptions {
     /// result does not depend on it. Not with sac.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 0))]
     pub processes: usize,
+    /// Policy to start from in place of random weights, a file or the folder of a run, whose hidden layers are no wider.
+    /// It may observe less: the parts of its observation are looked up by their names, and what else there is has no influence at first.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "POLICY"))]
+    pub initialize_from: Option<PathBuf>,
     /// Folder for the results, new or empty [default: runs/AGENT-N].
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: Option<PathBuf>,
@@ -89,6 +93,7 @@ impl RunOptions {
             ("seed", self.learn.seed.is_some()),
             ("agents", self.agents.is_some()),
             ("option", !self.task.given.is_empty()),
+            ("initialize-from", self.initialize_from.is_some()),
             ("out", self.out.is_some()),
         ];
         match of_new_runs.into_iter().find(|(_, given)| *given && self.resume.is_some()) {

@@ -65,6 +65,42 @@ pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, RunError> {
     })
 }
 
+/// Where the numbers that a policy observes are in the observation of another task, which may have more; parts are looked up
+/// by their names.
+///
+/// # Errors
+/// If the task has no such part, or decides otherwise.
+pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, RunError> {
+    let own = Setting::of(policy.meta()).factory()?.spec().clone();
+    policy.check(&own)?;
+    let wrong = |place: &str, found: String, expected: String| Err(RunError::file(path, place, found, expected));
+    if own.act != task.act {
+        let expected = format!("{} as {} has", task.act, task.id);
+        return wrong("actions", own.act.to_string(), expected);
+    }
+    if own.dt != task.dt {
+        let expected = format!("{} as {} has", task.dt, task.id);
+        return wrong("seconds between decisions", own.dt.to_string(), expected);
+    }
+    if own.observations == task.observations {
+        return Ok((0..task.obs).collect());
+    }
+    let mut sees = Vec::new();
+    for group in &own.observations {
+        let known = task.observations.iter().find(|known| known.name == group.name);
+        match known {
+            Some(known) if known.range.len() == group.range.len() => sees.extend(known.range.clone()),
+            _ => {
+                let found = format!("'{}' of {} numbers", group.name, group.range.len());
+                let names = task.observations.iter().map(|group| format!("{} ({})", group.name, group.range.len()));
+                let expected = format!("parts that {} observes: {}", task.id, names.collect::<Vec<_>>().join(", "));
+                return wrong("observation", found, expected);
+            }
+        }
+    }
+    Ok(sees)
+}
+
 /// Writes a policy in the format that the file's name ends with.
 ///
 /// # Errors

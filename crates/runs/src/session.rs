@@ -6,6 +6,7 @@ use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder, write_json};
 use crate::imitation;
 use crate::options::RunOptions;
+use crate::policy_file;
 use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
@@ -17,7 +18,7 @@ use marathon_config::{Loaded, default_for, default_of};
 use marathon_envs::ShardFactory;
 use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput,
-    evaluate_roles, train_with,
+    evaluate_roles, initialized, train_with,
 };
 use marathon_physics::lanes::Isa;
 use std::path::Path;
@@ -51,6 +52,14 @@ pub struct Outcome {
     pub summary: Summary,
     /// The folder, which stays locked as long as this lives.
     pub folder: Option<RunFolder>,
+}
+
+/// Where a new run starts, if it is to start from a policy.
+fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkpoint>, RunError> {
+    let Some(path) = &run.initialize_from else { return Ok(None) };
+    let policy = policy_file::read(path, None)?;
+    let sees = policy_file::seen_by(&policy, path, factory.spec())?;
+    Ok(Some(initialized(factory, Isa::best(), &run.config, &policy, &sees)?))
 }
 
 impl Session {
@@ -113,7 +122,9 @@ impl Session {
         let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
-        let run = RunFile::new(&setting, &loaded);
+        let mut run = RunFile::new(&setting, &loaded);
+        run.initialize_from.clone_from(&options.initialize_from);
+        let checkpoint = start_from(&run, &*factory)?;
         let mut folder = None;
         if !dry {
             let made = RunFolder::create(options.out.as_deref(), &agent)?;
@@ -123,7 +134,7 @@ impl Session {
             }
             folder = Some(made);
         }
-        Ok((Session { run, folder, factory, setting, checkpoint: None }, loaded.notes))
+        Ok((Session { run, folder, factory, setting, checkpoint }, loaded.notes))
     }
 
     fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<Self, RunError> {
@@ -156,6 +167,7 @@ impl Session {
         let (factory, setting) = task.factory(run.config.run.agents)?;
         let factory = with_demonstrations(factory, &run.config)?;
         folder.write_run(&run)?;
+        let checkpoint = checkpoint.map_or_else(|| start_from(&run, &*factory), |last| Ok(Some(last)))?;
         Ok(Session { folder: Some(folder), run, factory, setting, checkpoint })
     }
 

@@ -5,11 +5,11 @@ use crate::console::{note, print_json, say};
 use crate::error::CliError;
 use crate::interrupt;
 use crate::program;
+use cpu_time::ProcessTime;
 use marathon_learn::Control;
 use marathon_runs::distill::{DistillOptions, Distilled, distill};
 use marathon_runs::report::progress::bar;
 use marathon_runs::{Setting, policy_file, text};
-use cpu_time::ProcessTime;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -43,6 +43,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
         lr: args.lr,
         seed: args.seed,
         threads: args.threads,
+        initialize_from: args.initialize_from.clone(),
     };
     interrupt::install("finishing this round and writing the policy")?;
     note(format!(

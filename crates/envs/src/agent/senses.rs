@@ -5,6 +5,7 @@
 //! its negative at 180 degrees. World axes: +x forward, +y left, +z up.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
+use std::ops::Range;
 
 use marathon_physics::Readings;
 use marathon_physics::lanes::Real;
@@ -213,6 +214,18 @@ impl<T: Real> Senses<'_, T> {
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
         self.followed().frame(self.memory, ahead)
+    }
+
+    /// The same for an agent with these variables, in [`Agent::remember`](crate::Agent::remember), where they change.
+    #[inline(always)]
+    pub fn reference_of(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
+        self.followed().frame(memory, ahead)
+    }
+
+    /// The rows of clip number `i` among those of all, see [`Start::clips`](crate::Start::clips).
+    #[inline(always)]
+    pub fn clip_rows(&self, i: usize) -> Range<usize> {
+        self.followed().timeline.clips[i].rows.clone()
     }
 
     /// Moves on in the clip by a decision: to be called once by [`Agent::remember`](crate::Agent::remember).

@@ -3,6 +3,7 @@
 pub mod acting;
 pub mod activation;
 pub mod gaussian;
+pub mod graft;
 pub mod init;
 pub mod mlp;
 pub mod normalize;

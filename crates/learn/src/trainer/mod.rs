@@ -19,6 +19,7 @@ mod clock;
 pub mod config;
 pub mod evaluate;
 mod flat;
+pub mod initialize;
 mod memory;
 pub mod observer;
 pub mod remote;

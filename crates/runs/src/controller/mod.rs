@@ -33,8 +33,16 @@ const STANDING: f64 = 10.0;
 /// What counts as standing still: way of the center of mass, m, and mean speed of the parts, m/s.
 const DRIFT: f64 = 0.1;
 const RESTLESS: f64 = 0.05;
-/// How long a button is held, s, and in what time a figure that jumps at once is off the ground, s.
+/// Name of the button for a backflip, how long it is held, and how long one takes with a second afterward, s.
+const BACKFLIP: &str = "backflip";
+const HELD: f64 = 0.25;
+const FLIP: f64 = 3.0;
+/// What pushes over, m/s, and in what time one is up at once, s.
+const OVER: f64 = 4.0;
+const UP: f64 = 4.0;
+/// How long a button is held, s, how long one is off the ground who jumps, s, and in what time a figure that jumps at once is off the ground, s.
 const PRESSED: f64 = 1.0;
+const ALOFT: f64 = 0.1;
 const PROMPT: f64 = 0.35;
 /// Pushes: what they would add to the velocity of a rigid body of the figure's mass, m/s, and how long they last, s.
 const PUSHES: [f64; 3] = [0.25, 0.5, 1.0];
@@ -61,8 +69,12 @@ pub struct Obedience {
     pub stand: Stand,
     /// Told to jump from a stand; none for tasks without such a button.
     pub jump: Option<Jump>,
+    /// Told to turn over backward from a stand; none for tasks without such a button.
+    pub backflip: Option<Flip>,
     /// Pushed at half of the highest speed.
     pub pushes: Vec<Push>,
+    /// Pushed over while standing; none for tasks in which a fall is the end.
+    pub rise: Option<Rise>,
 }
 
 /// Minutes of commands by the task's own schedule.
@@ -122,10 +134,30 @@ pub struct Jump {
     pub prompt: u64,
     /// Those of them that fell within 4 s.
     pub falls: u64,
-    /// Median time until no foot is on the ground, s; none if fewer than half of them jumped.
+    /// Median time until no foot is on the ground for a tenth of a second, s; none if fewer than half of them jumped.
     pub latency: Option<f64>,
     /// Median of how far the center of mass rises above where it was, m; none if nobody was left.
     pub height: Option<f64>,
+}
+
+/// A backflip.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Flip {
+    /// Agents that had not fallen before.
+    pub agents: u64,
+    /// Those of them that turned over and landed on their feet, and stood or went on for a second.
+    pub landed: u64,
+}
+
+/// Getting up after a fall.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rise {
+    /// Agents that were pushed over.
+    pub agents: u64,
+    /// Those of them that were up again within 4 s.
+    pub prompt: u64,
+    /// Median of the time that it took, s; none if fewer than half of them got up.
+    pub time: Option<f64>,
 }
 
 /// A push from any side.
@@ -149,6 +181,7 @@ struct Commands {
     range: [f64; 2],
     turn: Option<(usize, f64)>,
     button: Option<usize>,
+    backflip: Option<usize>,
 }
 
 impl Commands {
@@ -164,6 +197,7 @@ impl Commands {
             range: [spec.command[speed].low, spec.command[speed].high],
             turn: number_of(CommandRange::is_turn).map(|i| (i, spec.command[i].high)),
             button: number_of(CommandRange::is_button),
+            backflip: spec.command.iter().position(|range| range.name == BACKFLIP),
         })
     }
 
@@ -216,6 +250,12 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
         Some(button) => Some(jump(trial()?, &commands, button)?),
         None => None,
     };
+    let backflip = match commands.backflip {
+        Some(button) => Some(flip(trial()?, &commands, button)?),
+        None => None,
+    };
+    let lying = trial()?;
+    let rise = if lying.can_rise() { Some(rise(lying, &commands)?) } else { None };
     let half = 0.5 * commands.range[1];
     let pushes = PUSHES.into_iter().map(|velocity| push(trial()?, &commands, half, velocity));
     Ok(Obedience {
@@ -227,7 +267,9 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
         turns,
         stand: stand(trial()?, &commands)?,
         jump,
+        backflip,
         pushes: pushes.collect::<Result<_, RunError>>()?,
+        rise,
     })
 }
 
@@ -336,7 +378,9 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump
     join(&mut tracks, trial.play(AFTER - PRESSED)?);
     let start = |agent| before.iter().find(|track| track.agent == agent).and_then(|track| track.moments.last());
     let time = |track: &Track| {
-        let off = track.moments.iter().position(|moment| !moment.grounded);
+        // who steps from foot to foot has none on the ground now and then
+        let window = (ALOFT / dt).round().max(1.0) as usize;
+        let off = track.moments.windows(window).position(|some| some.iter().all(|moment| !moment.grounded));
         off.map_or(f64::INFINITY, |i| (i + 1) as f64 * dt)
     };
     let rise = |track: &Track| {
@@ -350,6 +394,37 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump
         falls: falls(&tracks),
         latency: response::median_time(times),
         height: response::median(tracks.iter().filter_map(rise).collect()),
+    })
+}
+
+/// A backflip from a stand.
+fn flip(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Flip, RunError> {
+    trial.command(|_| commands.rest.clone())?;
+    trial.play(BEFORE)?;
+    let mut pressed = commands.rest.clone();
+    pressed[button] = 1.0;
+    trial.command(|_| pressed.clone())?;
+    let mut tracks = trial.play(HELD)?;
+    trial.command(|_| commands.rest.clone())?;
+    join(&mut tracks, trial.play(FLIP - HELD)?);
+    let tracking = Tracking::new(trial.model());
+    let flipped = |track: &&Track| {
+        let frames: Vec<Vec<f64>> = track.moments.iter().map(|moment| moment.qpos.clone()).collect();
+        !track.fallen && tracking.flips(&frames) > 0
+    };
+    Ok(Flip { agents: tracks.len() as u64, landed: tracks.iter().filter(flipped).count() as u64 })
+}
+
+/// A push over, and what follows.
+fn rise(mut trial: Trial<'_>, commands: &Commands) -> Result<Rise, RunError> {
+    trial.command(|_| commands.rest.clone())?;
+    trial.play(BEFORE)?;
+    trial.pushed(PUSH, OVER, |agent| agent as f64 * GOLDEN)?;
+    let times = trial.rise(2.0 * UP + 1.0)?;
+    Ok(Rise {
+        agents: times.len() as u64,
+        prompt: times.iter().filter(|time| **time <= UP + 1e-9).count() as u64,
+        time: response::median_time(times),
     })
 }
 

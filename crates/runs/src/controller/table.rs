@@ -1,6 +1,6 @@
 //! Obedience as lines for a person, and as a picture.
 
-use super::{EARLY, Minutes, Obedience, PROMPT, SETTLED, STANDING, Stand};
+use super::{EARLY, Minutes, Obedience, PROMPT, SETTLED, STANDING, Stand, UP};
 use crate::error::RunError;
 use crate::report::chart::Chart;
 use std::fmt::Write;
@@ -65,6 +65,9 @@ impl Obedience {
                 j.falls
             );
         }
+        if let Some(flip) = &self.backflip {
+            let _ = write!(out, "\ntold to turn over backward: {} of {} land on their feet", flip.landed, flip.agents);
+        }
         for p in &self.pushes {
             let _ = write!(
                 out,
@@ -73,6 +76,15 @@ impl Obedience {
                 p.falls,
                 p.agents,
                 seconds(&p.recovery)
+            );
+        }
+        if let Some(r) = &self.rise {
+            let _ = write!(
+                out,
+                "\npushed over: {} of {} are up again within {UP} s, half of them within {}",
+                r.prompt,
+                r.agents,
+                seconds(&r.time)
             );
         }
         out

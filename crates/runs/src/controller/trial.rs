@@ -14,6 +14,9 @@ use std::f64::consts::{PI, TAU};
 /// Name of the number with which a task tells how far a velocity is from the commanded one.
 const ERROR: &str = "velocity_error";
 
+/// Name of the number with which a task tells that a figure gets up after a fall.
+const RISING: &str = "rising";
+
 /// What an agent did in a decision.
 pub struct Moment {
     /// Where its center of mass is along the ground, m.
@@ -40,7 +43,7 @@ pub struct Track {
     /// Its number.
     pub agent: usize,
     pub moments: Vec<Moment>,
-    /// Whether it fell.
+    /// Whether it fell, be it that it gets up again.
     pub fallen: bool,
 }
 
@@ -61,6 +64,8 @@ pub struct Trial<'a> {
     speed: usize,
     /// Number of the task's own report of the error.
     error: Option<usize>,
+    /// Number of the task's report that a figure gets up; none if a fall ends its episode.
+    rising: Option<usize>,
     /// Where each agent was last; none of those that fell.
     places: Vec<Option<Place>>,
 }
@@ -77,12 +82,13 @@ impl<'a> Trial<'a> {
             ..VecEnvOptions::default()
         };
         let play = Play::of(setting, policy, &vec_options)?;
-        let error = play.spec().info.iter().position(|name| name == ERROR);
+        let number = |of: &str| play.spec().info.iter().position(|name| name == of);
+        let (error, rising) = (number(ERROR), number(RISING));
         let model = registry::agent(&setting.agent)?.model()?;
         let root = free(&model);
         let place = |agent| Ok(Some(Place::of(&model, root, &play.qpos(agent)?, 0.0)));
         let places = (0..options.episodes).map(place).collect::<Result<_, RunError>>()?;
-        Ok(Trial { play, model, root, speed, error, places })
+        Ok(Trial { play, model, root, speed, error, rising, places })
     }
 
     /// Seconds between decisions.
@@ -115,7 +121,7 @@ impl<'a> Trial<'a> {
             self.play.step()?;
             for track in tracks.iter_mut().filter(|track| !track.fallen) {
                 let (step, agent) = (self.play.last(), track.agent);
-                track.fallen = step.terminated[agent] || step.diverged[agent];
+                track.fallen = step.terminated[agent] || step.diverged[agent] || self.rises(agent);
                 if track.fallen {
                     self.places[agent] = None;
                 } else {
@@ -145,6 +151,45 @@ impl<'a> Trial<'a> {
         let tracks = self.play(seconds)?;
         (0..self.agents()).try_for_each(|agent| self.play.push(agent, body, [0.0; 3]))?;
         Ok(tracks)
+    }
+
+    /// Whether figures get up after a fall.
+    pub fn can_rise(&self) -> bool {
+        self.rising.is_some()
+    }
+
+    /// Whether an agent is getting up.
+    fn rises(&self, agent: usize) -> bool {
+        let step = self.play.last();
+        let infos = self.play.spec().info.len();
+        self.rising.is_some_and(|i| step.info[agent * infos + i] > 0.5)
+    }
+
+    /// Plays for some seconds and returns, for each agent that falls or lies, how long it takes to be up again, s; infinite if it
+    /// does not get up.
+    pub fn rise(&mut self, seconds: f64) -> Result<Vec<f64>, RunError> {
+        let (n, dt) = (self.agents(), self.dt());
+        let (mut since, mut times) = (vec![None; n], vec![None; n]);
+        for decision in 0..(seconds / dt).round() as usize {
+            self.play.decide();
+            self.play.step()?;
+            for agent in 0..n {
+                let given_up = self.play.last().terminated[agent] || self.play.last().diverged[agent];
+                let rises = self.rises(agent) && !given_up;
+                if given_up && since[agent].is_some() {
+                    times[agent].get_or_insert(f64::INFINITY);
+                }
+                match (since[agent], rises) {
+                    (None, true) => since[agent] = Some(decision),
+                    (Some(from), false) => {
+                        times[agent].get_or_insert((decision - from) as f64 * dt);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let fell = since.iter().zip(&times).filter(|(since, _)| since.is_some());
+        Ok(fell.map(|(_, time)| time.unwrap_or(f64::INFINITY)).collect())
     }
 
     /// What an agent has done since it was looked at last.

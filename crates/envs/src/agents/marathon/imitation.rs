@@ -11,7 +11,7 @@
 use marathon_physics::lanes::Real;
 
 use crate::agent::options::Choice;
-use crate::agent::{Following, Obs, Part, Senses, Start, Terms};
+use crate::agent::{Following, Frame, Obs, Part, Senses, Start, Terms};
 
 /// Memory of a figure that follows a clip.
 pub(super) const MEMORY: usize = BEGUN + 1;
@@ -127,6 +127,16 @@ pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f6
     }
 }
 
+/// What the terms add up to.
+#[inline(always)]
+pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
+    let mut sum = T::zero();
+    for ((_, weight, scale, _), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
+        sum = (error * T::lit(-scale)).exp().mul_add(T::lit(weight), sum);
+    }
+    sum
+}
+
 /// The errors of the terms.
 #[inline(always)]
 fn errors<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 5] {
@@ -178,7 +188,12 @@ pub(super) fn angle2<T: Real>(s: &Senses<T>, part: Part) -> T {
 /// Mean distance of the parts from where the clip has them, m; from the root's own place, or in the world.
 #[inline(always)]
 pub(super) fn distance<T: Real>(s: &Senses<T>, anatomy: &Anatomy, from_root: bool) -> T {
-    let clip = s.reference(0);
+    distance_from(s, &s.reference(0), anatomy, from_root)
+}
+
+/// The same from a moment of the clip.
+#[inline(always)]
+pub(super) fn distance_from<T: Real>(s: &Senses<T>, clip: &Frame<'_, T>, anatomy: &Anatomy, from_root: bool) -> T {
     let mut gap = [T::zero(); 3];
     if from_root {
         gap = sub(s.position(anatomy.root), clip.position(anatomy.root));

@@ -18,8 +18,10 @@
 
 mod body;
 pub mod clips;
+mod controller;
 pub mod gait;
 pub mod reward;
+mod skills;
 mod sparse;
 pub mod steer;
 
@@ -122,7 +124,8 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         let arguments = Arguments { clip: ClipNames(clip.into()), reward, ..Arguments::default() };
         Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
     };
-    tasks.map(agent).chain([Arc::new(steer::Steer::default()) as Arc<dyn AnyAgent>]).collect()
+    let told: [Arc<dyn AnyAgent>; 2] = [Arc::new(steer::Steer::default()), Arc::new(controller::Controller::default())];
+    tasks.map(agent).chain(told).collect()
 }
 
 /// Whether a model has the figure's joints.

@@ -50,19 +50,19 @@ use crate::episode_rng::EpisodeRng;
 pub const STYLE: [&str; 7] =
     ["height", "orientation", "velocity", "angular_velocity", "joint_positions", "joint_velocities", "ends"];
 /// What he moves like.
-const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
+pub(super) const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
 /// Number of the clip in which he stands.
 const STANDS: usize = 4;
 /// Numbers that he observes.
-const OBSERVATION: usize = 82 + JOINTS.len();
+pub(super) const OBSERVATION: usize = 82 + JOINTS.len();
 /// Fastest that he is told to go, m/s.
-const FASTEST: f64 = 3.0;
+pub(super) const FASTEST: f64 = 3.0;
 /// Sharpest that he is told to turn, rad/s.
-const SHARPEST: f64 = FRAC_PI_2;
+pub(super) const SHARPEST: f64 = FRAC_PI_2;
 /// Most that the commanded direction is off his heading, rad.
 pub const MOST_BEHIND: f64 = 1.0;
 /// How long a command holds, decisions.
-const HOLDS: [usize; 2] = [40, 240];
+pub(super) const HOLDS: [usize; 2] = [40, 240];
 /// Share of commands that are to stand, and of those that are to go straight on.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
@@ -70,15 +70,15 @@ const STRAIGHT: f64 = 0.4;
 const EXTREME: f64 = 0.7;
 
 /// Slots of the memory: cosine and sine of the commanded direction.
-const DIRECTION: usize = Following::SLOTS;
+pub(super) const DIRECTION: usize = Following::SLOTS;
 /// Slots of the velocity along the ground that he is to have now, m/s.
-const TARGET: usize = DIRECTION + 2;
+pub(super) const TARGET: usize = DIRECTION + 2;
 /// Slots of the gait: the share of its cycle that is over, and the speed that it is for, m/s.
-const PHASE: usize = TARGET + 2;
-const PACE: usize = PHASE + 1;
+pub(super) const PHASE: usize = TARGET + 2;
+pub(super) const PACE: usize = PHASE + 1;
 /// Slots that count the episode's decisions, and that hold the row of the clips where it started.
-const MADE: usize = PACE + 1;
-const BEGUN: usize = MADE + 1;
+pub(super) const MADE: usize = PACE + 1;
+pub(super) const BEGUN: usize = MADE + 1;
 /// How fast the target velocity and the pace change, m/s^2, and how far the pace is from his speed at most, m/s: a run does not
 /// lead who stands.
 const ACCELERATION: f64 = 4.0;
@@ -142,25 +142,25 @@ fn fitting_clip(command: &[f64]) -> usize {
 /// Marathon Man told where to go.
 #[derive(Clone, Debug, Default)]
 pub struct Steer {
-    arguments: SteerArguments,
+    pub(super) arguments: SteerArguments,
 }
 
 impl Steer {
     /// Angle from his heading to a direction, rad.
     #[inline(always)]
-    fn off<T: Real>(s: &Senses<T>, direction: [T; 2]) -> T {
+    pub(super) fn off<T: Real>(s: &Senses<T>, direction: [T; 2]) -> T {
         heading::off(s.heading(BUTT), direction)
     }
 
     /// Commanded direction.
     #[inline(always)]
-    fn direction<T: Real>(s: &Senses<T>) -> [T; 2] {
+    pub(super) fn direction<T: Real>(s: &Senses<T>) -> [T; 2] {
         [s.memory(DIRECTION), s.memory(DIRECTION + 1)]
     }
 
     /// How fast the center of mass moves along the ground, m/s.
     #[inline(always)]
-    fn speed<T: Real>(s: &Senses<T>) -> T {
+    pub(super) fn speed<T: Real>(s: &Senses<T>) -> T {
         let [x, y, _] = s.center_of_mass_velocity();
         hypot(x, y)
     }
@@ -168,7 +168,7 @@ impl Steer {
     /// Mean squares of the joints' distances from the gait, rad^2, and of the differences of their velocities from the gait's,
     /// rad^2/s^2, by DeepMimic's weights.
     #[inline(always)]
-    fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
+    pub(super) fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
         let (gaits, r) = (gaits(), s.readings());
         let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
         // angles lead by their velocity times the lead, so a lead of 1 s gives the velocity
@@ -187,14 +187,62 @@ impl Steer {
 
     /// Where the gait will be after `dt` seconds.
     #[inline(always)]
-    fn next_phase<T: Real>(phase: T, pace: T, dt: f64) -> T {
+    pub(super) fn next_phase<T: Real>(phase: T, pace: T, dt: f64) -> T {
         let next = gaits().frequency(pace).mul_add(T::lit(dt), phase);
         next - next.floor()
     }
 
+    /// Moves the commanded direction, the target velocity and the gait on by a decision, for a speed, a turn, and a velocity to the
+    /// left.
+    #[inline(always)]
+    pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], told: T, turn: T, left: T) {
+        let by = |angle: T| turn.mul_add(T::lit(s.dt()), angle);
+        let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
+        let direction = heading::turned(s.heading(BUTT), direction, by, MOST_BEHIND);
+        memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
+        memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
+        memory[MADE] += T::lit(1.0);
+        // nobody changes a velocity of 3 m/s at once, or turns sharply at it
+        let (speed, most) = (Self::speed(s), ACCELERATION * s.dt());
+        let sharpest = T::lit(SIDEWAYS).div(turn.abs().max(T::lit(SIDEWAYS / FASTEST)));
+        let told = told.min(sharpest);
+        let beside = [-(left * direction[1]), left * direction[0]];
+        let missing = [0, 1].map(|i| told.mul_add(direction[i], -memory[TARGET + i]) + beside[i]);
+        let share = T::lit(most).div(hypot(missing[0], missing[1]).max(T::lit(most)));
+        for i in 0..2 {
+            memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
+        }
+        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(turn.abs() * T::lit(TURNING_RADIUS));
+        let asked = speed + clamp(asked - speed, -LEAD, LEAD);
+        memory[PACE] += clamp(asked - memory[PACE], -most, most);
+    }
+
+    /// Adds the terms of the reward for the velocity, the direction and the gait, where they count.
+    #[inline(always)]
+    pub(super) fn add_terms<T: Real>(s: &Senses<T>, counts: T::Mask, terms: &mut Terms<T>) {
+        let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
+        let angle = Self::off(s, Self::direction(s));
+        let [pose, tempo] = Self::out_of_step(s);
+        let mut add = |name, weight, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
+        add("velocity", 0.3, slip * slip * T::lit(-5.0));
+        add("pace", 0.2, slip * slip * T::lit(-0.5));
+        add("drift", 0.05, slip * slip * T::lit(-100.0));
+        add("heading", 0.2, angle * angle * T::lit(-4.0));
+        add("gait", 0.2, pose * T::lit(-5.0));
+        add("tempo", 0.05, tempo * T::lit(-1.0));
+    }
+
+    /// Angles of the gait's next pose, led by some seconds.
+    #[inline(always)]
+    pub(super) fn next_pose<T: Real>(phase: T, pace: T, dt: f64, lead: f64) -> impl Fn(usize) -> T {
+        let gaits = gaits();
+        let next = gaits.moment(Self::next_phase(phase, pace, dt), pace, lead);
+        move |joint| gaits.angle(&next, joint)
+    }
+
     /// How far the velocity of the center of mass along the ground is from another, m/s.
     #[inline(always)]
-    fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
+    pub(super) fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
         let [vx, vy, _] = s.center_of_mass_velocity();
         hypot(vx - x, vy - y)
     }
@@ -281,10 +329,9 @@ impl Agent for Steer {
                 let reach = T::lit(self.arguments.reach.0);
                 // the servo's damping, which slows every motion, is not to slow the gait
                 let [phase, pace] = [PHASE, PACE].map(|slot| c.memory[slot]);
-                let gaits = gaits();
-                let next = gaits.moment(Self::next_phase(phase, pace, c.dt), pace, DAMPING_TIME);
+                let next = Self::next_pose(phase, pace, c.dt, DAMPING_TIME);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    c.ctrl[i] = c.action[i].mul_add(reach, gaits.angle(&next, joint));
+                    c.ctrl[i] = c.action[i].mul_add(reach, next(joint));
                 }
             }
         }
@@ -300,24 +347,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        let turn = |angle: T| s.command(1).mul_add(T::lit(s.dt()), angle);
-        let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
-        let direction = heading::turned(s.heading(BUTT), direction, turn, MOST_BEHIND);
-        memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
-        memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
-        memory[MADE] += T::lit(1.0);
-        // nobody changes a velocity of 3 m/s at once, or turns sharply at it
-        let (speed, most) = (Self::speed(s), ACCELERATION * s.dt());
-        let sharpest = T::lit(SIDEWAYS).div(s.command(1).abs().max(T::lit(SIDEWAYS / FASTEST)));
-        let told = s.command(0).min(sharpest);
-        let missing = [0, 1].map(|i| told.mul_add(memory[DIRECTION + i], -memory[TARGET + i]));
-        let share = T::lit(most).div(hypot(missing[0], missing[1]).max(T::lit(most)));
-        for i in 0..2 {
-            memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
-        }
-        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(s.command(1).abs() * T::lit(TURNING_RADIUS));
-        let asked = speed + clamp(asked - speed, -LEAD, LEAD);
-        memory[PACE] += clamp(asked - memory[PACE], -most, most);
+        Self::lead(s, memory, s.command(0), s.command(1), T::zero());
     }
 
     #[inline(always)]
@@ -345,36 +375,21 @@ impl Agent for Steer {
         for x in [pace, cos, sin] {
             out.scalar(x);
         }
-        let gaits = gaits();
-        let next = gaits.moment(Self::next_phase(phase, pace, s.dt()), pace, 0.0);
+        let next = Self::next_pose(phase, pace, s.dt(), 0.0);
         out.group("next_pose");
         for i in 0..JOINTS.len() {
-            out.scalar(gaits.angle(&next, i) - s.readings().qpos(FIRST_QPOS + i));
+            out.scalar(next(i) - s.readings().qpos(FIRST_QPOS + i));
         }
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
-        let angle = Self::off(s, Self::direction(s));
-        let [pose, tempo] = Self::out_of_step(s);
-        terms.add("velocity", 0.3, (slip * slip * T::lit(-5.0)).exp());
-        terms.add("pace", 0.2, (slip * slip * T::lit(-0.5)).exp());
-        terms.add("drift", 0.05, (slip * slip * T::lit(-100.0)).exp());
-        terms.add("heading", 0.2, (angle * angle * T::lit(-4.0)).exp());
-        terms.add("gait", 0.2, (pose * T::lit(-5.0)).exp());
-        terms.add("tempo", 0.05, (tempo * T::lit(-1.0)).exp());
+        Self::add_terms(s, T::not(T::none()), terms);
     }
 
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
-        let mut fallen = T::none();
-        for part in parts() {
-            if part != FEET[0] && part != FEET[1] {
-                fallen = T::or(fallen, s.touched_ground(part));
-            }
-        }
-        fallen
+        on_the_ground(s)
     }
 
     #[inline(always)]
@@ -384,4 +399,16 @@ impl Agent for Steer {
         let angle = Self::off(s, direction);
         out.scalar(angle.abs());
     }
+}
+
+/// Lanes in which anything but his feet touched the ground.
+#[inline(always)]
+pub(super) fn on_the_ground<T: Real>(s: &Senses<T>) -> T::Mask {
+    let mut fallen = T::none();
+    for part in parts() {
+        if part != FEET[0] && part != FEET[1] {
+            fallen = T::or(fallen, s.touched_ground(part));
+        }
+    }
+    fallen
 }

@@ -1,0 +1,364 @@
+//! Marathon Man in a player's hands: what [`Steer`] does, a step aside, a jump and a backflip on a button, and he gets up when he
+//! has fallen.
+//!
+//! | observation | content |
+//! |---|---|
+//! | 0..103 | what he observes in `MarathonManSteer-v0`; with a [skill](super::skills) on, vectors are seen from the clip's heading, and `next_pose` is the clip's |
+//! | 103..107 | with a skill: sine and cosine of the clip's phase as an angle, and of twice the angle |
+//! | 107..110 | with a skill: from his butt to where the clip has it, m |
+//! | 110..113 | commanded velocity to the left, m/s; jump; backflip |
+//! | 113..117 | which skill is on: jump, backflip, getting up from the belly, from the back |
+//! | 117..124 | with a skill: how far the clip's butt is above his at the next decision, m, its forward and up axis |
+//! | 124..152 | the same and the clip's angles less his own, four decisions later |
+//!
+//! Without a skill, the reward is that of `MarathonManSteer-v0` for the commanded velocity, direction and gait. With one it is
+//! DeepMimic's.
+
+use marathon_physics::Model;
+use marathon_physics::lanes::Real;
+
+use super::super::heading;
+use super::super::imitation::{self, StartAt, observe_body, sub, turned_to};
+use super::body::{
+    ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
+};
+use super::clips::{self, ALL, ClipNames};
+use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
+use super::steer::{
+    BEGUN, CLIPS, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
+};
+use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
+use crate::agent::senses::hypot;
+use crate::agent::{
+    Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms,
+    names,
+};
+use crate::episode_rng::EpisodeRng;
+use crate::error::nearest;
+use std::f64::consts::TAU;
+
+/// Fastest that he is told to step aside, m/s.
+const ASIDE: f64 = 0.8;
+/// Decisions of the clip ahead that he sees.
+const AHEAD: usize = 4;
+/// His skills, behind the variables of the steered figure.
+const SKILL: Skills = Skills { slot: BEGUN + 1 };
+/// Slot of whether a fall ends the episode, and number of all slots.
+const MORTAL: usize = SKILL.slot + SLOTS;
+const MEMORY: usize = MORTAL + 1;
+/// Share of the episodes that start in the midst of a skill.
+const SKILLED: f64 = 0.45;
+/// Mean distance of the parts from the clip's that ends an episode of skills alone, m.
+const TOO_FAR: f64 = 0.5;
+/// Shares of the commands that jump, turn over, and step aside.
+const JUMPING: f64 = 0.15;
+const FLIPPING: f64 = 0.12;
+const STEPPING: f64 = 0.15;
+
+crate::options! {
+    /// Arguments of Marathon Man in a player's hands.
+    pub struct ControllerArguments {
+        /// Most that an action moves a servo's target, rad.
+        reach: Scale = Scale(1.0),
+        /// Where an episode starts: at `random` decisions of the clips and skills, standing: `first`, or `adaptive`: as the steered
+        /// figure's.
+        start: StartAt = StartAt::Random,
+        /// What he is told where nobody commands: anything, `even`, or half of the time the extremes, `sharp`.
+        commands: super::steer::Commands = super::steer::Commands::Even,
+        /// Clips of what he does, `all` or some of them: where episodes start, what commands ask for where nobody commands. Without
+        /// those of getting up, a fall ends the episode; without those of the gait, the end of a skill.
+        clip: ClipNames = ClipNames(ALL.into()),
+        /// Share of the episodes that a fall ends: learners need not lie so long. Those that start lying are not among them.
+        mortal: Scale = Scale(0.0),
+        /// What an episode's end costs that is a failure.
+        price: Scale = Scale(0.0),
+    }
+}
+
+/// What he does.
+#[derive(Clone, Copy, Debug)]
+struct Does {
+    /// He goes and stands.
+    gait: bool,
+    /// His skills.
+    skills: [bool; SKILLS.len()],
+}
+
+impl Does {
+    /// He gets up, at least in one way; else a fall is the end.
+    fn rises(self) -> bool {
+        self.skills[FROM_A_STAND..].contains(&true)
+    }
+}
+
+/// Marathon Man in a player's hands.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    arguments: ControllerArguments,
+    does: Does,
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self::of(ControllerArguments::default())
+    }
+}
+
+impl Controller {
+    fn of(arguments: ControllerArguments) -> Self {
+        let named = |clip: &str| arguments.clip.0 == ALL || arguments.clip.names().contains(&clip);
+        let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
+        Controller { arguments, does }
+    }
+
+    /// The steered figure within.
+    fn steer(&self) -> Steer {
+        let ControllerArguments { reach, start, commands, .. } = self.arguments.clone();
+        Steer { arguments: SteerArguments { reach, start, commands, ..SteerArguments::default() } }
+    }
+}
+
+impl Agent for Controller {
+    fn facts(&self) -> Facts {
+        let clips = CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip));
+        Facts {
+            id: "MarathonManController-v0".into(),
+            summary: "a figure of 21 motors: go as told, jump, turn over backward, and get up, in the style of clips"
+                .into(),
+            model: model(Control::Pd).into(),
+            frame_skip: FRAME_SKIP,
+            max_episode_steps: MAX_EPISODE_STEPS,
+            observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),
+            actions: names(ACTIONS.map(|i| JOINTS[i].name)),
+            reward_terms: names(["velocity", "pace", "drift", "heading", "gait", "tempo", "skill"]),
+            info: names(["velocity_error", "heading_error", "skill", "rising"]),
+            metrics: names(["forward", "velocity_error", "heading_error"]),
+            parts: names(PARTS),
+            touch_sites: names(TOUCH),
+            command: vec![
+                CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
+                CommandRange::new("left", -ASIDE..=ASIDE, "m/s"),
+                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+                CommandRange::new("jump", 0.0..=1.0, ""),
+                CommandRange::new("backflip", 0.0..=1.0, ""),
+            ],
+            clips: clips.filter_map(clips::shipped).collect(),
+            follows_clips: false,
+            memory: MEMORY,
+            termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
+            ..Facts::default()
+        }
+    }
+
+    fn options(&self) -> Vec<OptionInfo> {
+        self.arguments.infos()
+    }
+
+    fn with_options(&self, options: &Options) -> Option<Self> {
+        Some(Self::of(self.arguments.with(options)))
+    }
+
+    fn fits(&self, model: &Model) -> Result<(), String> {
+        let known = CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip));
+        let known: Vec<&str> = known.collect();
+        let names = self.arguments.clip.names();
+        if let Some(name) = names.iter().find(|name| self.arguments.clip.0 != ALL && !known.contains(name)) {
+            let near = nearest(name, known.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
+            let near = near.unwrap_or_default();
+            return Err(format!("option clip is '{name}', expected all or some of {}{near}", known.join(", ")));
+        }
+        super::has_joints(model)
+    }
+
+    fn reset(&self, start: &mut Start) {
+        let Does { gait, skills } = self.does;
+        let known: Vec<usize> = (0..SKILLS.len()).filter(|i| skills[*i]).collect();
+        let first = self.arguments.start == StartAt::First;
+        let mortal = f64::from(u8::from(start.random.uniform(0.0, 1.0) < self.arguments.mortal.0));
+        if gait && (first || known.is_empty() || start.random.uniform(0.0, 1.0) >= SKILLED) {
+            self.steer().reset(start);
+            start.memory[MORTAL] = mortal;
+            return;
+        }
+        let skill = known[start.random.whole(0, known.len() - 1)];
+        let rows = start.clips().nth(CLIPS.len() + skill).expect("a row of clips for each clip");
+        let [first, last] = SKILLS[skill].rows.map(|row| (rows.start + row).min(rows.end - 1));
+        let row = if self.arguments.start == StartAt::First { first } else { start.random.whole(first, last - 1) };
+        start.start_in_clip(row);
+        start.memory[SKILL.slot] = (1 + skill) as f64;
+        start.memory[BEGUN] = 0.0;
+        start.memory[MORTAL] = if skill < FROM_A_STAND { mortal } else { 0.0 };
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        let mut going = [0.0; 2];
+        let mut hold = self.steer().command(random, step, &mut going);
+        let (mut left, mut jump, mut backflip) = (0.0, 0.0, 0.0);
+        let kind = random.uniform(0.0, 1.0);
+        if kind < JUMPING && self.does.skills[JUMP] {
+            (jump, hold) = (1.0, random.whole(20, 40));
+        } else if (JUMPING..JUMPING + FLIPPING).contains(&kind) && self.does.skills[BACKFLIP] {
+            (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
+        } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
+            (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
+        }
+        out.copy_from_slice(&[going[0], left, going[1], jump, backflip]);
+        hold
+    }
+
+    #[inline(always)]
+    fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
+        let reach = T::lit(self.arguments.reach.0);
+        let (on, clip) = (SKILL.on(c.memory), c.reference(1));
+        let gait = Steer::next_pose(c.memory[PHASE], c.memory[PACE], c.dt, DAMPING_TIME);
+        let mut targets = [T::zero(); JOINTS.len()];
+        for (joint, target) in targets.iter_mut().enumerate() {
+            let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
+            *target = T::select(on, of_clip, gait(joint));
+        }
+        for (i, joint) in ACTIONS.into_iter().enumerate() {
+            c.ctrl[i] = c.action[i].mul_add(reach, targets[joint]);
+        }
+    }
+
+    #[inline(always)]
+    fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let begins = [0, 1, 2, 3].map(|i| memory[i]);
+        self.steer().begin(s, memory);
+        memory[..4].copy_from_slice(&begins);
+        for (i, x) in SKILL.facing(s, memory).into_iter().enumerate() {
+            memory[DIRECTION + i] = x;
+        }
+    }
+
+    #[inline(always)]
+    fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let [speed, left, turn, jump, backflip] = [0, 1, 2, 3, 4].map(|i| s.command(i));
+        // a backflip waits until he has stopped
+        let flips = T::lit(0.5).lt(backflip);
+        let [speed, left, turn] = [speed, left, turn].map(|x| T::masked(T::not(flips), x));
+        let before = [DIRECTION, DIRECTION + 1].map(|slot| memory[slot]);
+        Steer::lead(s, memory, speed, turn, left);
+        let rose = SKILL.rises(memory);
+        let was_on = SKILL.remember(s, memory, [jump, backflip]);
+        let on = SKILL.on(memory);
+        // the direction outlasts a skill, but who has risen goes where he faces
+        let (heading, [x, y, _]) = (s.heading(BUTT), s.center_of_mass_velocity());
+        let risen = T::and(rose, T::not(on));
+        for i in 0..2 {
+            let kept = T::select(T::or(on, was_on), before[i], memory[DIRECTION + i]);
+            memory[DIRECTION + i] = T::select(risen, heading[i], kept);
+            memory[TARGET + i] = T::select(on, [x, y][i], memory[TARGET + i]);
+        }
+        memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
+    }
+
+    #[inline(always)]
+    fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let all = memory(s);
+        let on = SKILL.on(&all);
+        let facing = SKILL.facing(s, &all);
+        let turned = turned_to(facing);
+        out.group("command");
+        out.scalar(s.command(0));
+        out.scalar(s.command(2));
+        for x in heading::beside(facing, Steer::direction(s)) {
+            out.scalar(x);
+        }
+        let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
+        out.scalar(x);
+        out.scalar(y);
+        observe_body(s, &ANATOMY, &turned, out);
+        out.group("ends");
+        for part in END_EFFECTORS {
+            out.vector(turned(sub(s.position(part), s.position(BUTT))));
+        }
+        observe_soles(s, out);
+        let (phase, pace) = (s.memory(PHASE), s.memory(PACE));
+        let (sin, cos) = (phase * T::lit(TAU)).sin_cos();
+        out.group("gait");
+        for x in [pace, cos, sin] {
+            out.scalar(x);
+        }
+        let (gait, clip, r) = (Steer::next_pose(phase, pace, s.dt(), 0.0), s.reference(1), s.readings());
+        out.group("next_pose");
+        for i in 0..JOINTS.len() {
+            out.scalar(T::select(on, clip.qpos(FIRST_QPOS + i), gait(i)) - r.qpos(FIRST_QPOS + i));
+        }
+        out.group("phase");
+        for x in s.reference(0).phase_angles() {
+            out.scalar(T::masked(on, x));
+        }
+        out.group("place_in_clip");
+        let gap = turned(sub(s.reference(0).position(BUTT), s.position(BUTT)));
+        out.vector(gap.map(|x| T::masked(on, x)));
+        out.group("buttons");
+        for i in [1, 3, 4] {
+            out.scalar(s.command(i));
+        }
+        out.group("skill");
+        for i in 0..SKILLS.len() {
+            out.scalar(T::masked(SKILL.is(&all, i), T::lit(1.0)));
+        }
+        let masked = |[x, y, z]: [T; 3]| [x, y, z].map(|x| T::masked(on, x));
+        for (name, ahead) in [("in_1", 1), ("in_4", AHEAD)] {
+            let clip = s.reference(ahead);
+            let (forward, up, height) = carriage(&clip);
+            out.group(name);
+            out.scalar(T::masked(on, height - s.position(BUTT)[2]));
+            out.vector(masked(turned(forward)));
+            out.vector(masked(turned(up)));
+        }
+        let clip = s.reference(AHEAD);
+        out.group("later_pose");
+        for i in 0..JOINTS.len() {
+            out.scalar(T::masked(on, clip.qpos(FIRST_QPOS + i) - r.qpos(FIRST_QPOS + i)));
+        }
+    }
+
+    #[inline(always)]
+    fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let all = memory(s);
+        Steer::add_terms(s, T::not(SKILL.on(&all)), terms);
+        terms.add("skill", 1.0, SKILL.worth(&all) * imitation::similarity(s, &ANATOMY));
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let all = memory(s);
+        let rises = SKILL.rises(&all);
+        let mut over = SKILL.stuck(&all);
+        // the fall has made him rise
+        let mortal =
+            T::or(T::lit(0.5).lt(s.memory(MORTAL)), if self.does.rises() { T::none() } else { T::not(T::none()) });
+        over = T::or(over, T::and(mortal, T::and(rises, T::not(T::lit(0.5).lt(s.memory(SKILL.slot + 1))))));
+        if !self.does.gait {
+            let far = T::lit(TOO_FAR).lt(imitation::distance(s, &ANATOMY, true));
+            over = T::or(over, T::and(SKILL.on(&all), far));
+        }
+        over
+    }
+
+    #[inline(always)]
+    fn truncated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        if self.does.gait { T::none() } else { T::not(T::lit(0.5).lt(s.memory(SKILL.slot))) }
+    }
+
+    #[inline(always)]
+    fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        let direction = Steer::direction(s);
+        let [c, d] = direction;
+        let (speed, left) = (s.command(0), s.command(1));
+        out.scalar(Steer::slip(s, [speed * c - left * d, speed.mul_add(d, left * c)]));
+        out.scalar(Steer::off(s, direction).abs());
+        out.scalar(s.memory(SKILL.slot));
+        out.scalar(T::masked(SKILL.rises(&memory(s)), T::lit(1.0)));
+    }
+}
+
+/// His variables.
+#[inline(always)]
+fn memory<T: Real>(s: &Senses<T>) -> [T; MEMORY] {
+    std::array::from_fn(|i| s.memory(i))
+}

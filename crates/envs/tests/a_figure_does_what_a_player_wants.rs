@@ -1,0 +1,171 @@
+//! Marathon Man in a player's hands: he observes all that the steered figure does, and more; a button begins a skill where he is
+//! and as he faces, whose clip then leads him and pays him; the skill ends by itself; and who falls gets up, unless the clips of
+//! that are left out, or the episode is one that a fall ends.
+
+mod common;
+
+use common::options;
+use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions, factory, registry};
+use marathon_physics::lanes::Isa;
+
+const ID: &str = "MarathonManController-v0";
+const AGENTS: usize = 16;
+/// Decisions of the jump and of the backflip.
+const JUMP: usize = 42;
+const BACKFLIP: usize = 60;
+/// Numbers of the command, and of what is told: which skill is on, and whether it is one of getting up.
+const COMMAND: usize = 5;
+const INFO: usize = 4;
+const SKILL: usize = 2;
+const RISING: usize = 3;
+
+fn made(list: &[(&str, &str)]) -> (VecEnv, Step) {
+    let options = VecEnvOptions {
+        agents: AGENTS,
+        isa: Some(Isa::F64),
+        autoreset: Autoreset::Disabled,
+        options: options(list),
+        ..Default::default()
+    };
+    let mut env = VecEnv::new(ID, &options).unwrap();
+    let mut step = env.buffers();
+    env.reset(Some(11), &mut step.obs).unwrap();
+    (env, step)
+}
+
+/// Lets the servos follow what leads him.
+fn go(env: &mut VecEnv, step: &mut Step) {
+    let actions = vec![0.0; AGENTS * env.spec().act];
+    env.step(&actions, &mut step.as_mut()).unwrap();
+}
+
+fn told(step: &Step, agent: usize, i: usize) -> f32 {
+    step.info[agent * INFO + i]
+}
+
+fn tell(env: &mut VecEnv, command: [f64; COMMAND]) {
+    (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
+}
+
+/// Where a part of the observation is.
+fn part(env: &VecEnv, name: &str) -> std::ops::Range<usize> {
+    env.spec().observations.iter().find(|group| group.name == name).expect("it observes that").range.clone()
+}
+
+#[test]
+fn he_observes_what_the_steered_figure_does_first() {
+    let [own, steered] = [ID, "MarathonManSteer-v0"].map(|id| factory(id, Isa::best()).unwrap().spec().clone());
+    assert!(own.obs > steered.obs && own.observations.starts_with(&steered.observations));
+    let names: Vec<&str> = own.command.iter().map(|range| range.name.as_str()).collect();
+    assert_eq!(names, ["speed", "left", "turn", "jump", "backflip"]);
+    assert_eq!(own.command.iter().filter(|range| range.is_button()).count(), 2);
+}
+
+/// What a button begins has the length of its piece of the clip, and he is paid for being like it.
+#[test]
+fn a_button_begins_a_skill_that_ends_by_itself() {
+    for (button, number, length) in [(3, 1.0, JUMP), (4, 2.0, BACKFLIP)] {
+        let (mut env, mut step) = made(&[("start", "first")]);
+        tell(&mut env, [0.0; COMMAND]);
+        // the first decisions do not count: somebody may just have landed
+        for _ in 0..12 {
+            go(&mut env, &mut step);
+        }
+        let mut command = [0.0; COMMAND];
+        command[button] = 1.0;
+        tell(&mut env, command);
+        let (mut on, mut lengths) = ([0; AGENTS], Vec::new());
+        let next = part(&env, "next_pose");
+        for decision in 0..length + 8 {
+            go(&mut env, &mut step);
+            if decision == 3 {
+                tell(&mut env, [0.0; COMMAND]);
+            }
+            for agent in 0..AGENTS {
+                let skill = told(&step, agent, SKILL);
+                if skill == number {
+                    on[agent] += 1;
+                    // from a stand into the midst of a clip
+                    let gap = &step.obs[agent * env.spec().obs..][next.clone()];
+                    assert!(on[agent] > 1 || gap.iter().any(|x| x.abs() > 0.2), "{gap:?}");
+                } else if on[agent] > 0 {
+                    lengths.push((on[agent], skill));
+                    on[agent] = 0;
+                }
+            }
+        }
+        let whole = lengths.iter().filter(|(n, skill)| *n == length && *skill == 0.0).count();
+        // servos alone do not always land, but nobody is in the skill any longer than it is
+        assert!(lengths.iter().all(|(n, _)| *n <= length) && lengths.len() == AGENTS, "{lengths:?}");
+        assert!(button == 4 || whole > 0, "{lengths:?}");
+    }
+}
+
+/// In the midst of a skill, with the clip's own velocities, he is like the clip.
+#[test]
+fn who_is_like_the_clip_is_paid() {
+    for (clip, worth) in [("jump", 1.0), ("backflip", 1.0), ("getup_facedown", 0.5), ("getup_faceup", 0.5)] {
+        let (mut env, mut step) = made(&[("clip", clip)]);
+        go(&mut env, &mut step);
+        let mut rewards: Vec<f64> = step.reward.iter().map(|x| f64::from(*x) / worth).collect();
+        rewards.sort_by(f64::total_cmp);
+        assert!(rewards[AGENTS / 2] > 0.8 && rewards[AGENTS - 1] <= 1.0, "{clip}: {rewards:?}");
+        let names = &env.spec().reward_terms;
+        let paid = |i: &usize| (0..AGENTS).any(|agent| step.terms[agent * names.len() + i] != 0.0);
+        let paid: Vec<&str> = (0..names.len()).filter(paid).map(|i| names[i].as_str()).collect();
+        assert_eq!(paid, ["skill"]);
+    }
+}
+
+/// Pushes everybody over, and tells who was still at play before and what became of him.
+fn felled(list: &[(&str, &str)]) -> Vec<(bool, bool)> {
+    let (mut env, mut step) = made(list);
+    tell(&mut env, [0.0; COMMAND]);
+    let mut fate = vec![None; AGENTS];
+    for decision in 0..60 {
+        for agent in 0..AGENTS {
+            let force = if decision < 6 { [2500.0, 0.0, 0.0] } else { [0.0; 3] };
+            env.push(agent, 1, force, [0.0; 3]).unwrap();
+        }
+        go(&mut env, &mut step);
+        for agent in 0..AGENTS {
+            let (ended, rises) = (step.terminated[agent], told(&step, agent, RISING) > 0.5);
+            if fate[agent].is_none() && (ended || rises) {
+                fate[agent] = Some((ended, rises));
+            }
+        }
+    }
+    fate.into_iter().map(|fate| fate.expect("everybody falls")).collect()
+}
+
+#[test]
+fn who_falls_gets_up_or_has_failed() {
+    let all = felled(&[("start", "first")]);
+    assert!(all.iter().all(|(ended, rises)| !ended && *rises), "{all:?}");
+    for list in [[("start", "first"), ("clip", "walk,stand,jump")], [("start", "first"), ("mortal", "1")]] {
+        let all = felled(&list);
+        assert!(all.iter().all(|(ended, _)| *ended), "{list:?}: {all:?}");
+    }
+}
+
+/// Skills alone end their episodes; who cannot get up has failed at last.
+#[test]
+fn a_skill_alone_is_an_episode() {
+    let (mut env, mut step) = made(&[("clip", "jump"), ("start", "first")]);
+    let (mut truncated, mut over) = (0, [false; AGENTS]);
+    for _ in 0..JUMP + 1 {
+        go(&mut env, &mut step);
+        for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
+            truncated += usize::from(step.truncated[agent] && !step.terminated[agent]);
+            over[agent] = step.truncated[agent] || step.terminated[agent];
+        }
+    }
+    assert!(over.iter().all(|over| *over) && truncated > 0, "{over:?} {truncated}");
+}
+
+#[test]
+fn a_clip_that_he_has_no_skill_of_is_refused() {
+    let error = registry::factory_with(ID, &options(&[("clip", "walk,backflap")]), Isa::best()).err().unwrap();
+    let text = error.to_string();
+    assert!(text.contains("'backflap'") && text.contains("did you mean 'backflip'?"), "{text}");
+}

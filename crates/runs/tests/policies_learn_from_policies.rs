@@ -1,0 +1,128 @@
+//! What policies know is not lost: one policy learns what several do, in a small part of the time that each of them took; and a
+//! run that starts from a policy acts as that did, though it observes more. Whoever does not fit is refused by name.
+
+use marathon_envs::options::Value;
+use marathon_learn::{Control, EvalOptions, Policy, evaluate};
+use marathon_runs::distill::{DistillOptions, Distilled, distill};
+use marathon_runs::{LearnOptions, RunOptions, Session, Setting, Task, TaskOptions, imitation, policy_file};
+use std::path::PathBuf;
+
+fn shipped(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../assets/policies").join(format!("{name}.safetensors"))
+}
+
+fn man(options: &[(&str, &str)]) -> Setting {
+    let given = options.iter().map(|(name, value)| (name.to_string(), value.parse().unwrap())).collect();
+    Setting::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
+}
+
+/// Half a minute of processor time teaches a walk and a run to one network; each took minutes alone.
+#[test]
+fn one_policy_walks_and_runs() {
+    let teachers = [shipped("MarathonManWalk"), shipped("MarathonManRun")];
+    let options = DistillOptions { hidden: vec![96, 96], steps: 700_000, agents: 16, ..Default::default() };
+    let mut rounds: Vec<Distilled> = Vec::new();
+    let task = man(&[("future", "1"), ("start", "adaptive")]);
+    let policy = distill(task, &teachers, &options, &mut |now| {
+        rounds.push(*now);
+        Control::Continue
+    })
+    .unwrap();
+    let (first, last) = (rounds[8].loss, rounds[rounds.len() - 1].loss);
+    assert!(last < 0.25 * first, "the loss has fallen from {first} to {last} only");
+    assert_eq!(policy.meta().options.get("clip"), Some(&Value::Text("walk,run".into())));
+    // 5 s from the first frame; without having learned anything, he falls within half a second
+    let done = imitation::from_beginning(&policy, &EvalOptions { episodes: 16, ..Default::default() }).unwrap();
+    let seconds: Vec<f64> = done.iter().map(|clip| clip.seconds).collect();
+    assert!(seconds.len() == 2 && seconds.iter().all(|s| *s > 10.0), "he goes on for {seconds:?} s");
+}
+
+/// The same seed gives the same policy, whatever the number of threads; another seed another one.
+#[test]
+fn threads_change_nothing() {
+    let learned = |threads: usize, seed: u64| {
+        let options =
+            DistillOptions { hidden: vec![16], steps: 20_000, agents: 32, threads, seed, ..Default::default() };
+        distill(Setting::named("hopper").unwrap(), &[shipped("hopper")], &options, &mut |_| Control::Continue).unwrap()
+    };
+    let one = learned(1, 3);
+    assert!(one == learned(2, 3) && one != learned(1, 4));
+}
+
+/// A small network does what a larger one does.
+#[test]
+fn a_smaller_policy_hops_as_far() {
+    let path = shipped("hopper");
+    let options = DistillOptions { hidden: vec![48, 48], steps: 3_000_000, agents: 128, ..Default::default() };
+    let student =
+        distill(Setting::named("hopper").unwrap(), std::slice::from_ref(&path), &options, &mut |_| Control::Continue)
+            .unwrap();
+    let factory = Setting::named("hopper").unwrap().factory().unwrap();
+    let of = |policy: &Policy| {
+        let isa = marathon_physics::lanes::Isa::best();
+        evaluate(&*factory, isa, policy, &EvalOptions { episodes: 64, ..Default::default() }).unwrap().return_mean
+    };
+    let (own, theirs) = (of(&student), of(&policy_file::read(&path, None).unwrap()));
+    assert!(own > 0.9 * theirs, "{own} of {theirs}");
+}
+
+#[test]
+fn teachers_that_do_not_fit_are_refused() {
+    let learn = |task: Setting, teachers: &[PathBuf]| {
+        distill(task, teachers, &DistillOptions::default(), &mut |_| Control::Stop).unwrap_err().to_string()
+    };
+    let text = learn(Setting::named("walker").unwrap(), &[shipped("hopper")]);
+    assert!(text.contains("hopper.safetensors") && text.contains("actions") && text.contains("Walker2d-v0"), "{text}");
+    // Marathon Man with a clip knows no commands
+    let text = learn(man(&[]), &[shipped("MarathonManSteer")]);
+    assert!(
+        text.contains("observation") && text.contains("'command' of 6 numbers") && text.contains("phase (4)"),
+        "{text}"
+    );
+    assert!(learn(man(&[]), &[]).contains("teacher is not given"));
+}
+
+/// A run of Marathon Man that sees a later frame, too, starts from the walk of one that does not: it acts alike at first.
+#[test]
+fn a_run_starts_from_a_policy_that_observes_less() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = shipped("MarathonManWalk");
+    let task = || Task::named("MarathonMan").unwrap();
+    let options = |from: PathBuf| RunOptions {
+        learn: LearnOptions { steps: Some(20_000), threads: Some(1), ..Default::default() },
+        task: TaskOptions { given: vec![("future".into(), "1".parse().unwrap())] },
+        initialize_from: Some(from),
+        out: Some(folder.path().join("run")),
+        ..Default::default()
+    };
+    let (session, _) = Session::open(Some(task()), &options(path.clone()), None, false).unwrap();
+    let outcome = session.carry_out(false, &mut |_| Control::Continue).unwrap();
+    let (old, new) = (policy_file::read(&path, None).unwrap(), outcome.policy);
+    assert_eq!((old.meta().obs, new.meta().obs), (89, 119));
+    let agreement = |policy: &Policy| {
+        let (mut apart, mut own) = (0.0, 0.0);
+        for i in 0..64 {
+            // anything near what he observes
+            let obs: Vec<f32> = (0..119)
+                .map(|k| {
+                    let (mean, std) = (old.normalizer().mean(), old.normalizer().std());
+                    let wave = ((i * 119 + k) as f32 * 0.7).sin();
+                    mean.get(k).map_or(wave, |mean| mean + 0.5 * wave * std[k])
+                })
+                .collect();
+            for (a, b) in policy.act(&obs).iter().zip(old.act(&obs[..89])) {
+                apart += (a - b) * (a - b);
+                own += b * b;
+            }
+        }
+        (apart / own).sqrt()
+    };
+    assert!(agreement(&new) < 0.5, "{} of the actions' size", agreement(&new));
+    drop(outcome.folder);
+    let wrong = Session::open(Some(task()), &options(shipped("MarathonManBackflip")), None, true);
+    let text = wrong.err().unwrap().to_string();
+    assert!(
+        text.contains("hidden layers") && text.contains("[128, 128]") && text.contains("[64, 64] or narrower"),
+        "{text}"
+    );
+}
