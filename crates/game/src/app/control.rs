@@ -1,12 +1,14 @@
 //! What keys, mouse and gamepad do to the time, the camera and the stage.
 
 use crate::app::args::Mode;
+use crate::app::course::builds;
 use crate::app::hud::Hud;
 use crate::app::imitate::next_clip;
 use crate::app::keys::{Deed, Do};
 use crate::app::menu::Menu;
 use crate::app::notes::Notes;
-use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name, shipped_agents};
+use crate::app::policies::shipped_agents;
+use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name};
 use crate::app::steer::Steering;
 use crate::look::FollowCamera;
 use crate::ragdoll::RestartNow;
@@ -114,7 +116,7 @@ pub fn look(
     scroll: Res<AccumulatedMouseScroll>,
     wants: Option<Res<EguiWantsInput>>,
     pads: Query<&Gamepad>,
-    steering: Res<Steering>,
+    (show, steering): (Res<Show>, Res<Steering>),
     mut cameras: Query<&mut FollowCamera>,
 ) {
     let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
@@ -123,7 +125,7 @@ pub fn look(
         yaw -= motion.delta.x * TURN[0];
         pitch += motion.delta.y * TURN[0];
     }
-    if !over_ui {
+    if !over_ui && !builds(&show) {
         zoom *= 0.9_f32.powf(scroll.delta.y.clamp(-5.0, 5.0));
     }
     for pad in &pads {
