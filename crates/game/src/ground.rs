@@ -216,7 +216,7 @@ mod tests {
             assert_eq!((track.hfields.len(), track.hfields[0].ncol), (1, POINTS), "{name}");
         }
         assert_eq!(Ground::named("track"), Some(Ground::Track));
-        assert!(Ground::Track.agent("Humanoid-v5").is_err_and(|e| e.to_string().contains("no level floor")));
+        assert!(Ground::Track.agent("Swimmer-v5").is_err_and(|e| e.to_string().contains("no level floor")));
         Ok(())
     }
 

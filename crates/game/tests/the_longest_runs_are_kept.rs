@@ -187,7 +187,9 @@ fn two_games_write_at_once() -> Result<(), Box<dyn Error>> {
             }
         };
         let others = [0, 100].map(|first| scope.spawn(write(first)));
-        others.map(|other| other.join().expect("it has written"));
+        for other in others {
+            other.join().expect("it has written");
+        }
     });
     assert_eq!(Table::open(&path)?.longest(&course("boxes"), 1000)?.len(), 30);
     assert_eq!(replays(&path).len(), KEPT);

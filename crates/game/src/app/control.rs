@@ -1,7 +1,7 @@
 //! What keys, mouse and gamepad do to the time, the camera and the stage.
 
 use crate::app::args::Mode;
-use crate::app::course::builds;
+use crate::app::course::{builds, suits};
 use crate::app::hud::Hud;
 use crate::app::imitate::next_clip;
 use crate::app::keys::{Deed, Do};
@@ -83,8 +83,10 @@ pub fn stage(
             Deed::NextAgent if show.mode == Mode::Imitate => next_clip(&mut show, &mut notes),
             Deed::NextAgent if !matches!(show.mode, Mode::Replay | Mode::Outside) => {
                 let all = shipped_agents();
-                let next = all.iter().position(|a| *a == show.agent).map_or(0, |i| (i + 1) % all.len());
-                show.agent.clone_from(&all[next]);
+                let first = all.iter().position(|a| *a == show.agent).map_or(0, |i| i + 1);
+                let able = |agent: &&String| show.mode != Mode::Course || suits(&show, agent);
+                let Some(next) = all.iter().cycle().skip(first).take(all.len()).find(able) else { continue };
+                show.agent.clone_from(next);
                 show.model = None;
                 if matches!(show.source, Source::File(_)) {
                     show.source = Source::Shipped;

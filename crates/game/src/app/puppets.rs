@@ -60,6 +60,7 @@ pub fn stage(
     }
     for mut camera in cameras {
         camera.goal[2] = 3.1 * kind.size[0] + 0.6;
+        camera.ahead = 0.0;
         camera.jump();
     }
 }

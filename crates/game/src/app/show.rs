@@ -376,6 +376,10 @@ pub fn set_stage(
     for mut camera in &mut cameras {
         let crowd = (show.agents.min(ROW) as f32 - 1.0) * spacing * 0.28;
         camera.goal[2] = 3.1 * radius + crowd + 0.6;
+        camera.ahead = 0.0;
+        if show.mode == Mode::Course {
+            (camera.ahead, camera.goal[2]) = show.course.view(camera.goal[2]);
+        }
         camera.goal[1] = if show.agents > 1 { 0.32 } else { 0.16 };
         camera.jump();
     }

@@ -132,6 +132,15 @@ impl Choice {
         setting
     }
 
+    /// How far ahead of a runner the camera looks, and from where, m, if it is usually that far away: what comes is to be seen, and
+    /// for who builds that is the site.
+    pub fn view(&self, usual: f32) -> (f32, f32) {
+        match self.part {
+            Part::Build => (3.2, usual.max(9.5)),
+            Part::Watch | Part::Run => (1.2, 1.4 * usual),
+        }
+    }
+
     /// What a character gets beside its task.
     ///
     /// # Errors
@@ -189,6 +198,13 @@ pub fn check(choice: &Choice, setting: &Setting) -> Result<(), RunError> {
         }
         _ => setting.factory().map(drop),
     }
+}
+
+/// Whether an agent with the policy that comes with it can do the player's part on a show's course.
+pub fn suits(show: &Show, agent: &str) -> bool {
+    let mut other = show.clone();
+    (other.agent, other.source) = (agent.into(), Source::Shipped);
+    other.setting().is_ok_and(|setting| check(&other.course, &setting).is_ok())
 }
 
 /// Another agent, if the one of a show cannot do the player's part.

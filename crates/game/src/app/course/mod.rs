@@ -8,7 +8,7 @@ mod screen;
 mod table;
 
 pub use builder::{MOST_STEPS, Site, Step, builds};
-pub use choice::{Choice, Part, check, choose, has_own, suit};
+pub use choice::{Choice, Part, check, choose, has_own, suit, suits};
 pub use runs::{Runs, check as check_table};
 pub use screen::List;
 pub use table::{Course, KEPT, Place, ROWS, Run, Table, default_path, listing};

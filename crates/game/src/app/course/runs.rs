@@ -13,6 +13,7 @@ use crate::ragdoll::{Anatomy, End, Episode, EpisodeEnded, RestartNow};
 use crate::simulate::{Marathon, Seat};
 use bevy::prelude::*;
 use marathon_envs::agents::marathon::terrain::course::TO;
+use marathon_envs::options::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -220,9 +221,12 @@ pub fn follow(
     }
 }
 
-/// Arguments of the task as text.
+/// Arguments of the task, as on a command line.
 fn arguments(script: &Script) -> String {
-    let all = script.setting.options.iter().map(|(name, value)| format!("{name}={value}"));
+    let all = script.setting.options.iter().map(|(name, value)| match value {
+        Value::Text(text) => format!("{name}={text}"),
+        other => format!("{name}={other}"),
+    });
     all.collect::<Vec<_>>().join(" ")
 }
 

@@ -84,7 +84,9 @@ pub fn obey(
     }
     let place = PLACES.iter().position(|key| keys.just_pressed(*key)).filter(|_| list.open);
     if let Some(place) = place {
-        let replay = list.courses.first().and_then(|(_, longest)| longest.get(place)?.replay.clone());
+        let here = course(&show);
+        let longest = list.courses.iter().find(|(course, _)| *course == here).map_or(&[][..], |(_, longest)| longest);
+        let replay = longest.get(place).and_then(|run| run.replay.clone());
         match replay {
             Some(replay) => list.play(&replay),
             None => notes.say(format!("no run has place {}", place + 1)),
