@@ -220,13 +220,15 @@ pub fn draw(
         let above = match show.mode {
             Mode::Push => Some("circumstances"),
             Mode::Learn => Some("learning"),
-            Mode::Course => Some("course"),
             _ => None,
         };
         let above = above.and_then(|card| ctx.memory(|memory| memory.area_rect(Id::new(card))));
         let lift = LIFT[usize::from(show.mode == Mode::Replay && room.x < BESIDE)];
         let free = room.y - lift - above.map_or(0.0, |card| card.bottom());
-        let fits = |terms: usize| room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32;
+        // on a course one looks at what comes
+        let fits = |terms: usize| {
+            show.mode != Mode::Course && room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32
+        };
         if let Some(spec) = anatomy.spec.as_ref().filter(|spec| fits(spec.reward_terms.len())) {
             rewards(&ctx, &monitor, &spec.reward_terms, episode, lift);
         }

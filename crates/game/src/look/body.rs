@@ -20,6 +20,8 @@ const FIRST_HIDDEN_GROUP: i32 = 3;
 const METAL: [f32; 3] = [0.20, 0.21, 0.24];
 /// Rubber of the feet, sRGB.
 const RUBBER: [f32; 3] = [0.11, 0.12, 0.14];
+/// Height of the sides of a height field, m.
+const SIDE: f32 = 0.5;
 /// Things that belong to the world, sRGB.
 const WORLD: [f32; 3] = [0.62, 0.60, 0.56];
 
@@ -311,6 +313,23 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
             let n = columns as u32;
             let (a, b) = ((r - 1) * n + c - 1, r * n + c - 1);
             triangles.extend([a, a + 1, b + 1, a, b + 1, b]);
+        }
+    }
+    let (mut positions, mut checker) = (positions, checker);
+    // its sides, seen from outside: without them, nobody sees where a narrow track is high
+    for (row, seen_from_front) in [(0, true), (rows.saturating_sub(1), false)] {
+        let first = positions.len() as u32;
+        for column in 0..columns {
+            let at = row * columns + column;
+            for depth in [0.0, SIDE] {
+                positions.push(positions[at] - Vec3::Y * depth);
+                checker.push(checker[at] + Vec2::Y * (depth / ground::PERIOD));
+            }
+        }
+        for column in 1..columns as u32 {
+            let [a, b] = [first + 2 * (column - 1), first + 2 * column];
+            let side = if seen_from_front { [a, a + 1, b + 1, a, b + 1, b] } else { [a, b + 1, a + 1, a, b, b + 1] };
+            triangles.extend(side);
         }
     }
     // flat shading: the edge of a step must be seen

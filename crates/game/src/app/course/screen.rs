@@ -195,7 +195,7 @@ pub fn list(mut contexts: EguiContexts, mut list: ResMut<List>) -> Result {
                         ui.label(text(13.0, ACCENT, format!("{kind}   difficulty {difficulty}")));
                         ui.label(text(13.0, FAINT, part));
                     });
-                    egui::Grid::new(("runs", number)).num_columns(7).spacing([14.0, 3.0]).show(ui, |ui| {
+                    egui::Grid::new(("runs", number)).num_columns(8).spacing([14.0, 3.0]).show(ui, |ui| {
                         for (i, run) in longest.iter().enumerate() {
                             if row(ui, i + 1, run) {
                                 wanted.clone_from(&run.replay);
@@ -224,6 +224,7 @@ fn row(ui: &mut Ui, place: usize, run: &Run) -> bool {
     let who =
         if run.builder == "seed" { run.runner.clone() } else { format!("{} against {}", run.builder, run.runner) };
     ui.label(text(13.0, TEXT, who));
+    ui.label(text(13.0, FAINT, format!("seed {}", run.draw[0])));
     ui.label(text(12.0, FAINT, run.date.get(..10).unwrap_or_default()));
     run.replay.is_some() && ui.button("replay").clicked()
 }
