@@ -411,9 +411,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steeri
         Mode::Push => &[Deed::Menu, Deed::Push, Deed::Throw, Deed::Restart, Deed::Camera, Deed::Contacts],
         Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
         Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
-        Mode::Course if builds => {
-            &[Deed::Menu, Deed::Higher, Deed::Lower, Deed::Even, Deed::Restart, Deed::Runs, Deed::Camera]
-        }
+        Mode::Course if builds => &[Deed::Menu, Deed::Higher, Deed::Lower, Deed::Restart, Deed::Runs],
         Mode::Course => &[Deed::Menu, Deed::Pause, Deed::Restart, Deed::Runs, Deed::Slower, Deed::Camera],
         Mode::Outside => &[Deed::Menu, Deed::NextFocus, Deed::Camera, Deed::Hud],
         Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Back, Deed::Ahead, Deed::Slower, Deed::Camera],

@@ -393,6 +393,32 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_of_an_earlier_version_is_read() -> Result<(), Box<dyn std::error::Error>> {
+        let recording = sample()?;
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("old.replay");
+        // coordinates in single precision, neither actions nor ground
+        let (nq, terms) = (recording.qpos.len() / 10, recording.terms.len() / 10);
+        let bytes = |x: &[f32]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        let (places, qpos) = (bytes(&recording.places), bytes(&narrow(&recording.qpos)));
+        let (numbers, earned) = (bytes(&recording.numbers), bytes(&recording.terms));
+        let views = [
+            ("places", TensorView::new(Dtype::F32, vec![2, 3], &places)?),
+            ("qpos", TensorView::new(Dtype::F32, vec![5, 2, nq], &qpos)?),
+            ("numbers", TensorView::new(Dtype::F32, vec![5, 2, NUMBERS], &numbers)?),
+            ("terms", TensorView::new(Dtype::F32, vec![5, 2, terms], &earned)?),
+        ];
+        let about = serde_json::json!({ "agent": "Hopper-v0", "ground": "hills", "dt": recording.dt }).to_string();
+        let meta = HashMap::from([(FORMAT.to_string(), about)]);
+        std::fs::write(&path, safetensors::serialize(views, Some(meta))?)?;
+        let read = Recording::load(&path)?;
+        assert_eq!((read.frames(), read.agents, read.ground), (5, 2, Ground::Hills));
+        assert_eq!(read.qpos(4, 1)[0], 140.0);
+        assert!(read.action(4, 1).is_empty() && read.command(4, 1).is_empty() && read.grounds(4, 1).is_none());
+        Ok(())
+    }
+
+    #[test]
     fn what_is_no_recording_is_refused() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("b.replay");

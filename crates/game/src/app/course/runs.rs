@@ -104,9 +104,8 @@ impl Runs {
         let told = format!("{:.1} m in {:.1} s ({})", run.distance, run.seconds, run.ended);
         match added {
             Ok(place) => {
-                let shortest = run.course.part == Part::Build.name() && run.distance <= place.shortest && place.of > 1;
-                let shortest = if shortest { ", the shortest yet" } else { "" };
-                notes.say(format!("{told}: place {} of {}{shortest}", place.rank, place.of));
+                // the card tells it on the screen
+                info!("{told}: place {} of {}", place.rank, place.of);
                 self.standing = Some(place);
                 self.last = Some((run, place));
             }

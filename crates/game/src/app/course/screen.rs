@@ -3,8 +3,9 @@
 
 use crate::app::args::Mode;
 use crate::app::course::builder::{MOST_STEPS, Step, builds};
+use crate::app::course::choice::Part;
 use crate::app::course::runs::{Runs, course, who};
-use crate::app::course::table::{Course, KEPT, Run, Table};
+use crate::app::course::table::{Course, KEPT, Place, Run, Table};
 use crate::app::hud::{ACCENT, BAD, FAINT, Hud, TEXT, card as frame, line, text};
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
@@ -154,15 +155,13 @@ pub fn card(
             }
             if let Some((run, place)) = &runs.last {
                 let color = if place.rank == 1 { ACCENT } else { TEXT };
-                let Run { distance, seconds, ended, .. } = run;
-                line(
-                    ui,
-                    text(
-                        13.0,
-                        color,
-                        format!("last: {distance:.1} m, {seconds:.1} s, {ended}: place {} of {}", place.rank, place.of),
-                    ),
-                );
+                let Run { distance, seconds, ended, course, .. } = run;
+                let Place { rank, of, shortest, .. } = place;
+                // what who builds is after
+                let least = course.part == Part::Build.name() && distance <= shortest && *of > 1;
+                let least = if least { ", the shortest" } else { "" };
+                let told = format!("last: {distance:.1} m, {seconds:.1} s, {ended}: place {rank} of {of}{least}");
+                line(ui, text(13.0, color, told));
             }
         });
     });
