@@ -5,6 +5,7 @@ use crate::look::{TINTS, ground};
 use crate::ragdoll::{Anatomy, OwnGround, Part, Ragdoll};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
+use bevy::light::NotShadowCaster;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
@@ -114,8 +115,8 @@ fn dress(
             let looks = (Mesh3d(mesh), MeshMaterial3d(material), place, name);
             let mut shape = commands.spawn((looks, shape, ChildOf(anatomy.parts[geom.body])));
             if geom.kind == GeomType::Hfield {
-                // its bounds change with each course
-                shape.insert(NoFrustumCulling);
+                // its bounds change with each course; the floor is far below a track, and no place for its shadow
+                shape.insert((NoFrustumCulling, NotShadowCaster));
             }
             if model.bodies[geom.body].weld_id != 0 {
                 shape.insert(BodyMesh(ragdoll));
