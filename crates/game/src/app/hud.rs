@@ -371,11 +371,16 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steeri
     if all {
         Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -44.0]).interactable(false).show(ctx, |ui| {
             card().show(ui, |ui| {
-                egui::Grid::new("all keys").num_columns(3).spacing([18.0, 3.0]).show(ui, |ui| {
-                    for (_, name, key, button) in bindings.rows() {
-                        ui.label(text(13.0, TEXT, key).strong());
-                        ui.label(text(13.0, FAINT, button.unwrap_or("")));
-                        ui.label(text(13.0, TEXT, name));
+                // in two halves side by side: a small window is lower than all of them
+                let rows: Vec<_> = bindings.rows().collect();
+                let half = rows.len().div_ceil(2);
+                egui::Grid::new("all keys").num_columns(6).spacing([18.0, 3.0]).show(ui, |ui| {
+                    for (i, first) in rows[..half].iter().enumerate() {
+                        for (_, name, key, button) in [Some(first), rows.get(half + i)].into_iter().flatten() {
+                            ui.label(text(13.0, TEXT, *key).strong());
+                            ui.label(text(13.0, FAINT, button.unwrap_or("")));
+                            ui.label(text(13.0, TEXT, *name));
+                        }
                         ui.end_row();
                     }
                 });
