@@ -180,7 +180,9 @@ pub(crate) struct Still {
     /// It did not come out of the one before, but of a reset.
     pub fresh: bool,
     /// Action and command of the decision that has led here; a fresh one has the command alone.
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
     pub action: Vec<f32>,
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
     pub command: Vec<f64>,
     /// Elevations of the height fields.
     pub grounds: Arc<Vec<Vec<f32>>>,
