@@ -118,6 +118,24 @@ fn what_is_one_too_many_goes() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn a_table_from_elsewhere_takes_no_other_files_away() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("runs.sqlite");
+    let mine = folder.path().join("mine");
+    std::fs::write(&mine, "dear")?;
+    let mut table = Table::open(&path)?;
+    table.add(&run("boxes", 0, 1.0), &recording(0.0)?)?;
+    for name in [mine.display().to_string(), "../mine".into()] {
+        rusqlite::Connection::open(&path)?.execute("UPDATE runs SET replay = ?1 WHERE distance = 1", [name])?;
+        for i in 1..=KEPT as u64 + 1 {
+            table.add(&run("boxes", i, 10.0 + i as f64), &recording(0.0)?)?;
+        }
+        assert!(mine.exists());
+    }
+    Ok(())
+}
+
+#[test]
 fn what_is_no_table_is_left_as_it_is() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str| folder.path().join(name);

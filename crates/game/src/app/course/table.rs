@@ -212,8 +212,11 @@ impl Table {
         let pruned = prune(&begun, &run.course).and_then(|gone| begun.commit().map(|()| gone));
         match pruned {
             Ok(gone) => {
-                // a file that stays takes room, no more
-                gone.iter().for_each(|name| drop(std::fs::remove_file(folder.join(name))));
+                // a table from elsewhere may name what is no replay of its
+                for name in gone.iter().filter(|name| Path::new(name).file_name() == Some(name.as_ref())) {
+                    // a file that stays takes room, no more
+                    let _ = std::fs::remove_file(folder.join(name));
+                }
                 Ok(place)
             }
             Err(error) => {
