@@ -3,6 +3,7 @@
 //! They are profiles along the track, the same at every distance from it. The first meters are level, so that episodes
 //! begin as in training.
 
+use marathon_envs::agents::marathon::terrain::course::{FROM, POINTS, TO};
 use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Options, Registry, registry};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -21,6 +22,12 @@ const HALF_WIDTH: f64 = 30.0;
 /// What lies below this is the level ground, m: two surfaces at one height would both carry.
 const SUNK: f64 = 0.01;
 
+/// The floor of the suite's figures.
+const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
+/// Half the width of a [`Ground::Track`], and its thickness below the start's height, m.
+pub(crate) const TRACK_HALF_WIDTH: f64 = 8.0;
+const TRACK_BASE: f64 = 8.0;
+
 /// What a track is like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Ground {
@@ -33,10 +40,13 @@ pub enum Ground {
     Stairs,
     /// Boards across the track, 2 to 5 cm high.
     Boards,
+    /// Level ground in place of the floor, which [`LaidGround`](crate::LaidGround) shapes: a height field as the assault courses
+    /// of the Ant have it.
+    Track,
 }
 
 impl Ground {
-    /// All of them.
+    /// Those that have a shape of their own.
     pub const ALL: [Ground; 4] = [Ground::Level, Ground::Hills, Ground::Stairs, Ground::Boards];
 
     /// What it is called on the screen, on the command line and in recordings.
@@ -46,12 +56,13 @@ impl Ground {
             Ground::Hills => "hills",
             Ground::Stairs => "stairs",
             Ground::Boards => "boards",
+            Ground::Track => "track",
         }
     }
 
     /// The ground of a name.
     pub fn named(name: &str) -> Option<Self> {
-        Ground::ALL.into_iter().find(|ground| ground.name() == name)
+        Ground::ALL.into_iter().chain([Ground::Track]).find(|ground| ground.name() == name)
     }
 
     /// Height at a place of the track, m.
@@ -61,7 +72,7 @@ impl Ground {
             return 0.0;
         }
         match self {
-            Ground::Level => 0.0,
+            Ground::Level | Ground::Track => 0.0,
             Ground::Hills => {
                 // growing over 24 m, and back to level ground at the end
                 let most = 0.6 * (0.25 + way / 32.0).min((end - way) / 8.0).min(1.0);
@@ -101,8 +112,11 @@ impl Ground {
         }
         let facts = agent.facts();
         let text = self.laid(&source(&facts)?);
-        let text =
-            text.ok_or_else(|| wrong(&facts, "its model has no <worldbody>, where a ground could lie".into()))?;
+        let lacks = match self {
+            Ground::Track => "its model has no level floor of its own, which a course could replace",
+            _ => "its model has no <worldbody>, where a ground could lie",
+        };
+        let text = text.ok_or_else(|| wrong(&facts, lacks.into()))?;
         Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(text))))
     }
 
@@ -118,6 +132,9 @@ impl Ground {
 
     /// MJCF with this ground in it; `None` if it has no world.
     fn laid(self, text: &str) -> Option<String> {
+        if self == Ground::Track {
+            return track(text);
+        }
         let world = text.find("<worldbody")?;
         let world = world + text[world..].find('>')? + 1;
         let points = ((LENGTH + BEHIND) / GRID).round() as usize + 1;
@@ -142,6 +159,17 @@ impl Ground {
             text[world..].trim_end().strip_suffix("</mujoco>")?,
         ))
     }
+}
+
+/// MJCF with a height field in place of the floor, as the assault courses have it; `None` if there is no such floor.
+fn track(text: &str) -> Option<String> {
+    let (before, after) = text.split_once(FLOOR)?;
+    let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
+    Some(format!(
+        "{before}type=\"hfield\" hfield=\"track\" pos=\"{middle} 0 0\"{}<asset><hfield name=\"track\" nrow=\"2\" \
+         ncol=\"{POINTS}\" size=\"{half} {TRACK_HALF_WIDTH} 1 {TRACK_BASE}\"/></asset>\n</mujoco>\n",
+        after.trim_end().strip_suffix("</mujoco>")?,
+    ))
 }
 
 /// The agent's model as text.
@@ -177,6 +205,18 @@ mod tests {
             }
         }
         assert!(Ground::Hills.agent("hoper").is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn a_track_replaces_the_floor() -> Result<(), Box<dyn std::error::Error>> {
+        for name in ["hopper", "walker", "ant", "AntController"] {
+            let (level, track) = (registry::agent(name)?.model()?, Ground::Track.agent(name)?.model()?);
+            assert_eq!((track.nq, track.nu, track.geoms.len()), (level.nq, level.nu, level.geoms.len()), "{name}");
+            assert_eq!((track.hfields.len(), track.hfields[0].ncol), (1, POINTS), "{name}");
+        }
+        assert_eq!(Ground::named("track"), Some(Ground::Track));
+        assert!(Ground::Track.agent("Swimmer-v5").is_err_and(|e| e.to_string().contains("no level floor")));
         Ok(())
     }
 

@@ -5,10 +5,10 @@
 
 use crate::asset::RagdollPrefab;
 use crate::ground::Ground;
-use crate::ragdoll::{Character, Controls, End, Episode, Restart};
+use crate::ragdoll::{Character, Controls, End, Episode, Held, Restart};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
-use marathon_envs::{Autoreset, BLOCK, EnvError, Spec, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{Autoreset, BLOCK, EnvError, Role, Spec, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, Variation};
@@ -32,6 +32,14 @@ pub(crate) enum HerdError {
     Sim(#[from] marathon_physics::SimError),
     #[error("a body without a task takes no command")]
     Command,
+    #[error("a body without a task has no ground of its own")]
+    Ground,
+}
+
+/// A task as the policy of its role number `role` knows it. The first role's may be that of the task in which one has it all.
+pub(crate) fn part_of(spec: &Spec, role: usize) -> Option<Spec> {
+    let part = spec.of_role(spec.deciders().get(role)?);
+    Some(if role == 0 { Spec { id: spec.id.clone(), ..part } } else { part })
 }
 
 /// All ragdolls of one kind.
@@ -125,11 +133,14 @@ pub(crate) struct Pen {
     model: Arc<Model>,
     n_act: usize,
     dt: f64,
+    roles: Vec<Role>,
     obs: Vec<f32>,
     action: Vec<f32>,
+    /// What a role sees, and what it chooses.
+    seen: Vec<f32>,
     scratch: Vec<f32>,
-    /// The policies of those who live here, at work.
-    pilots: Vec<BlockPolicy<Arc<Policy>>>,
+    /// The policies of those who live here, at work, each with the number of its role.
+    pilots: Vec<(usize, BlockPolicy<Arc<Policy>>)>,
     out: Step,
 }
 
@@ -138,8 +149,10 @@ pub(crate) struct Pen {
 pub(crate) struct Resident {
     pub seed: u64,
     pub number: u64,
-    pub policy: Option<Arc<Policy>>,
+    /// Of the task's first role, and of its second.
+    pub policies: [Option<Arc<Policy>>; 2],
     pub controls: Option<Controls>,
+    pub held: Option<Held>,
     /// What it is told in place of its own schedule.
     pub command: Option<Vec<f64>>,
     pub restart: Restart,
@@ -166,6 +179,13 @@ pub(crate) struct Still {
     pub reference: Option<Vec<f64>>,
     /// It did not come out of the one before, but of a reset.
     pub fresh: bool,
+    /// Action and command of the decision that has led here; a fresh one has the command alone.
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
+    pub action: Vec<f32>,
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
+    pub command: Vec<f64>,
+    /// Elevations of the height fields.
+    pub grounds: Arc<Vec<Vec<f32>>>,
 }
 
 /// A push in the axes of the physics.
@@ -192,8 +212,9 @@ impl Resident {
             seed,
             number,
             restart,
-            policy: None,
+            policies: [None, None],
             controls: None,
+            held: None,
             command: None,
             episode: Episode::default(),
             grounds: Arc::default(),
@@ -268,6 +289,8 @@ impl Pen {
             dt: herd.dt,
             obs: vec![0.0; n_obs * BLOCK],
             action: vec![0.0; herd.model.nu * BLOCK],
+            roles: herd.spec.as_ref().map(|spec| spec.deciders()).unwrap_or_default(),
+            seen: Vec::new(),
             scratch: vec![0.0; herd.model.nu * BLOCK],
             pilots: Vec::new(),
             out,
@@ -293,6 +316,11 @@ impl Pen {
     /// Frees a lane.
     pub fn dismiss(&mut self, lane: usize) {
         self.lanes[lane] = None;
+        if let (Engine::Env(env), Some(field)) = (self.engine.get(), self.model.hfields.first()) {
+            let own: Vec<f32> = field.data.iter().map(|z| (field.size[2] * f64::from(*z)) as f32).collect();
+            // the field exists, and so do its points
+            let _ = env.set_ground(lane, 0, &own);
+        }
         self.vary(lane, &Variation::none(&self.model.clone()));
         if let Engine::Env(env) = self.engine.get() {
             // any agent can be given back to its schedule
@@ -320,6 +348,19 @@ impl Pen {
             resident.command = command;
         }
         told
+    }
+
+    /// Gives a ragdoll ground of its own, over all episodes.
+    pub fn lay(&mut self, lane: usize, elevations: &[f32]) -> Result<(), HerdError> {
+        let Engine::Env(env) = self.engine.get() else { return Err(HerdError::Ground) };
+        env.set_ground(lane, 0, elevations)?;
+        if let Some(resident) = &mut self.lanes[lane] {
+            resident.grounds = Arc::new(vec![elevations.to_vec()]);
+            if let Some(newest) = resident.trail.back_mut() {
+                newest.grounds = resident.grounds.clone();
+            }
+        }
+        Ok(())
     }
 
     /// Puts a ragdoll into a state.
@@ -370,11 +411,13 @@ impl Pen {
             Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new(), None),
         };
         if let Some(resident) = &mut self.lanes[lane] {
-            resident.episode.command = command;
+            resident.episode.command.clone_from(&command);
             if *resident.grounds != grounds {
                 resident.grounds = Arc::new(grounds);
             }
-            resident.trail.push_back(Still { time, qpos, qvel, reference, fresh });
+            let action = if fresh { vec![0.0; self.n_act] } else { resident.episode.action.clone() };
+            let grounds = resident.grounds.clone();
+            resident.trail.push_back(Still { time, qpos, qvel, reference, fresh, action, command, grounds });
         }
     }
 
@@ -406,22 +449,30 @@ impl Pen {
     fn choose(&mut self) {
         self.action.fill(0.0);
         let n = self.n_act;
-        let Pen { lanes, pilots, obs, action, scratch, .. } = self;
-        let has = |lane: &Option<Resident>, policy: &Arc<Policy>| {
-            lane.as_ref().and_then(|r| r.policy.as_ref()).is_some_and(|own| Arc::ptr_eq(own, policy))
+        let Pen { lanes, roles, pilots, obs, seen, action, scratch, .. } = self;
+        let n_obs = obs.len() / BLOCK;
+        let has = |lane: &Option<Resident>, role: usize, policy: &Arc<Policy>| {
+            lane.as_ref().and_then(|r| r.policies[role].as_ref()).is_some_and(|own| Arc::ptr_eq(own, policy))
         };
-        pilots.retain(|pilot| lanes.iter().any(|lane| has(lane, pilot.policy())));
-        for policy in lanes.iter().flatten().filter_map(|resident| resident.policy.as_ref()) {
-            if !pilots.iter().any(|pilot| Arc::ptr_eq(pilot.policy(), policy)) {
-                pilots.push(BlockPolicy::new(policy.clone(), Isa::best()));
+        pilots.retain(|(role, pilot)| lanes.iter().any(|lane| has(lane, *role, pilot.policy())));
+        for (role, policy) in lanes.iter().flatten().flat_map(|resident| resident.policies.iter().enumerate()) {
+            let Some(policy) = policy else { continue };
+            if !pilots.iter().any(|(known, pilot)| *known == role && Arc::ptr_eq(pilot.policy(), policy)) {
+                pilots.push((role, BlockPolicy::new(policy.clone(), Isa::best())));
             }
         }
-        for pilot in pilots {
+        for (number, pilot) in pilots {
+            let Some(role) = roles.get(*number) else { continue };
+            seen.clear();
+            for row in obs.chunks_exact(n_obs.max(1)) {
+                seen.extend_from_slice(&row[role.obs.clone()]);
+            }
             // all of a pen at once: most often they share one policy
-            pilot.act_rows(obs, None, scratch);
-            for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], pilot.policy())) {
-                let row = lane * n..(lane + 1) * n;
-                action[row.clone()].copy_from_slice(&scratch[row]);
+            let own = role.act.len();
+            pilot.act_rows(seen, None, &mut scratch[..own * BLOCK]);
+            for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], *number, pilot.policy())) {
+                let row = &mut action[lane * n..(lane + 1) * n];
+                row[role.act.clone()].copy_from_slice(&scratch[lane * own..(lane + 1) * own]);
             }
         }
         for (row, resident) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
@@ -430,6 +481,11 @@ impl Pen {
                 row.fill(0.0);
                 for (a, x) in row.iter_mut().zip(given).filter(|(_, x)| x.is_finite()) {
                     *a = *x;
+                }
+            }
+            if let Some(Held(given)) = &resident.held {
+                for (a, x) in row.iter_mut().zip(given) {
+                    *a = x.filter(|x| x.is_finite()).unwrap_or(*a);
                 }
             }
             if resident.lying.is_some() {
@@ -511,6 +567,7 @@ impl Pen {
             episode.info.clear();
             episode.info.extend_from_slice(&out.info[lane * n..(lane + 1) * n]);
             episode.distance += f64::from(out.forward[lane]);
+            episode.farthest = episode.farthest.max(episode.distance);
             episode.speed = out.forward[lane] / self.dt as f32;
         }
         let Restart { after_fall, on_time_up } = resident.restart;

@@ -82,6 +82,20 @@ pub struct Policy(pub Handle<PolicyAsset>);
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct Controls(pub Vec<f32>);
 
+/// The policy of the second role of a [`Ragdoll`]'s task, if it has [roles](marathon_envs::RoleFacts); [`Policy`] is then that of
+/// the first.
+#[derive(Component, Clone, Debug, PartialEq, Eq)]
+pub struct Opponent(pub Handle<PolicyAsset>);
+
+/// Some of a [`Ragdoll`]'s actions, by actuator, that something decides in place of its policies; `None` leaves one to them.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct Held(pub Vec<Option<f32>>);
+
+/// Ground that is laid below a [`Ragdoll`]: elevations of its model's first height field, as [`OwnGround`] has them. It stays over
+/// all episodes, unless the task draws ground of its own.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct LaidGround(pub Arc<Vec<f32>>);
+
 /// What a [`Ragdoll`] is told to do, if its agent takes commands ([`Spec::command`]): a number for each, within its range.
 /// Without it, and with `None`, the agent follows its own schedule.
 ///
@@ -144,6 +158,8 @@ pub struct Episode {
     pub info: Vec<f32>,
     /// Distance run along the track, m.
     pub distance: f64,
+    /// Farthest that it has come along the track, m.
+    pub farthest: f64,
     /// Speed along the track in the last decision, m/s.
     pub speed: f32,
     /// Actions of the last decision.

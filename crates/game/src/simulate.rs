@@ -3,11 +3,11 @@
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::axes::{to_game, to_physics};
 use crate::ground::Ground;
-use crate::herd::{Event, Herd, Pen, Resident, Shove};
+use crate::herd::{Event, Herd, Pen, Resident, Shove, part_of};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
-    AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, OwnGround, Part, Physique,
-    Policy, Push, Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
+    AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent,
+    OwnGround, Part, Physique, Policy, Push, Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
 };
 use crate::stage;
 use bevy::asset::LoadState;
@@ -220,15 +220,21 @@ pub(crate) fn take_in(
     ragdolls: Query<(
         &Seat,
         &Anatomy,
-        Option<&Policy>,
-        Option<Ref<Controls>>,
+        (Option<&Policy>, Option<&Opponent>),
+        (Option<&Controls>, Option<&Held>),
         Option<&AgentCommand>,
         Ref<Restart>,
         Option<Ref<Physique>>,
+        Option<Ref<LaidGround>>,
     )>,
 ) {
-    for (seat, anatomy, policy, controls, command, restart, physique) in &ragdolls {
+    for (seat, anatomy, (policy, opponent), (controls, held), command, restart, physique, laid) in &ragdolls {
         let Some(pen) = marathon.pen(*seat) else { continue };
+        if let Some(LaidGround(elevations)) = laid.filter(|laid| laid.is_changed()).as_deref()
+            && let Err(error) = pen.lay(seat.lane, elevations)
+        {
+            error!("a LaidGround cannot be laid: {error}");
+        }
         let wanted = command.and_then(|command| command.0.as_ref());
         if pen.lanes[seat.lane].as_ref().is_some_and(|resident| resident.command.as_ref() != wanted)
             && let Err(error) = pen.command(seat.lane, wanted.cloned())
@@ -250,28 +256,37 @@ pub(crate) fn take_in(
         }
         let Some(resident) = &mut pen.lanes[seat.lane] else { continue };
         resident.restart = *restart;
-        resident.controls = controls.map(|c| Controls::clone(&c));
-        let wanted = policy.and_then(|p| policies.get(&p.0));
-        let same = match (&resident.policy, wanted) {
-            (Some(old), Some(new)) => Arc::ptr_eq(old, &new.0),
-            (None, None) => true,
-            _ => false,
-        };
-        if !same {
-            resident.policy = wanted.map(|p| p.0.clone()).filter(|policy| fits(policy, anatomy));
+        resident.controls = controls.cloned();
+        resident.held = held.cloned();
+        let handles = [policy.map(|policy| &policy.0), opponent.map(|opponent| &opponent.0)];
+        for (role, handle) in handles.into_iter().enumerate() {
+            let wanted = handle.and_then(|handle| policies.get(handle));
+            let same = match (&resident.policies[role], wanted) {
+                (Some(old), Some(new)) => Arc::ptr_eq(old, &new.0),
+                (None, None) => true,
+                _ => false,
+            };
+            if !same {
+                let fitting = wanted.map(|p| p.0.clone()).filter(|policy| fits(policy, anatomy, role));
+                resident.policies[role] = fitting;
+            }
         }
     }
 }
 
-fn fits(policy: &marathon_learn::Policy, anatomy: &Anatomy) -> bool {
+fn fits(policy: &marathon_learn::Policy, anatomy: &Anatomy, role: usize) -> bool {
     let Some(spec) = &anatomy.spec else {
         error_once!("a Policy was given to a ragdoll that is no agent; it observes nothing that a policy could act on");
         return false;
     };
-    match policy.check(spec) {
+    let Some(part) = part_of(spec, role) else {
+        error_once!("an Opponent was given to '{}', whose task has one role alone", spec.id);
+        return false;
+    };
+    match policy.check(&part) {
         Ok(()) => true,
         Err(error) => {
-            error_once!("a policy does not fit '{}': {error}", spec.id);
+            error_once!("a policy does not fit '{}': {error}", part.id);
             false
         }
     }

@@ -1,5 +1,6 @@
 //! The command line of `marathon-game`.
 
+use crate::app::course::Part;
 use crate::app::cues::Cue;
 use crate::app::steer::{Mapping, Mappings};
 use crate::ground::Ground;
@@ -18,6 +19,9 @@ Examples:
   marathon-game --mode imitate                   a person walks, beside the clip that it follows; N: runs, flips
   marathon-game MarathonMan --mode imitate --option clip=my.bvh   a clip of your own; L learns it
   marathon-game walker --mode push               click to push, B to throw balls, sliders for gravity and friction
+  marathon-game --mode course                    an assault course, and the table of the longest runs (T)
+  marathon-game --mode course --part run         you lead the runner, by arrow keys or gamepad
+  marathon-game --mode course --part build       you build the ground ahead of it, with the mouse
   marathon-game --mode testbed my-robot.xml      a slider per motor
   marathon-game ant --ground stairs              or hills, or boards
   marathon-game MarathonManRun --skin marathon_man   with the skin of a person; or with that of hero.glb
@@ -33,8 +37,12 @@ Keys are shown on the screen (F1) and can be changed in the menu.";
 #[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
 pub struct Args {
     /// Agent (such as hopper, walker, humanoid, MarathonManRun), policy file, folder of a run, or MJCF file (.xml) [with
-    /// --mode imitate: MarathonManWalk].
-    #[arg(default_value = "hopper", default_value_if("mode", "imitate", "MarathonManWalk"))]
+    /// --mode imitate: MarathonManWalk; with --mode course: TerrainWalker2d, or with --part run AntController].
+    #[arg(default_value = "hopper", default_value_ifs([
+        ("mode", "imitate", "MarathonManWalk"),
+        ("part", "run", "AntController"),
+        ("mode", "course", "TerrainWalker2d"),
+    ]))]
     pub what: String,
     /// What to do.
     #[arg(long, value_enum, default_value_t = Mode::Watch)]
@@ -60,6 +68,26 @@ pub struct Args {
     /// How --mode learn learns; the seed is that of everything random.
     #[command(flatten)]
     pub learn: LearnOptions,
+
+    /// What --mode course runs over: flat, slopes, steps, stairs, gaps, rubble, boxes, mixed, meters, bumps, blocks or adversary
+    /// [default: mixed].
+    #[arg(long, value_name = "KIND")]
+    pub course: Option<String>,
+    /// How difficult that is, from 0 to 1 [default: 0.5].
+    #[arg(long, value_name = "D")]
+    pub difficulty: Option<f64>,
+    /// What you do there [default: watch].
+    #[arg(long, value_enum)]
+    pub part: Option<Part>,
+    /// What you are called in the table of the longest runs [default: your user name].
+    #[arg(long, value_name = "NAME")]
+    pub player: Option<String>,
+    /// Table of the longest runs, an SQLite file [default: marathon/runs.sqlite in the folder for your data].
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
+    /// Print that table.
+    #[arg(long)]
+    pub runs: bool,
 
     /// Port on which mlagents-learn listens (5004 by default): it trains the agents, and one watches.
     #[arg(long, value_name = "N", conflicts_with_all = ["mode", "policy", "replay", "record", "watch_stream"])]
@@ -183,6 +211,8 @@ pub enum Mode {
     Push,
     /// See how near one is to the motion clip that it follows.
     Imitate,
+    /// Run over an assault course.
+    Course,
     /// Train from random weights and look on.
     Learn,
     /// Move the motors of any MJCF model.
@@ -201,6 +231,7 @@ impl Mode {
             Mode::Watch => "watch",
             Mode::Push => "push",
             Mode::Imitate => "imitate",
+            Mode::Course => "assault course",
             Mode::Learn => "learn live",
             Mode::Testbed => "test bed",
             Mode::Replay => "replay",

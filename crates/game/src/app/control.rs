@@ -1,12 +1,14 @@
 //! What keys, mouse and gamepad do to the time, the camera and the stage.
 
 use crate::app::args::Mode;
+use crate::app::course::{builds, suits};
 use crate::app::hud::Hud;
 use crate::app::imitate::next_clip;
 use crate::app::keys::{Deed, Do};
 use crate::app::menu::Menu;
 use crate::app::notes::Notes;
-use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name, shipped_agents};
+use crate::app::policies::shipped_agents;
+use crate::app::show::{Actor, Focus, Show, Shown, Source, free_name};
 use crate::app::steer::Steering;
 use crate::look::FollowCamera;
 use crate::ragdoll::RestartNow;
@@ -81,8 +83,10 @@ pub fn stage(
             Deed::NextAgent if show.mode == Mode::Imitate => next_clip(&mut show, &mut notes),
             Deed::NextAgent if !matches!(show.mode, Mode::Replay | Mode::Outside) => {
                 let all = shipped_agents();
-                let next = all.iter().position(|a| *a == show.agent).map_or(0, |i| (i + 1) % all.len());
-                show.agent.clone_from(&all[next]);
+                let first = all.iter().position(|a| *a == show.agent).map_or(0, |i| i + 1);
+                let able = |agent: &&String| show.mode != Mode::Course || suits(&show, agent);
+                let Some(next) = all.iter().cycle().skip(first).take(all.len()).find(able) else { continue };
+                show.agent.clone_from(next);
                 show.model = None;
                 if matches!(show.source, Source::File(_)) {
                     show.source = Source::Shipped;
@@ -114,7 +118,7 @@ pub fn look(
     scroll: Res<AccumulatedMouseScroll>,
     wants: Option<Res<EguiWantsInput>>,
     pads: Query<&Gamepad>,
-    steering: Res<Steering>,
+    (show, steering): (Res<Show>, Res<Steering>),
     mut cameras: Query<&mut FollowCamera>,
 ) {
     let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
@@ -123,7 +127,7 @@ pub fn look(
         yaw -= motion.delta.x * TURN[0];
         pitch += motion.delta.y * TURN[0];
     }
-    if !over_ui {
+    if !over_ui && !builds(&show) {
         zoom *= 0.9_f32.powf(scroll.delta.y.clamp(-5.0, 5.0));
     }
     for pad in &pads {

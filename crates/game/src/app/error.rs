@@ -23,6 +23,14 @@ pub enum GameError {
         /// What was found and what was expected.
         problem: String,
     },
+    /// A table of the longest runs that cannot be used.
+    #[error("{}: {problem}", .path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What was found, and the remedy.
+        problem: String,
+    },
     /// An agent that does not exist, or a model that is not valid.
     #[error(transparent)]
     Env(#[from] marathon_envs::EnvError),

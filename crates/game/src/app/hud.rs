@@ -1,6 +1,7 @@
 //! Text and bars over the picture: who runs how fast, what it is rewarded for, how learning goes, which keys there are.
 
 use crate::app::args::Mode;
+use crate::app::course::builds;
 use crate::app::keys::{Bindings, Deed};
 use crate::app::learn::Lesson;
 use crate::app::notes::{Note, Notes};
@@ -25,10 +26,10 @@ const SHOWN: usize = 240;
 const FORGET: f32 = 0.998;
 
 const CARD: Color32 = Color32::from_rgba_premultiplied(12, 16, 22, 205);
-const TEXT: Color32 = Color32::from_rgb(236, 240, 244);
-const FAINT: Color32 = Color32::from_rgb(158, 170, 182);
-const ACCENT: Color32 = Color32::from_rgb(255, 158, 64);
-const BAD: Color32 = Color32::from_rgb(255, 106, 96);
+pub(super) const TEXT: Color32 = Color32::from_rgb(236, 240, 244);
+pub(super) const FAINT: Color32 = Color32::from_rgb(158, 170, 182);
+pub(super) const ACCENT: Color32 = Color32::from_rgb(255, 158, 64);
+pub(super) const BAD: Color32 = Color32::from_rgb(255, 106, 96);
 /// Colors of the reward's terms.
 const TERMS: [Color32; 8] = [
     Color32::from_rgb(86, 180, 233),
@@ -124,12 +125,12 @@ fn font(size: f32) -> FontId {
     FontId::new(size, FontFamily::Proportional)
 }
 
-fn text(size: f32, color: Color32, words: impl Into<String>) -> RichText {
+pub(super) fn text(size: f32, color: Color32, words: impl Into<String>) -> RichText {
     RichText::new(words).size(size).color(color)
 }
 
 /// Text that does not break, which would make the card jump.
-fn line(ui: &mut Ui, words: RichText) {
+pub(super) fn line(ui: &mut Ui, words: RichText) {
     ui.add(egui::Label::new(words).extend());
 }
 
@@ -190,9 +191,13 @@ pub fn draw(
                 }
                 if let Some(spec) = &anatomy.spec {
                     for (range, x) in spec.command.iter().zip(&episode.command) {
-                        let by = if command.is_some() { "you" } else { "its schedule" };
+                        let by = match (show.mode, command) {
+                            (Mode::Replay, _) => "",
+                            (_, Some(_)) => "   by you",
+                            (_, None) => "   by its schedule",
+                        };
                         let told =
-                            format!("{}: {} {}   by {by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
+                            format!("{}: {} {}{by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
                         line(ui, text(13.0, if command.is_some() { ACCENT } else { FAINT }, told));
                     }
                 }
@@ -220,7 +225,10 @@ pub fn draw(
         let above = above.and_then(|card| ctx.memory(|memory| memory.area_rect(Id::new(card))));
         let lift = LIFT[usize::from(show.mode == Mode::Replay && room.x < BESIDE)];
         let free = room.y - lift - above.map_or(0.0, |card| card.bottom());
-        let fits = |terms: usize| room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32;
+        // on a course one looks at what comes
+        let fits = |terms: usize| {
+            show.mode != Mode::Course && room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32
+        };
         if let Some(spec) = anatomy.spec.as_ref().filter(|spec| fits(spec.reward_terms.len())) {
             rewards(&ctx, &monitor, &spec.reward_terms, episode, lift);
         }
@@ -229,7 +237,7 @@ pub fn draw(
         learning(&ctx, &lesson);
     }
     if room.x > ROOM[0] || hud.help {
-        keys(&ctx, &bindings, hud.help, show.mode, *steering);
+        keys(&ctx, &bindings, hud.help, &show, *steering);
     }
     Ok(())
 }
@@ -358,19 +366,29 @@ fn learning(ctx: &egui::Context, lesson: &Lesson) {
 }
 
 /// The keys: the most useful ones in a line, or all of them.
-fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steering: Steering) {
+fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steering: Steering) {
+    let (mode, builds) = (show.mode, builds(show));
     if all {
         Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -44.0]).interactable(false).show(ctx, |ui| {
             card().show(ui, |ui| {
-                egui::Grid::new("all keys").num_columns(3).spacing([18.0, 3.0]).show(ui, |ui| {
-                    for (_, name, key, button) in bindings.rows() {
-                        ui.label(text(13.0, TEXT, key).strong());
-                        ui.label(text(13.0, FAINT, button.unwrap_or("")));
-                        ui.label(text(13.0, TEXT, name));
+                // in two halves side by side: a small window is lower than all of them
+                let rows: Vec<_> = bindings.rows().collect();
+                let half = rows.len().div_ceil(2);
+                egui::Grid::new("all keys").num_columns(6).spacing([18.0, 3.0]).show(ui, |ui| {
+                    for (i, first) in rows[..half].iter().enumerate() {
+                        for (_, name, key, button) in [Some(first), rows.get(half + i)].into_iter().flatten() {
+                            ui.label(text(13.0, TEXT, *key).strong());
+                            ui.label(text(13.0, FAINT, button.unwrap_or("")));
+                            ui.label(text(13.0, TEXT, *name));
+                        }
                         ui.end_row();
                     }
                 });
-                ui.label(text(12.0, FAINT, "right mouse button or right stick: turn the camera   wheel: closer"));
+                let wheel = match builds {
+                    true => "left mouse button: drag the end of the next meter   wheel: a step higher or lower",
+                    false => "wheel: closer",
+                };
+                ui.label(text(12.0, FAINT, format!("right mouse button or right stick: turn the camera   {wheel}")));
                 if steering.0 {
                     ui.label(text(
                         12.0,
@@ -398,6 +416,8 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
         Mode::Push => &[Deed::Menu, Deed::Push, Deed::Throw, Deed::Restart, Deed::Camera, Deed::Contacts],
         Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
         Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
+        Mode::Course if builds => &[Deed::Menu, Deed::Higher, Deed::Lower, Deed::Restart, Deed::Runs],
+        Mode::Course => &[Deed::Menu, Deed::Pause, Deed::Restart, Deed::Runs, Deed::Slower, Deed::Camera],
         Mode::Outside => &[Deed::Menu, Deed::NextFocus, Deed::Camera, Deed::Hud],
         Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Back, Deed::Ahead, Deed::Slower, Deed::Camera],
     };
@@ -411,9 +431,14 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, mode: Mode, steerin
                         ui.label(text(12.0, TEXT, "steer"));
                         ui.add_space(4.0);
                     }
+                    if builds {
+                        ui.label(text(12.0, ACCENT, "mouse").strong());
+                        ui.label(text(12.0, TEXT, "build"));
+                        ui.add_space(4.0);
+                    }
                     let shown = |deed: Deed| match deed {
                         Deed::Help => true,
-                        Deed::Release => steering.0,
+                        Deed::Release => steering.0 && mode != Mode::Course,
                         _ => useful.contains(&deed),
                     };
                     for (deed, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {

@@ -3,7 +3,8 @@
 use crate::app::args::Mode;
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
-use crate::app::show::{Actor, Focus, Show, Source, shipped_agents};
+use crate::app::policies::shipped_agents;
+use crate::app::show::{Actor, Focus, Show, Source};
 use crate::look::{ErrorColors, Ghost};
 use crate::simulate::RagdollState;
 use bevy::prelude::*;

@@ -57,6 +57,14 @@ pub enum Deed {
     Ahead,
     /// Give the character that one has steered back to its own schedule.
     Release,
+    /// Let the next meter of a course that one builds lead a step higher.
+    Higher,
+    /// A step lower.
+    Lower,
+    /// Level.
+    Even,
+    /// The longest runs.
+    Runs,
     /// A picture of the screen.
     Picture,
     /// Leave.
@@ -66,7 +74,7 @@ pub enum Deed {
 /// A deed, its name on the screen, its key and its button.
 type Row = (Deed, &'static str, KeyCode, Option<GamepadButton>);
 
-const DEFAULTS: [Row; 25] = [
+const DEFAULTS: [Row; 29] = [
     (Deed::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
     (Deed::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
     (Deed::Step, "one step", KeyCode::Period, None),
@@ -90,6 +98,10 @@ const DEFAULTS: [Row; 25] = [
     (Deed::Back, "back", KeyCode::ArrowLeft, Some(GamepadButton::DPadLeft)),
     (Deed::Ahead, "ahead", KeyCode::ArrowRight, Some(GamepadButton::DPadRight)),
     (Deed::Release, "let go", KeyCode::KeyG, Some(GamepadButton::LeftThumb)),
+    (Deed::Higher, "build higher", KeyCode::PageUp, None),
+    (Deed::Lower, "build lower", KeyCode::PageDown, None),
+    (Deed::Even, "build level", KeyCode::Home, None),
+    (Deed::Runs, "longest runs", KeyCode::KeyT, None),
     (Deed::Picture, "picture", KeyCode::F12, None),
     (Deed::Quit, "quit", KeyCode::KeyQ, None),
 ];

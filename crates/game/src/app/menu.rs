@@ -1,6 +1,7 @@
 //! The menu: mode, agent, policy, how many; keys. And the sliders of the modes that have some.
 
 use crate::app::args::Mode;
+use crate::app::course;
 use crate::app::hud::card;
 use crate::app::imitate::{FOLLOWER, choose_clip, clip_of, follows_clip};
 use crate::app::keys::{Bindings, Rebinding};
@@ -104,7 +105,7 @@ pub fn draw(
 
 fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
     ui.horizontal(|ui| {
-        for mode in [Mode::Watch, Mode::Push, Mode::Imitate, Mode::Learn, Mode::Testbed] {
+        for mode in [Mode::Watch, Mode::Push, Mode::Imitate, Mode::Course, Mode::Learn, Mode::Testbed] {
             let clicked = ui.selectable_label(choice.mode == mode, RichText::new(mode.name()).size(15.0)).clicked();
             if clicked {
                 choice.mode = mode;
@@ -116,6 +117,9 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
                 }
                 if mode == Mode::Imitate && !follows_clip(&choice.agent) {
                     choice.agent = FOLLOWER.into();
+                }
+                if mode == Mode::Course {
+                    course::suit(choice);
                 }
             }
         }
@@ -145,7 +149,10 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
             }
             ui.end_row();
         }
-        if matches!(choice.mode, Mode::Watch | Mode::Push | Mode::Imitate) {
+        if choice.mode == Mode::Course {
+            course::choose(ui, choice);
+        }
+        if matches!(choice.mode, Mode::Watch | Mode::Push | Mode::Imitate | Mode::Course) {
             ui.label("Policy");
             let name = |source: &Source| match source {
                 Source::Shipped => "the one that comes with it".to_string(),
@@ -169,13 +176,15 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
             ui.end_row();
         }
         if choice.mode != Mode::Testbed {
-            ui.label("Ground");
-            ui.horizontal(|ui| {
-                for ground in Ground::ALL {
-                    ui.selectable_value(&mut choice.ground, ground, ground.name());
-                }
-            });
-            ui.end_row();
+            if choice.mode != Mode::Course {
+                ui.label("Ground");
+                ui.horizontal(|ui| {
+                    for ground in Ground::ALL {
+                        ui.selectable_value(&mut choice.ground, ground, ground.name());
+                    }
+                });
+                ui.end_row();
+            }
             ui.label("Characters");
             ui.add(Slider::new(&mut choice.agents, 1..=64));
             ui.end_row();

@@ -3,6 +3,7 @@
 mod args;
 mod control;
 mod costume;
+mod course;
 mod cues;
 mod error;
 mod feed;
@@ -14,7 +15,9 @@ mod learn;
 mod menu;
 mod mlagents;
 mod notes;
+mod policies;
 mod puppets;
+mod recording;
 mod replay;
 mod show;
 mod steer;
@@ -23,6 +26,7 @@ mod weather;
 
 pub use args::{Args, CameraArg, GroundArg, Mode, QualityArg};
 pub use costume::{Costume, Fitting};
+pub use course::{Choice, Course, KEPT, List, MOST_STEPS, Part, Place, ROWS, Run, Runs, Site, Step, Table};
 pub use cues::{Cue, Cues};
 pub use error::GameError;
 pub use feed::{Board, Feed, Sight};
@@ -31,11 +35,13 @@ pub use imitate::{GhostAt, Imitation, Reading};
 pub use keys::{Bindings, Deed, Do, KeysPlugin};
 pub use learn::{Lesson, Teaching};
 pub use notes::{Note, Notes};
-pub use replay::{Playback, Recorder, Recording};
+pub use recording::{Recording, Row};
+pub use replay::{Playback, Recorder};
 pub use show::{Actor, Focus, Show, Source};
 pub use steer::{Mapping, Mappings, Steering};
 pub use weather::{Ball, Weather, WeatherPlugin};
 
+use crate::ground::Ground;
 use crate::look::{
     FollowCamera, FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
 };
@@ -46,7 +52,7 @@ use bevy_egui::{EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use clap::Parser;
 use marathon_runs::RunError;
 use std::ffi::OsString;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -77,6 +83,12 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// # Errors
 /// What keeps it from starting, found out before anything is drawn.
 pub fn run(args: &Args) -> Result<(), GameError> {
+    if args.runs {
+        let path = args.table.clone().map_or_else(course::default_path, Ok)?;
+        // whoever reads may have had enough
+        let _ = std::io::stdout().write_all(course::listing(&path)?.as_bytes());
+        return Ok(());
+    }
     let mut game = GamePlugin::new(args)?;
     if let Some(out) = &args.record {
         return film::film(args, out, game);
@@ -182,11 +194,16 @@ impl GamePlugin {
                 return Err(RunError::option("option", "does not go with a recording, which has its run's").into());
             }
             (show.mode, show.agent, show.agents) = (Mode::Replay, recording.setting.agent.clone(), recording.agents);
-            show.ground = recording.ground;
+            if Ground::ALL.contains(&recording.ground) {
+                show.ground = recording.ground;
+            }
             playback = Some(recording);
         }
         if show.mode == Mode::Learn {
             learn::settings(&show.setting()?, &Teaching { learn: args.learn.clone(), seed: 0 })?;
+        }
+        if show.mode == Mode::Course {
+            course::check_table(args.table.as_deref())?;
         }
         if args.mlagents_port.is_some() || args.watch_stream {
             show.mode = Mode::Outside;
@@ -260,8 +277,20 @@ impl Plugin for GamePlugin {
         .add_systems(FixedUpdate, (hud::watch, replay::record).after(MarathonSystems::Report))
         .add_systems(
             EguiPrimaryContextPass,
-            (style, hud::fit, hud::draw, menu::circumstances, menu::motors, replay::time_line, menu::draw).chain(),
+            (
+                style,
+                hud::fit,
+                course::card,
+                hud::draw,
+                menu::circumstances,
+                menu::motors,
+                replay::time_line,
+                course::list,
+                menu::draw,
+            )
+                .chain(),
         );
+        course::lay_out(app, args);
         if let Some(skin) = &self.skin {
             costume::lay_out(app, skin);
         }

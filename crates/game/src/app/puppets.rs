@@ -2,7 +2,7 @@
 
 use crate::app::show::Actor;
 use crate::look::{FollowCamera, Marks, Tint};
-use crate::ragdoll::{Anatomy, Episode, Part};
+use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
 use crate::stage;
 use bevy::prelude::*;
 use marathon_envs::Spec;
@@ -50,7 +50,7 @@ pub fn stage(
 ) {
     for (number, place) in places.enumerate() {
         let here = (Actor(number), Transform::from_translation(place), Visibility::default());
-        let puppet = commands.spawn((here, Marks::default(), Episode::default())).id();
+        let puppet = commands.spawn((here, Marks::default(), Episode::default(), OwnGround::default())).id();
         let parts = stage::parts(commands, &kind.model, puppet);
         let (model, spec) = (kind.model.clone(), kind.spec.clone());
         commands.entity(puppet).insert(Anatomy { model, spec, parts, feet: Vec::new(), dt: kind.dt });
@@ -60,6 +60,7 @@ pub fn stage(
     }
     for mut camera in cameras {
         camera.goal[2] = 3.1 * kind.size[0] + 0.6;
+        camera.ahead = 0.0;
         camera.jump();
     }
 }

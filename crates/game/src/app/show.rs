@@ -1,16 +1,18 @@
 //! What is on stage: which characters, moved by what, and who of them is in focus.
 
 use crate::app::args::{Args, Mode};
+use crate::app::course::{self, Choice};
 use crate::app::error::GameError;
 use crate::app::imitate::{FOLLOWER, follows_clip};
 use crate::app::notes::Notes;
+use crate::app::policies::{read_opponent, read_policy, shipped};
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::ground::Ground;
+use crate::herd::part_of;
 use crate::look::{FollowCamera, Marks, Tint};
-use crate::ragdoll::{Anatomy, Policy, Ragdoll, Restart};
+use crate::ragdoll::{AgentCommand, Anatomy, Held, LaidGround, Opponent, Policy, Ragdoll, Restart};
 use bevy::prelude::*;
 use marathon_envs::{nearest, registry};
-use marathon_learn::Policy as Net;
 use marathon_physics::Model;
 use marathon_render::Scene;
 use marathon_runs::folder::policy_path;
@@ -28,19 +30,6 @@ const WATCH: f32 = 0.5;
 /// Seconds that a fallen character lies when somebody looks on.
 const LIE: f64 = 1.2;
 
-/// Policies that come with the game.
-const SHIPPED: [&[u8]; 9] = [
-    include_bytes!("../../../../assets/policies/hopper.safetensors"),
-    include_bytes!("../../../../assets/policies/walker2d.safetensors"),
-    include_bytes!("../../../../assets/policies/humanoid.safetensors"),
-    include_bytes!("../../../../assets/policies/ant.safetensors"),
-    include_bytes!("../../../../assets/policies/MarathonManWalk.safetensors"),
-    include_bytes!("../../../../assets/policies/MarathonManRun.safetensors"),
-    include_bytes!("../../../../assets/policies/MarathonManBackflip.safetensors"),
-    include_bytes!("../../../../assets/policies/MarathonManSteer.safetensors"),
-    include_bytes!("../../../../assets/policies/AntController.safetensors"),
-];
-
 /// What is on stage. Who changes it calls [`Show::again`].
 #[derive(Resource, Clone, Debug)]
 pub struct Show {
@@ -54,8 +43,10 @@ pub struct Show {
     pub source: Source,
     /// How many.
     pub agents: usize,
-    /// What they run on; unused by the test bed.
+    /// What they run on; unused by the test bed and on assault courses.
     pub ground: Ground,
+    /// The assault course, and what the player does there.
+    pub course: Choice,
     /// Seed of their starts.
     pub seed: u64,
     /// Model of the test bed.
@@ -92,6 +83,10 @@ pub struct Script {
     pub policy: Option<Handle<PolicyAsset>>,
     /// The task on stage.
     pub setting: Setting,
+    /// What it stands on.
+    pub ground: Ground,
+    /// The policies of the task's roles, by file and checksum.
+    pub names: [Option<String>; 2],
     written: Option<SystemTime>,
     looked: f32,
 }
@@ -109,6 +104,7 @@ impl Show {
             source: Source::Shipped,
             agents: usize::from(args.agents),
             ground: args.ground.into(),
+            course: Choice::of(args)?,
             seed: args.seed(),
             model: None,
             version: 1,
@@ -152,9 +148,15 @@ impl Show {
             return Err(RunError::option("mode", problem).into());
         }
         show.chosen = Setting::named(&show.agent)?.with(&args.task)?;
+        if show.mode == Mode::Course {
+            show.course.take_from(&show.chosen.options);
+        }
         let setting = show.setting()?;
+        if show.mode == Mode::Course {
+            course::check(&show.course, &setting)?;
+        }
         match &show.source {
-            Source::File(path) => drop(policy_file::read(path, Some(setting.factory()?.spec()))?),
+            Source::File(path) => drop(policy_file::read(path, part_of(setting.factory()?.spec(), 0).as_ref())?),
             _ if !args.task.given.is_empty() => drop(setting.factory()?),
             _ => {}
         }
@@ -176,7 +178,21 @@ impl Show {
             Source::Trainer | Source::Nothing => None,
         };
         let noted = noted.filter(|noted| noted.agent == named.agent).unwrap_or(named);
-        Ok(if self.chosen.agent == noted.agent { noted.overlaid(&self.chosen) } else { noted })
+        let chosen = Some(&self.chosen).filter(|chosen| chosen.agent == noted.agent);
+        let setting = chosen.map_or_else(|| noted.clone(), |chosen| noted.clone().overlaid(chosen));
+        Ok(match self.mode {
+            Mode::Course => self.course.applied(setting, chosen),
+            _ => setting,
+        })
+    }
+
+    /// What the characters stand on.
+    pub fn stands_on(&self) -> Ground {
+        match self.mode {
+            Mode::Course if course::has_own(&self.agent) => Ground::Level,
+            Mode::Course => Ground::Track,
+            _ => self.ground,
+        }
     }
 
     /// Lets something else move the characters: a file in its own task, anything else in the present one.
@@ -214,12 +230,6 @@ pub fn exists(path: &Path) -> Result<(), GameError> {
     Err(GameError::Missing { path: path.into(), nearest })
 }
 
-/// The policy that comes with an agent.
-pub fn shipped(agent: &str) -> Option<Net> {
-    let policies = SHIPPED.iter().filter_map(|bytes| Net::from_bytes(Path::new("built in"), bytes).ok());
-    policies.into_iter().find(|p| p.meta().agent == agent)
-}
-
 /// What files about an agent are called: its name without the version.
 pub fn file_stem(agent: &str) -> String {
     agent.split("-v").next().unwrap_or(agent).to_lowercase()
@@ -235,15 +245,6 @@ pub fn free_name(stem: &str, extension: &str) -> PathBuf {
         }
         number += 1;
     }
-}
-
-/// Agents that a policy comes with, in the order in which a key goes through them.
-pub fn shipped_agents() -> Vec<String> {
-    SHIPPED
-        .iter()
-        .filter_map(|b| Net::from_bytes(Path::new("built in"), b).ok())
-        .map(|p| p.meta().agent.clone())
-        .collect()
 }
 
 /// Where character `i` stands: in rows, or side by side on tracks that are not level.
@@ -284,11 +285,15 @@ pub fn set_stage(
         None => show
             .setting()
             .and_then(|setting| {
+                if show.mode == Mode::Course {
+                    course::check(&show.course, &setting)?;
+                }
                 script.setting = setting;
                 body(&script.setting)
             })
             .map_err(|e| e.spelled(&Flags("marathon"))),
     };
+    script.ground = show.stands_on();
     let model = match model {
         Ok(model) => Arc::new(model),
         Err(error) => return notes.error(error),
@@ -296,15 +301,38 @@ pub fn set_stage(
     let ragdoll = if testbed {
         Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() }))
     } else {
-        Ragdoll::agent(&show.agent).on(show.ground).with_setting(script.setting.clone())
+        Ragdoll::agent(&show.agent).on(script.ground).with_setting(script.setting.clone())
     };
     match read_policy(&show, &script.setting) {
-        Ok(Some(policy)) => script.policy = Some(policies.add(policy)),
+        Ok(Some((policy, name))) => {
+            script.policy = Some(policies.add(policy));
+            script.names[0] = Some(name);
+        }
         Ok(None) if show.mode == Mode::Imitate && show.source == Source::Shipped => {
             notes.say(format!("no policy comes with {}: its servos alone follow the clip; learn live (L)", show.agent));
         }
         Ok(None) => {}
         Err(text) => notes.error(text),
+    }
+    let mut opponent = None;
+    match read_opponent(&show, &script.setting) {
+        Ok(Some((policy, name))) => {
+            opponent = Some(policies.add(policy));
+            script.names[1] = Some(name);
+        }
+        Ok(None) => {}
+        Err(text) => notes.error(text),
+    }
+    let (mut laid, mut command, mut held) = (None, None, None);
+    if show.mode == Mode::Course {
+        match script
+            .setting
+            .factory()
+            .and_then(|factory| show.course.equipment(show.seed, script.ground, factory.spec()))
+        {
+            Ok(equipment) => (laid, command, held) = (equipment.laid, equipment.command, equipment.held),
+            Err(error) => return notes.error(error.spelled(&Flags("marathon"))),
+        }
     }
     if let Source::File(path) = &show.source {
         script.written = written(path);
@@ -315,13 +343,14 @@ pub fn set_stage(
     }
     let scene = Scene::new(&model);
     let (spacing, radius) = (scene.spacing() as f32, scene.radius() as f32);
-    let level = show.ground == Ground::Level && model.hfields.is_empty();
+    let level = script.ground == Ground::Level && model.hfields.is_empty();
     let after_fall = if show.mode == Mode::Learn { 0.0 } else { LIE };
     for i in 0..if testbed { 1 } else { show.agents } {
         let mut actor = commands.spawn((
             Actor(i),
             ragdoll.clone().with_seed(show.seed, i as u64),
-            Restart { after_fall, on_time_up: true },
+            // a referee ends runs of tasks that know nothing of courses
+            Restart { after_fall, on_time_up: script.ground != Ground::Track },
             Transform::from_translation(place(i, spacing, level)),
             Marks::default(),
         ));
@@ -331,10 +360,26 @@ pub fn set_stage(
         if let Some(policy) = &script.policy {
             actor.insert(Policy(policy.clone()));
         }
+        if let Some(opponent) = &opponent {
+            actor.insert(Opponent(opponent.clone()));
+        }
+        if let Some(laid) = &laid {
+            actor.insert(LaidGround::clone(laid));
+        }
+        if let Some(command) = &command {
+            actor.insert(AgentCommand::clone(command));
+        }
+        if let Some(held) = &held {
+            actor.insert(Held::clone(held));
+        }
     }
     for mut camera in &mut cameras {
         let crowd = (show.agents.min(ROW) as f32 - 1.0) * spacing * 0.28;
         camera.goal[2] = 3.1 * radius + crowd + 0.6;
+        camera.ahead = 0.0;
+        if show.mode == Mode::Course {
+            (camera.ahead, camera.goal[2]) = show.course.view(camera.goal[2]);
+        }
         camera.goal[1] = if show.agents > 1 { 0.32 } else { 0.16 };
         camera.jump();
     }
@@ -345,27 +390,6 @@ pub fn set_stage(
 /// The body of a task.
 fn body(setting: &Setting) -> Result<Model, RunError> {
     setting.with_clips(|| Ok(registry::agent(&setting.agent)?.with_options(&setting.options)?.model()?))
-}
-
-/// The policy of a show; the text of an error names the remedy.
-fn read_policy(show: &Show, setting: &Setting) -> Result<Option<PolicyAsset>, String> {
-    match &show.source {
-        Source::Nothing | Source::Trainer => Ok(None),
-        Source::File(path) => {
-            let policy = setting.factory().and_then(|factory| policy_file::read(path, Some(factory.spec())));
-            Ok(Some(policy.map_err(|e| e.to_string())?.into()))
-        }
-        Source::Shipped if show.mode == Mode::Testbed => Ok(None),
-        // its servos alone follow the clip for a while
-        Source::Shipped if show.mode == Mode::Imitate => Ok(shipped(&show.agent).map(PolicyAsset::from)),
-        Source::Shipped => match shipped(&show.agent) {
-            Some(policy) => Ok(Some(policy.into())),
-            None => {
-                let name = &show.agent;
-                Err(format!("no policy comes with {name}; `marathon train {name}` makes one, or learn live (menu)"))
-            }
-        },
-    }
 }
 
 fn written(path: &Path) -> Option<SystemTime> {
@@ -397,7 +421,8 @@ pub fn reload(
         return;
     }
     match read_policy(&show, &script.setting) {
-        Ok(Some(policy)) => {
+        Ok(Some((policy, name))) => {
+            script.names[0] = Some(name);
             let steps = policy.0.meta().training.as_ref().map(|t| t.steps);
             if let Some(handle) = &script.policy {
                 let _ = policies.insert(handle.id(), policy);

@@ -2,8 +2,10 @@
 //!
 //! What a device says goes through its [mapping](Mapping): dead zone, curve, smoothing.
 
+use crate::app::args::Mode;
+use crate::app::course::Part;
 use crate::app::keys::{Deed, Do};
-use crate::app::show::{Actor, Focus};
+use crate::app::show::{Actor, Focus, Show};
 use crate::ragdoll::{AgentCommand, Anatomy};
 use crate::simulate::RagdollState;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
@@ -112,21 +114,24 @@ pub fn steer(
     pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
     mut deeds: MessageReader<Do>,
-    focus: Res<Focus>,
+    (show, focus): (Res<Show>, Res<Focus>),
     mut steering: ResMut<Steering>,
     mappings: Res<Mappings>,
     time: Res<Time<Real>>,
     mut said: Local<Said>,
     actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>), With<RagdollState>>,
 ) {
-    let released = deeds.read().filter(|deed| deed.0 == Deed::Release).count() > 0;
+    let on_course = show.mode == Mode::Course;
+    // on a course, who runs is one and the same to the end
+    let released = deeds.read().filter(|deed| deed.0 == Deed::Release).count() > 0 && !on_course;
+    let spectator = on_course && show.course.part != Part::Run;
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
     said.hear(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
     let (mut on, count) = (false, actors.iter().count());
     for (entity, actor, anatomy, command) in &actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
-        let led = player < said.players() && !ranges.is_empty();
+        let led = (player < said.players() || on_course) && !ranges.is_empty() && !spectator;
         let deflection = said.of(player);
         on |= led && player == 0;
         if !led || released {

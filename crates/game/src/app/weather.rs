@@ -167,6 +167,11 @@ fn push_of(model: &Model, speed: f32) -> f32 {
     (mass / PUSH_SECONDS) as f32 * speed
 }
 
+/// Whether one may meddle: on a course, runs are compared.
+fn meddles(show: &Show) -> bool {
+    show.mode != Mode::Course
+}
+
 /// A click pushes what is under it, away from the camera.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 fn click(
@@ -181,7 +186,10 @@ fn click(
     mut pushes: MessageWriter<Push>,
 ) {
     let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
-    if matches!(show.mode, Mode::Replay | Mode::Outside) || over_ui || !buttons.just_pressed(MouseButton::Left) {
+    if matches!(show.mode, Mode::Replay | Mode::Outside | Mode::Course)
+        || over_ui
+        || !buttons.just_pressed(MouseButton::Left)
+    {
         return;
     }
     let Some(cursor) = window.iter().next().and_then(Window::cursor_position) else { return };
@@ -200,13 +208,13 @@ fn click(
 /// A key pushes the root of the character in focus: forwards and backwards by turns.
 fn push_focus(
     mut deeds: MessageReader<Do>,
-    focus: Res<Focus>,
+    (show, focus): (Res<Show>, Res<Focus>),
     weather: Res<Weather>,
     actors: Query<(Entity, &Actor, &Anatomy, &Transform)>,
     mut pushes: MessageWriter<Push>,
     mut forwards: Local<bool>,
 ) {
-    for _ in deeds.read().filter(|d| d.0 == Deed::Push) {
+    for _ in deeds.read().filter(|d| d.0 == Deed::Push && meddles(&show)) {
         let Some((ragdoll, _, anatomy, track)) = actors.iter().find(|(_, a, ..)| a.0 == focus.0) else { continue };
         let body = anatomy.model.joints.first().map_or(1, |j| j.body);
         *forwards = !*forwards;
@@ -226,11 +234,11 @@ fn throw(
     camera: Query<(&FollowCamera, &Transform)>,
     actors: Query<(&Actor, &Anatomy, &RagdollState, &Transform, &Episode), Without<FollowCamera>>,
     (marathon, time): (Res<Marathon>, Res<Time<Fixed>>),
-    focus: Res<Focus>,
+    (show, focus): (Res<Show>, Res<Focus>),
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
 ) {
-    for _ in deeds.read().filter(|d| d.0 == Deed::Throw) {
+    for _ in deeds.read().filter(|d| d.0 == Deed::Throw && meddles(&show)) {
         let Some((camera, at)) = camera.iter().next() else { continue };
         let runner = actors.iter().find(|(actor, ..)| actor.0 == focus.0);
         // where it will be: the camera's focus lags behind, and so do global transforms, by a frame

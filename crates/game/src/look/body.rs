@@ -5,6 +5,7 @@ use crate::look::{TINTS, ground};
 use crate::ragdoll::{Anatomy, OwnGround, Part, Ragdoll};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
+use bevy::light::NotShadowCaster;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
@@ -20,6 +21,8 @@ const FIRST_HIDDEN_GROUP: i32 = 3;
 const METAL: [f32; 3] = [0.20, 0.21, 0.24];
 /// Rubber of the feet, sRGB.
 const RUBBER: [f32; 3] = [0.11, 0.12, 0.14];
+/// Height of the sides of a height field, m.
+const SIDE: f32 = 0.5;
 /// Things that belong to the world, sRGB.
 const WORLD: [f32; 3] = [0.62, 0.60, 0.56];
 
@@ -112,8 +115,8 @@ fn dress(
             let looks = (Mesh3d(mesh), MeshMaterial3d(material), place, name);
             let mut shape = commands.spawn((looks, shape, ChildOf(anatomy.parts[geom.body])));
             if geom.kind == GeomType::Hfield {
-                // its bounds change with each course
-                shape.insert(NoFrustumCulling);
+                // its bounds change with each course; the floor is far below a track, and no place for its shadow
+                shape.insert((NoFrustumCulling, NotShadowCaster));
             }
             if model.bodies[geom.body].weld_id != 0 {
                 shape.insert(BodyMesh(ragdoll));
@@ -311,6 +314,23 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
             let n = columns as u32;
             let (a, b) = ((r - 1) * n + c - 1, r * n + c - 1);
             triangles.extend([a, a + 1, b + 1, a, b + 1, b]);
+        }
+    }
+    let (mut positions, mut checker) = (positions, checker);
+    // its sides, seen from outside: without them, nobody sees where a narrow track is high
+    for (row, seen_from_front) in [(0, true), (rows.saturating_sub(1), false)] {
+        let first = positions.len() as u32;
+        for column in 0..columns {
+            let at = row * columns + column;
+            for depth in [0.0, SIDE] {
+                positions.push(positions[at] - Vec3::Y * depth);
+                checker.push(checker[at] + Vec2::Y * (depth / ground::PERIOD));
+            }
+        }
+        for column in 1..columns as u32 {
+            let [a, b] = [first + 2 * (column - 1), first + 2 * column];
+            let side = if seen_from_front { [a, a + 1, b + 1, a, b + 1, b] } else { [a, b + 1, a + 1, a, b, b + 1] };
+            triangles.extend(side);
         }
     }
     // flat shading: the edge of a step must be seen

@@ -92,6 +92,8 @@ pub struct FollowCamera {
     pub distance: f32,
     /// What it looks at, m.
     pub focus: Vec3,
+    /// How far ahead of whom it follows that is, m.
+    pub ahead: f32,
     /// The angles and the distance it is on the way to.
     pub goal: [f32; 3],
     /// It has arrived somewhere before; the first time it jumps.
@@ -107,6 +109,7 @@ impl Default for FollowCamera {
             pitch: 0.2,
             distance: 5.0,
             focus: Vec3::Y,
+            ahead: 0.0,
             goal: [-0.42, 0.2, 5.0],
             settled: false,
         }
@@ -182,7 +185,7 @@ fn follow(
             if let Some(part) = anatomy.parts.get(root).and_then(|p| parts.get(*p).ok()) {
                 // what eases after a runner stays behind by its speed times the easing
                 let ahead = episode.map_or(0.0, |e| (e.speed * pace).clamp(-FASTEST, FASTEST) * EASE[0]);
-                let to = track.transform_point(part.translation) + track.rotation * (Vec3::X * ahead);
+                let to = track.transform_point(part.translation) + track.rotation * (Vec3::X * (ahead + camera.ahead));
                 let jump = !camera.settled || camera.focus.distance(to) > 12.0;
                 let [side, up] = if jump { [1.0; 2] } else { EASE.map(ease) };
                 let focus = camera.focus;
