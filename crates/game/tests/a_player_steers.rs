@@ -169,7 +169,7 @@ fn the_example_drives_as_the_stick_says() {
 fn stick_and_arrow_keys_steer_the_character_in_focus() {
     let mut app = game(&["--agents", "2"]);
     let pad = pad(&mut app);
-    assert_eq!(*app.world().resource::<Steering>(), Steering(true));
+    assert_eq!(*app.world().resource::<Steering>(), Steering { on: true, buttons: false });
     let own = commands(&mut app);
     assert!(own.iter().all(|(x, mine)| x.abs() <= 2.0 && !mine) && own[0] != own[1], "{own:?}");
     // beyond the dead zone of 0.12 it begins at 0, and its end is the range's
@@ -299,7 +299,7 @@ fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
     show.agent = "Hopper-v0".into();
     show.again();
     frames(&mut app, 5);
-    assert_eq!(*app.world().resource::<Steering>(), Steering(false));
+    assert_eq!(*app.world().resource::<Steering>(), Steering::default());
     key(&mut app, KeyCode::ArrowUp, ButtonState::Pressed);
     frames(&mut app, 2);
     assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 2.0);

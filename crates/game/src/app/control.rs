@@ -134,7 +134,7 @@ pub fn look(
         let axis = |axis| pad.get(axis).filter(|x: &f32| x.abs() > 0.12).unwrap_or(0.0);
         yaw -= axis(GamepadAxis::RightStickX) * TURN[1] * time.delta_secs();
         pitch += axis(GamepadAxis::RightStickY) * TURN[1] * time.delta_secs();
-        if !steering.0 {
+        if !steering.on {
             zoom *= (-axis(GamepadAxis::LeftStickY) * time.delta_secs()).exp();
         }
     }

@@ -389,7 +389,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steeri
                     false => "wheel: closer",
                 };
                 ui.label(text(12.0, FAINT, format!("right mouse button or right stick: turn the camera   {wheel}")));
-                if steering.0 {
+                if steering.on {
                     ui.label(text(
                         12.0,
                         FAINT,
@@ -426,7 +426,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steeri
             ui,
             |ui| {
                 ui.horizontal(|ui| {
-                    if steering.0 {
+                    if steering.on {
                         ui.label(text(12.0, ACCENT, "arrows").strong());
                         ui.label(text(12.0, TEXT, "steer"));
                         ui.add_space(4.0);
@@ -438,7 +438,7 @@ fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steeri
                     }
                     let shown = |deed: Deed| match deed {
                         Deed::Help => true,
-                        Deed::Release => steering.0 && mode != Mode::Course,
+                        Deed::Release => steering.on && mode != Mode::Course,
                         _ => useful.contains(&deed),
                     };
                     for (deed, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {

@@ -1,6 +1,6 @@
 //! Keys and buttons: what they do, what they are called, and how they are changed and kept.
 
-use crate::app::steer::{KEYS as STEERING_KEYS, Steering};
+use crate::app::steer::{BUTTON_KEYS, BUTTONS, KEYS as STEERING_KEYS, Steering};
 use bevy::input::gamepad::{Gamepad, GamepadButton};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
@@ -296,11 +296,12 @@ pub(super) fn read(
 ) {
     // a text field has the keyboard, or the next key is to be bound
     let typing = wants.is_some_and(|w| w.wants_keyboard_input()) || rebinding.0.is_some();
-    let steering = steering.is_some_and(|s| s.0);
+    let Steering { on, buttons } = steering.map_or_else(Steering::default, |steering| *steering);
     for (deed, _, key, button) in &bindings.rows {
-        let taken = typing || steering && STEERING_KEYS.contains(key);
+        let taken = typing || on && STEERING_KEYS.contains(key) || buttons && BUTTON_KEYS.contains(key);
         let key = !taken && keys.just_pressed(*key);
-        let button = button.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
+        let own = button.filter(|button| !(buttons && BUTTONS.contains(button)));
+        let button = own.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
         if key || button {
             deeds.write(Do(*deed));
         }

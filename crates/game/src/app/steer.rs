@@ -18,8 +18,17 @@ use marathon_envs::CommandRange;
 pub(super) const KEYS: [KeyCode; 6] =
     [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::KeyA, KeyCode::KeyD];
 
-/// How far ahead, to the left, and aside to the left somebody pushes, in [-1, 1].
-type Deflection = [f32; 3];
+/// Keys and buttons of whoever turns and can do more than go, such as jump: for the first such number of the command, and for
+/// the second; they do nothing else meanwhile.
+pub(super) const BUTTON_KEYS: [KeyCode; 2] = [KeyCode::KeyW, KeyCode::KeyV];
+pub(super) const BUTTONS: [GamepadButton; 2] = [GamepadButton::South, GamepadButton::East];
+
+/// How far ahead, to the left, and aside to the left somebody pushes, in [-1, 1], and two buttons, 0 or 1.
+type Deflection = [f32; 5];
+/// Numbers of a deflection that are those of sticks and triggers.
+const STICKS: usize = 3;
+/// Nobody touches anything.
+const REST: Deflection = [0.0; 5];
 
 /// What becomes of a device's deflections.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,12 +85,12 @@ impl Said {
     /// Takes in what is said now.
     fn hear(&mut self, pads: &Query<(Entity, &Gamepad)>, keys: Deflection, mappings: &Mappings, dt: f32) {
         let hear = |said: &mut Deflection, now: Deflection, mapping: &Mapping| {
-            *said = [0, 1, 2].map(|i| mapping.smooth(said[i], now[i], dt));
+            *said = [0, 1, 2, 3, 4].map(|i| if i < STICKS { mapping.smooth(said[i], now[i], dt) } else { now[i] });
         };
         self.pads.retain(|(pad, _)| pads.contains(*pad));
         for (entity, pad) in pads {
             let at = self.pads.iter().position(|(known, _)| *known == entity).unwrap_or_else(|| {
-                self.pads.push((entity, [0.0; 3]));
+                self.pads.push((entity, REST));
                 self.pads.len() - 1
             });
             hear(&mut self.pads[at].1, of_pad(pad, &mappings.pad), &mappings.pad);
@@ -96,14 +105,19 @@ impl Said {
 
     /// What a player says: the first one by keyboard and gamepad, whichever is pushed farther, each other by a gamepad.
     fn of(&self, player: usize) -> Deflection {
-        let pad = self.pads.get(player).map_or([0.0; 3], |(_, said)| *said);
-        if player > 0 { pad } else { [0, 1, 2].map(|i| farthest(pad[i], self.keys[i])) }
+        let pad = self.pads.get(player).map_or(REST, |(_, said)| *said);
+        if player > 0 { pad } else { [0, 1, 2, 3, 4].map(|i| farthest(pad[i], self.keys[i])) }
     }
 }
 
-/// Whether the character in focus takes commands: the left stick and the arrow keys are its own then.
+/// What of the devices is the character's in focus.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Steering(pub bool);
+pub struct Steering {
+    /// It takes commands: the left stick and the arrow keys.
+    pub on: bool,
+    /// It takes such as jump: the keys and buttons for that.
+    pub buttons: bool,
+}
 
 /// Tells the character in focus what the first gamepad and the keys say, and those behind it what the other gamepads say. Once a
 /// character has been told something, it stays under command until [`Deed::Release`], or until it is nobody's.
@@ -127,25 +141,27 @@ pub fn steer(
     let spectator = on_course && show.course.part != Part::Run;
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
     said.hear(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
-    let (mut on, count) = (false, actors.iter().count());
+    let (mut own, count) = (Steering::default(), actors.iter().count());
     for (entity, actor, anatomy, command) in &actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
         let led = (player < said.players() || on_course) && !ranges.is_empty() && !spectator;
         let deflection = said.of(player);
-        on |= led && player == 0;
+        if led && player == 0 {
+            own = Steering { on: true, buttons: buttons(ranges).next().is_some() };
+        }
         if !led || released {
             if command.is_some() {
                 commands.entity(entity).remove::<AgentCommand>();
             }
-        } else if command.is_some() || deflection != [0.0; 3] {
+        } else if command.is_some() || deflection != REST {
             let wanted = AgentCommand(Some(told(ranges, deflection)));
             if command != Some(&wanted) {
                 commands.entity(entity).insert(wanted);
             }
         }
     }
-    steering.set_if_neq(Steering(on));
+    steering.set_if_neq(own);
 }
 
 /// What is farther from 0.
@@ -158,14 +174,22 @@ fn of_pad(pad: &Gamepad, mapping: &Mapping) -> Deflection {
     let axis = |axis| mapping.map(pad.get(axis).unwrap_or(0.0));
     let trigger = |button| mapping.map(pad.get(button).unwrap_or(0.0));
     let [left, right] = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(trigger);
-    [axis(GamepadAxis::LeftStickY), -axis(GamepadAxis::LeftStickX), left - right]
+    let [first, second] = BUTTONS.map(|button| f32::from(pad.pressed(button)));
+    [axis(GamepadAxis::LeftStickY), -axis(GamepadAxis::LeftStickX), left - right, first, second]
 }
 
 /// How far the keyboard is.
 fn of_keys(keys: Option<&ButtonInput<KeyCode>>) -> Deflection {
     let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
     let [up, down, left, right, aside_left, aside_right] = KEYS.map(pressed);
-    [up - down, left - right, aside_left - aside_right]
+    let [first, second] = BUTTON_KEYS.map(pressed);
+    [up - down, left - right, aside_left - aside_right, first, second]
+}
+
+/// Where a command has what a button says, of whoever turns.
+fn buttons(ranges: &[CommandRange]) -> impl Iterator<Item = usize> {
+    let turns = ranges.iter().any(CommandRange::is_turn);
+    ranges.iter().enumerate().filter(move |(_, range)| turns && range.is_button()).map(|(i, _)| i)
 }
 
 /// The command of a deflection, ahead, to the left, and aside. A released stick means rest, the ends of a stick those of the range.
@@ -174,9 +198,10 @@ fn of_keys(keys: Option<&ButtonInput<KeyCode>>) -> Deflection {
 /// * For whoever does not turn, such as a figure in a plane, right and left are the speed. Up is the button, if the command has
 ///   one: a number from 0 to 1 without a unit. Otherwise up and down are the speed, too.
 /// * Where no number is in m/s, up and down are the first number, left and right the second.
-/// * The second number in m/s of whoever turns is a step aside: the triggers, or A and D.
+/// * The second number in m/s of whoever turns is a step aside: the triggers, or A and D. Its first two buttons, such as a jump,
+///   are A and B of a gamepad, or W and V.
 fn told(ranges: &[CommandRange], deflection: Deflection) -> Vec<f64> {
-    let [ahead, left, aside] = deflection.map(f64::from);
+    let [ahead, left, aside, pressed @ ..] = deflection.map(f64::from);
     let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
     let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
     let mut pushed = vec![0.0; ranges.len()];
@@ -191,6 +216,7 @@ fn told(ranges: &[CommandRange], deflection: Deflection) -> Vec<f64> {
             if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
                 pushed[speed + 1 + second] = aside;
             }
+            buttons(ranges).zip(pressed).for_each(|(i, x)| pushed[i] = x);
         }
         _ => pushed.iter_mut().zip([ahead, left]).for_each(|(number, x)| *number = x),
     }
@@ -213,17 +239,17 @@ mod tests {
             CommandRange::new("height", 0.5..=1.0, "m"),
         ];
         for (deflection, expected) in [
-            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
-            ([1.0, -1.0, 0.0], [3.0, -2.0, 0.5]),
-            ([-1.0, 1.0, 0.0], [-1.0, 2.0, 0.5]),
-            ([0.5, 0.25, 1.0], [1.5, 0.5, 0.5]),
-            ([-0.5, 0.0, 0.0], [-0.5, 0.0, 0.5]),
+            ([0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
+            ([1.0, -1.0, 0.0, 0.0, 0.0], [3.0, -2.0, 0.5]),
+            ([-1.0, 1.0, 0.0, 0.0, 0.0], [-1.0, 2.0, 0.5]),
+            ([0.5, 0.25, 1.0, 0.0, 0.0], [1.5, 0.5, 0.5]),
+            ([-0.5, 0.0, 0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]),
         ] {
             assert_eq!(told(&ranges, deflection), expected);
         }
         // a range without zero rests at its nearer end
-        assert_eq!(told(&ranges[2..], [-1.0, 0.0, 0.0]), [0.5]);
-        assert_eq!(told(&ranges[2..], [1.0, 0.0, 0.0]), [1.0]);
+        assert_eq!(told(&ranges[2..], [-1.0, 0.0, 0.0, 0.0, 0.0]), [0.5]);
+        assert_eq!(told(&ranges[2..], [1.0, 0.0, 0.0, 0.0, 0.0]), [1.0]);
     }
 
     #[test]
@@ -239,13 +265,13 @@ mod tests {
             ([-1.0, 0.0], [0.0, 0.0]),
         ] {
             let [ahead, left] = deflection;
-            let deflection = [ahead, left, 0.0];
+            let deflection = [ahead, left, 0.0, 0.0, 0.0];
             assert_eq!(told(&[velocity.clone(), jump.clone()], deflection), expected, "{deflection:?}");
         }
         for (deflection, expected) in [([1.0, 0.0], 4.0), ([0.0, -1.0], 4.0), ([-0.5, 0.25], -2.0), ([0.25, 0.5], -2.0)]
         {
             let [ahead, left] = deflection;
-            let deflection = [ahead, left, 0.0];
+            let deflection = [ahead, left, 0.0, 0.0, 0.0];
             assert_eq!(told(std::slice::from_ref(&velocity), deflection), [expected], "{deflection:?}");
         }
     }
@@ -258,12 +284,23 @@ mod tests {
             CommandRange::new("turn", -1.5..=1.5, "rad/s"),
         ];
         for (deflection, expected) in [
-            ([0.5, -1.0, 0.0], [1.5, 0.0, -1.5]),
-            ([0.0, 0.0, 1.0], [0.0, 2.0, 0.0]),
-            ([0.0, 0.0, -0.5], [0.0, -1.0, 0.0]),
+            ([0.5, -1.0, 0.0, 0.0, 0.0], [1.5, 0.0, -1.5]),
+            ([0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            ([0.0, 0.0, -0.5, 0.0, 0.0], [0.0, -1.0, 0.0]),
         ] {
             assert_eq!(told(&ranges, deflection), expected, "{deflection:?}");
         }
+    }
+
+    #[test]
+    fn who_turns_may_jump() {
+        let button = |name| CommandRange::new(name, 0.0..=1.0, "");
+        let mut ranges =
+            vec![CommandRange::new("speed", 0.0..=3.0, "m/s"), CommandRange::new("turn", -1.5..=1.5, "rad/s")];
+        ranges.extend(["jump", "backflip", "sing"].map(button));
+        assert_eq!(told(&ranges, [1.0, 0.0, 0.0, 1.0, 0.0]), [3.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(told(&ranges, [0.0, 0.0, 0.0, 0.0, 1.0]), [0.0, 0.0, 0.0, 1.0, 0.0]);
+        assert_eq!((buttons(&ranges).count(), buttons(&ranges[..2]).count(), buttons(&ranges[2..]).count()), (3, 0, 0));
     }
 
     #[test]
