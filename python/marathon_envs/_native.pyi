@@ -375,6 +375,7 @@ def train(
     resume: str | PathLike[str] | None = None,
     players: Any = None,
     options: dict[str, Any] | None = None,
+    initialize_from: str | PathLike[str] | None = None,
 ) -> TrainResult:
     """Train a policy with the native trainer, without the GIL, and evaluate it.
 
@@ -395,6 +396,8 @@ def train(
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
         options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``.
+        initialize_from: a policy to start from in place of random weights, a file or the folder of a run, whose hidden
+            layers are no wider; it may observe less.
     """
 
 @final

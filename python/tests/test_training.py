@@ -234,3 +234,14 @@ def test_evaluation_agrees_with_playing_by_hand() -> None:
 
 def test_the_command_comes_with_the_package(tmp_path: Path) -> None:
     assert "Hopper-v0" in command(tmp_path, "list") and "marathon 0" in command(tmp_path, "--version")
+
+
+def test_a_run_may_start_from_a_policy(tmp_path: Path) -> None:
+    """It acts as the policy did at first: a run that has only filled its statistics is no different yet."""
+    first = train("hopper", steps=200_000, seed=1, threads=1, out=tmp_path / "first")
+    again = train("hopper", steps=8_192, seed=2, threads=1, initialize_from=tmp_path / "first")
+    fresh = train("hopper", steps=8_192, seed=2, threads=1)
+    assert again.eval["return_mean"] > 2 * fresh.eval["return_mean"]
+    assert again.eval["return_mean"] > 0.3 * first.eval["return_mean"]
+    with pytest.raises(ValueError, match="initialize_from belongs to a new run"):
+        train(resume=tmp_path / "first", initialize_from=tmp_path / "first")

@@ -79,14 +79,15 @@ impl TrainResult {
 /// holds; if it returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes;
 /// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
 /// for a class alone. `options`: arguments of a task with a name.
-/// `players`: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
+/// `initialize_from`: a policy to start from in place of random weights, a file or the folder of a run, whose hidden layers are
+/// no wider; it may observe less. `players`: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 #[pyfunction]
 #[pyo3(signature = (
     task = None, config = None, *, callback = None, seed = None, steps = None, agents = None, threads = None, out = None,
-    resume = None, players = None, options = None
+    resume = None, players = None, options = None, initialize_from = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
@@ -102,6 +103,7 @@ pub fn train(
     resume: Option<PathBuf>,
     players: Option<Py<PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
+    initialize_from: Option<PathBuf>,
 ) -> PyResult<TrainResult> {
     let of_task = match &task {
         Some(Task::Name(name)) => arguments::read(task::plain(name), options)?,
@@ -114,6 +116,7 @@ pub fn train(
         processes: 0,
         out,
         resume,
+        initialize_from,
     };
     let mut made = Made::default();
     let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), &mut made)).transpose()?;

@@ -38,7 +38,7 @@ pub struct Flags<'a>(pub &'a str);
 
 impl Spelling for Flags<'_> {
     fn option(&self, name: &str) -> String {
-        format!("--{name}")
+        format!("--{}", name.replace('_', "-"))
     }
     fn with_value(&self, name: &str, value: &str) -> String {
         format!("--{name} {value}")

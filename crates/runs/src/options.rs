@@ -93,7 +93,7 @@ impl RunOptions {
             ("seed", self.learn.seed.is_some()),
             ("agents", self.agents.is_some()),
             ("option", !self.task.given.is_empty()),
-            ("initialize-from", self.initialize_from.is_some()),
+            ("initialize_from", self.initialize_from.is_some()),
             ("out", self.out.is_some()),
         ];
         match of_new_runs.into_iter().find(|(_, given)| *given && self.resume.is_some()) {

@@ -27,7 +27,7 @@ fn options_that_do_not_go_together_are_refused_by_their_names() {
         (new(|o| o.learn.algo = Some("sac".into())), "algo"),
         (new(|o| o.learn.seed = Some(1)), "seed"),
         (new(|o| o.agents = Some(16)), "agents"),
-        (new(|o| o.initialize_from = Some("b".into())), "initialize-from"),
+        (new(|o| o.initialize_from = Some("b".into())), "initialize_from"),
         (new(|o| o.out = Some("b".into())), "out"),
     ] {
         assert_eq!(text, format!("{name} belongs to a new run, not to one that resume goes on with"));

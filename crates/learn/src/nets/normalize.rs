@@ -51,7 +51,7 @@ impl Moments {
     }
 
     /// Takes the statistics of another map of observations over, whose number `i` is number `sees[i]` here. They count as
-    /// [`ASSUMED`] samples.
+    /// 100,000 samples.
     pub fn assume(&mut self, known: &Normalizer, sees: &[usize]) {
         for (place, (mean, std)) in sees.iter().zip(known.mean().iter().zip(known.std())) {
             (self.mean[*place], self.var[*place]) = (f64::from(*mean), f64::from(*std) * f64::from(*std));

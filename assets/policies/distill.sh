@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# Makes the policies of this folder that are learned from others: MarathonMan (one for thirteen clips) and
+# MarathonManController. What they are learned from is trained before, but for the policies that are here; about two hours of
+# processor time in all.
+#
+#     assets/policies/distill.sh [MarathonMan] [MarathonManController]
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+wanted=("$@")
+if [ $# = 0 ]; then
+  wanted=(MarathonMan MarathonManController)
+fi
+cargo build --release
+marathon="${CARGO_TARGET_DIR:-target}/release/marathon"
+shipped=assets/policies
+runs=$(mktemp -d)
+trap 'rm -rf "$runs"' EXIT
+
+# A policy of one clip, trained if it is not here.
+teacher() {
+  if [ -f "$shipped/MarathonMan$1.safetensors" ]; then
+    echo "--teacher=$shipped/MarathonMan$1.safetensors"
+    return
+  fi
+  if [ ! -d "$runs/$1" ]; then
+    "$marathon" train "MarathonMan$1" "${@:2}" --seed 1 --threads 1 --out "$runs/$1" >&2
+  fi
+  echo "--teacher=$runs/$1"
+}
+
+for policy in "${wanted[@]}"; do
+  case "$policy" in
+    MarathonMan)
+      teachers=()
+      for clip in Walk WalkLeft WalkRight Run Backflip SpinKick Jump Kick Punch Crawl GetUpFaceDown GetUpFaceUp; do
+        teachers+=("$(teacher "$clip")")
+      done
+      # good enough after less than its usual 60 million
+      teachers+=("$(teacher Cartwheel --steps 23M)")
+      "$marathon" distill MarathonMan --option future=3 --option start=adaptive --hidden 256,256 --steps 30M --seed 1 \
+        "${teachers[@]}" --out "$shipped/MarathonMan.safetensors"
+      ;;
+    MarathonManController)
+      # who goes falls most easily, and so is shown twice
+      teachers=("$(teacher Steer)" "$(teacher Steer)")
+      for clip in Jump Backflip GetUpFaceDown GetUpFaceUp; do
+        teachers+=("$(teacher "$clip")")
+      done
+      "$marathon" distill MarathonManController --option commands=sharp --option start=adaptive --hidden 128,128 --steps 10M \
+        --seed 1 "${teachers[@]}" --out "$runs/start.safetensors"
+      "$marathon" train MarathonManController --initialize-from "$runs/start.safetensors" --seed 1 --threads 1 --out "$runs/run"
+      cp "$runs/run/policy.safetensors" "$shipped/MarathonManController.safetensors"
+      ;;
+    *)
+      echo "no policy $policy is learned from others here: MarathonMan, MarathonManController" >&2
+      exit 2
+      ;;
+  esac
+done
