@@ -112,7 +112,7 @@ pub struct DistillArgs {
     pub agent: String,
     #[command(flatten)]
     pub task: TaskOptions,
-    /// Policy to learn from, a file or the folder of a run; may be repeated.
+    /// Policy to learn from, a file or the folder of a run; may be repeated. One that is named twice has twice the agents.
     #[arg(long = "teacher", value_name = "POLICY", required = true)]
     pub teachers: Vec<PathBuf>,
     /// File to write, .safetensors or .onnx.

@@ -47,9 +47,10 @@ const COMMON: [&str; 17] = [
 const ON_POLICY: [&str; 6] =
     ["final_entropy_coef", "action_clip", "init_log_std", "min_std", "final_min_std", "max_std"];
 /// Those of each algorithm's own settings.
-const PPO: [&str; 10] = [
+const PPO: [&str; 11] = [
     "minibatches",
     "value_lr",
+    "value_warmup",
     "target_kl",
     "final_target_kl",
     "lr_range",
@@ -238,6 +239,7 @@ impl From<'_, '_> {
             epochs: settings.num_epoch as usize,
             lr: settings.learning_rate,
             value_lr: self.positive("value_lr", settings.learning_rate)?,
+            value_warmup: marathon.count("value_warmup", 0..=1 << 31, base.value_warmup)?,
             schedule: self.schedule,
             target_kl: self.moving(target_kl, "final_target_kl", Range::Positive, None)?,
             lr_range: lr_range(marathon, base.lr_range)?,

@@ -104,7 +104,13 @@ pub fn distill(
         lessons_of.push(clips_of(&task, teacher)?);
     }
     // what the student is for: all that its teachers do
-    let all: Vec<&str> = lessons_of.iter().flatten().map(String::as_str).collect();
+    let mut all: Vec<&str> = Vec::new();
+    for clip in lessons_of.iter().flatten().flat_map(|clips| clips.split(',')) {
+        // a teacher may be named twice, so that it counts for more
+        if !all.contains(&clip) {
+            all.push(clip);
+        }
+    }
     let whole = if all.is_empty() { task.clone() } else { follow(&task, &all.join(","))? };
     let spec = whole.factory()?.spec().clone();
     let mut classes = Vec::new();

@@ -19,7 +19,7 @@ fn man(options: &[(&str, &str)]) -> Setting {
 /// Half a minute of processor time teaches a walk and a run to one network; each took minutes alone.
 #[test]
 fn one_policy_walks_and_runs() {
-    let teachers = [shipped("MarathonManWalk"), shipped("MarathonManRun")];
+    let teachers = [shipped("MarathonManWalk"), shipped("MarathonManRun"), shipped("MarathonManRun")];
     let options = DistillOptions { hidden: vec![96, 96], steps: 700_000, agents: 16, ..Default::default() };
     let mut rounds: Vec<Distilled> = Vec::new();
     let task = man(&[("future", "1"), ("start", "adaptive")]);

@@ -27,6 +27,10 @@ pub struct Ppo {
     pub lr: f64,
     /// Learning rate of the value function.
     pub value_lr: f64,
+    /// Rollouts at the start in which the value function learns alone: a policy that starts from another would forget what it
+    /// knows by the advantages of a value function that knows nothing.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub value_warmup: u64,
     /// How the policy's learning rate moves.
     pub schedule: Schedule,
     /// Divergence per update that the adaptive schedule aims at, nats. Small steps at the end settle a gait.
@@ -59,6 +63,7 @@ impl Default for Ppo {
             epochs: 4,
             lr: 1e-3,
             value_lr: 1e-3,
+            value_warmup: 0,
             schedule: Schedule::Adaptive,
             target_kl: Moving::still(0.015),
             lr_range: [1e-5, 3e-3],
@@ -117,6 +122,11 @@ impl Ppo {
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(n: &u64) -> bool {
+    *n == 0
+}
+
 /// PPO at work.
 #[derive(Clone)]
 pub struct PpoRule {
@@ -166,13 +176,15 @@ impl PpoRule {
 
         adam.advance();
         let part = if settings.schedule == Schedule::Linear { *lr / settings.lr } else { 1.0 };
-        let rates = nets.layout.rates(*lr, part * settings.value_lr);
+        // the first rollout only fills the statistics
+        let warms_up = progress.iteration <= settings.value_warmup && settings.value_warmup > 0;
+        let rates = nets.layout.rates(if warms_up { 0.0 } else { *lr }, part * settings.value_lr);
         workers.pieces(&mut |net, range, gradient| {
             adam.update(nets.isa, &mut nets.params, range, gradient, scale[net], rates[net]);
         });
         nets.bound_std(progress);
 
-        if settings.schedule == Schedule::Adaptive {
+        if settings.schedule == Schedule::Adaptive && !warms_up {
             let kl = sums.kl * mean;
             let target = progress.at(settings.target_kl);
             if kl > 2.0 * target {

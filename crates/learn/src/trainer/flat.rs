@@ -208,6 +208,7 @@ impl From<&FlatConfig> for TrainConfig {
                 epochs: flat.epochs,
                 lr,
                 value_lr,
+                value_warmup: 0,
                 schedule,
                 target_kl: moving(flat.target_kl, flat.final_target_kl),
                 lr_range: flat.lr_range,

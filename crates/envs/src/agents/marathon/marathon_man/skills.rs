@@ -1,7 +1,8 @@
 //! What Marathon Man does beside going: he jumps and turns over backward on a button, and gets up after a fall.
 //!
 //! A skill is a piece of a clip. It begins where he is and as he faces; its place follows him, since a jump from a run goes
-//! farther than the clip's. To get up he first lies as the clip does, for as long as he needs.
+//! farther than the clip's. To get up or to turn over, he first becomes as the clip is at its beginning, for as long as he needs, up
+//! to [`SETTLING`].
 
 use marathon_physics::lanes::Real;
 
@@ -21,10 +22,10 @@ pub struct Skill {
 }
 
 /// All of them. The jump leaves the ground 13 decisions after its beginning, 0.33 s, and is back on it after 31; the backflip
-/// after 22 and 40. Who lies earns less than who stands.
+/// after 28 and 46, and what he waits. Who lies earns less than who stands.
 pub const SKILLS: [Skill; 4] = [
     Skill { clip: "jump", rows: [18, 60], worth: 1.0 },
-    Skill { clip: "backflip", rows: [6, 66], worth: 1.0 },
+    Skill { clip: "backflip", rows: [0, 66], worth: 1.0 },
     Skill { clip: "getup_facedown", rows: [0, 1000], worth: 0.5 },
     Skill { clip: "getup_faceup", rows: [0, 1000], worth: 0.5 },
 ];
@@ -40,19 +41,19 @@ const FACE_UP: usize = 3;
 /// Slots of the memory that the skills have: which one, counted from 1, or 0; and for how many decisions it has lasted, or
 /// for how many there has been none.
 pub const SLOTS: usize = 2;
-/// Shortest that he takes to lie as the clip does, decisions.
-const SETTLING: f64 = 12.0;
-/// Mean distance of the parts from the clip's at which he gives an attempt to get up up, and begins again, m.
+/// Shortest and longest that he takes to be as the clip is at its beginning, decisions.
+const SETTLING: [f64; 2] = [12.0, 80.0];
+/// Mean distance of the parts from the clip's at which an attempt to get up has failed and he begins again, m.
 const LOST: f64 = 0.5;
 /// Decisions from one skill to the next.
 const PAUSE: f64 = 10.0;
 /// Fastest that he begins a backflip, m/s, and lowest that his butt is when he stands, m.
 const SLOW: f64 = 0.8;
 const UPRIGHT: f64 = 0.55;
-/// How nearly he lies as the clip does: cosine between the forward axes of the butt, and difference of its heights, m.
+/// How nearly he is as the clip is: cosine between the forward axes of the butt, and difference of its heights, m.
 const AS_THE_CLIP: [f64; 2] = [0.8, 0.12];
 /// Who takes so many decisions cannot get up.
-const STUCK: f64 = 240.0;
+const STUCK: f64 = 320.0;
 
 /// The skills' variables of an agent, `slot` being the first of them.
 #[derive(Clone, Copy, Debug)]
@@ -110,9 +111,11 @@ impl Skills {
         s.follow(memory);
         let down = self.is(memory, FACE_DOWN);
         let first = |i: usize| T::lit((s.clip_rows(CLIPS.len() + i).start + SKILLS[i].rows[0]) as f64);
-        let beginning = T::select(down, first(FACE_DOWN), first(FACE_UP));
-        let begins = T::and(rises, T::not(beginning.lt(before[Following::ROW])));
-        let ready = T::and(self.lies_as(s, &before), T::not(lasted.lt(T::lit(SETTLING))));
+        let flips = self.is(memory, BACKFLIP);
+        let beginning = T::select(flips, first(BACKFLIP), T::select(down, first(FACE_DOWN), first(FACE_UP)));
+        let begins = T::and(T::or(rises, flips), T::not(beginning.lt(before[Following::ROW])));
+        let [least, most] = SETTLING.map(T::lit);
+        let ready = T::or(T::and(self.is_as(s, &before), T::not(lasted.lt(least))), T::not(lasted.lt(most)));
         let waits = T::and(begins, T::not(ready));
         for (i, kept) in before.into_iter().enumerate() {
             memory[i] = T::select(T::or(waits, T::not(on)), kept, memory[i]);
@@ -138,12 +141,12 @@ impl Skills {
         let fallen = T::or(T::and(grounded, T::not(rises)), T::and(rises, failed));
         let free = T::and(T::and(T::not(on), T::lit(PAUSE).lt(lasted)), stands);
         let wants_flip = T::and(half.lt(backflip), Steer::speed(s).lt(T::lit(SLOW)));
-        let flips = T::and(free, wants_flip);
+        let turns = T::and(free, wants_flip);
         let jumps = T::and(free, T::and(half.lt(jump), T::not(half.lt(backflip))));
         let on_the_back = T::zero().lt(s.forward(BUTT)[2]);
         let wanted = T::select(jumps, T::lit(1.0 + JUMP as f64), T::lit(1.0 + BACKFLIP as f64));
         let rising = T::select(on_the_back, T::lit(1.0 + FACE_UP as f64), T::lit(1.0 + FACE_DOWN as f64));
-        let (next, enters) = (T::select(fallen, rising, wanted), T::or(fallen, T::or(jumps, flips)));
+        let (next, enters) = (T::select(fallen, rising, wanted), T::or(fallen, T::or(jumps, turns)));
         // an attempt after a failed one counts on
         let again = T::and(rises, fallen);
         memory[slot] = T::select(enters, next, T::select(ended, T::zero(), memory[slot]));
@@ -182,9 +185,9 @@ impl Skills {
         memory[2] += T::masked(on, y - v);
     }
 
-    /// Whether he lies as a clip does.
+    /// Whether he is as a clip is.
     #[inline(always)]
-    fn lies_as<T: Real>(&self, s: &Senses<T>, following: &[T]) -> T::Mask {
+    fn is_as<T: Real>(&self, s: &Senses<T>, following: &[T]) -> T::Mask {
         let (clip, own) = (s.reference_of(following, 0), s.forward(BUTT));
         let [forward, ..] = clip.axes(BUTT);
         let cos = own[0].mul_add(forward[0], own[1].mul_add(forward[1], own[2] * forward[2]));
