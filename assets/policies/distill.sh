@@ -37,18 +37,39 @@ for policy in "${wanted[@]}"; do
       done
       # good enough after less than its usual 60 million
       teachers+=("$(teacher Cartwheel --steps 23M)")
-      "$marathon" distill MarathonMan --option future=3 --option start=adaptive --hidden 256,256 --steps 30M --seed 1 \
-        "${teachers[@]}" --out "$shipped/MarathonMan.safetensors"
+      left=$(teacher WalkLeft) flip=$(teacher Backflip) wheel=$(teacher Cartwheel)
+      learn() {
+        "$marathon" distill MarathonMan --option future=3 --option start=adaptive --hidden 256,256 "${teachers[@]}" "$@"
+      }
+      learn --steps 30M --seed 1 --out "$runs/one.safetensors"
+      # then what it does worst
+      learn "$left" "$flip" "$flip" "$wheel" --steps 9M --lr 5e-4 --seed 2 --initialize-from "$runs/one.safetensors" \
+        --out "$runs/two.safetensors"
+      learn "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 9M --lr 5e-4 --seed 3 --initialize-from "$runs/two.safetensors" \
+        --out "$shipped/MarathonMan.safetensors"
       ;;
     MarathonManController)
-      # who goes falls most easily, and so is shown twice
-      teachers=("$(teacher Steer)" "$(teacher Steer)")
-      for clip in Jump Backflip GetUpFaceDown GetUpFaceUp; do
-        teachers+=("$(teacher "$clip")")
+      skills=()
+      for clip in Backflip GetUpFaceDown GetUpFaceUp; do
+        skills+=("$(teacher "$clip")")
       done
-      "$marathon" distill MarathonManController --option commands=sharp --option start=adaptive --hidden 128,128 --steps 10M \
-        --seed 1 "${teachers[@]}" --out "$runs/start.safetensors"
-      "$marathon" train MarathonManController --initialize-from "$runs/start.safetensors" --seed 1 --threads 1 --out "$runs/run"
+      steer=$(teacher Steer) jump=$(teacher Jump)
+      learn() {
+        "$marathon" distill MarathonManController --option commands=sharp --option start=adaptive --hidden 128,128 \
+          "${skills[@]}" "$@"
+      }
+      # who goes falls most easily, and so is shown twice
+      learn "$steer" "$steer" "$jump" --steps 10M --seed 1 --out "$runs/start.safetensors"
+      "$marathon" train MarathonManController --option mortal=0.7 --steps 47M --initialize-from "$runs/start.safetensors" \
+        --seed 1 --threads 1 --out "$runs/goes"
+      # what he forgot meanwhile; the network of the run, as one that goes and jumps only
+      "$marathon" export "$runs/goes" --out "$runs/goes.onnx"
+      "$marathon" import "$runs/goes.onnx" --agent MarathonManController --option start=adaptive --option commands=sharp \
+        --option clip=walk,walk_left,walk_right,run,stand,jump --out "$runs/goes.safetensors"
+      goes="--teacher=$runs/goes.safetensors"
+      learn "$goes" "$goes" "$goes" "${skills[0]}" --steps 8M --lr 5e-4 --seed 2 --initialize-from "$runs/goes" \
+        --out "$runs/knows.safetensors"
+      "$marathon" train MarathonManController --initialize-from "$runs/knows.safetensors" --seed 1 --threads 1 --out "$runs/run"
       cp "$runs/run/policy.safetensors" "$shipped/MarathonManController.safetensors"
       ;;
     *)

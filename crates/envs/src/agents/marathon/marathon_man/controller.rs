@@ -20,7 +20,8 @@ use marathon_physics::lanes::Real;
 use super::super::heading;
 use super::super::imitation::{self, StartAt, observe_body, sub, turned_to};
 use super::body::{
-    ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
+    ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH,
+    model,
 };
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
@@ -135,6 +136,7 @@ impl Agent for Controller {
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
             touch_sites: names(TOUCH),
+            feet: names(FEET.map(|part| PARTS[part.0])),
             command: vec![
                 CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
                 CommandRange::new("left", -ASIDE..=ASIDE, "m/s"),
