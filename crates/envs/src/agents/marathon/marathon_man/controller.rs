@@ -17,18 +17,16 @@
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
-use super::super::heading;
-use super::super::imitation::{self, StartAt, observe_body, sub, turned_to};
+use super::super::imitation::{self, StartAt, sub, turned_to};
 use super::body::{
-    ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH,
-    model,
+    ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
 };
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
     BEGUN, CLIPS, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
 };
-use super::{FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
+use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
 use crate::agent::senses::hypot;
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms,
@@ -36,7 +34,6 @@ use crate::agent::{
 };
 use crate::episode_rng::EpisodeRng;
 use crate::error::nearest;
-use std::f64::consts::TAU;
 
 /// Fastest that he is told to step aside, m/s.
 const ASIDE: f64 = 0.8;
@@ -261,33 +258,9 @@ impl Agent for Controller {
         let all = memory(s);
         let on = SKILL.on(&all);
         let facing = SKILL.facing(s, &all);
-        let turned = turned_to(facing);
-        out.group("command");
-        out.scalar(s.command(0));
-        out.scalar(s.command(2));
-        for x in heading::beside(facing, Steer::direction(s)) {
-            out.scalar(x);
-        }
-        let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
-        out.scalar(x);
-        out.scalar(y);
-        observe_body(s, &ANATOMY, &turned, out);
-        out.group("ends");
-        for part in END_EFFECTORS {
-            out.vector(turned(sub(s.position(part), s.position(BUTT))));
-        }
-        observe_soles(s, out);
-        let (phase, pace) = (s.memory(PHASE), s.memory(PACE));
-        let (sin, cos) = (phase * T::lit(TAU)).sin_cos();
-        out.group("gait");
-        for x in [pace, cos, sin] {
-            out.scalar(x);
-        }
-        let (gait, clip, r) = (Steer::next_pose(phase, pace, s.dt(), 0.0), s.reference(1), s.readings());
-        out.group("next_pose");
-        for i in 0..JOINTS.len() {
-            out.scalar(T::select(on, clip.qpos(FIRST_QPOS + i), gait(i)) - r.qpos(FIRST_QPOS + i));
-        }
+        let (turned, next, r) = (turned_to(facing), s.reference(1), s.readings());
+        let pose = |i, of_gait| T::select(on, next.qpos(FIRST_QPOS + i), of_gait);
+        Steer::observe_going(s, facing, [0, 2], pose, out);
         out.group("phase");
         for x in s.reference(0).phase_angles() {
             out.scalar(T::masked(on, x));

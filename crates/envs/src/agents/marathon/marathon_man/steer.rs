@@ -232,6 +232,46 @@ impl Steer {
         add("tempo", 0.05, tempo * T::lit(-1.0));
     }
 
+    /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
+    /// `numbers`: those of the command that are the speed and the turn. `next`: the next angle of a hinge, given the gait's.
+    #[inline(always)]
+    pub(super) fn observe_going<T: Real>(
+        s: &Senses<T>,
+        facing: [T; 2],
+        numbers: [usize; 2],
+        next: impl Fn(usize, T) -> T,
+        out: &mut Obs<T>,
+    ) {
+        let turned = turned_to(facing);
+        out.group("command");
+        for i in numbers {
+            out.scalar(s.command(i));
+        }
+        for x in heading::beside(facing, Self::direction(s)) {
+            out.scalar(x);
+        }
+        let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
+        out.scalar(x);
+        out.scalar(y);
+        observe_body(s, &ANATOMY, &turned, out);
+        out.group("ends");
+        for part in END_EFFECTORS {
+            out.vector(turned(sub(s.position(part), s.position(BUTT))));
+        }
+        observe_soles(s, out);
+        let (phase, pace) = (s.memory(PHASE), s.memory(PACE));
+        let (sin, cos) = (phase * T::lit(TAU)).sin_cos();
+        out.group("gait");
+        for x in [pace, cos, sin] {
+            out.scalar(x);
+        }
+        let gait = Self::next_pose(phase, pace, s.dt(), 0.0);
+        out.group("next_pose");
+        for i in 0..JOINTS.len() {
+            out.scalar(next(i, gait(i)) - s.readings().qpos(FIRST_QPOS + i));
+        }
+    }
+
     /// Angles of the gait's next pose, led by some seconds.
     #[inline(always)]
     pub(super) fn next_pose<T: Real>(phase: T, pace: T, dt: f64, lead: f64) -> impl Fn(usize) -> T {
@@ -352,34 +392,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        let [cos, sin] = s.heading(BUTT);
-        let turned = turned_to([cos, sin]);
-        out.group("command");
-        out.scalar(s.command(0));
-        out.scalar(s.command(1));
-        for x in heading::beside([cos, sin], Self::direction(s)) {
-            out.scalar(x);
-        }
-        let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
-        out.scalar(x);
-        out.scalar(y);
-        observe_body(s, &ANATOMY, &turned, out);
-        out.group("ends");
-        for part in END_EFFECTORS {
-            out.vector(turned(sub(s.position(part), s.position(BUTT))));
-        }
-        observe_soles(s, out);
-        let (phase, pace) = (s.memory(PHASE), s.memory(PACE));
-        let (sin, cos) = (phase * T::lit(TAU)).sin_cos();
-        out.group("gait");
-        for x in [pace, cos, sin] {
-            out.scalar(x);
-        }
-        let next = Self::next_pose(phase, pace, s.dt(), 0.0);
-        out.group("next_pose");
-        for i in 0..JOINTS.len() {
-            out.scalar(next(i) - s.readings().qpos(FIRST_QPOS + i));
-        }
+        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, out);
     }
 
     #[inline(always)]
