@@ -37,7 +37,7 @@ for policy in "${wanted[@]}"; do
       done
       # good enough after less than its usual 60 million
       teachers+=("$(teacher Cartwheel --steps 23M)")
-      left=$(teacher WalkLeft) flip=$(teacher Backflip) wheel=$(teacher Cartwheel)
+      left=$(teacher WalkLeft) right=$(teacher WalkRight) flip=$(teacher Backflip) wheel=$(teacher Cartwheel)
       learn() {
         "$marathon" distill MarathonMan --option future=3 --option start=adaptive --hidden 256,256 "${teachers[@]}" "$@"
       }
@@ -46,7 +46,9 @@ for policy in "${wanted[@]}"; do
       learn "$left" "$flip" "$flip" "$wheel" --steps 9M --lr 5e-4 --seed 2 --initialize-from "$runs/one.safetensors" \
         --out "$runs/two.safetensors"
       learn "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 9M --lr 5e-4 --seed 3 --initialize-from "$runs/two.safetensors" \
-        --out "$shipped/MarathonMan.safetensors"
+        --out "$runs/three.safetensors"
+      learn "$left" "$left" "$right" "$flip" "$flip" "$flip" "$wheel" --steps 6M --lr 4e-4 --seed 4 \
+        --initialize-from "$runs/three.safetensors" --out "$shipped/MarathonMan.safetensors"
       ;;
     MarathonManController)
       skills=()
