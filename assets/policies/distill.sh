@@ -48,7 +48,10 @@ for policy in "${wanted[@]}"; do
       learn "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 9M --lr 5e-4 --seed 3 --initialize-from "$runs/two.safetensors" \
         --out "$runs/three.safetensors"
       learn "$left" "$left" "$right" "$flip" "$flip" "$flip" "$wheel" --steps 6M --lr 4e-4 --seed 4 \
-        --initialize-from "$runs/three.safetensors" --out "$shipped/MarathonMan.safetensors"
+        --initialize-from "$runs/three.safetensors" --out "$runs/four.safetensors"
+      # the policy that is here was stopped after 4.3 million
+      learn "$left" "$left" "$right" "$flip" "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 8M --lr 3e-4 --seed 5 \
+        --initialize-from "$runs/four.safetensors" --out "$shipped/MarathonMan.safetensors"
       ;;
     MarathonManController)
       skills=()
