@@ -241,7 +241,8 @@ def test_a_run_may_start_from_a_policy(tmp_path: Path) -> None:
     first = train("hopper", steps=200_000, seed=1, threads=1, out=tmp_path / "first")
     again = train("hopper", steps=8_192, seed=2, threads=1, initialize_from=tmp_path / "first")
     fresh = train("hopper", steps=8_192, seed=2, threads=1)
-    assert again.eval["return_mean"] > 2 * fresh.eval["return_mean"]
-    assert again.eval["return_mean"] > 0.3 * first.eval["return_mean"]
+    assert first.evaluation is not None and again.evaluation is not None and fresh.evaluation is not None
+    assert again.evaluation["return_mean"] > 2 * fresh.evaluation["return_mean"]
+    assert again.evaluation["return_mean"] > 0.3 * first.evaluation["return_mean"]
     with pytest.raises(ValueError, match="initialize_from belongs to a new run"):
         train(resume=tmp_path / "first", initialize_from=tmp_path / "first")
