@@ -118,27 +118,8 @@ pub struct DistillArgs {
     /// File to write, .safetensors or .onnx.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Widths of the policy's hidden layers.
-    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = DistillOptions::default().hidden)]
-    pub hidden: Vec<usize>,
-    /// Policy to start from in place of random weights, with no wider layers.
-    #[arg(long, value_name = "POLICY")]
-    pub initialize_from: Option<PathBuf>,
-    /// Decisions of all agents together.
-    #[arg(long, value_name = "N", default_value_t = DistillOptions::default().steps, value_parser = marathon_runs::options::parse_steps)]
-    pub steps: u64,
-    /// Agents of each teacher.
-    #[arg(long, value_name = "N", default_value_t = DistillOptions::default().agents)]
-    pub agents: usize,
-    /// Learning rate at the start; it falls to zero.
-    #[arg(long, value_name = "RATE", default_value_t = DistillOptions::default().lr)]
-    pub lr: f64,
-    /// Seed of everything random.
-    #[arg(long, value_name = "S", default_value_t = DistillOptions::default().seed)]
-    pub seed: u64,
-    /// Threads that play. The result does not depend on it.
-    #[arg(long, value_name = "T", default_value_t = 1)]
-    pub threads: usize,
+    #[command(flatten)]
+    pub options: DistillOptions,
 }
 
 /// Options of `eval`.

@@ -2,15 +2,14 @@
 //! has ended enters the table of the longest runs, and its replay is the run to the bit, ground included.
 #![cfg(feature = "render")]
 
+#[path = "common/windowless.rs"]
+mod windowless;
+
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::settings::WgpuSettings;
-use bevy::time::TimeUpdateStrategy;
-use bevy::window::{ExitCondition, PrimaryWindow};
-use bevy::winit::WinitPlugin;
+use bevy::window::PrimaryWindow;
 use clap::Parser;
 use marathon_envs::{Autoreset, VecEnvOptions};
 use marathon_game::app::{
@@ -21,6 +20,7 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
+use windowless::frames;
 
 /// Where a course's ground has a place, m: its first point and the distance of its points.
 const FROM: f64 = -6.0;
@@ -29,25 +29,11 @@ const CELL: f64 = 0.1;
 /// The game on a course, with a window that nobody draws.
 fn game(table: &Path, words: &[&str]) -> App {
     let table = table.display().to_string();
-    let args = Args::parse_from([&["marathon-game", "--table", &table, "--player", "Ada"], words].concat());
-    let mut app = App::new();
-    let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
-    let plugins = DefaultPlugins.set(window).set(render).disable::<WinitPlugin>().disable::<bevy::log::LogPlugin>();
-    app.add_plugins(plugins).add_plugins(GamePlugin::new(&args).expect("the command line makes sense"));
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
-    app.init_resource::<Seen>().add_systems(FixedUpdate, see.after(MarathonSystems::Report));
-    app.world_mut().spawn((Window { resolution: (800, 600).into(), ..default() }, PrimaryWindow));
-    app.finish();
-    app.cleanup();
-    app.update();
-    app.insert_resource(Bindings::default());
-    frames(&mut app, 3);
-    app
-}
-
-fn frames(app: &mut App, n: usize) {
-    (0..n).for_each(|_| app.update());
+    let words = [&["--table", &table, "--player", "Ada"], words].concat();
+    windowless::game(&words, Duration::from_millis(20), |app| {
+        app.init_resource::<Seen>().add_systems(FixedUpdate, see.after(MarathonSystems::Report));
+        app.world_mut().spawn((Window { resolution: (800, 600).into(), ..default() }, PrimaryWindow));
+    })
 }
 
 /// A decision of the only character: number of the episode, coordinates, elevations.
@@ -207,18 +193,10 @@ fn the_mouse_builds() -> Result<(), Box<dyn Error>> {
         let mut windows = app.world_mut().query_filtered::<(Entity, &mut Window), With<PrimaryWindow>>();
         let (window, mut place) = windows.single_mut(app.world_mut()).expect("one window");
         place.set_cursor_position(Some(cursor));
-        app.world_mut().write_message(MouseButtonInput {
-            button: MouseButton::Left,
-            state: ButtonState::Pressed,
-            window,
-        });
-        app.update();
-        app.world_mut().write_message(MouseButtonInput {
-            button: MouseButton::Left,
-            state: ButtonState::Released,
-            window,
-        });
-        app.update();
+        for state in [ButtonState::Pressed, ButtonState::Released] {
+            app.world_mut().write_message(MouseButtonInput { button: MouseButton::Left, state, window });
+            app.update();
+        }
         window
     };
     let window = drag(&mut app, 0.41);

@@ -2,6 +2,9 @@
 //! `marathon-game`. The rover of `examples/rover.rs` takes a velocity; the trained one of the example `steer` drives at it.
 #![cfg(feature = "render")]
 
+#[path = "common/windowless.rs"]
+mod windowless;
+
 #[allow(dead_code, reason = "a part of it is enough")]
 mod common;
 #[allow(dead_code, reason = "its window stays closed")]
@@ -16,26 +19,18 @@ use bevy::input::gamepad::{
 };
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::settings::WgpuSettings;
-use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use clap::Parser;
-use marathon_game::app::{Actor, Args, Bindings, Deed, GamePlugin, Steering};
+use marathon_game::app::{Actor, Args, Bindings, Deed, Steering};
 use marathon_game::prelude::*;
 use std::sync::LazyLock;
 use std::time::Duration;
+use windowless::frames;
 
 /// Twenty milliseconds, the rover's decision.
 const FRAME: Duration = Duration::from_millis(20);
 
 /// The rover, registered once, and its policy.
 static ROVER: LazyLock<marathon_learn::Policy> = LazyLock::new(|| steer::learn().expect("the rover learns"));
-
-fn frames(app: &mut App, n: usize) {
-    (0..n).for_each(|_| app.update());
-}
 
 /// The game with the rover, without a window.
 fn game(words: &[&str]) -> App {
@@ -45,19 +40,7 @@ fn game(words: &[&str]) -> App {
 
 /// The game with an agent, without a window.
 fn game_of(agent: &str, words: &[&str]) -> App {
-    let args = Args::parse_from([&["marathon-game", agent], words].concat());
-    let mut app = App::new();
-    let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
-    let plugins = DefaultPlugins.set(window).set(render).disable::<WinitPlugin>().disable::<bevy::log::LogPlugin>();
-    app.add_plugins(plugins).add_plugins(GamePlugin::new(&args).expect("the command line makes sense"));
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    app.finish();
-    app.cleanup();
-    app.update();
-    app.insert_resource(Bindings::default());
-    frames(&mut app, 3);
-    app
+    windowless::game(&[&[agent], words].concat(), FRAME, |_| ())
 }
 
 /// A gamepad, as its driver tells of it.

@@ -1,18 +1,16 @@
 //! The systems of the app, driven by its keys, without a window and without drawing.
 #![cfg(feature = "render")]
 
+#[path = "common/windowless.rs"]
+mod windowless;
+
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::settings::WgpuSettings;
-use bevy::time::TimeUpdateStrategy;
-use bevy::window::{ExitCondition, FileDragAndDrop};
-use bevy::winit::WinitPlugin;
-use clap::Parser;
+use bevy::window::FileDragAndDrop;
 use marathon_game::app::{
-    Actor, Args, Ball, Bindings, Costume, Deed, Fitting, Focus, GamePlugin, Lesson, Mode, Notes, Playback, Reading,
-    Recorder, Recording, Show,
+    Actor, Ball, Bindings, Costume, Deed, Fitting, Focus, Lesson, Mode, Notes, Playback, Reading, Recorder, Recording,
+    Show,
 };
 use marathon_game::axes::to_game;
 use marathon_game::look::{CameraMode, part_errors};
@@ -20,25 +18,10 @@ use marathon_game::prelude::*;
 use marathon_render::Scene;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use windowless::frames;
 
 fn app(words: &[&str]) -> App {
-    let args = Args::parse_from([&["marathon-game"], words].concat());
-    let mut app = App::new();
-    let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
-    let plugins = DefaultPlugins.set(window).set(render).disable::<WinitPlugin>().disable::<bevy::log::LogPlugin>();
-    app.add_plugins(plugins).add_plugins(GamePlugin::new(&args).expect("the command line makes sense"));
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)));
-    app.finish();
-    app.cleanup();
-    app.update();
-    app.insert_resource(Bindings::default());
-    frames(&mut app, 3);
-    app
-}
-
-fn frames(app: &mut App, n: usize) {
-    (0..n).for_each(|_| app.update());
+    windowless::game(words, Duration::from_millis(20), |_| ())
 }
 
 /// Presses the key that does something, as a window would send it.

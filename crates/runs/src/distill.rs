@@ -5,16 +5,16 @@
 //! observation are looked up in the student's.
 
 use crate::error::RunError;
+#[cfg(feature = "clap")]
+use crate::options::parse_steps;
 use crate::policy_file;
-use crate::setting::{Setting, TaskOptions};
+use crate::setting::{CLIP, Setting, TaskOptions};
 use marathon_envs::options::Value;
 use marathon_envs::{Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::{Activation, BlockPolicy, Control, Distiller, Lessons, Policy, PolicyMeta};
 use marathon_physics::lanes::Isa;
 use std::path::PathBuf;
 
-/// The argument that names what agents follow.
-const CLIP: &str = "clip";
 /// Decisions of each agent between two rounds of learning.
 const HORIZON: usize = 32;
 /// Rounds at the start in which the teachers play alone, and nobody learns: what they see makes the statistics.
@@ -30,21 +30,29 @@ const PASSES: usize = 4;
 
 /// How to learn from others.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct DistillOptions {
-    /// Widths of the hidden layers.
+    /// Widths of the policy's hidden layers.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = Self::default().hidden))]
     pub hidden: Vec<usize>,
+    /// Policy to start from in place of random weights, with no wider layers: a file or the folder of a run.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "POLICY"))]
+    pub initialize_from: Option<PathBuf>,
     /// Decisions of all agents together.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().steps, value_parser = parse_steps))]
     pub steps: u64,
     /// Agents of each teacher.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().agents))]
     pub agents: usize,
     /// Learning rate at the start; it falls to zero.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", default_value_t = Self::default().lr))]
     pub lr: f64,
     /// Seed of everything random.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S", default_value_t = Self::default().seed))]
     pub seed: u64,
     /// Threads that play. The result does not depend on it.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "T", default_value_t = Self::default().threads))]
     pub threads: usize,
-    /// Policy to start from in place of random weights, if any: a file or the folder of a run.
-    pub initialize_from: Option<PathBuf>,
 }
 
 impl Default for DistillOptions {

@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::play::Play;
-use crate::setting::{Setting, TaskOptions};
+use crate::setting::{CLIP, Setting, TaskOptions};
 use marathon_envs::agents::marathon::marathon_man::clips::ClipNames;
 use marathon_envs::options::Value;
 use marathon_envs::{Autoreset, VecEnvOptions, registry};
@@ -12,9 +12,8 @@ use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use serde::{Deserialize, Serialize};
 
-/// Arguments of tasks that follow clips: where episodes start, and which clips there are.
+/// Argument of tasks that follow clips: where episodes start.
 const START: &str = "start";
-const CLIP: &str = "clip";
 
 /// Episodes whose pose errors are averaged: those of table 3 of the AMP paper.
 const WARPED: usize = 32;

@@ -173,7 +173,7 @@ impl FilmOptions {
 
 /// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.
 #[cfg(feature = "clap")]
-pub fn parse_steps(text: &str) -> Result<u64, String> {
+pub(crate) fn parse_steps(text: &str) -> Result<u64, String> {
     let bad = || "expected a positive number of steps such as 4000000, 4_000_000, 4M, 500k or 4e6".to_string();
     let digits: String = text.chars().filter(|c| !matches!(c, '_' | ',')).collect();
     if let Ok(n) = digits.parse::<u64>() {

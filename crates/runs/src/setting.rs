@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The argument that names motion clips.
-const CLIP: &str = "clip";
+pub(crate) const CLIP: &str = "clip";
 
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
 static NAMING: Mutex<()> = Mutex::new(());

@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::program;
 use cpu_time::ProcessTime;
 use marathon_learn::Control;
-use marathon_runs::distill::{DistillOptions, Distilled, distill};
+use marathon_runs::distill::{Distilled, distill};
 use marathon_runs::report::progress::bar;
 use marathon_runs::{Setting, policy_file, text};
 use serde::Serialize;
@@ -36,26 +36,18 @@ struct Report {
 /// Ctrl-C, with the policy as it was then.
 pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     let task = Setting::named(&args.agent)?.with(&args.task)?;
-    let options = DistillOptions {
-        hidden: args.hidden.clone(),
-        steps: args.steps,
-        agents: args.agents,
-        lr: args.lr,
-        seed: args.seed,
-        threads: args.threads,
-        initialize_from: args.initialize_from.clone(),
-    };
+    let options = &args.options;
     interrupt::install("finishing this round and writing the policy")?;
     note(format!(
         "learning {} from {} teachers: {} decisions, seed {}",
         task.agent,
         args.teachers.len(),
-        text::thousands(args.steps),
-        args.seed
+        text::thousands(options.steps),
+        options.seed
     ));
-    let (progress, mut due, mut last) = (bar(args.steps), EVERY, None);
+    let (progress, mut due, mut last) = (bar(options.steps), EVERY, None);
     let start = ProcessTime::try_now().ok();
-    let policy = distill(task, &args.teachers, &options, &mut |now: &Distilled| {
+    let policy = distill(task, &args.teachers, options, &mut |now: &Distilled| {
         last = Some(*now);
         let line = format!("loss {:.5}  failures {:.3} % of decisions", now.loss, 100.0 * now.failures);
         if let Some(bar) = &progress {
@@ -63,7 +55,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
             bar.set_message(line);
         } else if now.steps >= due {
             due += EVERY;
-            note(format!("{:>12} of {} decisions  {line}", text::thousands(now.steps), text::thousands(args.steps)));
+            note(format!("{:>12} of {} decisions  {line}", text::thousands(now.steps), text::thousands(options.steps)));
         }
         if interrupt::requested() { Control::Stop } else { Control::Continue }
     })?;

@@ -34,9 +34,12 @@ impl Following {
     pub const SLOTS: usize = 4;
     /// Slot of the row.
     pub const ROW: usize = 0;
-    const X: usize = 1;
-    const Y: usize = 2;
-    const YAW: usize = 3;
+    /// Slot of the x at which the clip's present lap has begun, m.
+    pub const X: usize = 1;
+    /// Slot of the y, m.
+    pub const Y: usize = 2;
+    /// Slot of the lap's turn about the vertical axis, rad.
+    pub const YAW: usize = 3;
 }
 
 /// Clips at the pace of decisions, in double precision: where episodes start.

@@ -121,9 +121,8 @@ pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
 /// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of those that are for the pose; DeepMimic's is 1.
 #[inline(always)]
 pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64, terms: &mut Terms<T>) {
-    for ((name, weight, scale, of_pose), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
-        let scale = if of_pose { sharpness * scale } else { scale };
-        terms.add(name, weight, (error * T::lit(-scale)).exp());
+    for ((name, weight, ..), value) in TERMS.into_iter().zip(values(s, anatomy, sharpness)) {
+        terms.add(name, weight, value);
     }
 }
 
@@ -131,10 +130,21 @@ pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f6
 #[inline(always)]
 pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
     let mut sum = T::zero();
-    for ((_, weight, scale, _), error) in TERMS.into_iter().zip(errors(s, anatomy)) {
-        sum = (error * T::lit(-scale)).exp().mul_add(T::lit(weight), sum);
+    for ((_, weight, ..), value) in TERMS.into_iter().zip(values(s, anatomy, 1.0)) {
+        sum = value.mul_add(T::lit(weight), sum);
     }
     sum
+}
+
+/// The values of the terms, without their weights.
+#[inline(always)]
+fn values<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64) -> [T; TERMS.len()] {
+    let mut values = errors(s, anatomy);
+    for ((_, _, scale, of_pose), value) in TERMS.into_iter().zip(&mut values) {
+        let scale = if of_pose { sharpness * scale } else { scale };
+        *value = (*value * T::lit(-scale)).exp();
+    }
+    values
 }
 
 /// The errors of the terms.

@@ -119,10 +119,19 @@ impl ClipNames {
     /// # Errors
     /// If one is missing; the text names the nearest.
     pub fn check(&self) -> Result<(), String> {
-        let Some(missing) = self.names().into_iter().find(|name| find(name).is_none()) else { return Ok(()) };
-        let names = all_names();
-        let near = nearest(missing, names.iter().map(String::as_str));
+        self.check_among(&all_names())
+    }
+
+    /// Whether they are `all`, or among some.
+    ///
+    /// # Errors
+    /// If one is not; the text names the nearest.
+    pub fn check_among<S: AsRef<str>>(&self, known: &[S]) -> Result<(), String> {
+        let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
+        let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
+        let Some(missing) = missing else { return Ok(()) };
+        let near = nearest(missing, known.iter().copied());
         let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-        Err(format!("option clip is '{missing}', expected a clip that is known{near} known: {}", names.join(", ")))
+        Err(format!("option clip is '{missing}', expected a clip that is known{near} known: {}", known.join(", ")))
     }
 }

@@ -33,7 +33,6 @@ use crate::agent::{
     names,
 };
 use crate::episode_rng::EpisodeRng;
-use crate::error::nearest;
 
 /// Fastest that he is told to step aside, m/s.
 const ASIDE: f64 = 0.8;
@@ -71,6 +70,11 @@ crate::options! {
         /// What an episode's end costs that is a failure.
         price: Scale = Scale(0.0),
     }
+}
+
+/// Clips of the gait, then those of the skills.
+fn known_clips() -> Vec<&'static str> {
+    CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip)).collect()
 }
 
 /// What he does.
@@ -118,7 +122,6 @@ impl Controller {
 
 impl Agent for Controller {
     fn facts(&self) -> Facts {
-        let clips = CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip));
         Facts {
             id: "MarathonManController-v0".into(),
             summary: "a figure of 21 motors: go as told, jump, turn over backward, and get up, in the style of clips"
@@ -141,7 +144,7 @@ impl Agent for Controller {
                 CommandRange::new("jump", 0.0..=1.0, ""),
                 CommandRange::new("backflip", 0.0..=1.0, ""),
             ],
-            clips: clips.filter_map(clips::shipped).collect(),
+            clips: known_clips().into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
             memory: MEMORY,
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
@@ -158,14 +161,7 @@ impl Agent for Controller {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        let known = CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip));
-        let known: Vec<&str> = known.collect();
-        let names = self.arguments.clip.names();
-        if let Some(name) = names.iter().find(|name| self.arguments.clip.0 != ALL && !known.contains(name)) {
-            let near = nearest(name, known.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
-            let near = near.unwrap_or_default();
-            return Err(format!("option clip is '{name}', expected all or some of {}{near}", known.join(", ")));
-        }
+        self.arguments.clip.check_among(&known_clips())?;
         super::has_joints(model)
     }
 

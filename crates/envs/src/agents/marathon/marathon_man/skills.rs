@@ -181,8 +181,8 @@ impl Skills {
     fn stay<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let on = self.on(memory);
         let ([x, y, _], [u, v, _]) = (s.position(BUTT), s.reference_of(memory, 0).position(BUTT));
-        memory[1] += T::masked(on, x - u);
-        memory[2] += T::masked(on, y - v);
+        memory[Following::X] += T::masked(on, x - u);
+        memory[Following::Y] += T::masked(on, y - v);
     }
 
     /// Whether he is as a clip is.
@@ -198,7 +198,7 @@ impl Skills {
     /// The direction along the ground that vectors of a skill are seen from: cosine and sine.
     #[inline(always)]
     pub fn facing<T: Real>(&self, s: &Senses<T>, memory: &[T]) -> [T; 2] {
-        let (sin, cos) = memory[3].sin_cos();
+        let (sin, cos) = memory[Following::YAW].sin_cos();
         let (on, [c, d]) = (self.on(memory), s.heading(BUTT));
         [T::select(on, cos, c), T::select(on, sin, d)]
     }

@@ -62,7 +62,7 @@ pub(super) const SHARPEST: f64 = FRAC_PI_2;
 /// Most that the commanded direction is off his heading, rad.
 pub const MOST_BEHIND: f64 = 1.0;
 /// How long a command holds, decisions.
-pub(super) const HOLDS: [usize; 2] = [40, 240];
+const HOLDS: [usize; 2] = [40, 240];
 /// Share of commands that are to stand, and of those that are to go straight on.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
@@ -77,7 +77,7 @@ pub(super) const TARGET: usize = DIRECTION + 2;
 pub(super) const PHASE: usize = TARGET + 2;
 pub(super) const PACE: usize = PHASE + 1;
 /// Slots that count the episode's decisions, and that hold the row of the clips where it started.
-pub(super) const MADE: usize = PACE + 1;
+const MADE: usize = PACE + 1;
 pub(super) const BEGUN: usize = MADE + 1;
 /// How fast the target velocity and the pace change, m/s^2, and how far the pace is from his speed at most, m/s: a run does not
 /// lead who stands.
@@ -168,7 +168,7 @@ impl Steer {
     /// Mean squares of the joints' distances from the gait, rad^2, and of the differences of their velocities from the gait's,
     /// rad^2/s^2, by DeepMimic's weights.
     #[inline(always)]
-    pub(super) fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
+    fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
         let (gaits, r) = (gaits(), s.readings());
         let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
         // angles lead by their velocity times the lead, so a lead of 1 s gives the velocity
@@ -187,7 +187,7 @@ impl Steer {
 
     /// Where the gait will be after `dt` seconds.
     #[inline(always)]
-    pub(super) fn next_phase<T: Real>(phase: T, pace: T, dt: f64) -> T {
+    fn next_phase<T: Real>(phase: T, pace: T, dt: f64) -> T {
         let next = gaits().frequency(pace).mul_add(T::lit(dt), phase);
         next - next.floor()
     }
