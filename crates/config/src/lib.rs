@@ -50,6 +50,9 @@ const MARATHON_MAN: (&str, &str) =
 /// For Marathon Man told where to go.
 const MARATHON_MAN_STEER: (&str, &str) =
     ("marathon_man_steer-fast.yaml", include_str!("../../../assets/configs/marathon_man_steer-fast.yaml"));
+/// For Marathon Man on assault courses.
+const MARATHON_MAN_TERRAIN: (&str, &str) =
+    ("marathon_man_terrain-fast.yaml", include_str!("../../../assets/configs/marathon_man_terrain-fast.yaml"));
 /// For Marathon Man in a player's hands.
 const MARATHON_MAN_CONTROLLER: (&str, &str) =
     ("marathon_man_controller-fast.yaml", include_str!("../../../assets/configs/marathon_man_controller-fast.yaml"));
@@ -58,7 +61,7 @@ const MARATHON_MAN_CONTROLLER: (&str, &str) =
 const IN_STYLE: (&str, &str) = ("in_style-fast.yaml", include_str!("../../../assets/configs/in_style-fast.yaml"));
 
 /// The configurations that come with the agents, file and text, by the agent's id or its id without the version.
-const FAST: [(&str, (&str, &str)); 48] = [
+const FAST: [(&str, (&str, &str)); 49] = [
     ("Hopper-v5", GYMNASIUM),
     ("Walker2d-v5", GYMNASIUM),
     ("HalfCheetah-v5", GYMNASIUM),
@@ -83,6 +86,7 @@ const FAST: [(&str, (&str, &str)); 48] = [
     ("TerrainHopper", TERRAIN),
     ("TerrainWalker2d", TERRAIN),
     ("TerrainAnt", TERRAIN),
+    ("TerrainMarathonMan", MARATHON_MAN_TERRAIN),
     ("MarathonMan", MARATHON_MAN),
     ("MarathonManWalk", MARATHON_MAN),
     ("MarathonManWalkLeft", MARATHON_MAN),

@@ -104,16 +104,28 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
 /// In the midst of a skill, with the clip's own velocities, he is like the clip.
 #[test]
 fn who_is_like_the_clip_is_paid() {
+    let model = marathon_envs::agent("MarathonManController-v0").unwrap().model().unwrap();
     for (clip, worth) in [("jump", 1.0), ("backflip", 1.0), ("getup_facedown", 0.5), ("getup_faceup", 0.5)] {
         let (mut env, mut step) = made(&[("clip", clip)]);
         go(&mut env, &mut step);
-        let mut rewards: Vec<f64> = step.reward.iter().map(|x| f64::from(*x) / worth).collect();
-        rewards.sort_by(f64::total_cmp);
-        assert!(rewards[AGENTS / 2] > 0.8 && rewards[AGENTS - 1] <= 1.0, "{clip}: {rewards:?}");
         let names = &env.spec().reward_terms;
-        let paid = |i: &usize| (0..AGENTS).any(|agent| step.terms[agent * names.len() + i] != 0.0);
+        let of = |agent: usize, i: usize| f64::from(step.terms[agent * names.len() + i]);
+        let [skill, leap] = ["skill", "leap"].map(|term| names.iter().position(|name| name == term).unwrap());
+        let mut likeness: Vec<f64> = (0..AGENTS).map(|agent| of(agent, skill) / worth).collect();
+        likeness.sort_by(f64::total_cmp);
+        assert!(likeness[AGENTS / 2] > 0.8 && likeness[AGENTS - 1] <= 1.0, "{clip}: {likeness:?}");
+        let paid = |i: &usize| (0..AGENTS).any(|agent| of(agent, *i) != 0.0);
         let paid: Vec<&str> = (0..names.len()).filter(paid).map(|i| names[i].as_str()).collect();
-        assert_eq!(paid, ["skill"]);
+        // only a jump is paid for its height: 5 for each meter of the lower foot, up to 1.5
+        assert_eq!(paid, if clip == "jump" { vec!["skill", "leap"] } else { vec!["skill"] });
+        let feet = ["right_right_foot", "left_left_foot"];
+        for agent in (0..AGENTS).filter(|_| clip == "jump") {
+            let state = env.state(agent).unwrap();
+            let low =
+                feet.map(|foot| common::center(&model, &state, foot)[2]).into_iter().fold(f64::INFINITY, f64::min);
+            let expected = 5.0 * (low - 0.06).clamp(0.0, 0.3);
+            assert!((of(agent, leap) - expected).abs() < 1e-3, "{agent}: {} {expected}", of(agent, leap));
+        }
     }
 }
 

@@ -32,17 +32,17 @@ fn height(model: &Model, env: &VecEnv, agent: usize) -> f64 {
 
 #[test]
 fn observations_are_the_originals_and_the_command() {
-    // numbers of the original: 34 and 46 with buttons, of which one is the jump
-    for (id, own, buttons) in [("HopperController-v0", 31, 34), ("WalkerController-v0", 43, 46)] {
+    // the original has 34 and 46 numbers with buttons, of which one is the jump, and no target velocity
+    for (id, own, buttons) in [("HopperController-v0", 31, 35), ("WalkerController-v0", 43, 47)] {
         for (input, numbers) in [("discrete", buttons), ("continuous", buttons - 1)] {
             let mut env = env(id, input);
             let spec = env.spec().clone();
-            assert_eq!((spec.obs, spec.command.len()), (numbers, numbers - own - 1), "{id} {input}");
+            assert_eq!((spec.obs, spec.command.len()), (numbers, numbers - own - 2), "{id} {input}");
             let mut out = env.buffers();
             let told: Vec<f64> = [-2.5, 1.0][..spec.command.len()].to_vec();
             env.set_command(3, Some(&told)).unwrap();
             env.reset(Some(1), &mut out.obs).unwrap();
-            let seen: Vec<f64> = out.obs[3 * numbers + own..4 * numbers - 1].iter().map(|x| f64::from(*x)).collect();
+            let seen: Vec<f64> = out.obs[3 * numbers + own..4 * numbers - 2].iter().map(|x| f64::from(*x)).collect();
             assert_eq!(seen, told, "{id} {input}");
         }
     }
@@ -55,7 +55,7 @@ fn the_reward_is_its_formula() {
         let mut env = env(id, input);
         let model = agent(id).unwrap().model().unwrap();
         let (n, act, k) = (env.spec().obs, env.spec().act, env.spec().reward_terms.len());
-        assert_eq!(env.spec().reward_terms[..6], ["velocity", "uprightness", "jump", "still", "height", "effort"]);
+        assert_eq!(env.spec().reward_terms[..7], TERMS);
         let commands = env.spec().command.len();
         let mut told = vec![vec![0.0; commands]; AGENTS];
         for (agent, command) in told.iter_mut().enumerate() {
@@ -70,6 +70,7 @@ fn the_reward_is_its_formula() {
         env.reset(Some(2), &mut out.obs).unwrap();
         let first = |env: &VecEnv, agent: usize| velocities(&model, env, agent)[0][0];
         let mut past: Vec<[f64; 3]> = (0..AGENTS).map(|agent| [first(&env, agent); 3]).collect();
+        let mut targets: Vec<f64> = past.iter().map(|past| past[0]).collect();
         let mut actions = vec![0.0; AGENTS * act];
         let (mut leapt, mut rested, mut over) = (0, 0.0f64, [false; AGENTS]);
         for decision in 0..60 {
@@ -83,10 +84,12 @@ fn the_reward_is_its_formula() {
                 let moving = velocities(&model, &env, agent);
                 past[agent] = [moving[0][0], past[agent][0], past[agent][1]];
                 let mean = past[agent].iter().sum::<f64>() / 3.0;
-                assert!((obs[n - 1] - mean).abs() < 1e-4, "{} {mean}", obs[n - 1]);
+                assert!((obs[n - 2] - mean).abs() < 1e-4, "{} {mean}", obs[n - 2]);
+                targets[agent] = follow(targets[agent], told[agent][0], env.spec().dt);
+                assert!((obs[n - 1] - targets[agent]).abs() < 1e-4, "{} {}", obs[n - 1], targets[agent]);
                 over[agent] = out.terminated[agent];
                 if over[agent] {
-                    assert_eq!(out.reward[agent], -40.0);
+                    assert_eq!(out.reward[agent], -10.0);
                     continue;
                 }
                 let (command, jump) = (told[agent][0], told[agent].get(1).copied().unwrap_or(0.0));
@@ -97,11 +100,11 @@ fn the_reward_is_its_formula() {
                 let leap = if touching > 0.0 { 0.0 } else { 1.0 + feet[0].min(feet[1]) };
                 let square = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
                 let speed2 = moving.iter().map(square).sum::<f64>() / moving.len() as f64;
-                let still = if command == 0.0 && jump == 0.0 { 0.5 * (-speed2 / 0.04).exp() } else { 0.0 };
+                let still = if command == 0.0 && jump == 0.0 { 1.5 * (-speed2 / 0.04).exp() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
                 let low = (1.1 - height(&model, &env, agent)).clamp(0.0, 1.1);
-                let velocity = (1.0 - 0.8 * off).clamp(-1.0, 1.0);
-                let expected = [velocity, 0.5 - tilt / PI, jump * leap, still, -low, -EFFORT * effort];
+                let [velocity, pace] = paid(targets[agent], mean);
+                let expected = [velocity, pace, 0.5 - tilt / PI, jump * leap, still, -low, -EFFORT * effort];
                 for (i, expected) in expected.into_iter().enumerate() {
                     let got = f64::from(out.terms[agent * k + i]);
                     assert!((got - expected).abs() < 2e-3, "agent {agent}, term {i}: {got}, expected {expected}");
@@ -116,12 +119,25 @@ fn the_reward_is_its_formula() {
 
 /// Price of the effort.
 const EFFORT: f64 = 0.05;
+/// Terms of the reward.
+const TERMS: [&str; 7] = ["velocity", "pace", "uprightness", "jump", "still", "height", "effort"];
+
+/// The target velocity after a decision of `dt` seconds: it follows the command by 6 m/s^2.
+fn follow(target: f64, told: f64, dt: f64) -> f64 {
+    target + (told - target).clamp(-6.0 * dt, 6.0 * dt)
+}
+
+/// What a velocity earns.
+fn paid(target: f64, velocity: f64) -> [f64; 2] {
+    let off = (target - velocity).abs();
+    [(-4.0 * off * off).exp(), 0.5 * (4.0 - off)]
+}
 
 /// With an adversary, its action is what the figure is told from the next decision on, the figure observes and earns what it does
 /// without one, and the adversary earns what is not obeyed.
 #[test]
 fn an_adversary_commands() {
-    for (id, fall) in [("HopperController-v0", -60.0), ("WalkerController-v0", -40.0)] {
+    for id in ["HopperController-v0", "WalkerController-v0"] {
         for input in ["discrete", "continuous"] {
             let plain = env(id, input).spec().clone();
             let given = Options::new().with("input", input).with("commander", "adversary");
@@ -134,13 +150,14 @@ fn an_adversary_commands() {
             assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id} {input}");
             assert_eq!(commander.act, plain.act..plain.act + 1 + buttons);
             assert!(commander.intermittent && spec.command.is_empty());
-            assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..6], &["fall".into()]].concat());
+            assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..7], &["fall".into()]].concat());
             assert_eq!(spec.reward_terms[commander.terms.clone()], ["disobedience", "felled"]);
 
             let (n, act, k) = (spec.obs, spec.act, spec.reward_terms.len());
             let mut out = env.buffers();
             env.reset(Some(1), &mut out.obs).unwrap();
             let (mut told, mut fallen) = ([[0.0; 2]; AGENTS], [false; AGENTS]);
+            let mut targets: Vec<f64> = out.obs.chunks_exact(n).map(|obs| f64::from(obs[plain.obs - 1])).collect();
             let mut actions = vec![0.0; AGENTS * act];
             for decision in 0..80 {
                 for (i, row) in actions.chunks_exact_mut(act).enumerate() {
@@ -156,18 +173,24 @@ fn an_adversary_commands() {
                         "discrete" => [4.0 * (pressed - f64::from(u8::from(said < -0.2))), pressed],
                         _ => [4.0 * said, 0.0],
                     };
-                    let (own, mean) = (plain.obs - buttons - 2, f64::from(obs[plain.obs - 1]));
+                    let (own, mean) = (plain.obs - buttons - 3, f64::from(obs[plain.obs - 2]));
+                    targets[i] = follow(targets[i], told[i][0], spec.dt);
                     let off = (told[i][0] - mean).abs();
                     let near = |got: f32, expected: f64| (f64::from(got) - expected).abs() < 1e-4;
                     if !fallen[i] {
                         assert!(near(obs[own], next[0]) && (buttons == 0 || near(obs[own + 1], next[1])));
                         assert!(near(obs[plain.obs], next[0]) && near(obs[plain.obs + 1], next[1]));
-                        assert!(near(terms[0], (1.0 - 0.8 * off).clamp(-1.0, 1.0)), "{id} {input}, agent {i}");
-                        assert!(near(terms[7], off / 4.0) && near(out.info[i], off));
+                        assert!(near(obs[plain.obs - 1], targets[i]), "{id} {input}, agent {i}");
+                        let [velocity, pace] = paid(targets[i], mean);
+                        assert!(
+                            (f64::from(terms[0]) - velocity).abs() < 1e-3 && near(terms[1], pace),
+                            "{id} {input}, agent {i}"
+                        );
+                        assert!(near(terms[8], off / 4.0) && near(out.info[i], off));
                         let down = out.terminated[i];
-                        let expected = if down { [fall as f32, 10.0] } else { [0.0; 2] };
-                        assert_eq!([terms[6], terms[8]], expected, "{id} {input}, agent {i}");
-                        assert!(near(out.reward[i], terms[..7].iter().map(|x| f64::from(*x)).sum()));
+                        let expected = if down { [-10.0, 10.0] } else { [0.0; 2] };
+                        assert_eq!([terms[7], terms[9]], expected, "{id} {input}, agent {i}");
+                        assert!(near(out.reward[i], terms[..8].iter().map(|x| f64::from(*x)).sum()));
                     }
                     told[i] = next;
                     fallen[i] |= out.terminated[i];

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{action, go_on};
+use common::{action, center, go_on};
 use marathon_envs::{AgentState, Autoreset, Step, VecEnv, VecEnvOptions, agent};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
@@ -23,38 +23,64 @@ fn env(id: &str, options: &[(&str, &str)], autoreset: Autoreset) -> VecEnv {
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Feet of the Ant.
+/// Points along a course, and distance of the rows of one that differs to the sides, m.
+const POINTS: usize = 1121;
+const ROW: f64 = 0.5;
+/// All of them.
+const FIGURES: [&str; 4] = ["TerrainHopper-v0", "TerrainWalker2d-v0", "TerrainAnt-v0", "TerrainMarathonMan-v0"];
+/// Feet of the Ant and of Marathon Man.
 const ANKLES: [&str; 4] = ["left_ankle_geom", "right_ankle_geom", "third_ankle_geom", "fourth_ankle_geom"];
+const SOLES: [&str; 2] = ["right_right_foot", "left_left_foot"];
 
 /// Whether a figure moves in space: the height is the third of its coordinates, not the second.
 fn in_space(id: &str) -> bool {
-    id == "TerrainAnt-v0"
+    matches!(id, "TerrainAnt-v0" | "TerrainMarathonMan-v0")
 }
 
 /// Name of its torso.
 fn torso(id: &str) -> &'static str {
-    if in_space(id) { "torso_geom" } else { "torso" }
+    match id {
+        "TerrainAnt-v0" => "torso_geom",
+        "TerrainMarathonMan-v0" => "butt",
+        _ => "torso",
+    }
 }
 
 fn up(id: &str) -> usize {
     if in_space(id) { 2 } else { 1 }
 }
 
-/// Where the center of a geom is, m.
-fn center(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
-    let pose = Pose::of(model, &state.qpos);
-    let geom = model.geoms.iter().find(|g| g.name == geom).unwrap();
-    let mut local = pose.pos[0];
-    [local.x, local.y, local.z] = geom.pos;
-    (pose.quat[geom.body] * local + pose.pos[geom.body]).to_array()
+/// The axis of a geom's body that points forward in the spawn pose.
+fn axis(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
+    let body = model.geoms.iter().find(|g| g.name == geom).unwrap().body;
+    let (now, spawn) = (Pose::of(model, &state.qpos), Pose::of(model, &model.qpos0));
+    let mut ahead = now.pos[0];
+    [ahead.x, ahead.y, ahead.z] = [1.0, 0.0, 0.0];
+    (now.quat[body] * (spawn.quat[body].inverse() * ahead)).to_array()
 }
 
-/// Height of a course at a place, m.
-fn height(ground: &[f32], x: f64) -> f64 {
-    let course = &ground[..ground.len() / 2];
-    let at = ((x - FROM) / CELL).clamp(0.0, (course.len() - 1) as f64);
-    let (i, part) = ((at as usize).min(course.len() - 2), at - (at as usize).min(course.len() - 2) as f64);
-    f64::from(course[i]) * (1.0 - part) + f64::from(course[i + 1]) * part
+/// Height of the ground at a place, m. A cell of its grid is two triangles, whose common side goes to the upper right.
+fn height(ground: &[f32], x: f64, y: f64) -> f64 {
+    let rows = ground.len() / POINTS;
+    let row = if rows == 2 { 16.0 } else { ROW };
+    let cell = |at: f64, points: usize| {
+        let at = at.clamp(0.0, (points - 1) as f64);
+        let i = (at as usize).min(points - 2);
+        (i, at - i as f64)
+    };
+    let ((i, u), (j, v)) = (cell((x - FROM) / CELL, POINTS), cell(y / row + 0.5 * (rows - 1) as f64, rows));
+    let z = |i: usize, j: usize| f64::from(ground[POINTS * j + i]);
+    let (low, high) = (z(i, j), z(i + 1, j + 1));
+    if u > v {
+        low + u * (z(i + 1, j) - low) + v * (high - z(i + 1, j))
+    } else {
+        low + v * (z(i, j + 1) - low) + u * (high - z(i, j + 1))
+    }
+}
+
+/// Numbers of the ground that a figure sees besides the heights of its feet.
+fn seen(id: &str) -> usize {
+    if in_space(id) { 45 } else { 26 }
 }
 
 #[test]
@@ -63,23 +89,36 @@ fn a_figure_sees_the_ground_that_it_has() {
         ("TerrainHopper-v0", 30, "foot", &["foot"][..]),
         ("TerrainWalker2d-v0", 41, "torso", &["left_foot", "right_foot"][..]),
         ("TerrainAnt-v0", 53, "torso_geom", &ANKLES[..]),
+        ("TerrainMarathonMan-v0", 103, "butt", &SOLES[..]),
     ] {
         let model = agent(id).unwrap().model().unwrap();
         let mut blind = env(id, &[("heights", "false"), ("difficulty", "1")], Autoreset::Disabled);
         assert_eq!(blind.spec().obs, own + feet.len(), "{id}");
         let mut env = env(id, &[("difficulty", "1")], Autoreset::Disabled);
-        // 57 and 69 numbers, as the original's
+        // in a plane 57 and 69 numbers, as the original's
         let n = env.spec().obs;
-        assert_eq!(n, own + feet.len() + 26, "{id}");
+        assert_eq!(n, own + feet.len() + seen(id), "{id}");
         let mut out = env.buffers();
         env.reset(Some(1), &mut out.obs).unwrap();
         let grounds: Vec<Vec<f32>> = (0..AGENTS).map(|i| env.ground(i, 0).unwrap()).collect();
         assert!((1..AGENTS).all(|i| grounds[i] != grounds[0] && grounds[i].iter().any(|z| *z != 0.0)), "{id}");
+        let differs = |ground: &[f32]| ground[..POINTS] != ground[ground.len() - POINTS..];
+        assert!(grounds.iter().all(|ground| differs(ground) == in_space(id)), "{id}");
         // somewhere on the course, so high that nothing touches it
         for (i, ground) in grounds.iter().enumerate() {
             let mut state = env.state(i).unwrap();
             state.qpos[0] += 5.0 + 4.9 * i as f64;
-            state.qpos[up(id)] += 1.0 + height(ground, state.qpos[0]);
+            let y = if in_space(id) { 0.7 * (i % 5) as f64 - 1.3 } else { 0.0 };
+            if in_space(id) {
+                state.qpos[1] = y;
+                // faces to the left, and the hands are off the ground
+                let turn = 0.3 * (i % 3) as f64;
+                let [w, z] = [(0.5 * turn).cos(), (0.5 * turn).sin()];
+                let q: [f64; 4] = std::array::from_fn(|k| state.qpos[3 + k]);
+                let turned = [w * q[0] - z * q[3], w * q[1] - z * q[2], w * q[2] + z * q[1], w * q[3] + z * q[0]];
+                state.qpos[3..7].copy_from_slice(&turned);
+            }
+            state.qpos[up(id)] += 1.0 + height(ground, state.qpos[0], y);
             env.set_state(i, &state).unwrap();
         }
         env.observe(&[true; AGENTS], &mut out.obs).unwrap();
@@ -87,12 +126,23 @@ fn a_figure_sees_the_ground_that_it_has() {
             let state = env.state(i).unwrap();
             let mut expected: Vec<f64> = Vec::new();
             for foot in feet {
-                let [x, _, z] = center(&model, &state, foot);
-                expected.push(z - height(ground, x));
+                let [x, y, z] = center(&model, &state, foot);
+                expected.push(z - height(ground, x, y));
             }
-            let [x, _, z] = center(&model, &state, eyes);
-            expected.extend((0..25).map(|k| (height(ground, x - 2.0 + 0.2 * f64::from(k)) - z).clamp(-3.0, 3.0)));
-            expected.push((x / 0.2).rem_euclid(1.0));
+            let [x, y, z] = center(&model, &state, eyes);
+            let clipped = |ground: f64| (ground - z).clamp(-3.0, 3.0);
+            if in_space(id) {
+                // nine rows ahead, five places from left to right in each
+                let [c, d, _] = axis(&model, &state, eyes);
+                let [c, d] = [c / c.hypot(d), d / c.hypot(d)];
+                for k in 0..45 {
+                    let (ahead, left) = (0.4 * f64::from(k / 5) - 0.4, 0.6 - 0.3 * f64::from(k % 5));
+                    expected.push(clipped(height(ground, x + ahead * c - left * d, y + ahead * d + left * c)));
+                }
+            } else {
+                expected.extend((0..25).map(|k| clipped(height(ground, x - 2.0 + 0.2 * f64::from(k), 0.0))));
+                expected.push((x / 0.2).rem_euclid(1.0));
+            }
             for (k, (expected, seen)) in expected.iter().zip(&obs[own..]).enumerate() {
                 let off = (expected - f64::from(*seen)).abs();
                 // single precision at 100 m, where the ground may rise by 6 m per m; the phase jumps from 1 to 0
@@ -148,7 +198,7 @@ fn fall_at(env: &mut VecEnv, out: &mut Step, x: &[f64]) {
         let ground = env.ground(i, 0).unwrap();
         state.qpos[0] += x;
         // on its side: nothing but feet may touch the ground
-        state.qpos[1] += height(&ground, state.qpos[0]) - 0.8;
+        state.qpos[1] += height(&ground, state.qpos[0], 0.0) - 0.8;
         state.qpos[2] += 0.5 * PI;
         env.set_state(i, &state).unwrap();
     }
@@ -198,7 +248,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
 
 #[test]
 fn a_figure_stands_on_its_ground() {
-    for id in ["TerrainHopper-v0", "TerrainWalker2d-v0", "TerrainAnt-v0"] {
+    for id in FIGURES {
         let model = agent(id).unwrap().model().unwrap();
         let options = [("course", "bumps"), ("difficulty", "1"), ("falls", "hurt")];
         let mut env = env(id, &options, Autoreset::Disabled);
@@ -208,7 +258,7 @@ fn a_figure_stands_on_its_ground() {
         for i in 0..AGENTS {
             let mut state = env.state(i).unwrap();
             state.qpos[0] += 5.0 + i as f64;
-            state.qpos[up(id)] += 0.3 + height(&ground, state.qpos[0]);
+            state.qpos[up(id)] += 0.3 + height(&ground, state.qpos[0], 0.0);
             env.set_state(i, &state).unwrap();
         }
         let actions = vec![0.0; AGENTS * env.spec().act];
@@ -217,8 +267,8 @@ fn a_figure_stands_on_its_ground() {
         }
         for i in 0..AGENTS {
             let state = env.state(i).unwrap();
-            let [x, _, z] = center(&model, &state, torso(id));
-            let above = z - height(&ground, x);
+            let [x, y, z] = center(&model, &state, torso(id));
+            let above = z - height(&ground, x, y);
             // it has fallen, and lies on the ground and not in it
             assert!((0.03..1.4).contains(&above), "{id}, agent {i}: {above} at {x}");
         }
@@ -338,7 +388,7 @@ fn an_episode_ends_where_nothing_happens_any_more() {
 /// The adversary builds a meter whenever the runner reaches one, and earns what the runner loses.
 #[test]
 fn an_adversary_builds_ahead_of_the_runner() {
-    for id in ["TerrainHopper-v0", "TerrainWalker2d-v0", "TerrainAnt-v0"] {
+    for id in FIGURES {
         let plain = env(id, &[], Autoreset::Disabled).spec().clone();
         let options = [("course", "adversary"), ("difficulty", "1"), ("falls", "hurt")];
         let mut env = env(id, &options, Autoreset::Disabled);
@@ -346,7 +396,8 @@ fn an_adversary_builds_ahead_of_the_runner() {
         let [runner, builder] = &spec.roles[..] else { panic!("two roles: {:?}", spec.roles) };
         // a runner's policy runs on any course
         assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id}");
-        assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..5], &["fall".into()]].concat());
+        let own = plain.reward_terms.iter().position(|term| term == "termination").unwrap();
+        assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..own], &["fall".into()]].concat());
         assert_eq!((spec.act, builder.act.clone()), (plain.act + 1, plain.act..plain.act + 1));
         assert!(builder.intermittent && spec.reward_terms[builder.terms.clone()] == ["inverse"]);
 
@@ -363,8 +414,11 @@ fn an_adversary_builds_ahead_of_the_runner() {
         for i in 0..AGENTS {
             let ground = env.ground(i, 0).unwrap();
             let step = 0.1 * (i as f64 - 10.0);
-            assert!((height(&ground, 6.0) - step).abs() < 1e-6 && height(&ground, 5.0) == 0.0, "{id}, agent {i}");
-            assert!((height(&ground, 50.0) - step).abs() < 1e-6);
+            assert!(
+                (height(&ground, 6.0, 0.0) - step).abs() < 1e-6 && height(&ground, 5.0, 0.0) == 0.0,
+                "{id}, agent {i}"
+            );
+            assert!((height(&ground, 50.0, 0.0) - step).abs() < 1e-6);
             let terms = &out.terms[k * i..k * (i + 1)];
             assert_eq!(terms[k - 1], -terms[..k - 1].iter().sum::<f32>());
             assert_eq!(out.reward[i], terms[..k - 1].iter().sum::<f32>());
@@ -388,10 +442,10 @@ fn an_adversary_builds_ahead_of_the_runner() {
             let state = env.state(i).unwrap();
             let (ground, obs) = (env.ground(i, 0).unwrap(), &out.obs[n * i..n * (i + 1)]);
             let x = center(&agent(id).unwrap().model().unwrap(), &state, torso(id))[0];
-            let [six, seven] = [6.0, 7.0].map(|x| height(&ground, x));
+            let [six, seven] = [6.0, 7.0].map(|x| height(&ground, x, 0.0));
             assert!(x > 1.0 && seven > six + 0.5, "{id}, agent {i} at {x}: {six} {seven}");
             for (point, seen) in obs[site.clone()].iter().take(12).enumerate() {
-                let expected = height(&ground, x + 0.5 * (point + 1) as f64) - height(&ground, x);
+                let expected = height(&ground, x + 0.5 * (point + 1) as f64, 0.0) - height(&ground, x, 0.0);
                 assert!((expected - f64::from(*seen)).abs() < 1e-3, "{id}, agent {i}: {expected} {seen}");
             }
         }

@@ -25,7 +25,7 @@ fn names_are_found_by_id_alias_and_base() {
 #[test]
 fn an_unknown_name_gets_the_nearest_and_the_list() {
     let known = "known: Hopper-v0, Hopper-v1, Walker2d-v0, Walker2d-v1, Humanoid-v0, Humanoid-v1, Ant-v0, Ant-v1, \
-                 HopperController-v0, WalkerController-v0, AntController-v0, TerrainHopper-v0, TerrainWalker2d-v0, TerrainAnt-v0, \
+                 HopperController-v0, WalkerController-v0, AntController-v0, TerrainHopper-v0, TerrainWalker2d-v0, TerrainAnt-v0, TerrainMarathonMan-v0, \
                  MarathonMan-v0, MarathonManWalk-v0, MarathonManWalkLeft-v0, MarathonManWalkRight-v0, \
                  MarathonManRun-v0, MarathonManBackflip-v0, MarathonManSpinKick-v0, MarathonManSpin-v0, \
                  MarathonManCartwheel-v0, MarathonManRoll-v0, MarathonManJump-v0, MarathonManKick-v0, \

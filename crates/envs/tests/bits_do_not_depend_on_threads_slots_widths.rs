@@ -101,6 +101,12 @@ fn ant_on_courses() {
     check("TerrainAnt-v0");
 }
 
+/// His gait and the course have variables in one memory.
+#[test]
+fn marathon_man_on_courses() {
+    check("TerrainMarathonMan-v0");
+}
+
 /// The same in a plane.
 #[test]
 fn hopper_on_courses() {

@@ -133,13 +133,15 @@ fn no_observation_is_constant() {
                 (0..4).flat_map(|leg| [13 + 8 * leg, 14 + 8 * leg, 19 + 8 * leg]).collect()
             }
             "AntController-v0" => vec![],
+            // nobody tells him to turn
+            "TerrainMarathonMan-v0" => vec![1],
             // the masses of 13 bodies, the last of ten numbers of each
             "Humanoid-v5" | "HumanoidStandup-v5" => (0..13).map(|body| 22 + 23 + 10 * body + 9).collect(),
             // the poles fall before the cart comes to the rail's end
             "InvertedDoublePendulum-v5" => vec![8],
             // sideways: axes, velocity; all of the angular velocity but pitch; the place in the clip
             id if id.starts_with("Walker2dStyle") => vec![6, 9, 12, 14, 16, 32],
-            id if id.starts_with("MarathonMan") || id.starts_with("HumanoidStyle") => vec![],
+            id if id.contains("MarathonMan") || id.starts_with("HumanoidStyle") => vec![],
             id if id.ends_with("-v5") || is_dm_controls(id) => vec![],
             // knees, pairs 3 and 6, turn about y; elbows, pairs 9 and 11, about an axis without x
             _ => vec![31, 33, 43, 45, 55, 63],
@@ -176,6 +178,9 @@ fn resets_are_random_and_reproducible() {
 fn resets_stay_near_the_spawn_pose() {
     for id in own_agents() {
         let agent = marathon_envs::agent(&id).unwrap();
+        if !agent.facts().clips.is_empty() {
+            continue; // they start in a clip
+        }
         let (model, noise) = (agent.model().unwrap(), ResetNoise::MARATHON);
         let spawn = &model.keyframes[0];
         assert_eq!(spawn.name, "spawn");

@@ -2,6 +2,8 @@
 //! `marathon-game`. The rover of `examples/rover.rs` takes a velocity; the trained one of the example `steer` drives at it.
 #![cfg(feature = "render")]
 
+#[path = "common/devices.rs"]
+mod devices;
 #[path = "common/windowless.rs"]
 mod windowless;
 
@@ -13,13 +15,10 @@ mod steer;
 
 use bevy::input::ButtonState;
 use bevy::input::InputPlugin;
-use bevy::input::gamepad::{
-    GamepadAxis, GamepadButton, GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent,
-    RawGamepadButtonChangedEvent, RawGamepadEvent,
-};
-use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
 use clap::Parser;
+use devices::{key, pad, press, push};
 use marathon_game::app::{Actor, Args, Bindings, Deed, Steering};
 use marathon_game::prelude::*;
 use std::sync::LazyLock;
@@ -41,37 +40,6 @@ fn game(words: &[&str]) -> App {
 /// The game with an agent, without a window.
 fn game_of(agent: &str, words: &[&str]) -> App {
     windowless::game(&[&[agent], words].concat(), FRAME, |_| ())
-}
-
-/// A gamepad, as its driver tells of it.
-fn pad(app: &mut App) -> Entity {
-    let pad = app.world_mut().spawn_empty().id();
-    let connection = GamepadConnection::Connected { name: "test pad".into(), vendor_id: None, product_id: None };
-    let event = GamepadConnectionEvent { gamepad: pad, connection };
-    app.world_mut().write_message(event.clone());
-    app.world_mut().write_message(RawGamepadEvent::Connection(event));
-    app.update();
-    pad
-}
-
-fn push(app: &mut App, pad: Entity, axis: GamepadAxis, value: f32) {
-    let event = RawGamepadAxisChangedEvent { gamepad: pad, axis, value };
-    app.world_mut().write_message(RawGamepadEvent::Axis(event));
-    app.update();
-}
-
-fn press(app: &mut App, pad: Entity, button: GamepadButton) {
-    for value in [1.0, 0.0] {
-        let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
-        app.world_mut().write_message(RawGamepadEvent::Button(event));
-        app.update();
-    }
-}
-
-fn key(app: &mut App, key_code: KeyCode, state: ButtonState) {
-    let (logical_key, window) = (Key::Character("key".into()), Entity::PLACEHOLDER);
-    app.world_mut().write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window });
-    app.update();
 }
 
 /// What the actors are told, in their order.

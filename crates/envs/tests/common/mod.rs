@@ -8,7 +8,9 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{AgentState, Autoreset, Options, Step, VecEnv, VecEnvOptions};
+use marathon_motion::kinematics::Pose;
+use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 use serde_json::Value;
 
@@ -116,4 +118,13 @@ pub fn go_on(env: &mut VecEnv, out: &mut Step, from: usize, to: usize, scale: f3
         env.step(&actions, &mut out.as_mut()).expect("the arrays fit");
         each(decision, out);
     }
+}
+
+/// Where the center of a geom is, m.
+pub fn center(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
+    let pose = Pose::of(model, &state.qpos);
+    let geom = model.geoms.iter().find(|g| g.name == geom).unwrap();
+    let mut local = pose.pos[0];
+    [local.x, local.y, local.z] = geom.pos;
+    (pose.quat[geom.body] * local + pose.pos[geom.body]).to_array()
 }

@@ -245,8 +245,9 @@ pub(super) fn observe_body<T: Real>(
     out: &mut Obs<T>,
 ) {
     let (root, r) = (anatomy.root, s.readings());
+    let [x, y, z] = s.position(root);
     out.group("height");
-    out.scalar(s.height(root));
+    out.scalar(z - s.ground_height(x, y));
     out.group("orientation");
     out.vector(turned(s.forward(root)));
     out.vector(turned(s.up(root)));

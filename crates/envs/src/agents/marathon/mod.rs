@@ -36,6 +36,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(terrain::TerrainHopper::default()),
         Arc::new(terrain::TerrainWalker2d::default()),
         Arc::new(terrain::TerrainAnt::default()),
+        Arc::new(marathon_man::TerrainMarathonMan::default()),
     ];
     out.extend(marathon_man::all());
     out.extend(in_style::all());

@@ -22,9 +22,6 @@ pub trait Figure: Agent + Clone + Default {
     const OBSERVED: &'static [&'static str];
     /// Price of the effort; the original takes 0.3.
     const EFFORT: f64;
-    /// Worth of a fall. At the original's -1, a figure that is told to run backward lets itself fall that way: its velocity is
-    /// right until it lies, and a fall is cheaper than to stand there.
-    const FALL: f64;
     /// What a jump is worth now: nothing while a foot is on the ground, or else 1 and the height of the lowest foot, m.
     fn leap<T: Real>(s: &Senses<T>) -> T;
     /// How far the torso is lower than it may be, m.
@@ -40,7 +37,6 @@ impl Figure for HopperV0 {
     const OBSERVED: &'static [&'static str] =
         &["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities", "foot_height"];
     const EFFORT: f64 = -0.1;
-    const FALL: f64 = -60.0;
 
     #[inline(always)]
     fn leap<T: Real>(s: &Senses<T>) -> T {
@@ -64,7 +60,6 @@ impl Figure for Walker2dV1 {
         &["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities", "foot_heights"];
     // at 0.3, walking costs more than it earns
     const EFFORT: f64 = -0.05;
-    const FALL: f64 = -40.0;
 
     #[inline(always)]
     fn leap<T: Real>(s: &Senses<T>) -> T {

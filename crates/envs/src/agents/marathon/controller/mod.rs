@@ -9,10 +9,11 @@
 //! | what the figure's own task observes | |
 //! | `command` | commanded velocity, m/s; with `discrete` also the jump, 0 or 1 |
 //! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
+//! | `target_velocity` | what the velocity should be by now: it follows the command by 6 m/s^2, m/s |
 //!
-//! r = clamp(1 - 0.8 abs(commanded - mean velocity), -1, 1) + forward bonus + jump - effort + still. The forms of the first three
-//! terms and of the effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not
-//! stand still. The Walker also pays for a low torso. A fall costs 60 or 40.
+//! r = exp(-4 e^2) + 2 - 0.5 e + forward bonus + jump - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
+//! and effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not stand still. The
+//! Walker also pays for a low torso. Standing is worth something whatever is told, so that a fall is never a way out.
 
 mod ant;
 mod commander;
@@ -39,14 +40,24 @@ use schedule::Schedule;
 pub const FASTEST: f64 = 4.0;
 /// Slots of the memory: the torso's velocity along x at the last three decisions, m/s. The original takes the mean of nine
 /// physics steps.
-const MEMORY: usize = 3;
+const VELOCITIES: usize = 3;
+/// The target velocity, m/s.
+const TARGET: usize = VELOCITIES;
+const MEMORY: usize = TARGET + 1;
+/// How fast the target velocity follows the command, m/s^2. Friction allows 9.8.
+const RAMP: f64 = 6.0;
 /// Terms of the reward.
-const TERMS: [&str; 6] = ["velocity", "uprightness", "jump", "still", "height", "effort"];
-/// Price of a difference of 1 m/s. The original's is 1.2 per 4 m/s, with which standing upright is worth something to a figure
-/// that is told to run, so that it stands.
-const PRICE: f64 = 3.2 / FASTEST;
+const TERMS: [&str; 7] = ["velocity", "pace", "uprightness", "jump", "still", "height", "effort"];
+/// Sharpness of the worth of the right velocity, s^2/m^2.
+const SHARPNESS: f64 = 4.0;
+/// Price of a difference of 1 m/s, and the difference at which a decision is worth nothing, m/s: that of a figure that stands while it
+/// is told to run.
+const PRICE: f64 = 0.5;
+const WORTHLESS: f64 = FASTEST;
+/// Worth of a fall.
+const FALL: f64 = -10.0;
 /// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
-const STILL: f64 = 0.5;
+const STILL: f64 = 1.5;
 const RESTLESS: f64 = 0.04;
 
 /// The Hopper told how fast to go.
@@ -132,7 +143,7 @@ impl<F: Figure> Controller<F> {
 
 /// Worth of standing still, 0 to 1: 1/e where the mean square of the velocities of the first `parts` parts is `restless`, m^2/s^2.
 #[inline(always)]
-fn stillness<T: Real>(s: &Senses<T>, parts: usize, restless: f64) -> T {
+pub(super) fn stillness<T: Real>(s: &Senses<T>, parts: usize, restless: f64) -> T {
     let mut speed2 = T::zero();
     for part in (0..parts).map(Part) {
         let [x, y, z] = s.linear_velocity(part);
@@ -151,19 +162,19 @@ impl<F: Figure> Agent for Controller<F> {
         let mut facts = Facts {
             id: F::ID.into(),
             summary: F::SUMMARY.into(),
-            observation: own.observation.map(|n| n + command.len() + 1),
+            observation: own.observation.map(|n| n + command.len() + 2),
             reward_terms: names(TERMS),
             info: names(["velocity_error"]),
             metrics: names(["forward", "velocity_error"]),
             parts: names(F::PARTS),
             command,
             memory: MEMORY,
-            termination_reward: Some(F::FALL),
+            termination_reward: Some(FALL),
             ..own
         };
         if self.is_opposed() {
             let own = [&TERMS[..], &["fall"]].concat();
-            let seen = [F::OBSERVED, &["command", "mean_velocity"]].concat();
+            let seen = [F::OBSERVED, &["command", "mean_velocity", "target_velocity"]].concat();
             facts.roles = commander::roles(input, facts.actions.clone(), &seen, &own);
             facts.actions.extend(names(commander::actions(input)));
             facts.reward_terms = names(own.iter().chain(&commander::TERMS));
@@ -198,11 +209,16 @@ impl<F: Figure> Agent for Controller<F> {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        memory.copy_within(0..MEMORY - 1, 1);
+        memory.copy_within(0..VELOCITIES - 1, 1);
         memory[0] = s.linear_velocity(F::TORSO)[0];
-        if self.is_opposed() {
+        let told = if self.is_opposed() {
             commander::remember(self, s, memory);
-        }
+            memory[commander::PRESENT]
+        } else {
+            s.command(0)
+        };
+        let most = RAMP * s.dt();
+        memory[TARGET] += clamp(told - memory[TARGET], -most, most);
     }
 
     #[inline(always)]
@@ -215,6 +231,8 @@ impl<F: Figure> Agent for Controller<F> {
         }
         out.group("mean_velocity");
         out.scalar(mean_velocity(s));
+        out.group("target_velocity");
+        out.scalar(s.memory(TARGET));
         if self.is_opposed() {
             commander::observe::<F, T>(s, out);
         }
@@ -223,22 +241,23 @@ impl<F: Figure> Agent for Controller<F> {
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let (zero, one) = (T::zero(), T::lit(1.0));
-        let target = self.told(s, 0, false);
-        let off = (target - mean_velocity(s)).abs();
-        terms.add("velocity", 1.0, clamp(off.neg_mul_add(T::lit(PRICE), one), -1.0, 1.0));
+        let (told, velocity) = (self.told(s, 0, false), mean_velocity(s));
+        let off = (s.memory(TARGET) - velocity).abs();
+        terms.add("velocity", 1.0, (off * off * T::lit(-SHARPNESS)).exp());
+        terms.add("pace", PRICE, T::lit(WORTHLESS) - off);
         terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
         let jump = self.jump(s);
         terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
-        let rest = (one - target.abs().max(jump) * T::lit(10.0)).max(zero);
+        let rest = (one - told.abs().max(jump) * T::lit(10.0)).max(zero);
         terms.add("still", STILL, rest * stillness(s, F::PARTS.len(), RESTLESS));
         terms.add("height", -1.0, F::low(s));
         // what an adversary does is no effort of the figure's
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));
         if self.is_opposed() {
             let fallen = self.figure.terminated(s);
-            terms.add("fall", F::FALL, T::masked(fallen, one));
-            commander::add_terms(off, fallen, terms);
+            terms.add("fall", FALL, T::masked(fallen, one));
+            commander::add_terms((told - velocity).abs(), fallen, terms);
         }
     }
 

@@ -24,10 +24,10 @@ use super::body::{
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    BEGUN, CLIPS, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
+    BEGUN, CLIPS, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET, TERMS,
 };
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
-use crate::agent::senses::hypot;
+use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms,
     names,
@@ -47,6 +47,10 @@ const MEMORY: usize = MORTAL + 1;
 const SKILLED: f64 = 0.45;
 /// Mean distance of the parts from the clip's that ends an episode of skills alone, m.
 const TOO_FAR: f64 = 0.5;
+/// Height of a foot's center that is on the ground, worth of a jump's height, 1/m, and height that is worth no more, m.
+const STANDING_FOOT: f64 = 0.06;
+const LEAP: f64 = 5.0;
+const HIGH: f64 = 0.3;
 /// Shares of the commands that jump, turn over, and step aside.
 const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
@@ -131,7 +135,7 @@ impl Agent for Controller {
             max_episode_steps: MAX_EPISODE_STEPS,
             observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
-            reward_terms: names(["velocity", "pace", "drift", "heading", "gait", "tempo", "skill"]),
+            reward_terms: names(TERMS.iter().chain(&["skill", "leap"])),
             info: names(["velocity_error", "heading_error", "skill", "rising"]),
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
@@ -291,8 +295,13 @@ impl Agent for Controller {
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let all = memory(s);
-        Steer::add_terms(s, T::not(SKILL.on(&all)), terms);
+        let told = s.command(1).abs() + s.command(2).abs() + s.command(0);
+        Steer::add_terms(s, T::not(SKILL.on(&all)), told, terms);
         terms.add("skill", 1.0, SKILL.worth(&all) * imitation::similarity(s, &ANATOMY));
+        // a hop looks much like a jump
+        let [right, left] = FEET.map(|foot| s.height(foot));
+        let high = clamp(right.min(left) - T::lit(STANDING_FOOT), 0.0, HIGH);
+        terms.add("leap", LEAP, T::masked(SKILL.is(&all, JUMP), high));
     }
 
     #[inline(always)]

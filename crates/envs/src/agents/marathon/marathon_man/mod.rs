@@ -19,6 +19,7 @@
 mod body;
 pub mod clips;
 mod controller;
+mod courses;
 pub mod gait;
 pub mod reward;
 mod skills;
@@ -40,6 +41,7 @@ use super::imitation::{self, sub, turned_to};
 pub use body::Control;
 use body::{ACTIONS, ANATOMY, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model};
 use clips::ClipNames;
+pub use courses::TerrainMarathonMan;
 pub use reward::Reward;
 
 /// Physics steps per decision: 200 Hz physics, 40 Hz control.

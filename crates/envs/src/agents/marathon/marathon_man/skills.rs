@@ -22,12 +22,13 @@ pub struct Skill {
 }
 
 /// All of them. The jump leaves the ground 13 decisions after its beginning, 0.33 s, and is back on it after 31; the backflip
-/// after 28 and 46, and what he waits. Who lies earns less than who stands.
+/// after 28 and 46, and what he waits. Who lies earns less than who stands. The person of the clips first lies for a while, and
+/// stands for another at the end.
 pub const SKILLS: [Skill; 4] = [
     Skill { clip: "jump", rows: [18, 60], worth: 1.0 },
     Skill { clip: "backflip", rows: [0, 66], worth: 1.0 },
-    Skill { clip: "getup_facedown", rows: [0, 1000], worth: 0.5 },
-    Skill { clip: "getup_faceup", rows: [0, 1000], worth: 0.5 },
+    Skill { clip: "getup_facedown", rows: [8, 100], worth: 0.5 },
+    Skill { clip: "getup_faceup", rows: [48, 142], worth: 0.5 },
 ];
 /// How many of them, the first, begin in a stand.
 pub const FROM_A_STAND: usize = 2;

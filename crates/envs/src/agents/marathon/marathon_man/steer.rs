@@ -30,6 +30,7 @@ use std::sync::LazyLock;
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
+use super::super::controller::stillness;
 use super::super::heading;
 use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
 use super::body::{
@@ -51,6 +52,22 @@ pub const STYLE: [&str; 7] =
     ["height", "orientation", "velocity", "angular_velocity", "joint_positions", "joint_velocities", "ends"];
 /// What he moves like.
 pub(super) const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
+/// Parts of the observation, in their order.
+pub(super) const OBSERVED: [&str; 11] = [
+    "command",
+    "height",
+    "orientation",
+    "velocity",
+    "angular_velocity",
+    "joint_positions",
+    "joint_velocities",
+    "ends",
+    "touch",
+    "gait",
+    "next_pose",
+];
+/// Terms of the reward.
+pub(super) const TERMS: [&str; 7] = ["velocity", "pace", "drift", "heading", "gait", "tempo", "still"];
 /// Number of the clip in which he stands.
 const STANDS: usize = 4;
 /// Numbers that he observes.
@@ -62,7 +79,7 @@ pub(super) const SHARPEST: f64 = FRAC_PI_2;
 /// Most that the commanded direction is off his heading, rad.
 pub const MOST_BEHIND: f64 = 1.0;
 /// How long a command holds, decisions.
-const HOLDS: [usize; 2] = [40, 240];
+pub(super) const HOLDS: [usize; 2] = [40, 240];
 /// Share of commands that are to stand, and of those that are to go straight on.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
@@ -85,6 +102,8 @@ const ACCELERATION: f64 = 4.0;
 const LEAD: f64 = 0.8;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
 const SIDEWAYS: f64 = 2.5;
+/// Mean square of the parts' velocities at which standing still is worth 1/e, m^2/s^2.
+const RESTLESS: f64 = 0.1;
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
 
@@ -217,9 +236,10 @@ impl Steer {
         memory[PACE] += clamp(asked - memory[PACE], -most, most);
     }
 
-    /// Adds the terms of the reward for the velocity, the direction and the gait, where they count.
+    /// Adds the terms of the reward for the velocity, the direction, the gait and stillness, where they count. `told`: how much he is
+    /// told to go or turn, 0 if he is to stand.
     #[inline(always)]
-    pub(super) fn add_terms<T: Real>(s: &Senses<T>, counts: T::Mask, terms: &mut Terms<T>) {
+    pub(super) fn add_terms<T: Real>(s: &Senses<T>, counts: T::Mask, told: T, terms: &mut Terms<T>) {
         let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
         let angle = Self::off(s, Self::direction(s));
         let [pose, tempo] = Self::out_of_step(s);
@@ -230,6 +250,8 @@ impl Steer {
         add("heading", 0.2, angle * angle * T::lit(-4.0));
         add("gait", 0.2, pose * T::lit(-5.0));
         add("tempo", 0.05, tempo * T::lit(-1.0));
+        let rest = T::and(counts, told.lt(T::lit(0.01)));
+        terms.add("still", 0.2, T::masked(rest, stillness(s, PARTS.len(), RESTLESS)));
     }
 
     /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
@@ -272,6 +294,18 @@ impl Steer {
         }
     }
 
+    /// How much he is told to go and turn.
+    #[inline(always)]
+    pub(super) fn told<T: Real>(s: &Senses<T>) -> T {
+        s.command(0).abs() + s.command(1).abs()
+    }
+
+    /// What he observes where nothing but the gait leads him: vectors are in his heading.
+    #[inline(always)]
+    pub(super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, out);
+    }
+
     /// Angles of the gait's next pose, led by some seconds.
     #[inline(always)]
     pub(super) fn next_pose<T: Real>(phase: T, pace: T, dt: f64, lead: f64) -> impl Fn(usize) -> T {
@@ -298,7 +332,7 @@ impl Agent for Steer {
             max_episode_steps: MAX_EPISODE_STEPS,
             observation: Some(OBSERVATION),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
-            reward_terms: names(["velocity", "pace", "drift", "heading", "gait", "tempo"]),
+            reward_terms: names(TERMS),
             info: names(["velocity_error", "heading_error"]),
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
@@ -392,12 +426,12 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, out);
+        Self::observe_along(s, out);
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        Self::add_terms(s, T::not(T::none()), terms);
+        Self::add_terms(s, T::not(T::none()), Self::told(s), terms);
     }
 
     #[inline(always)]

@@ -7,7 +7,7 @@ use marathon_physics::lanes::Real;
 
 use super::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
 use super::runners::Runner;
-use super::{BUILT, DUE, SINCE, STEP};
+use super::{BUILT, DIFFICULTY, DUE, SINCE, STEP};
 use crate::agent::{Obs, RoleFacts, Senses, Site, names};
 
 /// Names of the roles.
@@ -53,22 +53,24 @@ pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     for i in 1..=POINTS_SEEN {
         out.scalar(s.ground_height(x + T::lit(i as f64 * SPACING), y) - below);
     }
-    [z - below, vx, vz, fx, fz, s.memory(STEP), s.memory(SINCE) * T::lit(s.dt())]
+    [z - below, vx, vz, fx, fz, s.memory(F::MEMORY + STEP), s.memory(F::MEMORY + SINCE) * T::lit(s.dt())]
         .into_iter()
         .for_each(|x| out.scalar(x));
 }
 
-/// Builds the next meter, and goes on level behind it.
-pub(super) fn build(site: &mut Site, difficulty: f64) {
+/// Builds the next meter, and goes on level behind it. `first`: the course's first variable in the memory.
+pub(super) fn build(site: &mut Site, first: usize) {
+    let memory = &mut site.memory[first..];
+    let difficulty = memory[DIFFICULTY];
     let wanted = site.action.last().copied().unwrap_or(0.0);
     // the runner reaches its next meter before it sees what is not built yet
-    let start = ((LEVEL_TO + site.memory[BUILT] - FROM) / CELL).round() as usize;
+    let start = ((LEVEL_TO + memory[BUILT] - FROM) / CELL).round() as usize;
     let per_meter = (1.0 / CELL).round() as usize;
     for ground in site.grounds.iter_mut().take(1) {
         let Some(from) = ground.get(start.min(POINTS - 1)).copied() else { continue };
         let step = 0.1 * libm::round(STEPS * wanted) * difficulty;
         let to = (f64::from(from) + step).clamp(-FARTHEST, FARTHEST);
-        site.memory[STEP] = to - f64::from(from);
+        memory[STEP] = to - f64::from(from);
         for row in ground.chunks_exact_mut(POINTS) {
             for (i, z) in row.iter_mut().enumerate().skip(start + 1) {
                 let share = ((i - start) as f64 / per_meter as f64).min(1.0);
@@ -76,8 +78,8 @@ pub(super) fn build(site: &mut Site, difficulty: f64) {
             }
         }
     }
-    site.memory[BUILT] += 1.0;
-    site.memory[DUE] = 0.0;
+    memory[BUILT] += 1.0;
+    memory[DUE] = 0.0;
 }
 
 #[cfg(test)]
@@ -85,14 +87,18 @@ mod tests {
     use super::super::MEMORY;
     use super::*;
 
+    /// Variables of the figure.
+    const FIRST: usize = 3;
+
     fn after(actions: &[f64], difficulty: f64) -> (Vec<f64>, Vec<Vec<f32>>) {
-        let (mut memory, mut grounds) = (vec![0.0; MEMORY], vec![vec![0.0; 2 * POINTS]]);
+        let (mut memory, mut grounds) = (vec![0.0; FIRST + MEMORY], vec![vec![0.0; 2 * POINTS]]);
         for action in actions {
-            memory[DUE] = 1.0;
-            build(&mut Site { action: &[0.3, *action], memory: &mut memory, grounds: &mut grounds }, difficulty);
-            assert_eq!(memory[DUE], 0.0);
+            memory[FIRST + DUE] = 1.0;
+            memory[FIRST + DIFFICULTY] = difficulty;
+            build(&mut Site { action: &[0.3, *action], memory: &mut memory, grounds: &mut grounds }, FIRST);
+            assert!(memory[FIRST + DUE] == 0.0 && memory[..FIRST] == [0.0; FIRST]);
         }
-        (memory, grounds)
+        (memory.split_off(FIRST), grounds)
     }
 
     fn height(ground: &[f32], x: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! Courses: profiles of the ground along x, the same at every y.
+//! Courses: profiles of the ground along x, the same at every y. A figure in space has a field, made of a course.
 //!
 //! A course is level for some meters around the start. What follows comes in pieces, each with chance of its own, until the end.
 //! Everything that makes a piece hard grows with the difficulty, 0 to 1: at 0, every course is level.
@@ -20,6 +20,14 @@ pub const LEVEL_TO: f64 = 5.0;
 pub const FARTHEST: f64 = 4.0;
 /// Depth of a gap, m.
 const DEPTH: f64 = 0.6;
+/// Distance between the rows of a field, m.
+pub const ROW: f64 = 0.5;
+/// How oblique the pieces of a field are at most: m along x for each m to the side. The way on which a field becomes oblique, m.
+const OBLIQUE: f64 = 0.3;
+const BECOMES: f64 = 8.0;
+/// Greatest height of a field's bumps, m, and points along x from one to the next.
+const UNEVEN: f64 = 0.08;
+const KNOT: usize = 5;
 
 /// What a course is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,6 +99,41 @@ impl Kind {
         course.points.truncate(POINTS);
         course.points
     }
+
+    /// Elevations of a field for a figure in space, m above the start, row by row, the one with the smallest y first. Two rows
+    /// are a course that is the same at every y. More rows of random pieces are oblique, and uneven to all sides.
+    pub fn field(self, difficulty: f64, rows: usize, random: &mut EpisodeRng) -> Vec<f32> {
+        let course = self.elevations(difficulty, random);
+        if rows == 2 || !(MIX.contains(&self) || self == Kind::Mixed) {
+            let row = course.iter().map(|z| *z as f32);
+            return (0..rows).flat_map(|_| row.clone()).collect();
+        }
+        let oblique = random.around_zero(OBLIQUE * difficulty);
+        let knots_in_row = POINTS.div_ceil(KNOT) + 1;
+        let knots: Vec<f64> = (0..rows * knots_in_row).map(|_| random.uniform(0.0, UNEVEN * difficulty)).collect();
+        let first = (LEVEL_TO - FROM) / CELL;
+        let mut field = Vec::with_capacity(rows * POINTS);
+        for (row, knots) in knots.chunks_exact(knots_in_row).enumerate() {
+            let aside = oblique * ROW * (row as f64 - 0.5 * (rows - 1) as f64) / CELL;
+            for point in 0..POINTS {
+                let from_start = point as f64 - first;
+                // none at the start, all of it a few meters on
+                let share = (from_start * CELL / BECOMES).clamp(0.0, 1.0);
+                let (knot, part) = (point / KNOT, (point % KNOT) as f64 / KNOT as f64);
+                let bump = (1.0 - part) * knots[knot] + part * knots[knot + 1];
+                let z = between(&course, point as f64 + share * aside);
+                field.push((z + bump * (from_start * CELL).clamp(0.0, 1.0)) as f32);
+            }
+        }
+        field
+    }
+}
+
+/// Elevation between the points of a course; beyond its ends, that of the end.
+fn between(course: &[f64], at: f64) -> f64 {
+    let at = at.clamp(0.0, (course.len() - 1) as f64);
+    let (i, part) = ((at as usize).min(course.len() - 2), at - libm::floor(at));
+    if at as usize > i { course[i + 1] } else { (1.0 - part) * course[i] + part * course[i + 1] }
 }
 
 /// A course in the making.
@@ -241,6 +284,31 @@ mod tests {
                 assert!(most <= FARTHEST + DEPTH, "{name} {most}");
                 assert_eq!(most > 0.0, !LEVEL.contains(kind), "{name}");
             }
+        }
+    }
+
+    /// A field is level at the start, differs to the sides where its pieces are random, and is a course where they are not.
+    #[test]
+    fn fields_are_uneven_to_all_sides() {
+        const ROWS: usize = 17;
+        for (kind, name) in Kind::NAMED {
+            for episode in 0..5 {
+                let mut random = EpisodeRng::new(EpisodeId { seed: 1, agent: 0, episode });
+                let field = kind.field(1.0, ROWS, &mut random);
+                assert_eq!(field.len(), ROWS * POINTS, "{name}");
+                let rows: Vec<&[f32]> = field.chunks_exact(POINTS).collect();
+                let level = ((LEVEL_TO - FROM) / CELL) as usize;
+                assert!(rows.iter().all(|row| row[..level].iter().all(|z| *z == 0.0)), "{name}");
+                let random = MIX.contains(kind) || *kind == Kind::Mixed;
+                assert_eq!(rows.windows(2).all(|pair| pair[0] == pair[1]), !random, "{name}");
+                let course = elevations(*kind, 1.0, episode);
+                for (z, own) in rows[ROWS / 2].iter().zip(&course) {
+                    let more = f64::from(*z) - own;
+                    assert!((-1e-6..=if random { UNEVEN + 1e-6 } else { 1e-6 }).contains(&more), "{name}: {more}");
+                }
+            }
+            let mut random = EpisodeRng::new(EpisodeId { seed: 1, agent: 0, episode: 9 });
+            assert!(kind.field(0.0, ROWS, &mut random).iter().all(|z| *z == 0.0), "{name}");
         }
     }
 

@@ -6,12 +6,14 @@
 //! |---|---|
 //! | what the figure's own task observes | but for the heights of its feet |
 //! | `foot_heights` | height of each foot's center above the ground below it, m |
-//! | `ground_ahead` | with `heights`: how far the ground is above the Hopper's foot or the Walker's torso, at 25 points every 0.2 m from 2 m behind it on, m |
-//! | `phase` | with `heights`: share of the present 0.2 m that lies behind, 0 to 1 |
+//! | `ground_ahead` | with `heights`: how far the ground is above the Hopper's foot or the Walker's torso, at 25 points every 0.2 m from 2 m behind it on, m; in space above the torso, at 45 points around and ahead of it |
+//! | `phase` | with `heights`, in a plane: share of the present 0.2 m that lies behind, 0 to 1 |
 //!
 //! `full`: r = v/4 + forward bonus - effort - 4 (joints at limit) - pain, of the torso; experiment 004 of the original.
 //! `velocity`: r = clamp(v / 8 m/s, 0, 1), that of the Marathon Environments 2.
 //! `sparse`: r = way / 20 m at the end of the episode, 0 before.
+//! Marathon Man's `full` is the reward of the task in which he is [steered](super::marathon_man::steer); his task is
+//! [there](super::marathon_man::TerrainMarathonMan), too.
 //!
 //! With the course `adversary` the task has two roles: the figure, and a builder who earns -r.
 
@@ -30,14 +32,24 @@ use super::idle;
 use super::walker2d::Walker2dV0;
 use crate::agent::options::Choice;
 use crate::agent::{
-    Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Site, Start, Terms, names,
+    Agent, Ctrl, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Site, Start, Terms, names,
 };
-use course::{FROM, Kind, POINTS, TO};
+use crate::episode_rng::EpisodeRng;
+use course::{FROM, Kind, POINTS, ROW, TO};
 
 /// Points at which the ground is seen, and how far one is from the next and the first behind the figure, m.
 const SEEN: usize = 25;
 const SPACING: f64 = 0.2;
 const BEHIND: f64 = 2.0;
+/// The same for a figure in space: places ahead of it and to its left, m, from left to right, the farthest row last.
+const GRID: [[f64; 2]; 45] = {
+    let (mut grid, mut i) = ([[0.0; 2]; 45], 0);
+    while i < grid.len() {
+        grid[i] = [0.4 * (i / 5) as f64 - 0.4, 0.6 - 0.3 * (i % 5) as f64];
+        i += 1;
+    }
+    grid
+};
 /// Farthest below or above the figure that ground is seen, m.
 const SIGHT: f64 = 3.0;
 
@@ -68,10 +80,6 @@ const RUNG: f64 = 0.05;
 const PATIENCE: f64 = 5.0;
 /// Falls before here end the episode even of a figure that may fall, m.
 const TOO_EARLY: f64 = 4.0;
-/// Price of the joints driven at their limit: 0.8 for each.
-const JOINTS_AT_LIMIT: f64 = -4.0;
-/// Worth of a fall that ends the episode, where an adversary builds.
-const FALL: f64 = -1.0;
 /// Price of a fall that ends nothing.
 const PAIN: f64 = -5.0;
 /// Way that earns 1 with the sparse reward, m.
@@ -164,6 +172,15 @@ pub struct Terrain<F> {
 }
 
 impl<F: Runner> Terrain<F> {
+    /// Rows of its height field.
+    const ROWS: usize = if F::IN_SPACE { (2.0 * F::HALF_WIDTH / ROW) as usize + 1 } else { 2 };
+
+    /// A variable of the course, behind those of the figure.
+    #[inline(always)]
+    fn own<T: Real>(s: &Senses<T>, slot: usize) -> T {
+        s.memory(F::MEMORY + slot)
+    }
+
     /// The figure's model with a height field in place of the floor.
     fn model(&self) -> String {
         const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
@@ -172,9 +189,9 @@ impl<F: Runner> Terrain<F> {
         let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
         let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
         let idle = if self.built() { idle::actuators(F::JOINT, &[builder::ACTION]) } else { String::new() };
-        let width = F::HALF_WIDTH;
+        let (width, rows) = (F::HALF_WIDTH, Self::ROWS);
         let field = format!(
-            "{idle}<asset><hfield name=\"course\" nrow=\"2\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n"
+            "{idle}<asset><hfield name=\"course\" nrow=\"{rows}\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n"
         );
         idle::extended(&text.replacen(FLOOR, &course, 1), &field)
     }
@@ -192,6 +209,7 @@ impl<F: Runner> Terrain<F> {
 
     /// Level of the next course after an episode that has left its memory; 0 for the first one.
     fn next_level(previous: &[f64]) -> f64 {
+        let previous = &previous[F::MEMORY..];
         let change = match previous[FARTHEST] {
             far if far >= FAR => RUNG,
             near if near < NEAR => -RUNG,
@@ -204,10 +222,16 @@ impl<F: Runner> Terrain<F> {
     #[inline(always)]
     fn observe_ahead<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         let [x, y, z] = s.position(F::EYES);
+        let clipped = |ground: T| (ground - z).max(T::lit(-SIGHT)).min(T::lit(SIGHT));
         out.group("ground_ahead");
+        if F::IN_SPACE {
+            for point in GRID {
+                out.scalar(clipped(s.ground_near(F::EYES, point)));
+            }
+            return;
+        }
         for i in 0..SEEN {
-            let ground = s.ground_height(x + T::lit(i as f64 * SPACING - BEHIND), y);
-            out.scalar((ground - z).max(T::lit(-SIGHT)).min(T::lit(SIGHT)));
+            out.scalar(clipped(s.ground_height(x + T::lit(i as f64 * SPACING - BEHIND), y)));
         }
         out.group("phase");
         let cells = x * T::lit(1.0 / SPACING);
@@ -217,14 +241,14 @@ impl<F: Runner> Terrain<F> {
     /// Lanes that have made no new meter for too long.
     #[inline(always)]
     fn stuck<T: Real>(s: &Senses<T>) -> T::Mask {
-        T::lit(PATIENCE / s.dt()).lt(s.memory(SINCE))
+        T::lit(PATIENCE / s.dt()).lt(Self::own(s, SINCE))
     }
 
     /// Lanes that have come to the end of the course, or to within 0.2 m of its edge.
     #[inline(always)]
     fn through<T: Real>(s: &Senses<T>) -> T::Mask {
         let aside = s.position(F::TORSO)[1].abs();
-        T::or(T::lit(TO - 1.0).lt(s.memory(AT)), T::lit(F::HALF_WIDTH - EDGE).lt(aside))
+        T::or(T::lit(TO - 1.0).lt(Self::own(s, AT)), T::lit(F::HALF_WIDTH - EDGE).lt(aside))
     }
 }
 
@@ -233,19 +257,23 @@ impl<F: Runner> Agent for Terrain<F> {
         let own = self.figure.facts();
         let reward = self.arguments.reward;
         let mut terms = match reward {
-            Reward::Full => names(["velocity", "uprightness", "effort", "joints_at_limit", "pain"]),
+            Reward::Full => names(F::TERMS.iter().chain(&["pain"])),
             Reward::Velocity => names(["velocity"]),
             Reward::Sparse => names(["distance"]),
         };
         let (mut actions, mut roles, mut price) = (own.actions.clone(), Vec::new(), None);
         if reward == Reward::Full {
-            price = own.termination_reward;
+            price = Some(F::FALL);
         }
         if self.built() {
             if price.take().is_some() {
                 terms.push("fall".into());
             }
-            let ahead: &[&str] = if self.arguments.heights { &["ground_ahead", "phase"] } else { &[] };
+            let ahead: &[&str] = match (self.arguments.heights, F::IN_SPACE) {
+                (true, false) => &["ground_ahead", "phase"],
+                (true, true) => &["ground_ahead"],
+                (false, _) => &[],
+            };
             let seen = [F::BODY, &["foot_heights"], ahead].concat();
             roles = builder::roles(actions.clone(), &seen, &terms);
             actions.push(builder::ACTION.into());
@@ -261,7 +289,7 @@ impl<F: Runner> Agent for Terrain<F> {
             roles,
             info: names(["distance", "difficulty"]),
             metrics: names(["forward", "difficulty"]),
-            memory: MEMORY,
+            memory: F::MEMORY + MEMORY,
             termination_reward: price,
             ..own
         }
@@ -283,16 +311,26 @@ impl<F: Runner> Agent for Terrain<F> {
             Levels::Curriculum => Self::next_level(start.previous),
         };
         let difficulty = level * most.min(1.0);
-        start.memory[LEVEL] = level;
-        start.memory[DIFFICULTY] = difficulty;
-        let profile = course.elevations(difficulty, start.random);
-        let row = profile.iter().map(|z| *z as f32);
-        start.set_ground(0, row.clone().chain(row).collect());
-        start.add_noise(ResetNoise::MARATHON);
+        let field = course.field(difficulty, Self::ROWS, start.random);
+        start.set_ground(0, field);
+        self.figure.place(start);
+        start.memory[F::MEMORY + LEVEL] = level;
+        start.memory[F::MEMORY + DIFFICULTY] = difficulty;
+    }
+
+    fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        self.figure.tell(random, step, out)
+    }
+
+    #[inline(always)]
+    fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
+        self.figure.ctrl(c);
     }
 
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let (own, memory) = memory.split_at_mut(F::MEMORY);
+        self.figure.begin(s, own);
         let [x, ..] = s.position(F::TORSO);
         for slot in [AT, FARTHEST, MARK] {
             memory[slot] = x;
@@ -302,6 +340,8 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
+        let (own, memory) = memory.split_at_mut(F::MEMORY);
+        self.figure.remember(s, own);
         let (zero, one) = (T::zero(), T::lit(1.0));
         let [x, ..] = s.position(F::TORSO);
         memory[AT] = x;
@@ -335,20 +375,16 @@ impl<F: Runner> Agent for Terrain<F> {
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         match self.arguments.reward {
             Reward::Full => {
-                let (whole, own) = (T::lit(1.0) - s.memory(HURT), self.ignored());
-                terms.add("velocity", 1.0, s.velocity(F::TORSO));
-                terms.add("uprightness", 1.0, whole * s.forward_bonus(F::TORSO));
-                terms.add("effort", F::EFFORT, whole * s.effort(own));
-                terms.add("joints_at_limit", JOINTS_AT_LIMIT, s.joints_at_limit_penalty(own));
-                terms.add("pain", PAIN, s.memory(HIT));
+                F::add_terms(s, T::lit(1.0) - Self::own(s, HURT), self.ignored(), terms);
+                terms.add("pain", PAIN, Self::own(s, HIT));
                 if self.built() {
-                    terms.add("fall", FALL, T::masked(self.terminated(s), T::lit(1.0)));
+                    terms.add("fall", F::FALL, T::masked(self.terminated(s), T::lit(1.0)));
                 }
             }
             Reward::Velocity => terms.add("velocity", 1.0, s.normalized_velocity(F::TORSO, FASTEST)),
             Reward::Sparse => {
                 let over = T::or(self.terminated(s), T::or(self.truncated(s), s.time_is_up()));
-                terms.add("distance", 1.0, T::masked(over, s.memory(FARTHEST) * T::lit(1.0 / WAY)));
+                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / WAY)));
             }
         }
         if self.built() {
@@ -358,26 +394,25 @@ impl<F: Runner> Agent for Terrain<F> {
     }
 
     fn build(&self, site: &mut Site) {
-        let difficulty = site.memory[DIFFICULTY];
-        builder::build(site, difficulty);
+        builder::build(site, F::MEMORY);
     }
 
     #[inline(always)]
     fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
-        if self.built() { T::lit(0.5).lt(memory[DUE]) } else { T::none() }
+        if self.built() { T::lit(0.5).lt(memory[F::MEMORY + DUE]) } else { T::none() }
     }
 
     #[inline(always)]
     fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
-        if role == 0 { T::not(T::none()) } else { T::lit(0.5).lt(s.memory(DUE)) }
+        if role == 0 { T::not(T::none()) } else { T::lit(0.5).lt(Self::own(s, DUE)) }
     }
 
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
-        let lies = T::lit(0.5).lt(s.memory(LIES));
+        let lies = T::lit(0.5).lt(Self::own(s, LIES));
         match self.arguments.falls {
             Falls::End => lies,
-            Falls::Hurt => T::and(lies, s.memory(AT).lt(T::lit(TOO_EARLY))),
+            Falls::Hurt => T::and(lies, Self::own(s, AT).lt(T::lit(TOO_EARLY))),
         }
     }
 
@@ -388,7 +423,7 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar(s.memory(FARTHEST));
-        out.scalar(s.memory(DIFFICULTY));
+        out.scalar(Self::own(s, FARTHEST));
+        out.scalar(Self::own(s, DIFFICULTY));
     }
 }

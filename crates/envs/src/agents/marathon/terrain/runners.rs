@@ -5,7 +5,11 @@ use marathon_physics::lanes::Real;
 use super::super::ant::{self, AntV0};
 use super::super::hopper::{self, FOOT, HopperV0};
 use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
-use crate::agent::{Agent, Motors, Obs, Part, Senses};
+use crate::agent::{Agent, Motors, Obs, Part, ResetNoise, Senses, Start, Terms};
+use crate::episode_rng::EpisodeRng;
+
+/// Price of the joints driven at their limit: 0.8 for each.
+const JOINTS_AT_LIMIT: f64 = -4.0;
 
 /// What all observe of their bodies.
 const BODY: [&str; 6] = ["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities"];
@@ -23,7 +27,15 @@ pub trait Runner: Agent + Clone + Default {
     /// Its feet, in the order in which it observes their heights.
     const SOLES: &'static [Part];
     /// Price of the effort.
-    const EFFORT: f64;
+    const EFFORT: f64 = 0.0;
+    /// Worth of a fall that ends the episode.
+    const FALL: f64 = -1.0;
+    /// Terms of its reward `full`.
+    const TERMS: &'static [&'static str] = &["velocity", "uprightness", "effort", "joints_at_limit"];
+    /// Its own variables, the first of its memory.
+    const MEMORY: usize = 0;
+    /// Whether it moves in space: then it sees the ground to its sides, too, which differs there.
+    const IN_SPACE: bool = false;
     /// What it observes of its body, by name.
     const BODY: &'static [&'static str];
     /// The motor behind its own: the adversary's.
@@ -34,6 +46,25 @@ pub trait Runner: Agent + Clone + Default {
     const HALF_WIDTH: f64;
     /// Writes what it observes of its body.
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
+
+    /// Where it starts.
+    fn place(&self, start: &mut Start) {
+        start.add_noise(ResetNoise::MARATHON);
+    }
+
+    /// What it is told where nobody commands, and for how many decisions.
+    fn tell(&self, _: &mut EpisodeRng, _: usize, _: &mut [f64]) -> usize {
+        usize::MAX
+    }
+
+    /// Adds its terms of the reward `full`. `whole`: 1, or 0 after a fall. `ignored`: motors that are not its own.
+    #[inline(always)]
+    fn add_terms<T: Real>(s: &Senses<T>, whole: T, ignored: Motors, terms: &mut Terms<T>) {
+        terms.add("velocity", 1.0, s.velocity(Self::TORSO));
+        terms.add("uprightness", 1.0, whole * s.forward_bonus(Self::TORSO));
+        terms.add("effort", Self::EFFORT, whole * s.effort(ignored));
+        terms.add("joints_at_limit", JOINTS_AT_LIMIT, s.joints_at_limit_penalty(ignored));
+    }
 }
 
 impl Runner for HopperV0 {
@@ -84,6 +115,7 @@ impl Runner for AntV0 {
     const JOINT: &'static str = "hip_1";
     // it may stray from its line
     const HALF_WIDTH: f64 = 8.0;
+    const IN_SPACE: bool = true;
 
     #[inline(always)]
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {

@@ -1,0 +1,61 @@
+//! Marathon Man on assault courses: the [steered figure](super::steer) with ground of its own, which he sees.
+
+use marathon_physics::lanes::Real;
+
+use super::super::terrain::{Runner, Terrain};
+use super::body::{ACTIONS, BUTT, FEET, JOINTS};
+use super::steer::{BEGUN, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
+use crate::agent::{Agent, Motors, Obs, Part, Senses, Start, Terms};
+use crate::episode_rng::EpisodeRng;
+
+/// Slowest that he is told to run, m/s.
+const SLOWEST: f64 = 1.0;
+
+/// Marathon Man on courses, told where to go.
+pub type TerrainMarathonMan = Terrain<Steer>;
+
+/// He runs ahead, at a speed that changes now and then, and a player may lead him elsewhere.
+impl Runner for Steer {
+    const ID: &'static str = "TerrainMarathonMan-v0";
+    const SUMMARY: &'static str =
+        "a figure of 21 motors: run as told over slopes, steps, gaps and boxes that it sees coming";
+    const TORSO: Part = BUTT;
+    const EYES: Part = BUTT;
+    const SOLES: &'static [Part] = &FEET;
+    const FALL: f64 = -20.0;
+    const TERMS: &'static [&'static str] = &TERMS;
+    const MEMORY: usize = BEGUN + 1;
+    const IN_SPACE: bool = true;
+    const BODY: &'static [&'static str] = &OBSERVED;
+    const GROUND: Motors = Motors::number(ACTIONS.len());
+    const JOINT: &'static str = JOINTS[0].name;
+    const HALF_WIDTH: f64 = 8.0;
+
+    #[inline(always)]
+    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+        Steer::observe_along(s, out);
+    }
+
+    // as in his clips, but at the course's beginning, and along it
+    fn place(&self, start: &mut Start) {
+        self.reset(start);
+        let [w, x, y, z] = [3, 4, 5, 6].map(|i| start.qpos[i]);
+        let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+        let (sin, cos) = libm::sincos(-0.5 * yaw);
+        start.qpos[..2].fill(0.0);
+        // the turn about z, times what he has
+        start.qpos[3..7].copy_from_slice(&[cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]);
+        let ((sin, cos), [vx, vy]) = (libm::sincos(-yaw), [start.qvel[0], start.qvel[1]]);
+        start.qvel[..2].copy_from_slice(&[cos * vx - sin * vy, sin * vx + cos * vy]);
+    }
+
+    fn tell(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
+        out.copy_from_slice(&[random.uniform(SLOWEST, FASTEST), 0.0]);
+        random.whole(HOLDS[0], HOLDS[1])
+    }
+
+    #[inline(always)]
+    fn add_terms<T: Real>(s: &Senses<T>, whole: T, _: Motors, terms: &mut Terms<T>) {
+        Steer::add_terms(s, T::lit(0.5).lt(whole), Steer::told(s), terms);
+    }
+}
