@@ -58,7 +58,10 @@ pub struct Outcome {
 fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkpoint>, RunError> {
     let Some(path) = &run.initialize_from else { return Ok(None) };
     let policy = policy_file::read(path, None)?;
-    let sees = policy_file::seen_by(&policy, path, factory.spec())?;
+    // of a task with several roles, the first one starts from it
+    let spec = factory.spec();
+    let [role, ..] = &spec.deciders()[..] else { return Ok(None) };
+    let sees = policy_file::seen_by(&policy, path, &spec.of_role(role))?;
     Ok(Some(initialized(factory, Isa::best(), &run.config, &policy, &sees)?))
 }
 

@@ -126,3 +126,29 @@ fn a_run_starts_from_a_policy_that_observes_less() {
         "{text}"
     );
 }
+
+/// Of a task with two roles the first one starts from the policy. If only its value function learns, it plays as that does, while
+/// the other role learns against it.
+#[test]
+fn a_role_may_play_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = shipped("TerrainWalker2d");
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../assets/configs/terrain-adversary.yaml");
+    let options = RunOptions {
+        learn: LearnOptions { steps: Some(100_000), threads: Some(1), config: Some(config), ..Default::default() },
+        initialize_from: Some(path.clone()),
+        out: Some(folder.path().join("run")),
+        ..Default::default()
+    };
+    let task = Task::named("TerrainWalker2d").unwrap();
+    let (session, _) = Session::open(Some(task), &options, None, false).unwrap();
+    let outcome = session.carry_out(false, &mut |_| Control::Continue).unwrap();
+    let (old, new) = (policy_file::read(&path, None).unwrap(), outcome.policy);
+    assert_eq!(new.params(), old.params());
+    let [(name, builder)] = &outcome.others[..] else { panic!("one other role") };
+    assert!(name == "builder" && builder.meta().act == 1);
+    // its episodes are shorter than those of one that runs where nobody builds
+    let obs: Vec<f32> = (0..old.meta().obs).map(|k| 0.1 * (k as f32).sin()).collect();
+    let (a, b) = (old.act(&obs), new.act(&obs));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.2), "{a:?} {b:?}");
+}

@@ -14,8 +14,8 @@ use marathon_envs::{CommandRange, Options, Spec, VecEnvOptions, registry};
 use marathon_runs::{RunError, Setting};
 use std::sync::Arc;
 
-/// Who is whose courses are laid below those that have none of their own.
-const MODEL: &str = "TerrainAnt-v0";
+/// Who is whose courses are laid below those that have none of their own: the same at every y.
+const MODEL: &str = "TerrainWalker2d-v0";
 /// Who is led, and who is built against, if nobody says otherwise.
 pub const LED: &str = "AntController-v0";
 /// See there.
@@ -153,7 +153,7 @@ impl Choice {
         Ok(Equipment { laid, command, held })
     }
 
-    /// The course of a seed: the one that its first Ant would have in its first episode.
+    /// The course of a seed: the one that its first Walker would have in its first episode.
     fn elevations(&self, seed: u64) -> Result<Vec<f32>, RunError> {
         let mut setting = Setting::named(MODEL)?;
         setting.options.set("course", self.kind());
