@@ -75,7 +75,11 @@ for policy in "${wanted[@]}"; do
       learn "$goes" "$goes" "$goes" "${skills[0]}" --steps 8M --lr 5e-4 --seed 2 --initialize-from "$runs/goes" \
         --out "$runs/knows.safetensors"
       "$marathon" train MarathonManController --initialize-from "$runs/knows.safetensors" --seed 1 --threads 1 --out "$runs/run"
-      cp "$runs/run/policy.safetensors" "$shipped/MarathonManController.safetensors"
+      # and on: to stand still, to jump higher, to get up
+      "$marathon" train MarathonManController --initialize-from "$runs/run" --seed 2 --threads 1 --out "$runs/still"
+      "$marathon" train MarathonManController --option mortal=0.3 --steps 40M --initialize-from "$runs/still" --seed 3 --threads 1 \
+        --out "$runs/last"
+      cp "$runs/last/policy.safetensors" "$shipped/MarathonManController.safetensors"
       ;;
     *)
       echo "no policy $policy is learned from others here: MarathonMan, MarathonManController" >&2

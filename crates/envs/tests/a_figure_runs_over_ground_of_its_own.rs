@@ -474,3 +474,27 @@ fn built_ground_is_saved_and_restored() {
     assert!(on == again);
     assert!((0..AGENTS).all(|i| first.ground(i, 0).unwrap() == other.ground(i, 0).unwrap()));
 }
+
+/// Marathon Man starts as somewhere in his clips, but at the beginning of the course and along it, and is told to run ahead.
+#[test]
+fn marathon_man_starts_along_his_course() {
+    let id = "TerrainMarathonMan-v0";
+    let model = agent(id).unwrap().model().unwrap();
+    let mut env = env(id, &[], Autoreset::Disabled);
+    let mut out = env.buffers();
+    env.reset(Some(5), &mut out.obs).unwrap();
+    let (n, mut fastest) = (env.spec().obs, 0.0f64);
+    for i in 0..AGENTS {
+        let state = env.state(i).unwrap();
+        assert_eq!(state.qpos[..2], [0.0; 2]);
+        let [x, y, _] = axis(&model, &state, "butt");
+        assert!(y.atan2(x).abs() < 1e-6, "agent {i} faces {x} {y}");
+        let [vx, vy] = [state.qvel[0], state.qvel[1]];
+        // from a run or a walk, he goes on forward, and sways
+        assert!(vx > -0.3 && vy.abs() < 0.6, "agent {i}: {vx} {vy}");
+        fastest = fastest.max(vx);
+        let told = f64::from(out.obs[n * i]);
+        assert!((1.0..=3.0).contains(&told) && out.obs[n * i + 1] == 0.0, "agent {i} is told {told}");
+    }
+    assert!(fastest > 1.5, "somebody runs: {fastest}");
+}
