@@ -1,19 +1,22 @@
 """Unmodified `mlagents_envs` drives `marathon-player`.
 
 Promises: every batch has a decision of every agent, ends of episodes come beside them with their true kind, a reset
-works at any time, side channels work both ways, every environment can be served, and a player that cannot go on says
-why in its log and leaves at once.
+works at any time, side channels work both ways, every environment can be served, each role of a task is a behavior of
+its own, and a player that cannot go on says why in its log and leaves at once.
 """
 
 import json
+import pathlib
 import subprocess
 import sys
 import time
 import uuid
 
 import numpy as np
+import onnx
 import pytest
 from conftest import MARATHON, PLAYER, free_port
+from contract import best_actions
 from mlagents_envs.base_env import ActionTuple
 from mlagents_envs.environment import UnityEnvironment
 from mlagents_envs.exception import UnityEnvironmentException
@@ -21,9 +24,13 @@ from mlagents_envs.side_channel.engine_configuration_channel import EngineConfig
 from mlagents_envs.side_channel.environment_parameters_channel import EnvironmentParametersChannel
 from mlagents_envs.side_channel.float_properties_channel import FloatPropertiesChannel
 from mlagents_envs.side_channel.stats_side_channel import StatsSideChannel
+from onnx.reference import ReferenceEvaluator
 
+ROOT = pathlib.Path(__file__).parents[2]
 HOPPERS = ("--spawn-env=Hopper-v0", "--num-spawn-envs=16")
 NAME = "Hopper-v0?team=0"
+COURSES = ("--spawn-env=TerrainWalker2d-v0", "--option=course=adversary", "--num-spawn-envs=8")
+RUNNER, BUILDER = "TerrainWalker2d-v0?team=0", "TerrainWalker2d-v0.builder?team=0"
 
 
 def act(env, name, random):
@@ -210,6 +217,91 @@ def test_parameters_change_the_task_in_the_middle_of_episodes(launch, log):
     assert "warning" not in log()
 
 
+@pytest.fixture(scope="module")
+def walker(tmp_path_factory):
+    """A walker that runs over what a builder builds: actions for observations."""
+    file = tmp_path_factory.mktemp("walker") / "walker.onnx"
+    policy = ROOT / "assets" / "policies" / "TerrainWalker2d.safetensors"
+    subprocess.run([MARATHON, "export", policy, "--out", file], check=True, capture_output=True)
+    runner = ReferenceEvaluator(onnx.load(file))
+    return lambda obs: best_actions(runner, obs)
+
+
+def run_over(env, walker, ground):
+    """A decision of all runners, and of the builders that are asked, which build ground[their number]."""
+    seen, asked = env.get_steps(RUNNER)[0], env.get_steps(BUILDER)[0]
+    env.set_actions(RUNNER, ActionTuple(continuous=walker(seen.obs[0])))
+    env.set_actions(BUILDER, ActionTuple(continuous=ground[asked.agent_id - 8].reshape(-1, 1)))
+    env.step()
+
+
+def test_roles_are_behaviors_of_their_own(launch, walker):
+    env = launch(*COURSES, "--max-episode-steps=300", seed=2)
+    env.reset()
+    assert set(env.behavior_specs) == {RUNNER, BUILDER}
+    assert sizes(env, RUNNER) == (69, 6) and sizes(env, BUILDER) == (19, 1)
+    # ground that falls or rises, tenths of the difficulty, which is a half
+    ground = np.array([-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4], np.float32)
+    sums, ends, decisions, fresh = np.zeros((2, 8)), 0, 0, np.ones(8, bool)
+    meters = np.zeros(8, int)
+    for _ in range(650):
+        runners, fallen = env.get_steps(RUNNER)
+        builders, over = env.get_steps(BUILDER)
+        assert list(runners.agent_id) == list(range(8)) and set(builders.agent_id) <= set(range(8, 16))
+        # where an episode ends, it ends for both, in the same way, and what one lost is what the other got
+        assert list(over.agent_id - 8) == list(fallen.agent_id) and list(over.interrupted) == list(fallen.interrupted)
+        for role, steps in enumerate((fallen, over)):
+            np.add.at(sums[role], steps.agent_id - 8 * role, steps.reward)
+        for agent in fallen.agent_id:
+            assert abs(sums[0, agent]) > 1 and abs(sums[:, agent].sum()) < 1e-3, sums[:, agent]
+            fresh[agent], meters[agent], ends = True, 0, ends + 1
+            sums[:, agent] = 0
+        for role, steps in enumerate((runners, builders)):
+            np.add.at(sums[role], steps.agent_id - 8 * role, steps.reward)
+        # at the start, and then when the runner has made a new meter
+        assert set(np.flatnonzero(fresh)) <= set(builders.agent_id - 8)
+        for agent, obs in zip(builders.agent_id - 8, builders.obs[0], strict=True):
+            assert obs[18] == 0
+            if not fresh[agent]:
+                decisions, meters[agent] = decisions + 1, meters[agent] + 1
+                # the last step, and, while the runner is on the level ground of the start, what has been built in all
+                assert abs(obs[17] - 0.5 * ground[agent]) < 1e-5
+                if meters[agent] <= 3:
+                    assert abs(obs[11] - meters[agent] * 0.5 * ground[agent]) < 1e-5, (agent, meters[agent], obs)
+        fresh[:] = False
+        run_over(env, walker, ground)
+    assert ends >= 16 and 50 < decisions < 650, (ends, decisions)
+
+
+def test_a_reset_lets_all_roles_decide(launch, walker):
+    env = launch(*COURSES, seed=3)
+    env.reset()
+    for _ in range(10):
+        run_over(env, walker, np.zeros(8, np.float32))
+    assert len(env.get_steps(RUNNER)[0]) == 8 and len(env.get_steps(BUILDER)[0]) == 0
+    env.reset()
+    for name in (RUNNER, BUILDER):
+        decisions, ends = env.get_steps(name)
+        assert len(decisions) == 8 and len(ends) == 0 and not decisions.reward.any()
+
+
+def test_a_commander_decides_every_hundred_decisions(launch):
+    env = launch("--spawn-env=WalkerController-v0", "--option=commander=adversary", "--num-spawn-envs=16", seed=4)
+    env.reset()
+    walker, commander = env.behavior_specs
+    assert (walker, commander) == ("WalkerController-v0?team=0", "WalkerController-v0.commander?team=0")
+    assert sizes(env, walker) == (47, 6) and env.behavior_specs[commander].action_spec.continuous_size == 2
+    age, at_hundreds = np.zeros(16, int), 0
+    for _ in range(250):
+        asked = env.get_steps(commander)[0]
+        assert list(asked.agent_id - 16) == list(np.flatnonzero(age % 100 == 0))
+        at_hundreds += np.count_nonzero(age[asked.agent_id - 16])
+        env.step()
+        age += 1
+        age[env.get_steps(walker)[1].agent_id] = 0
+    assert at_hundreds > 0
+
+
 def test_several_workers_and_areas_have_lives_of_their_own(launch, log):
     port = free_port()
     envs = [launch(*HOPPERS, base_port=port, worker_id=i, seed=9 + i, num_areas=2) for i in range(2)]
@@ -293,6 +385,8 @@ def test_what_cannot_be_served_is_told():
     assert "no trainer listens on port" in fails("--mlagents-port", port, "--connect-timeout=0")
     assert "takes no option 'colour'" in fails("--mlagents-port", port, "--option=colour=1")
     assert "two behaviors are called 'Hopper-v0'" in fails("--mlagents-port", port, *HOPPERS, *HOPPERS)
+    taken = (*COURSES, "--spawn-env=Hopper-v0", "--behavior-name=TerrainWalker2d-v0.builder")
+    assert "two behaviors are called 'TerrainWalker2d-v0.builder'" in fails("--mlagents-port", port, *taken)
     assert "--mlagents-port is missing" in fails(code=2)
     assert "did you mean --num-spawn-envs?" in fails("--mlagents-port", port, "--num-spawn-env=1", code=2)
 

@@ -25,7 +25,7 @@ or it connects to an mlagents-learn that was started without --env and waits:
   --mlagents-port N        port on which the trainer listens, on this computer
   --spawn-env ID           agent, such as Hopper-v0 [Hopper-v0]; again for a further behavior, whose flags follow it
   --num-spawn-envs N       number of its agents in each area [64]
-  --behavior-name NAME     name of the behavior [the agent's]
+  --behavior-name NAME     name of the behavior, or of the first role's [the agent's]
   --option NAME=VALUE      argument of the agent
   --max-episode-steps N    decisions after which an episode is truncated [the task's]
   --threads N              threads that simulate; 0: one per processor [1]

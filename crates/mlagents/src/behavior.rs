@@ -1,11 +1,13 @@
-//! Agents of one kind under one of ML-Agents' behavior names: from actions to infos.
+//! Agents of one kind under one of ML-Agents' behavior names, or one for each role of their task: from actions to infos.
 
 use crate::channels::{Aggregation, write_stat};
 use crate::error::PlayerError;
+use crate::face::{Face, roles};
 use crate::parameters::{Names, Parameters};
-use crate::wire::{ActionSpec, AgentActionList, AgentInfo, BrainParameters, FloatData, Observation};
+use crate::wire::{AgentActionList, BrainParameters};
 use marathon_envs::{Autoreset, Options, Spec, Step, VecEnv, VecEnvOptions, registry};
 use marathon_physics::Model;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a [`Behavior`] is made of.
@@ -15,7 +17,8 @@ pub struct BehaviorOptions {
     pub env: String,
     /// Number of agents in one area.
     pub agents: usize,
-    /// Name for the trainer; `None`: the agent's registry name.
+    /// Name for the trainer; `None`: the agent's registry name. Of a task with several roles, the first one's; that of another
+    /// has a point and the role's name besides.
     pub name: Option<String>,
     /// Named arguments of the agent.
     pub options: Options,
@@ -47,10 +50,10 @@ struct Episode {
     terms: Vec<f32>,
 }
 
-/// Agents of one kind.
+/// Agents of one kind: one behavior to the trainer, or one for each role of their task.
 pub struct Behavior {
-    /// With the team, as ML-Agents wants it.
-    name: String,
+    /// One for each role.
+    faces: Vec<Face>,
     spec: Spec,
     env: VecEnv,
     /// What the environment is to be made with but for parameters, and what it was made with.
@@ -64,9 +67,6 @@ pub struct Behavior {
     episodes: Vec<Episode>,
     /// Episodes that each agent has begun.
     begun: Vec<u64>,
-    ids: Vec<i32>,
-    /// An info to write into.
-    info: AgentInfo,
     /// Times that all episodes were begun anew.
     resets: u64,
     /// Whether any agent has ever been varied.
@@ -96,14 +96,12 @@ impl Behavior {
         let names = Names::new(&model, &spec.action_names, &spec.command, &spec.options);
         let n = env.agents();
         Ok(Behavior {
-            name: format!("{}?team=0", options.name.as_ref().unwrap_or(&spec.id)),
+            faces: Face::all(options.name.as_ref().unwrap_or(&spec.id), &spec, n, first_id),
             out: env.buffers(),
             actions: vec![0.0; n * spec.act],
             ended: vec![false; n],
             episodes: vec![Episode { terms: vec![0.0; spec.reward_terms.len()], ..Default::default() }; n],
             begun: vec![0; n],
-            ids: (first_id..).take(n).collect(),
-            info: AgentInfo { observations: vec![observation(&vec![0.0; spec.obs])], ..Default::default() },
             resets: 0,
             varied: false,
             commanded: false,
@@ -116,9 +114,19 @@ impl Behavior {
         })
     }
 
-    /// Name for the trainer, such as `Hopper-v0?team=0`.
+    /// Name for the trainer, such as `Hopper-v0?team=0`: the first role's.
     pub fn name(&self) -> &str {
-        &self.name
+        self.faces.first().map_or("", Face::name)
+    }
+
+    /// Names of all roles for the trainer, such as `TerrainWalker2d-v0?team=0` and `TerrainWalker2d-v0.builder?team=0`.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.faces.iter().map(Face::name)
+    }
+
+    /// How many numbers the agents have: one for each and each of its roles.
+    pub fn ids(&self) -> usize {
+        self.faces.len() * self.env.agents()
     }
 
     /// Facts of the task.
@@ -147,17 +155,22 @@ impl Behavior {
     }
 
     /// Bytes of the longest message part that the agents can need: when all their episodes end at once, there are two infos
-    /// for each.
+    /// for each and each of its roles.
     pub fn largest(&self) -> usize {
-        let info = AgentInfo { reward: 1.0, done: true, max_step_reached: true, id: i32::MAX, ..self.info.clone() };
-        let entry = prost::encoding::message::encoded_len(1, &info);
-        self.name.len() + self.env.agents().saturating_mul(2 * entry) + 32
+        let [frame, each] = self.bytes();
+        frame + self.env.agents().saturating_mul(each)
     }
 
     /// How many agents there may be if a message may have so many bytes.
     pub fn most_agents(&self, bytes: usize) -> usize {
-        let each = self.largest().saturating_sub(self.name.len() + 32) / self.env.agents();
-        bytes.saturating_sub(self.name.len() + 32) / each.max(1)
+        let [frame, each] = self.bytes();
+        bytes.saturating_sub(frame) / each.max(1)
+    }
+
+    /// Bytes of a message without agents, and those of an agent.
+    fn bytes(&self) -> [usize; 2] {
+        let sum = |bytes: fn(&Face) -> usize| self.faces.iter().map(bytes).sum();
+        [sum(Face::frame_bytes), sum(Face::bytes_per_agent)]
     }
 
     /// Begins all episodes anew; the first time under a seed.
@@ -172,7 +185,7 @@ impl Behavior {
         let varied = self.vary(parameters);
         self.made.seed = seed.unwrap_or(self.made.seed);
         self.env.reset(seed, &mut self.out.obs)?;
-        self.out.reward.fill(0.0);
+        self.faces.iter_mut().for_each(Face::begin);
         self.clear_ended();
         configured.and(varied)
     }
@@ -199,8 +212,13 @@ impl Behavior {
         let sizes = |spec: &Spec| (spec.obs, spec.act, spec.reward_terms.len(), spec.info.len());
         if sizes(env.spec()) != sizes(&self.spec) {
             let (expected, found) = ((self.spec.obs, self.spec.act), (env.spec().obs, env.spec().act));
-            return Err(PlayerError::Sizes { name: self.name.clone(), expected, found });
+            return Err(PlayerError::Sizes { name: self.name().into(), expected, found });
         }
+        let (expected, found) = (roles(&self.spec), roles(env.spec()));
+        if found != expected {
+            return Err(PlayerError::Roles { name: self.name().into(), expected, found });
+        }
+        self.faces.iter_mut().zip(env.spec().deciders()).for_each(|(face, role)| face.set_role(role));
         env.load(&self.env.save())?;
         self.env = env;
         self.made = wanted;
@@ -214,28 +232,18 @@ impl Behavior {
         Ok(())
     }
 
-    /// Acts, advances to the next decision, and begins new episodes where they ended.
+    /// Acts, advances to the next decision, and begins new episodes where they ended. `chosen` has the actions of each behavior,
+    /// for the agents for which its role decides. A role that does not decide goes on with its last action.
     ///
     /// # Errors
-    /// If the actions are not as many as agents or have another length; or parameters make no sense.
-    pub fn step(&mut self, actions: Option<&AgentActionList>, parameters: &Parameters) -> Result<(), PlayerError> {
-        let (n, act) = (self.env.agents(), self.spec.act);
-        match actions {
-            // nobody decided: at rest
-            None => self.actions.fill(0.0),
-            Some(list) => {
-                let lengths = list.value.iter().map(|action| action.continuous_actions.len());
-                if list.value.len() != n || lengths.clone().any(|length| length != act) {
-                    let length = lengths.clone().find(|length| *length != act).unwrap_or(act);
-                    let found = (list.value.len(), length);
-                    return Err(PlayerError::Actions { name: self.name.clone(), found, expected: (n, act) });
-                }
-                for (row, action) in self.actions.chunks_exact_mut(act).zip(&list.value) {
-                    for (i, (to, x)) in row.iter_mut().zip(&action.continuous_actions).enumerate() {
-                        *to = self.spec.action_of(i, *x);
-                    }
-                }
-            }
+    /// If the actions are not as many as those agents or have another length; or parameters make no sense.
+    pub fn step(
+        &mut self,
+        chosen: &BTreeMap<String, AgentActionList>,
+        parameters: &Parameters,
+    ) -> Result<(), PlayerError> {
+        for face in &self.faces {
+            face.act(chosen.get(face.name()), &self.spec, &mut self.actions)?;
         }
         self.env.step(&self.actions, &mut self.out.as_mut())?;
         let terms = self.spec.reward_terms.len();
@@ -247,15 +255,24 @@ impl Behavior {
                 *sum += x;
             }
         }
+        self.faces.iter_mut().for_each(|face| face.earn(&self.spec, &self.out));
         if !self.ended.contains(&true) {
-            return Ok(());
+            return self.look();
         }
         for (begun, ended) in self.begun.iter_mut().zip(&self.ended) {
             *begun += u64::from(*ended);
         }
         let varied = self.vary(parameters);
         self.env.reset_agents(&self.ended, &mut self.out.obs)?;
-        varied
+        self.look().and(varied)
+    }
+
+    /// Takes note of who decides next.
+    fn look(&mut self) -> Result<(), PlayerError> {
+        for face in &mut self.faces {
+            face.look(&self.env)?;
+        }
+        Ok(())
     }
 
     /// Draws what the agents whose episodes ended are like in the next.
@@ -297,80 +314,58 @@ impl Behavior {
         }
     }
 
-    /// What the trainer has to know of the behavior.
-    pub fn parameters(&self) -> BrainParameters {
-        let action_spec = ActionSpec { num_continuous: self.spec.act as i32 };
-        BrainParameters { brain_name: self.name.clone(), is_training: true, action_spec: Some(action_spec) }
+    /// What the trainer has to know of the behaviors.
+    pub fn parameters(&self) -> impl Iterator<Item = BrainParameters> {
+        self.faces.iter().map(Face::parameters)
     }
 
-    /// Appends the infos of all agents, an encoded [`AgentInfoList`](crate::wire::AgentInfoList), and statistics about the
-    /// episodes that ended. Must be called once after every [`Behavior::reset`] and [`Behavior::step`]. With `fresh_ids`, the
-    /// number for the next new episode, agents change their numbers between episodes.
-    pub fn report(&mut self, infos: &mut Vec<u8>, stats: &mut Vec<u8>, mut fresh_ids: Option<&mut i32>) {
-        let mut info = std::mem::take(&mut self.info);
-        for i in 0..self.env.agents() {
-            if self.ended[i] {
-                self.describe(i, Some(self.out.truncated[i]), &mut info);
-                put(infos, &info);
-                self.write_stats(i, stats);
-                if let Some(next) = &mut fresh_ids {
-                    self.ids[i] = **next;
-                    **next = next.wrapping_add(1).max(0);
-                }
+    /// Writes the infos of all roles, for each behavior an encoded [`AgentInfoList`](crate::wire::AgentInfoList), and appends
+    /// statistics about the episodes that ended. Must be called once after every [`Behavior::reset`] and [`Behavior::step`].
+    /// With `fresh_ids`, the number for the next new episode, agents change their numbers between episodes.
+    pub fn report(
+        &mut self,
+        infos: &mut BTreeMap<String, Vec<u8>>,
+        stats: &mut Vec<u8>,
+        mut fresh_ids: Option<&mut i32>,
+    ) {
+        for face in &mut self.faces {
+            // looked up without making a new key
+            if !infos.contains_key(face.name()) {
+                infos.insert(face.name().to_string(), Vec::new());
             }
-            self.describe(i, None, &mut info);
-            put(infos, &info);
+            if let Some(infos) = infos.get_mut(face.name()) {
+                infos.clear();
+                face.report(&self.spec, &self.out, &self.ended, fresh_ids.as_deref_mut(), infos);
+            }
         }
-        self.info = info;
+        for i in 0..self.ended.len() {
+            if self.ended[i] {
+                self.write_stats(i, stats);
+            }
+        }
         self.clear_ended();
     }
 
-    /// Writes an agent's info: of the end of its episode, and whether that was the time limit, or of its present state.
-    fn describe(&self, i: usize, end: Option<bool>, info: &mut AgentInfo) {
-        let row = i * self.spec.obs..(i + 1) * self.spec.obs;
-        let data = if end.is_some() { &self.out.final_obs[row] } else { &self.out.obs[row] };
-        // what was got before the end belongs to the end
-        info.reward = if end.is_none() && self.ended[i] { 0.0 } else { self.out.reward[i] };
-        info.done = end.is_some();
-        info.max_step_reached = end.unwrap_or(false);
-        info.id = self.ids[i];
-        if let Some(numbers) = info.observations.first_mut().and_then(|sensor| sensor.float_data.as_mut()) {
-            numbers.data.copy_from_slice(data);
-        }
-    }
-
-    /// What an episode amounted to, for TensorBoard.
+    /// What an episode amounted to, for TensorBoard: what the task reports under the first role's name.
     fn write_stats(&self, i: usize, stats: &mut Vec<u8>) {
-        let label = self.name.trim_end_matches("?team=0");
         let episode = &self.episodes[i];
-        let mut average = |name: &str, value: f32| {
+        let mut average = |label: &str, name: &str, value: f32| {
             if value.is_finite() {
                 write_stat(stats, &format!("{label}/{name}"), value, Aggregation::Average);
             }
         };
-        average("Distance", episode.distance);
-        average("Speed", episode.distance / (episode.steps as f32 * self.spec.dt as f32));
-        for (name, sum) in self.spec.reward_terms.iter().zip(&episode.terms) {
-            average(&format!("Reward/{name}"), *sum);
+        let label = self.faces.first().map_or("", Face::label);
+        average(label, "Distance", episode.distance);
+        average(label, "Speed", episode.distance / (episode.steps as f32 * self.spec.dt as f32));
+        for face in &self.faces {
+            let own = face.role().terms.clone();
+            for (name, sum) in self.spec.reward_terms[own.clone()].iter().zip(&episode.terms[own]) {
+                average(face.label(), &format!("Reward/{name}"), *sum);
+            }
         }
         if self.out.diverged[i] {
             write_stat(stats, &format!("{label}/Diverged"), 1.0, Aggregation::Sum);
         }
-    }
-}
-
-/// Appends an entry of an [`AgentInfoList`](crate::wire::AgentInfoList).
-fn put(list: &mut Vec<u8>, info: &AgentInfo) {
-    prost::encoding::message::encode(1, info, list);
-}
-
-/// A vector of numbers as a sensor gives it.
-pub(crate) fn observation(data: &[f32]) -> Observation {
-    Observation {
-        shape: vec![data.len() as i32],
-        float_data: Some(FloatData { data: data.to_vec() }),
-        dimension_properties: vec![Observation::NO_PROPERTY],
-        name: format!("VectorSensor_size{}", data.len()),
     }
 }
 
@@ -380,6 +375,10 @@ mod tests {
     use crate::channels::Sampler;
     use crate::wire::AgentInfoList;
     use prost::Message;
+
+    const NAME: &str = "Hopper-v0?team=0";
+    /// Actions of nobody.
+    const NOBODY: BTreeMap<String, AgentActionList> = BTreeMap::new();
 
     fn hoppers(agents: usize, max_episode_steps: usize) -> Behavior {
         let options = BehaviorOptions { agents, max_episode_steps: Some(max_episode_steps), ..Default::default() };
@@ -391,13 +390,13 @@ mod tests {
         let mut behavior = hoppers(300, 1);
         let none = Parameters::default();
         behavior.reset(Some(1), &none).unwrap();
-        let (mut infos, mut stats) = (Vec::new(), Vec::new());
-        behavior.report(&mut infos, &mut stats, None);
-        let begun = infos.len();
-        behavior.step(None, &none).unwrap();
-        infos.clear();
-        behavior.report(&mut infos, &mut stats, None);
-        assert_eq!(AgentInfoList::decode(&*infos).unwrap().value.len(), 600);
+        let (mut all, mut stats) = (BTreeMap::new(), Vec::new());
+        behavior.report(&mut all, &mut stats, None);
+        let begun = all[NAME].len();
+        behavior.step(&NOBODY, &none).unwrap();
+        behavior.report(&mut all, &mut stats, None);
+        let infos = &all[NAME];
+        assert_eq!(AgentInfoList::decode(&**infos).unwrap().value.len(), 600);
         let (length, foreseen) = (infos.len(), behavior.largest());
         assert!(length > 2 * begun - 600 * 8 && length < foreseen && length > foreseen * 9 / 10);
         assert!(behavior.most_agents(foreseen) == 300 && behavior.most_agents(foreseen / 2) < 150);
@@ -410,14 +409,14 @@ mod tests {
         let (mut plain, mut changed) = (hoppers(2, 100), hoppers(2, 100));
         for behavior in [&mut plain, &mut changed] {
             behavior.reset(Some(5), &none).unwrap();
-            behavior.step(None, &none).unwrap();
+            behavior.step(&NOBODY, &none).unwrap();
         }
         let mut longer = Parameters::default();
         longer.set("max_episode_steps".into(), Sampler::Constant(200.0));
         changed.change(&longer).unwrap();
         for _ in 0..5 {
-            plain.step(None, &none).unwrap();
-            changed.step(None, &longer).unwrap();
+            plain.step(&NOBODY, &none).unwrap();
+            changed.step(&NOBODY, &longer).unwrap();
         }
         assert_eq!(plain.last().obs, changed.last().obs);
         assert_eq!(changed.env().spec().max_episode_steps, 200);

@@ -4,7 +4,7 @@
 //! on for each decision: what the agent saw, what it got for the decision before, what it did. Lengths are protocol buffers'
 //! variable integers. The last entry of an episode is the state in which it ended, with an action that nobody took.
 
-use crate::behavior::observation;
+use crate::face::observation;
 use crate::wire::{ActionSpec, AgentInfo, AgentInfoActionPair, BrainParameters, DemonstrationMeta, RecordedAction};
 use marathon_envs::{Demonstrations, Spec};
 use prost::Message;

@@ -74,6 +74,19 @@ pub enum PlayerError {
         /// As they would be.
         found: (usize, usize),
     },
+    /// An environment parameter would change who decides in a behavior's task.
+    #[error(
+        "environment parameters would change the roles of {name} from {expected} to {found}, which a trainer cannot follow; they \
+         stay as they are"
+    )]
+    Roles {
+        /// Behavior of the first role.
+        name: String,
+        /// The roles as they are.
+        expected: String,
+        /// As they would be.
+        found: String,
+    },
     /// More agents than fit into a message.
     #[error(
         "{agents} agents of {name} are too many: when all their episodes end at once, a message takes {bytes} bytes, and \

@@ -104,9 +104,11 @@ impl Player {
         let Setup { seed, areas, package_version } = &setup;
         log.line(format_args!("mlagents-envs {package_version}; seed {seed}; areas: {areas}"));
         for behavior in &behaviors {
-            let (name, spec) = (behavior.name(), behavior.spec());
             let n = behavior.env().agents();
-            log.line(format_args!("{name}: agents: {n}; observations: {}; actions: {}", spec.obs, spec.act));
+            for (name, role) in behavior.names().zip(behavior.spec().deciders()) {
+                let (obs, act) = (role.obs.len(), role.act.len());
+                log.line(format_args!("{name}: agents: {n}; observations: {obs}; actions: {act}"));
+            }
         }
         let order = trainer.first()?;
         Ok(Player {
@@ -172,14 +174,13 @@ impl Player {
             let done = match turn {
                 Turn::Step => {
                     let changed = if changed { behavior.change(&self.parameters) } else { Ok(()) };
-                    let actions = order.agent_actions.get(behavior.name());
-                    behavior.step(actions, &self.parameters).and(changed)
+                    behavior.step(&order.agent_actions, &self.parameters).and(changed)
                 }
                 _ => behavior.reset(seed, &self.parameters),
             };
             match done {
                 // a parameter that is out of range: training can go on, its author must know
-                Err(e @ (PlayerError::Env(_) | PlayerError::Sizes { .. })) => {
+                Err(e @ (PlayerError::Env(_) | PlayerError::Sizes { .. } | PlayerError::Roles { .. })) => {
                     let text = e.to_string();
                     if self.told.insert(text.clone()) {
                         self.log.line(format_args!("warning: {}: {text}", behavior.name()));
@@ -216,20 +217,13 @@ impl Player {
         let output = self.message.output.get_or_insert_default();
         // a behavior introduces itself beside its first infos
         output.initialization = (!self.begun).then(|| RlInitializationOutput {
-            brain_parameters: self.behaviors.iter().map(Behavior::parameters).collect(),
+            brain_parameters: self.behaviors.iter().flat_map(Behavior::parameters).collect(),
             ..Default::default()
         });
         let RlOutput { agent_infos, side_channel } = output.rl.get_or_insert_default();
         side_channel.clear();
         for behavior in &mut self.behaviors {
-            // looked up without making a new key
-            if !agent_infos.contains_key(behavior.name()) {
-                agent_infos.insert(behavior.name().to_string(), Vec::new());
-            }
-            if let Some(infos) = agent_infos.get_mut(behavior.name()) {
-                infos.clear();
-                behavior.report(infos, side_channel, self.fresh_ids.then_some(&mut self.next_id));
-            }
+            behavior.report(agent_infos, side_channel, self.fresh_ids.then_some(&mut self.next_id));
         }
         let statistics = side_channel.len();
         if statistics > 0 && self.message.encoded_len() > MESSAGE_LIMIT {
@@ -307,13 +301,15 @@ fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), P
     let mut next_id = 0;
     for one in &options.behaviors {
         let behavior = Behavior::new(one, areas, options.threads, next_id)?;
-        if behaviors.iter().any(|other| other.name() == behavior.name()) {
-            let name = behavior.name().trim_end_matches("?team=0");
+        if let Some(name) =
+            behavior.names().find(|name| behaviors.iter().any(|other| other.names().any(|n| n == *name)))
+        {
+            let name = name.trim_end_matches("?team=0");
             return Err(PlayerError::Usage(format!(
                 "two behaviors are called '{name}'; give one another name with --behavior-name"
             )));
         }
-        next_id += behavior.env().agents() as i32;
+        next_id += behavior.ids() as i32;
         behaviors.push(behavior);
     }
     Ok((behaviors, next_id))

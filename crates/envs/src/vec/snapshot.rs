@@ -42,6 +42,7 @@ impl VecEnv {
     }
 
     /// Restores what [`VecEnv::save`] returned, of an earlier version too unless that left out something that this task needs.
+    /// Who [decides](VecEnv::decides) next is not in it.
     ///
     /// # Errors
     /// If the bytes are damaged, or not a snapshot of an environment with the same agent and the same number of them; then
@@ -50,7 +51,9 @@ impl VecEnv {
         let blocks = self.blocks_in(bytes)?;
         let before = self.save();
         let result = self.load_blocks(blocks);
-        if result.is_err() {
+        if result.is_ok() {
+            self.workers.iter_mut().for_each(|worker| worker.deciders.forget());
+        } else {
             let own = self.blocks_in(&before).and_then(|blocks| self.load_blocks(blocks));
             debug_assert!(own.is_ok(), "an environment loads what it saved");
         }

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 
 use super::arrays::{ObsNumber, Step, StepMut, to_rows};
 use super::pool::Pool;
+use super::worker::Worker;
 use crate::agent::Options;
 use crate::error::EnvError;
 use crate::registry::{self, Registry};
-use crate::shard::{AgentContext, AgentShard, AgentState, BLOCK, BlockStep, Spec};
+use crate::shard::{AgentContext, AgentState, BLOCK, Spec};
 
 /// What happens to an agent whose episode ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,19 +70,9 @@ pub struct VecEnv {
     autoreset: Autoreset,
     pub(super) workers: Vec<Worker>,
     /// Agents per worker, a multiple of the block; the last worker may have fewer.
-    stride: usize,
+    pub(super) stride: usize,
     /// None for a single worker.
     pool: Option<Pool>,
-}
-
-/// A shard and the block-shaped arrays that it reads and writes.
-pub(super) struct Worker {
-    pub(super) shard: Box<dyn AgentShard>,
-    action: Vec<f32>,
-    obs: Vec<f32>,
-    out: BlockStep,
-    /// A mask per block: agents that start a new episode at the next step instead of acting.
-    pub(super) pending: Vec<u16>,
 }
 
 impl VecEnv {
@@ -121,13 +112,7 @@ impl VecEnv {
                 let own = share.min(blocks - first);
                 let mut shard = factory.agent_shard(first, own, options.seed);
                 shard.limit_episodes(spec.max_episode_steps);
-                Worker {
-                    shard,
-                    action: vec![0.0; spec.act * BLOCK],
-                    obs: vec![0.0; spec.obs * BLOCK],
-                    out: BlockStep::default(),
-                    pending: vec![0; own],
-                }
+                Worker::new(shard, own)
             })
             .collect();
         let pool = if workers.len() > 1 { Some(Pool::new(workers.len())?) } else { None };
@@ -356,7 +341,7 @@ impl VecEnv {
         self.check_agent(agent)?;
         let (worker, local) = (&mut self.workers[agent / self.stride], agent % self.stride);
         worker.shard.set_state(local, state)?;
-        worker.pending[local / BLOCK] &= !(1 << (local % BLOCK));
+        worker.begin(local / BLOCK, 1 << (local % BLOCK));
         Ok(())
     }
 
@@ -378,7 +363,7 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.feet(agent % self.stride))
     }
 
-    fn check(&self, what: &str, found: usize, columns: usize) -> Result<(), EnvError> {
+    pub(super) fn check(&self, what: &str, found: usize, columns: usize) -> Result<(), EnvError> {
         let expected = self.agents * columns;
         if found == expected { Ok(()) } else { Err(EnvError::Shape { what: what.into(), found, expected }) }
     }
@@ -420,83 +405,3 @@ impl VecEnv {
 
 /// Which agents of an environment are meant.
 type Chosen<'a> = &'a (dyn Fn(usize) -> bool + Sync);
-
-impl Worker {
-    /// Starts new episodes in a block; their observations are left in `self.obs`.
-    fn reset(&mut self, block: usize, mask: u16) {
-        self.shard.reset(block, mask, &mut self.obs);
-        self.pending[block] &= !mask;
-    }
-
-    /// Leaves the observations of a block in `self.obs`.
-    fn observe(&mut self, block: usize, mask: u16) {
-        self.shard.observe(block, mask, &mut self.obs);
-    }
-
-    /// Steps all agents of this worker.
-    fn step<O: ObsNumber>(&mut self, autoreset: Autoreset, actions: &[f32], out: &mut StepMut<'_, O>) {
-        let Worker { shard, action, obs, out: o, pending } = self;
-        let spec = shard.spec();
-        let (n_obs, n_act) = (spec.obs, spec.act);
-        let (n_terms, n_info) = (spec.reward_terms.len(), spec.info.len());
-        for block in 0..shard.blocks() {
-            let first = block * BLOCK;
-            let count = BLOCK.min(out.reward.len() - first);
-            let real = ((1_u32 << count) - 1) as u16;
-            let agents = first..first + count;
-
-            // lanes without an agent get no action
-            for (i, row) in actions[first * n_act..(first + count) * n_act].chunks_exact(n_act).enumerate() {
-                for (a, x) in row.iter().enumerate() {
-                    action[a * BLOCK + i] = *x;
-                }
-            }
-            shard.step(block, action, obs, o);
-            let due = std::mem::take(&mut pending[block]);
-            if due != 0 {
-                shard.reset(block, due, obs);
-                shard.info(block, due, &mut o.info);
-                clear(o, due);
-            }
-
-            out.reward[agents.clone()].copy_from_slice(&o.reward[..count]);
-            out.forward[agents.clone()].copy_from_slice(&o.forward[..count]);
-            to_rows(&o.terms, n_terms, real, &mut out.terms[first * n_terms..(first + count) * n_terms]);
-            to_rows(&o.info, n_info, real, &mut out.info[first * n_info..(first + count) * n_info]);
-            for i in 0..count {
-                out.terminated[first + i] = o.terminated >> i & 1 == 1;
-                out.truncated[first + i] = o.truncated >> i & 1 == 1;
-                out.diverged[first + i] = o.diverged >> i & 1 == 1;
-            }
-            let rows = first * n_obs..(first + count) * n_obs;
-            to_rows(obs, n_obs, real, &mut out.final_obs[rows.clone()]);
-            // lanes without an agent live on unseen
-            let ended = o.terminated | o.truncated;
-            let begun = match autoreset {
-                Autoreset::SameStep => ended,
-                Autoreset::NextStep | Autoreset::Disabled => 0,
-            };
-            if autoreset == Autoreset::NextStep {
-                pending[block] = ended;
-            }
-            out.obs[rows.clone()].copy_from_slice(&out.final_obs[rows.clone()]);
-            if begun != 0 {
-                shard.reset(block, begun, obs);
-                to_rows(obs, n_obs, real & begun, &mut out.obs[rows]);
-            }
-        }
-    }
-}
-
-/// Takes back what a step said of the agents in `mask`.
-fn clear(out: &mut BlockStep, mask: u16) {
-    let terms = out.terms.chunks_exact_mut(BLOCK);
-    for row in terms.chain([&mut out.reward[..], &mut out.forward[..]]) {
-        for lane in (0..BLOCK).filter(|i| mask >> i & 1 == 1) {
-            row[lane] = 0.0;
-        }
-    }
-    out.terminated &= !mask;
-    out.truncated &= !mask;
-    out.diverged &= !mask;
-}

@@ -130,6 +130,16 @@ pub fn step(behavior: &str, agents: usize, action: &[f32]) -> UnityMessage {
     input(UnityInput { rl: Some(RlInput { agent_actions, ..Default::default() }), initialization: None })
 }
 
+/// Says what each agent of each behavior shall do, with something over the side channels.
+pub fn act(chosen: &[(&str, Vec<Vec<f32>>)], side_channel: Vec<u8>) -> UnityMessage {
+    let list = |rows: &Vec<Vec<f32>>| AgentActionList {
+        value: rows.iter().map(|row| AgentAction { continuous_actions: row.clone() }).collect(),
+    };
+    let agent_actions = chosen.iter().map(|(name, rows)| (name.to_string(), list(rows))).collect();
+    let rl = RlInput { agent_actions, side_channel, ..Default::default() };
+    input(UnityInput { rl: Some(rl), initialization: None })
+}
+
 /// Says goodbye.
 pub fn close() -> UnityMessage {
     UnityMessage { header: Some(Header { status: 400 }), output: None, input: None }

@@ -1,0 +1,64 @@
+//! Who decides next, where a task has several roles.
+
+use super::vec_env::VecEnv;
+use crate::error::EnvError;
+use crate::shard::{BLOCK, BlockStep};
+
+/// Who decides next in the blocks of a worker.
+pub(super) struct Deciders {
+    roles: usize,
+    /// A bit per agent, `[block][role]`.
+    masks: Vec<u16>,
+}
+
+impl Deciders {
+    /// Everybody, of so many roles; none where one has it all.
+    pub fn new(roles: usize, blocks: usize) -> Self {
+        Deciders { roles, masks: vec![!0; roles * blocks] }
+    }
+
+    /// Takes note that agents begin an episode, at whose start all roles decide.
+    pub fn begin(&mut self, block: usize, mask: u16) {
+        self.of(block).iter_mut().for_each(|decides| *decides |= mask);
+    }
+
+    /// Takes note of a decision, in which episodes of the agents in `begun` have ended or begun.
+    pub fn follow(&mut self, block: usize, out: &BlockStep, begun: u16) {
+        for (role, decides) in self.of(block).iter_mut().enumerate() {
+            *decides = out.deciding(role) | begun;
+        }
+    }
+
+    /// Lets everybody decide, as nobody knows.
+    pub fn forget(&mut self) {
+        self.masks.fill(!0);
+    }
+
+    fn of(&mut self, block: usize) -> &mut [u16] {
+        &mut self.masks[block * self.roles..][..self.roles]
+    }
+}
+
+impl VecEnv {
+    /// Writes for which agents a role decides next, `[agents]`. Roles are numbered as in
+    /// [`Spec::deciders`](crate::Spec::deciders). Where an intermittent role does not decide, its last action is to be repeated.
+    /// All roles decide at the start of an episode, and after [`VecEnv::load`] until the next step.
+    ///
+    /// # Errors
+    /// If there is no such role, or the array's length is wrong.
+    pub fn decides(&self, role: usize, out: &mut [bool]) -> Result<(), EnvError> {
+        self.check("decides [agents]", out.len(), 1)?;
+        let roles = self.spec.roles.len();
+        if role >= roles.max(1) {
+            let expected = "less than the number of roles";
+            return Err(EnvError::Option { option: "role", found: role.to_string(), expected });
+        }
+        for (worker, rows) in self.workers.iter().zip(out.chunks_mut(self.stride)) {
+            for (block, rows) in rows.chunks_mut(BLOCK).enumerate() {
+                let mask = worker.deciders.masks.get(block * roles + role).copied().unwrap_or(!0);
+                rows.iter_mut().enumerate().for_each(|(i, decides)| *decides = mask >> i & 1 == 1);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,207 @@
+//! One role of a task as a behavior of its own: for which agents it decides, what it is told to do, what it observes and earns.
+//!
+//! A task without roles has one face, which has it all. A role that does not decide every time has no infos in between: its
+//! last action goes on, and what it earns is summed until its next info.
+
+use crate::error::PlayerError;
+use crate::wire::{ActionSpec, AgentActionList, AgentInfo, BrainParameters, FloatData, Observation};
+use marathon_envs::{EnvError, Role, Spec, Step, VecEnv};
+use std::ops::Range;
+
+/// ML-Agents' suffix of all behaviors that do not play against themselves.
+const TEAM: &str = "?team=0";
+/// Bytes of an entry of a message's map besides its key and its infos.
+const ENTRY: usize = 32;
+
+/// A role to a trainer.
+pub(crate) struct Face {
+    /// With the team, as ML-Agents wants it.
+    name: String,
+    /// Which of the task's roles.
+    number: usize,
+    role: Role,
+    /// For which agents it decides next.
+    decides: Vec<bool>,
+    /// What it has earned since its last info.
+    earned: Vec<f32>,
+    ids: Vec<i32>,
+    /// An info to write into.
+    info: AgentInfo,
+}
+
+impl Face {
+    /// One for each role of a task. The first has the name; the name of another has the role's behind a point. (Marathon's own
+    /// configurations have a slash there. ML-Agents takes that for a folder, and fails to write its first checkpoint.) Numbers
+    /// of their agents begin at `first_id`.
+    pub fn all(name: &str, spec: &Spec, agents: usize, first_id: i32) -> Vec<Face> {
+        let mut ids = first_id..;
+        let face = |(number, role): (usize, Role)| Face {
+            name: match number {
+                0 => format!("{name}{TEAM}"),
+                _ => format!("{name}.{}{TEAM}", role.name),
+            },
+            number,
+            decides: vec![true; agents],
+            earned: vec![0.0; agents],
+            ids: ids.by_ref().take(agents).collect(),
+            info: AgentInfo { observations: vec![observation(&vec![0.0; role.obs.len()])], ..Default::default() },
+            role,
+        };
+        spec.deciders().into_iter().enumerate().map(face).collect()
+    }
+
+    /// Name for the trainer, such as `Hopper-v0?team=0`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The name without the team.
+    pub fn label(&self) -> &str {
+        self.name.trim_end_matches(TEAM)
+    }
+
+    /// The role.
+    pub fn role(&self) -> &Role {
+        &self.role
+    }
+
+    /// Takes over where the parts of the role lie in the task after an argument of it has changed.
+    pub fn set_role(&mut self, role: Role) {
+        self.role = role;
+    }
+
+    /// What the trainer has to know of the behavior.
+    pub fn parameters(&self) -> BrainParameters {
+        let action_spec = ActionSpec { num_continuous: self.role.act.len() as i32 };
+        BrainParameters { brain_name: self.name.clone(), is_training: true, action_spec: Some(action_spec) }
+    }
+
+    /// Bytes of the behavior's part of a message without any infos.
+    pub fn frame_bytes(&self) -> usize {
+        self.name.len() + ENTRY
+    }
+
+    /// Bytes that an agent can need: where an episode ends, there are two infos.
+    pub fn bytes_per_agent(&self) -> usize {
+        let info = AgentInfo { reward: 1.0, done: true, max_step_reached: true, id: i32::MAX, ..self.info.clone() };
+        2 * prost::encoding::message::encoded_len(1, &info)
+    }
+
+    /// Writes what the trainer chose into the actions of all agents, `[agents][act]`.
+    ///
+    /// # Errors
+    /// If it did not choose for exactly the agents for which the role decides, or not all their actions.
+    pub fn act(&self, chosen: Option<&AgentActionList>, spec: &Spec, actions: &mut [f32]) -> Result<(), PlayerError> {
+        let Range { start, end } = self.role.act;
+        let rows = actions.chunks_exact_mut(spec.act).zip(&self.decides).filter(|(_, decides)| **decides);
+        let rows = rows.map(|(row, _)| &mut row[start..end]);
+        let Some(list) = chosen else {
+            // nobody decided: at rest
+            rows.for_each(|row| row.fill(0.0));
+            return Ok(());
+        };
+        let (n, act) = (self.decides.iter().filter(|decides| **decides).count(), end - start);
+        let mut lengths = list.value.iter().map(|action| action.continuous_actions.len());
+        let wrong = lengths.find(|length| *length != act);
+        if list.value.len() != n || wrong.is_some() {
+            let found = (list.value.len(), wrong.unwrap_or(act));
+            return Err(PlayerError::Actions { name: self.name.clone(), found, expected: (n, act) });
+        }
+        for (row, action) in rows.zip(&list.value) {
+            for (i, (to, x)) in row.iter_mut().zip(&action.continuous_actions).enumerate() {
+                *to = spec.action_of(start + i, *x);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds up what the role earned with a decision.
+    pub fn earn(&mut self, spec: &Spec, out: &Step) {
+        if self.number == 0 {
+            self.earned.iter_mut().zip(&out.reward).for_each(|(sum, x)| *sum += x);
+            return;
+        }
+        let terms = out.terms.chunks_exact(spec.reward_terms.len().max(1));
+        for (sum, terms) in self.earned.iter_mut().zip(terms) {
+            *sum += terms[self.role.terms.clone()].iter().sum::<f32>();
+        }
+    }
+
+    /// Takes note of who decides next.
+    pub fn look(&mut self, env: &VecEnv) -> Result<(), EnvError> {
+        env.decides(self.number, &mut self.decides)
+    }
+
+    /// All episodes have begun anew.
+    pub fn begin(&mut self) {
+        self.decides.fill(true);
+        self.earned.fill(0.0);
+    }
+
+    /// Appends an encoded [`AgentInfoList`](crate::wire::AgentInfoList): infos of the agents for which the role decides, and of
+    /// those whose episode ended one more. With `fresh_ids`, the number for the next new episode, agents change their numbers
+    /// between episodes.
+    pub fn report(
+        &mut self,
+        spec: &Spec,
+        out: &Step,
+        ended: &[bool],
+        mut fresh_ids: Option<&mut i32>,
+        infos: &mut Vec<u8>,
+    ) {
+        for (i, ended) in ended.iter().enumerate() {
+            let row = i * spec.obs..(i + 1) * spec.obs;
+            if *ended {
+                self.describe(i, &out.final_obs[row.clone()], Some(out.truncated[i]));
+                put(infos, &self.info);
+                if let Some(next) = &mut fresh_ids {
+                    self.ids[i] = **next;
+                    **next = next.wrapping_add(1).max(0);
+                }
+            }
+            if self.decides[i] {
+                self.describe(i, &out.obs[row], None);
+                put(infos, &self.info);
+            }
+        }
+    }
+
+    /// Writes an agent's info: of the end of its episode, and whether that was the time limit, or of its present state. What was
+    /// got before the end belongs to the end.
+    fn describe(&mut self, i: usize, obs: &[f32], end: Option<bool>) {
+        let info = &mut self.info;
+        info.reward = std::mem::take(&mut self.earned[i]);
+        info.done = end.is_some();
+        info.max_step_reached = end.unwrap_or(false);
+        info.id = self.ids[i];
+        if let Some(numbers) = info.observations.first_mut().and_then(|sensor| sensor.float_data.as_mut()) {
+            numbers.data.copy_from_slice(&obs[self.role.obs.clone()]);
+        }
+    }
+}
+
+/// The roles of a task as errors tell them.
+pub(crate) fn roles(spec: &Spec) -> String {
+    let one = |role: &Role| {
+        let Role { name, obs, act, terms, .. } = role;
+        let (obs, act, terms) = (obs.len(), act.len(), terms.len());
+        let name = if name.is_empty() { "one role" } else { name };
+        format!("{name} ({obs} observations, {act} actions, {terms} terms of the reward)")
+    };
+    spec.deciders().iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// Appends an entry of an [`AgentInfoList`](crate::wire::AgentInfoList).
+fn put(list: &mut Vec<u8>, info: &AgentInfo) {
+    prost::encoding::message::encode(1, info, list);
+}
+
+/// A vector of numbers as a sensor gives it.
+pub(crate) fn observation(data: &[f32]) -> Observation {
+    Observation {
+        shape: vec![data.len() as i32],
+        float_data: Some(FloatData { data: data.to_vec() }),
+        dimension_properties: vec![Observation::NO_PROPERTY],
+        name: format!("VectorSensor_size{}", data.len()),
+    }
+}
