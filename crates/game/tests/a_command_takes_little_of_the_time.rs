@@ -35,10 +35,10 @@ enum Device {
 fn latency(device: Device, words: &[&str]) -> [f64; 2] {
     let mut app = windowless::game(&[&["AntController", "--agents", "1"], words].concat(), FRAME, |_| ());
     let pad = pad(&mut app);
-    // it stands as it is told
-    push(&mut app, pad, GamepadAxis::LeftStickY, 0.3);
+    // who is told something once stays under command, and then stands
+    push(&mut app, pad, GamepadAxis::LeftStickY, 1.0);
     push(&mut app, pad, GamepadAxis::LeftStickY, 0.0);
-    frames(&mut app, 120);
+    frames(&mut app, 240);
     // the event comes with the first frame
     match device {
         Device::Pad => push(&mut app, pad, GamepadAxis::LeftStickY, 1.0),

@@ -18,7 +18,7 @@ use bevy::input::InputPlugin;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
 use clap::Parser;
-use devices::{key, pad, press, push};
+use devices::{key, pad, press, pull, push};
 use marathon_game::app::{Actor, Args, Bindings, Deed, Steering};
 use marathon_game::prelude::*;
 use std::sync::LazyLock;
@@ -201,12 +201,7 @@ fn who_can_step_aside_does_so_by_triggers_and_keys() {
     for (pushed, button, expected) in
         [(1.0, GamepadButton::LeftTrigger2, 2.0), (1.0, GamepadButton::RightTrigger2, -2.0)]
     {
-        let trigger = |app: &mut App, value| {
-            let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
-            app.world_mut().write_message(RawGamepadEvent::Button(event));
-            app.update();
-        };
-        trigger(&mut app, pushed);
+        pull(&mut app, pad, button, pushed);
         // 0.1 s in frames of 20 ms: two thirds of it, and some frames until it is observed
         frames(&mut app, 5);
         let told = command(&mut app)[1] / expected;
@@ -214,7 +209,7 @@ fn who_can_step_aside_does_so_by_triggers_and_keys() {
         frames(&mut app, 60);
         let told = command(&mut app);
         assert!(arrived(&told, [0.0, expected, 0.0]), "{told:?}");
-        trigger(&mut app, 0.0);
+        pull(&mut app, pad, button, 0.0);
         frames(&mut app, 60);
     }
     // a square behind the dead zone: half of the way says a quarter

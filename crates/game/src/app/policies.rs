@@ -10,7 +10,7 @@ use marathon_runs::{Setting, policy_file};
 use std::path::Path;
 
 /// Policies that come with the game.
-const SHIPPED: [&[u8]; 12] = [
+const SHIPPED: [&[u8]; 14] = [
     include_bytes!("../../../../assets/policies/hopper.safetensors"),
     include_bytes!("../../../../assets/policies/walker2d.safetensors"),
     include_bytes!("../../../../assets/policies/humanoid.safetensors"),
@@ -23,6 +23,8 @@ const SHIPPED: [&[u8]; 12] = [
     include_bytes!("../../../../assets/policies/TerrainWalker2d.safetensors"),
     include_bytes!("../../../../assets/policies/HopperController.safetensors"),
     include_bytes!("../../../../assets/policies/WalkerController.safetensors"),
+    include_bytes!("../../../../assets/policies/MarathonManController.safetensors"),
+    include_bytes!("../../../../assets/policies/TerrainMarathonMan.safetensors"),
 ];
 
 /// The policy that comes with an agent.

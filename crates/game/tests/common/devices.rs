@@ -27,12 +27,17 @@ pub fn push(app: &mut App, pad: Entity, axis: GamepadAxis, value: f32) {
     app.update();
 }
 
+/// Presses a button or trigger as far as said, and lets a frame go by.
+pub fn pull(app: &mut App, pad: Entity, button: GamepadButton, value: f32) {
+    let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
+    app.world_mut().write_message(RawGamepadEvent::Button(event));
+    app.update();
+}
+
 /// Presses a button for a frame, and releases it for another.
 pub fn press(app: &mut App, pad: Entity, button: GamepadButton) {
     for value in [1.0, 0.0] {
-        let event = RawGamepadButtonChangedEvent { gamepad: pad, button, value };
-        app.world_mut().write_message(RawGamepadEvent::Button(event));
-        app.update();
+        pull(app, pad, button, value);
     }
 }
 
