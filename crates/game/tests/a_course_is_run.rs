@@ -275,7 +275,7 @@ fn the_list_starts_a_replay() -> Result<(), Box<dyn Error>> {
     // the next agent is one that can do the same
     press(&mut app, KeyCode::KeyN);
     frames(&mut app, 5);
-    assert_eq!(app.world().resource::<Show>().agent, "Hopper-v0");
+    assert_eq!(app.world().resource::<Show>().agent, "HopperController-v0");
     assert!(app.world().resource::<Runs>().last.is_none());
     assert_eq!(app.world().resource::<Bindings>().key(Deed::Runs), "T");
     press(&mut app, KeyCode::KeyT);

@@ -14,6 +14,7 @@ pub fn pad(app: &mut App) -> Entity {
     let pad = app.world_mut().spawn_empty().id();
     let connection = GamepadConnection::Connected { name: "test pad".into(), vendor_id: None, product_id: None };
     let event = GamepadConnectionEvent { gamepad: pad, connection };
+    // it tells a connection twice: one message makes the pad, the other goes to those who read raw events
     app.world_mut().write_message(event.clone());
     app.world_mut().write_message(RawGamepadEvent::Connection(event));
     app.update();

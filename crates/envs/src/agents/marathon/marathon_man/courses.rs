@@ -4,7 +4,7 @@ use marathon_physics::lanes::Real;
 
 use super::super::terrain::{Runner, Terrain};
 use super::body::{ACTIONS, BUTT, FEET, JOINTS};
-use super::steer::{BEGUN, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
+use super::steer::{BEGUN, DIRECTION, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
 use crate::agent::{Agent, Motors, Obs, Part, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
@@ -36,7 +36,7 @@ impl Runner for Steer {
         Steer::observe_along(s, out);
     }
 
-    // as in his clips, but at the course's beginning, and along it
+    // as in his clips, but at the course's beginning, with the root facing along it
     fn place(&self, start: &mut Start) {
         self.reset(start);
         let [w, x, y, z] = [3, 4, 5, 6].map(|i| start.qpos[i]);
@@ -47,6 +47,11 @@ impl Runner for Steer {
         start.qpos[3..7].copy_from_slice(&[cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]);
         let ((sin, cos), [vx, vy]) = (libm::sincos(-yaw), [start.qvel[0], start.qvel[1]]);
         start.qvel[..2].copy_from_slice(&[cos * vx - sin * vy, sin * vx + cos * vy]);
+    }
+
+    #[inline(always)]
+    fn aim<T: Real>(own: &mut [T]) {
+        own[DIRECTION..DIRECTION + 2].copy_from_slice(&[T::lit(1.0), T::zero()]);
     }
 
     fn tell(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {

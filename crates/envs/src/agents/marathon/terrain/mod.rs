@@ -331,6 +331,7 @@ impl<F: Runner> Agent for Terrain<F> {
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let (own, memory) = memory.split_at_mut(F::MEMORY);
         self.figure.begin(s, own);
+        F::aim(own);
         let [x, ..] = s.position(F::TORSO);
         for slot in [AT, FARTHEST, MARK] {
             memory[slot] = x;

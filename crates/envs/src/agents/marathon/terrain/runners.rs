@@ -52,6 +52,10 @@ pub trait Runner: Agent + Clone + Default {
         start.add_noise(ResetNoise::MARATHON);
     }
 
+    /// Points its own variables along the course when an episode begins.
+    #[inline(always)]
+    fn aim<T: Real>(_: &mut [T]) {}
+
     /// What it is told where nobody commands, and for how many decisions.
     fn tell(&self, _: &mut EpisodeRng, _: usize, _: &mut [f64]) -> usize {
         usize::MAX
