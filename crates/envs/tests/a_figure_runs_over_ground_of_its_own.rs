@@ -498,7 +498,7 @@ fn marathon_man_starts_along_his_course() {
         );
         let [vx, vy] = [state.qvel[0], state.qvel[1]];
         // from a run or a walk, he goes on forward, and sways
-        assert!(vx > -0.3 && vy.abs() < 0.6, "agent {i}: {vx} {vy}");
+        assert!(vx > -0.3 && vy.abs() < 0.6 + 0.1 * vx.abs(), "agent {i}: {vx} {vy}");
         fastest = fastest.max(vx);
         let told = f64::from(out.obs[n * i]);
         assert!((1.0..=3.0).contains(&told) && out.obs[n * i + 1] == 0.0, "agent {i} is told {told}");
