@@ -4,7 +4,7 @@
 //! on for each decision: what the agent saw, what it got for the decision before, what it did. Lengths are protocol buffers'
 //! variable integers. The last entry of an episode is the state in which it ended, with an action that nobody took.
 
-use crate::face::observation;
+use crate::face::{TEAM, observation};
 use crate::wire::{ActionSpec, AgentInfo, AgentInfoActionPair, BrainParameters, DemonstrationMeta, RecordedAction};
 use marathon_envs::{Demonstrations, Spec};
 use prost::Message;
@@ -46,7 +46,7 @@ impl Demonstration {
     pub fn new(name: &str, spec: &Spec) -> Self {
         Demonstration {
             name: name.into(),
-            behavior: format!("{}?team=0", spec.id),
+            behavior: format!("{}{TEAM}", spec.id),
             spec: spec.clone(),
             pairs: Vec::new(),
             steps: 0,

@@ -9,7 +9,7 @@ use marathon_envs::{EnvError, Role, Spec, Step, VecEnv};
 use std::ops::Range;
 
 /// ML-Agents' suffix of all behaviors that do not play against themselves.
-const TEAM: &str = "?team=0";
+pub(crate) const TEAM: &str = "?team=0";
 /// Bytes of an entry of a message's map besides its key and its infos.
 const ENTRY: usize = 32;
 

@@ -3,6 +3,7 @@
 use crate::behavior::{Behavior, BehaviorOptions};
 use crate::channels::{self, Engine};
 use crate::error::PlayerError;
+use crate::face::TEAM;
 use crate::log::Log;
 use crate::parameters::Parameters;
 use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
@@ -304,7 +305,7 @@ fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), P
         if let Some(name) =
             behavior.names().find(|name| behaviors.iter().any(|other| other.names().any(|n| n == *name)))
         {
-            let name = name.trim_end_matches("?team=0");
+            let name = name.trim_end_matches(TEAM);
             return Err(PlayerError::Usage(format!(
                 "two behaviors are called '{name}'; give one another name with --behavior-name"
             )));
