@@ -14,6 +14,8 @@
 //! Without a skill, the reward is that of `MarathonManSteer-v0` for the commanded velocity, direction and gait. With one it is
 //! DeepMimic's.
 
+use std::f64::consts::PI;
+
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
@@ -24,7 +26,7 @@ use super::body::{
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    BEGUN, CLIPS, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET, TERMS,
+    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET, TERMS,
 };
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
 use crate::agent::senses::{clamp, hypot};
@@ -55,6 +57,11 @@ const HIGH: f64 = 0.3;
 const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
 const STEPPING: f64 = 0.15;
+/// Share of `sharp` commands to stand, and how long they hold, decisions.
+const RESTING: f64 = 0.15;
+const RESTS: [usize; 2] = [80, 240];
+/// Change of his velocity by a push over, m/s.
+const KNOCK: [f64; 2] = [2.0, 5.0];
 
 crate::options! {
     /// Arguments of Marathon Man in a player's hands.
@@ -65,12 +72,14 @@ crate::options! {
         /// figure's.
         start: StartAt = StartAt::Random,
         /// What he is told where nobody commands: anything, `even`, or half of the time the extremes, `sharp`.
-        commands: super::steer::Commands = super::steer::Commands::Even,
+        commands: Commands = Commands::Even,
         /// Clips of what he does, `all` or some of them: where episodes start, what commands ask for where nobody commands. Without
         /// those of getting up, a fall ends the episode; without those of the gait, the end of a skill.
         clip: ClipNames = ClipNames(ALL.into()),
         /// Share of the episodes that a fall ends: learners need not lie so long. Those that start lying are not among them.
         mortal: Scale = Scale(0.0),
+        /// Share of the episodes of the gait that begin with a push over, which no fall ends: learners come to lie as they fall.
+        knocked: Scale = Scale(0.0),
         /// What an episode's end costs that is a failure.
         price: Scale = Scale(0.0),
     }
@@ -177,6 +186,13 @@ impl Agent for Controller {
         if gait && (first || known.is_empty() || start.random.uniform(0.0, 1.0) >= SKILLED) {
             self.steer().reset(start);
             start.memory[MORTAL] = mortal;
+            if start.random.uniform(0.0, 1.0) < self.arguments.knocked.0 {
+                let angle = start.random.around_zero(PI);
+                let speed = start.random.uniform(KNOCK[0], KNOCK[1]);
+                start.qvel[0] += speed * libm::cos(angle);
+                start.qvel[1] += speed * libm::sin(angle);
+                start.memory[MORTAL] = 0.0;
+            }
             return;
         }
         let skill = known[start.random.whole(0, known.len() - 1)];
@@ -201,6 +217,8 @@ impl Agent for Controller {
             (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
         } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
             (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
+        } else if self.arguments.commands == Commands::Sharp && kind > 1.0 - RESTING {
+            (going, hold) = ([0.0; 2], random.whole(RESTS[0], RESTS[1]));
         }
         out.copy_from_slice(&[going[0], left, going[1], jump, backflip]);
         hold

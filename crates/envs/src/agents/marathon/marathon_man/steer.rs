@@ -102,8 +102,9 @@ const ACCELERATION: f64 = 4.0;
 const LEAD: f64 = 0.8;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
 const SIDEWAYS: f64 = 2.5;
-/// Mean square of the parts' velocities at which standing still is worth 1/e, m^2/s^2.
-const RESTLESS: f64 = 0.1;
+/// Mean squares of the parts' velocities at which each half of what standing still is worth is down to 1/e, m^2/s^2: who shuffles is
+/// to come to rest, and who rests to keep quite still.
+const RESTLESS: [f64; 2] = [0.1, 0.01];
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
 
@@ -251,7 +252,8 @@ impl Steer {
         add("gait", 0.2, pose * T::lit(-5.0));
         add("tempo", 0.05, tempo * T::lit(-1.0));
         let rest = T::and(counts, told.lt(T::lit(0.01)));
-        terms.add("still", 0.2, T::masked(rest, stillness(s, PARTS.len(), RESTLESS)));
+        let [shuffles, stirs] = RESTLESS.map(|most| stillness(s, PARTS.len(), most));
+        terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 
     /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
