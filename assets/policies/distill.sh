@@ -78,7 +78,12 @@ for policy in "${wanted[@]}"; do
       # and on: to stand still, to jump higher, to get up
       "$marathon" train MarathonManController --initialize-from "$runs/run" --seed 2 --threads 1 --out "$runs/still"
       "$marathon" train MarathonManController --option mortal=0.3 --steps 40M --initialize-from "$runs/still" --seed 3 --threads 1 \
-        --out "$runs/last"
+        --out "$runs/rises"
+      # falls as pushes cause them, then starts from a stand
+      "$marathon" train MarathonManController --option mortal=0.3 --option knocked=0.2 --steps 40M --initialize-from "$runs/rises" \
+        --seed 4 --threads 1 --out "$runs/knocked"
+      "$marathon" train MarathonManController --option start=first --option mortal=0.5 --option knocked=0.1 --steps 18M \
+        --initialize-from "$runs/knocked" --seed 7 --threads 1 --out "$runs/last"
       cp "$runs/last/policy.safetensors" "$shipped/MarathonManController.safetensors"
       ;;
     *)
