@@ -174,7 +174,8 @@ impl Agent for AntController {
         // told to go nowhere and not to turn
         let told = s.command(0).abs().max(s.command(1).abs()).max(s.command(2).abs());
         let rest = told.neg_mul_add(T::lit(10.0), T::lit(1.0)).max(T::zero());
-        terms.add("still", 0.5, rest * super::stillness(s, PARTS.len(), RESTLESS));
+        let [still] = super::stillness(s, PARTS.len(), [RESTLESS]);
+        terms.add("still", 0.5, rest * still);
         terms.add("effort", -0.05, s.effort_mean(Motors::NONE));
     }
 

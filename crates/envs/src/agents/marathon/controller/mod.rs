@@ -141,15 +141,16 @@ impl<F: Figure> Controller<F> {
     }
 }
 
-/// Worth of standing still, 0 to 1: 1/e where the mean square of the velocities of the first `parts` parts is `restless`, m^2/s^2.
+/// Worths of standing still, 0 to 1 each: 1/e where the mean square of the velocities of the first `parts` parts is that of `restless`,
+/// m^2/s^2.
 #[inline(always)]
-pub(super) fn stillness<T: Real>(s: &Senses<T>, parts: usize, restless: f64) -> T {
+pub(super) fn stillness<T: Real, const N: usize>(s: &Senses<T>, parts: usize, restless: [f64; N]) -> [T; N] {
     let mut speed2 = T::zero();
     for part in (0..parts).map(Part) {
         let [x, y, z] = s.linear_velocity(part);
         speed2 += x.mul_add(x, y.mul_add(y, z * z));
     }
-    (speed2 * T::lit(-1.0 / (restless * parts as f64))).exp()
+    restless.map(|most| (speed2 * T::lit(-1.0 / (most * parts as f64))).exp())
 }
 
 impl<F: Figure> Agent for Controller<F> {
@@ -250,7 +251,8 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
         let rest = (one - told.abs().max(jump) * T::lit(10.0)).max(zero);
-        terms.add("still", STILL, rest * stillness(s, F::PARTS.len(), RESTLESS));
+        let [still] = stillness(s, F::PARTS.len(), [RESTLESS]);
+        terms.add("still", STILL, rest * still);
         terms.add("height", -1.0, F::low(s));
         // what an adversary does is no effort of the figure's
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));

@@ -26,7 +26,8 @@ use super::body::{
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET, TERMS,
+    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
+    TERMS,
 };
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
 use crate::agent::senses::{clamp, hypot};

@@ -252,7 +252,7 @@ impl Steer {
         add("gait", 0.2, pose * T::lit(-5.0));
         add("tempo", 0.05, tempo * T::lit(-1.0));
         let rest = T::and(counts, told.lt(T::lit(0.01)));
-        let [shuffles, stirs] = RESTLESS.map(|most| stillness(s, PARTS.len(), most));
+        let [shuffles, stirs] = stillness(s, PARTS.len(), RESTLESS);
         terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 
