@@ -43,6 +43,11 @@ const ANT_CONTROLLER: (&str, &str) =
 /// For figures that run over uneven ground.
 const TERRAIN: (&str, &str) = ("terrain-fast.yaml", include_str!("../../../assets/configs/terrain-fast.yaml"));
 
+/// For an adversary that builds the ground of a runner that does not learn, and the name of the adversary's role.
+const ADVERSARY: (&str, &str) =
+    ("terrain-adversary.yaml", include_str!("../../../assets/configs/terrain-adversary.yaml"));
+const BUILDER: &str = "builder";
+
 /// For Marathon Man and his clips.
 const MARATHON_MAN: (&str, &str) =
     ("marathon_man-fast.yaml", include_str!("../../../assets/configs/marathon_man-fast.yaml"));
@@ -155,6 +160,18 @@ impl Default for Loaded {
 pub fn default_of(algorithm: &str) -> Loaded {
     let config = TrainConfig::of(algorithm).expect("the name of an algorithm");
     Loaded { config, ..Loaded::default() }
+}
+
+/// The configuration that trains an adversary against a runner of a course, which does not learn.
+///
+/// # Errors
+/// If there is none for the task.
+pub fn against(task: &str) -> Result<Loaded, ConfigError> {
+    let (path, bytes) = (ADVERSARY.0.as_ref(), ADVERSARY.1.as_bytes());
+    let id = names::id(task);
+    let mut loaded = parse(path, bytes, &id)?;
+    loaded.config.roles = parse_roles(path, bytes, &id, &[BUILDER])?;
+    Ok(loaded)
 }
 
 /// The configuration that trains an agent fast; the trainer's own defaults for agents that have none.

@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::play::Play;
-use crate::setting::{CLIP, Setting, TaskOptions};
+use crate::setting::{CLIP, FIRST, START, Setting, TaskOptions};
 use marathon_envs::agents::marathon::marathon_man::clips::ClipNames;
 use marathon_envs::options::Value;
 use marathon_envs::{Autoreset, VecEnvOptions, registry};
@@ -11,9 +11,6 @@ use marathon_motion::{Places, Tracking};
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use serde::{Deserialize, Serialize};
-
-/// Argument of tasks that follow clips: where episodes start.
-const START: &str = "start";
 
 /// Episodes whose pose errors are averaged: those of table 3 of the AMP paper.
 const WARPED: usize = 32;
@@ -60,7 +57,7 @@ pub struct Followed {
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
     let (setting, clips) = clips_of(policy)?;
     let of_clip = |clip: String| {
-        let first = follow_from("first", &clip, policy, &setting, options)?;
+        let first = follow_from(FIRST, &clip, policy, &setting, options)?;
         let random = follow_from("random", &clip, policy, &setting, options)?;
         Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
     };
@@ -73,7 +70,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>,
 /// If the task cannot be made.
 pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Followed>, RunError> {
     let (setting, clips) = clips_of(policy)?;
-    clips.iter().map(|clip| follow_from("first", clip, policy, &setting, options)).collect()
+    clips.iter().map(|clip| follow_from(FIRST, clip, policy, &setting, options)).collect()
 }
 
 /// A policy's task and the clips that it follows; an empty name where the task has no choice.

@@ -2,7 +2,7 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
-use marathon_envs::options::Value;
+use marathon_envs::options::{OF_LEARNING, Value};
 use marathon_envs::shard::task_of_role;
 use marathon_envs::{Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
@@ -13,6 +13,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The argument that names motion clips.
 pub(crate) const CLIP: &str = "clip";
+
+/// The argument that says where episodes start, and its value for a start as every use of a policy has it.
+pub(crate) const START: &str = "start";
+pub(crate) const FIRST: &str = "first";
 
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
 static NAMING: Mutex<()> = Mutex::new(());
@@ -55,13 +59,24 @@ impl Setting {
         Ok(Setting { agent: registry::agent(name)?.facts().id, ..Setting::default() })
     }
 
-    /// The task that a policy is for; of a role's policy, that in which it has the role.
+    /// The task that a policy is for, without what only helped to learn; of a role's policy, that in which it has the role.
     pub fn of(policy: &PolicyMeta) -> Self {
         Setting {
             agent: task_of_role(&policy.agent).into(),
-            options: policy.options.clone(),
+            options: policy.options.clone().without(&OF_LEARNING),
             clips: policy.clips.clone(),
         }
+    }
+
+    /// The same with episodes that start as they do for whoever plays, if the agent can start elsewhere.
+    ///
+    /// # Errors
+    /// If there is no such agent.
+    pub fn from_the_first(self) -> Result<Self, RunError> {
+        if registry::agent(&self.agent)?.options().iter().all(|option| option.name != START) {
+            return Ok(self);
+        }
+        self.with(&TaskOptions { given: vec![(START.into(), Value::Text(FIRST.into()))] })
     }
 
     /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds their names.

@@ -6,6 +6,7 @@ use super::kept::{self, cell, median};
 use super::record::{EPISODES, Record};
 use crate::error::CliError;
 use crate::interrupt;
+use marathon_config::{against, default_for};
 use marathon_envs::nearest;
 use marathon_envs::options::Value;
 use marathon_learn::{EvalOptions, evaluate};
@@ -20,6 +21,9 @@ use std::path::{Path, PathBuf};
 const KEEP: &str = "runs/assault-course";
 /// The figures.
 const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
+
+/// Those who see the ground, and those who do not.
+const SIGHTS: [&str; 2] = ["heights", "blind"];
 
 /// Ground to learn on: its name and the arguments that make it.
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
@@ -43,6 +47,10 @@ const COURSES: [(&str, &str, &str); 5] = [
     ("meters", "meters", "0.5"),
 ];
 
+/// What a runner's own adversary may build, and for how many of the runner's decisions it learns.
+const ADVERSARY: [(&str, &str); 3] = [("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")];
+const ADVERSARY_STEPS: u64 = 4_000_000;
+
 /// What a finished run has found.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -55,6 +63,9 @@ struct Found {
     cpu_seconds: f64,
     /// On each course: the mean way of an episode, m, and how many episodes ended with a fall.
     courses: Vec<Judged>,
+    /// On the ground of an adversary that has learned against it while it stayed as it was; findings of earlier studies have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    adversary: Option<Judged>,
 }
 
 /// A policy on a course.
@@ -67,22 +78,24 @@ struct Judged {
     falls: u64,
 }
 
-/// Trains and measures; with `kept_only`, tells of what is kept without training anything.
+/// Trains and measures, `only` some tasks, grounds and sights if any are named; with `kept_only`, tells of what is kept without training anything.
 ///
 /// # Errors
 /// If a name is unknown, or a run cannot be trained or read, or was made with another configuration.
-pub fn run(options: &Options, tasks: &[String], grounds: &[String], kept_only: bool) -> Result<Record, CliError> {
+pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<Record, CliError> {
+    let [tasks, grounds, sights] = only;
     let tasks = chosen("--tasks", tasks, &TASKS)?;
     let grounds = chosen("--grounds", grounds, &GROUNDS.map(|(name, _)| name))?;
+    let sights = chosen("--sights", sights, &SIGHTS)?;
     interrupt::install("finishing this iteration; the same command goes on from there")?;
     let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
     let (mut rows, mut bars) = (Vec::new(), Vec::new());
     for task in &tasks {
         for (ground, arguments) in GROUNDS.iter().filter(|(name, _)| grounds.contains(name)) {
-            for heights in [true, false] {
+            for sight in &sights {
+                let heights = *sight == SIGHTS[0];
                 let mut found = Vec::new();
                 for seed in 1..=options.seeds {
-                    let sight = if heights { "heights" } else { "blind" };
                     let folder = keep.join(format!("{task}-{ground}-{sight}-{seed}"));
                     found.extend(one(task, arguments, heights, seed, &folder, options, kept_only)?);
                 }
@@ -101,10 +114,12 @@ pub fn run(options: &Options, tasks: &[String], grounds: &[String], kept_only: b
     }
     let mut columns = vec!["figure", "learned on", "sees the ground", "seeds", "decisions", "processor seconds"];
     columns.extend(COURSES.iter().map(|(name, ..)| *name));
+    columns.push("its own adversary");
     let list = |flag: &str, given: &[&str], all: usize| {
         if given.len() == all { String::new() } else { format!(" {flag} {}", given.join(",")) }
     };
     let mut words = list("--tasks", &tasks, TASKS.len()) + &list("--grounds", &grounds, GROUNDS.len());
+    words.push_str(&list("--sights", &sights, SIGHTS.len()));
     if kept_only {
         words.push_str(" --kept-only");
     }
@@ -129,9 +144,11 @@ fn about() -> String {
          ahead.\n\n\
          The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
          courses of full difficulty, and on the original's meters, of up to 0.5 m. The courses made by hand and the meters are \
-         nobody's training ground. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
+         nobody's training ground. *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
+         a meter, while the runner stayed as it was; some runs have not met one. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
          fall: medians over the seeds, and each seed's number in brackets if they differ. The picture has the mean of both \
-         courses made by hand."
+         courses made by hand.",
+        thousands(ADVERSARY_STEPS)
     )
 }
 
@@ -157,9 +174,15 @@ fn one(
     options: &Options,
     kept_only: bool,
 ) -> Result<Option<Found>, CliError> {
-    let mut arguments = arguments(ground);
-    arguments.given.push(("heights".into(), Value::Bool(heights)));
-    let job = kept::Job { task: task.into(), arguments, seed, all_policies: false };
+    let sight = ("heights".into(), Value::Bool(heights));
+    let with_sight = |list| TaskOptions { given: [arguments(list).given, vec![sight.clone()]].concat() };
+    let job = kept::Job {
+        task: task.into(),
+        arguments: with_sight(ground),
+        seed,
+        loaded: default_for(task),
+        initialize_from: None,
+    };
     let (file, expected) = (kept::file(folder), job.expected(options)?);
     if let Some(found) = kept::read::<Found>(&file)? {
         kept::check(&file, &found.run, &expected)?;
@@ -169,7 +192,25 @@ fn one(
         return Ok(None);
     }
     job.train(folder, options)?;
-    let found = judged(folder, options)?;
+    let against = kept::Job {
+        arguments: with_sight(&ADVERSARY),
+        loaded: against(task)?,
+        initialize_from: Some(folder.into()),
+        ..job
+    };
+    let path = folder.join("adversary");
+    let steps = options.steps.map_or(ADVERSARY_STEPS, |steps| steps.min(ADVERSARY_STEPS));
+    against.train(&path, &Options { steps: Some(steps), ..options.clone() })?;
+    let mut found = judged(folder, options)?;
+    let [course, _, difficulty] = ADVERSARY.map(|(_, value)| value);
+    let (folder, _): (_, RunFile) = RunFolder::open(&path)?;
+    let met = summary(&folder)?.eval;
+    found.adversary = met.map(|met| Judged {
+        course: course.into(),
+        difficulty: difficulty.parse().unwrap_or_default(),
+        distance: met.distance_mean,
+        falls: met.falls,
+    });
     kept::write(&file, &found)?;
     Ok(Some(found))
 }
@@ -183,10 +224,6 @@ fn arguments(list: &[(&str, &str)]) -> TaskOptions {
 /// Plays a finished run's policy on all courses.
 fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
-    let file = folder.summary();
-    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
-    let summary: Summary =
-        serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))?;
     let judge = EvalOptions { episodes: EPISODES, threads: options.threads, ..EvalOptions::default() };
     let mut courses = Vec::new();
     for (_, course, difficulty) in COURSES {
@@ -200,8 +237,15 @@ fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
             falls: result.falls,
         });
     }
-    let Summary { steps, cpu_seconds, .. } = summary;
-    Ok(Found { run, steps, cpu_seconds, courses })
+    let Summary { steps, cpu_seconds, .. } = summary(&folder)?;
+    Ok(Found { run, steps, cpu_seconds, courses, adversary: None })
+}
+
+/// The summary of a run.
+fn summary(folder: &RunFolder) -> Result<Summary, CliError> {
+    let file = folder.summary();
+    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
+    serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))
 }
 
 /// A line of the table.
@@ -219,11 +263,16 @@ fn row(task: &str, ground: &str, heights: bool, found: &[Found]) -> Vec<String> 
         of(&|f| f.steps as f64, &whole),
         of(&|f| f.cpu_seconds, &whole),
     ];
-    for i in 0..COURSES.len() {
-        let way = of(&|f| f.courses[i].distance, &|x| format!("{x:.1}"));
-        let falls = of(&|f| f.courses[i].falls as f64, &whole);
-        out.push(format!("{way} m; {falls} fall"));
-    }
+    let judged = |on: &dyn Fn(&Found) -> Option<&Judged>| {
+        let known: Vec<&Judged> = found.iter().filter_map(on).collect();
+        let of = |value: &dyn Fn(&Judged) -> f64, text: &dyn Fn(f64) -> String| {
+            cell(&known.iter().map(|judged| Some(value(judged))).collect::<Vec<_>>(), text)
+        };
+        let (way, falls) = (of(&|j| j.distance, &|x| format!("{x:.1}")), of(&|j| j.falls as f64, &whole));
+        if known.is_empty() { "-".into() } else { format!("{way} m; {falls} fall") }
+    };
+    out.extend((0..COURSES.len()).map(|i| judged(&|f| f.courses.get(i))));
+    out.push(judged(&|f| f.adversary.as_ref()));
     out
 }
 

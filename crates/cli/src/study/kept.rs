@@ -4,7 +4,7 @@
 use super::Options;
 use crate::error::CliError;
 use crate::interrupt;
-use marathon_config::{Loaded, default_for};
+use marathon_config::Loaded;
 use marathon_learn::{Control, IterationStats};
 use marathon_runs::folder::{difference_of_runs, write_json};
 use marathon_runs::{LearnOptions, RunError, RunFile, RunOptions, Session, Task, TaskOptions};
@@ -18,24 +18,23 @@ pub struct Job {
     pub task: String,
     pub arguments: TaskOptions,
     pub seed: u64,
-    /// Whether the policies on the way are kept, too.
-    pub all_policies: bool,
+    /// Its configuration; a study's own number of steps comes before that of the configuration.
+    pub loaded: Loaded,
+    /// The policy that it starts from; none: random weights.
+    pub initialize_from: Option<PathBuf>,
 }
 
 impl Job {
-    /// Options and configuration of a new run.
-    fn new_run(&self, options: &Options) -> (RunOptions, Loaded) {
+    /// Options of a new run.
+    fn new_run(&self, options: &Options) -> RunOptions {
         let learn = LearnOptions {
             steps: options.steps,
             seed: Some(self.seed),
             threads: Some(options.threads),
             ..LearnOptions::default()
         };
-        let mut loaded = default_for(&self.task);
-        if self.all_policies {
-            loaded.keep_checkpoints = usize::MAX;
-        }
-        (RunOptions { learn, task: self.arguments.clone(), ..RunOptions::default() }, loaded)
+        let (task, initialize_from) = (self.arguments.clone(), self.initialize_from.clone());
+        RunOptions { learn, task, initialize_from, ..RunOptions::default() }
     }
 
     /// What would be trained today.
@@ -43,8 +42,8 @@ impl Job {
     /// # Errors
     /// If there is no such task, or it does not take the arguments.
     pub fn expected(&self, options: &Options) -> Result<RunFile, CliError> {
-        let (new, loaded) = self.new_run(options);
-        Ok(Session::open(Some(Task::named(&self.task)?), &new, Some(loaded), true)?.0.run)
+        let new = self.new_run(options);
+        Ok(Session::open(Some(Task::named(&self.task)?), &new, Some(self.loaded.clone()), true)?.0.run)
     }
 
     /// Makes the run that is to be in a folder, or what is missing of it.
@@ -57,9 +56,8 @@ impl Job {
             run.learn.steps = options.steps;
             Session::open(None, &run, None, false)
         } else {
-            let (run, loaded) = self.new_run(options);
-            let run = RunOptions { out: Some(folder.into()), ..run };
-            Session::open(Some(Task::named(&self.task)?), &run, Some(loaded), false)
+            let run = RunOptions { out: Some(folder.into()), ..self.new_run(options) };
+            Session::open(Some(Task::named(&self.task)?), &run, Some(self.loaded.clone()), false)
         };
         let session = match opened {
             Ok((session, _)) => session,

@@ -83,6 +83,9 @@ pub enum What {
         /// [default: all].
         #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
         grounds: Vec<String>,
+        /// Whether runners see the ground: heights, blind, or both with a comma between them [default: both].
+        #[arg(long, value_name = "SIGHTS", value_delimiter = ',')]
+        sights: Vec<String>,
         /// Only what is kept: a page of the runs that are there, without training any.
         #[arg(long)]
         kept_only: bool,
@@ -90,7 +93,7 @@ pub enum What {
 }
 
 /// What all studies have.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Options {
     /// Seeds of each row.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
@@ -156,8 +159,8 @@ pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
         What::StyleTransfer { options, clips, kept_only } => {
             (style_transfer::run(options, clips, *kept_only)?, options)
         }
-        What::AssaultCourse { options, tasks, grounds, kept_only } => {
-            (assault_course::run(options, tasks, grounds, *kept_only)?, options)
+        What::AssaultCourse { options, tasks, grounds, sights, kept_only } => {
+            (assault_course::run(options, [tasks, grounds, sights], *kept_only)?, options)
         }
     };
     let page = record.save(options)?;

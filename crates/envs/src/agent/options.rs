@@ -70,6 +70,9 @@ impl From<&str> for Value {
     }
 }
 
+/// Arguments that help to learn: whoever plays a policy has their defaults, whatever it learned with.
+pub const OF_LEARNING: [&str; 2] = ["mortal", "knocked"];
+
 /// Arguments by name, in the order in which they were given. Equal ones may have been given in another order.
 #[derive(Clone, Debug, Default)]
 pub struct Options(Vec<(String, Value)>);
@@ -109,6 +112,12 @@ impl Options {
     /// All names and values.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
         self.0.iter().map(|(name, value)| (name.as_str(), value))
+    }
+
+    /// These without some.
+    pub fn without(mut self, names: &[&str]) -> Self {
+        self.0.retain(|(name, _)| !names.contains(&name.as_str()));
+        self
     }
 
     /// Whether there are none.

@@ -224,12 +224,13 @@ fn obedient() -> Vec<String> {
     registry::ids().into_iter().filter(told).collect()
 }
 
-/// Plays all trials with a policy's best actions, with so many agents each as `options` has episodes.
+/// Plays all trials with a policy's best actions, with so many agents each as `options` has episodes. All of them start as they do for
+/// whoever plays, wherever the policy learned.
 ///
 /// # Errors
 /// If the policy's task does not exist, or cannot be told a speed.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
-    let setting = Setting::of(policy.meta());
+    let setting = Setting::of(policy.meta()).from_the_first()?;
     let commands = Commands::of(policy, &setting)?;
     let trial = || Trial::new(&setting, policy, options, commands.speed);
     let levels = commands.levels();

@@ -8,6 +8,7 @@ use super::record::Record;
 use crate::error::CliError;
 use crate::interrupt;
 use findings::Found;
+use marathon_config::{Loaded, default_for};
 use marathon_envs::{nearest, registry};
 use marathon_learn::EvalOptions;
 use marathon_physics::lanes::Isa;
@@ -42,7 +43,9 @@ struct Job {
 impl Job {
     /// Its training with a seed; each policy on the way is looked at afterwards.
     fn training(&self, seed: u64) -> kept::Job {
-        kept::Job { task: self.task.clone(), arguments: TaskOptions::default(), seed, all_policies: true }
+        let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&self.task) };
+        let (task, arguments) = (self.task.clone(), TaskOptions::default());
+        kept::Job { task, arguments, seed, loaded, initialize_from: None }
     }
 }
 

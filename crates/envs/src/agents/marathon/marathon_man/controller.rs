@@ -12,7 +12,7 @@
 //! | 124..152 | the same and the clip's angles less his own, four decisions later |
 //!
 //! Without a skill, the reward is that of `MarathonManSteer-v0` for the commanded velocity, direction and gait. With one it is
-//! DeepMimic's.
+//! DeepMimic's; to get up, he is also paid for the height of his butt.
 
 use std::f64::consts::PI;
 
@@ -24,7 +24,7 @@ use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
 };
 use super::clips::{self, ALL, ClipNames};
-use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, SKILLS, SLOTS, Skills, carriage};
+use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
     BEGUN, CLIPS, Commands, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
     TERMS,
@@ -54,13 +54,12 @@ const TOO_FAR: f64 = 0.5;
 const STANDING_FOOT: f64 = 0.06;
 const LEAP: f64 = 5.0;
 const HIGH: f64 = 0.3;
+/// Worth of a butt that is as high as that of someone who has got up.
+const RISE: f64 = 0.3;
 /// Shares of the commands that jump, turn over, and step aside.
 const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
 const STEPPING: f64 = 0.15;
-/// Share of `sharp` commands to stand, and how long they hold, decisions.
-const RESTING: f64 = 0.15;
-const RESTS: [usize; 2] = [80, 240];
 /// Change of his velocity by a push over, m/s.
 const KNOCK: [f64; 2] = [2.0, 5.0];
 
@@ -145,7 +144,7 @@ impl Agent for Controller {
             max_episode_steps: MAX_EPISODE_STEPS,
             observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
-            reward_terms: names(TERMS.iter().chain(&["skill", "leap"])),
+            reward_terms: names(TERMS.iter().chain(&["skill", "leap", "rise"])),
             info: names(["velocity_error", "heading_error", "skill", "rising"]),
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
@@ -218,8 +217,6 @@ impl Agent for Controller {
             (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
         } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
             (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
-        } else if self.arguments.commands == Commands::Sharp && kind > 1.0 - RESTING {
-            (going, hold) = ([0.0; 2], random.whole(RESTS[0], RESTS[1]));
         }
         out.copy_from_slice(&[going[0], left, going[1], jump, backflip]);
         hold
@@ -321,6 +318,8 @@ impl Agent for Controller {
         let [right, left] = FEET.map(|foot| s.height(foot));
         let high = clamp(right.min(left) - T::lit(STANDING_FOOT), 0.0, HIGH);
         terms.add("leap", LEAP, T::masked(SKILL.is(&all, JUMP), high));
+        let risen = clamp(s.height(BUTT) * T::lit(1.0 / RISEN), 0.0, 1.0);
+        terms.add("rise", RISE, T::masked(SKILL.rises(&all), risen));
     }
 
     #[inline(always)]

@@ -42,8 +42,9 @@ const FACE_UP: usize = 3;
 /// Slots of the memory that the skills have: which one, counted from 1, or 0; and for how many decisions it has lasted, or
 /// for how many there has been none.
 pub const SLOTS: usize = 2;
-/// Shortest and longest that he takes to be as the clip is at its beginning, decisions.
+/// Shortest and longest that he takes to be as the clip is at its beginning, decisions; he comes to a stop for longer than he lies.
 const SETTLING: [f64; 2] = [12.0, 80.0];
+const LYING: f64 = 40.0;
 /// Mean distance of the parts from the clip's at which an attempt to get up has failed and he begins again, m.
 const LOST: f64 = 0.5;
 /// Decisions from one skill to the next.
@@ -51,6 +52,9 @@ const PAUSE: f64 = 10.0;
 /// Fastest that he begins a backflip, m/s, and lowest that his butt is when he stands, m.
 const SLOW: f64 = 0.8;
 const UPRIGHT: f64 = 0.55;
+/// He has got up before the clip has: height of his butt, m, and cosine between its up axis and the vertical.
+pub const RISEN: f64 = 0.75;
+const ERECT: f64 = 0.8;
 /// How nearly he is as the clip is: cosine between the forward axes of the butt, and difference of its heights, m.
 const AS_THE_CLIP: [f64; 2] = [0.8, 0.12];
 /// Who takes so many decisions cannot get up.
@@ -115,7 +119,7 @@ impl Skills {
         let flips = self.is(memory, BACKFLIP);
         let beginning = T::select(flips, first(BACKFLIP), T::select(down, first(FACE_DOWN), first(FACE_UP)));
         let begins = T::and(T::or(rises, flips), T::not(beginning.lt(before[Following::ROW])));
-        let [least, most] = SETTLING.map(T::lit);
+        let (least, most) = (T::lit(SETTLING[0]), T::select(rises, T::lit(LYING), T::lit(SETTLING[1])));
         let ready = T::or(T::and(self.is_as(s, &before), T::not(lasted.lt(least))), T::not(lasted.lt(most)));
         let waits = T::and(begins, T::not(ready));
         for (i, kept) in before.into_iter().enumerate() {
@@ -134,7 +138,9 @@ impl Skills {
         let grounded = T::or(lies, T::and(T::not(on), on_the_ground(s)));
         let stands = T::and(T::lit(UPRIGHT).lt(s.height(BUTT)), T::not(grounded));
         let upright = T::or(stands, T::and(T::not(rises), T::not(grounded)));
-        let ended = T::and(on, T::and(over, upright));
+        let erect = T::and(T::lit(RISEN).lt(s.height(BUTT)), T::lit(ERECT).lt(s.up(BUTT)[2]));
+        let risen = T::and(rises, T::and(stands, erect));
+        let ended = T::and(on, T::or(risen, T::and(over, upright)));
 
         // what begins
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));

@@ -80,6 +80,10 @@ pub(super) const SHARPEST: f64 = FRAC_PI_2;
 pub const MOST_BEHIND: f64 = 1.0;
 /// How long a command holds, decisions.
 pub(super) const HOLDS: [usize; 2] = [40, 240];
+/// Share of `sharp` commands that are to rest, and how long they hold, decisions: who is told to stand for a second only never comes
+/// to rest.
+const RESTING: f64 = 0.2;
+const RESTS: [usize; 2] = [80, 240];
 /// Share of commands that are to stand, and of those that are to go straight on.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
@@ -113,7 +117,7 @@ const TURNING_RADIUS: f64 = 0.4;
 pub enum Commands {
     /// Speeds and turns, each as likely.
     Even,
-    /// Half of the time, shorter, the extremes: to stand, to run, and the sharpest turns.
+    /// Half of the time, shorter, the extremes: to stand, to run, and the sharpest turns; and rests.
     Sharp,
 }
 
@@ -387,7 +391,12 @@ impl Agent for Steer {
     }
 
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
-        if self.arguments.commands == Commands::Sharp && random.whole(0, 1) == 0 {
+        let sharp = self.arguments.commands == Commands::Sharp;
+        if sharp && random.uniform(0.0, 1.0) < RESTING {
+            out.fill(0.0);
+            return random.whole(RESTS[0], RESTS[1]);
+        }
+        if sharp && random.whole(0, 1) == 0 {
             out[0] = [0.0, FASTEST, random.uniform(EXTREME * FASTEST, FASTEST)][random.whole(0, 2)];
             out[1] = [0.0, SHARPEST, -SHARPEST, random.around_zero(SHARPEST)][random.whole(0, 3)];
             return random.whole(HOLDS[0], HOLDS[1] / 2);
