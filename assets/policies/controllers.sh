@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Makes the policies of this folder that obey a player in a plane, HopperController and WalkerController. Each learns to go from the
-# policy of its figure that runs, and then not to fall. About seven minutes of processor time in all.
+# Makes the policies of this folder that obey a player in two runs each: HopperController and WalkerController learn to go from the policy
+# of their figure that runs, and then not to fall; AntController learns to go from nothing, and then to stand still; MarathonManSteer
+# the same, and not to fall. About an hour of processor time in all.
 #
-#     assets/policies/controllers.sh [HopperController] [WalkerController]
+#     assets/policies/controllers.sh [HopperController] [WalkerController] [AntController] [MarathonManSteer]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 wanted=("$@")
 if [ $# = 0 ]; then
-  wanted=(HopperController WalkerController)
+  wanted=(HopperController WalkerController AntController MarathonManSteer)
 fi
 cargo build --release
 marathon="${CARGO_TARGET_DIR:-target}/release/marathon"
@@ -16,16 +17,19 @@ runs=$(mktemp -d)
 trap 'rm -rf "$runs"' EXIT
 
 for agent in "${wanted[@]}"; do
+  from=()
   case "$agent" in
-    HopperController) runner=hopper ;;
-    WalkerController) runner=walker2d ;;
+    HopperController) from=(--initialize-from "$shipped/hopper.safetensors") steady=controller ;;
+    WalkerController) from=(--initialize-from "$shipped/walker2d.safetensors") steady=controller ;;
+    AntController) steady=ant_controller ;;
+    MarathonManSteer) steady=marathon_man_steer ;;
     *)
-      echo "no policy $agent is made here: HopperController, WalkerController" >&2
+      echo "no policy $agent is made here: HopperController, WalkerController, AntController, MarathonManSteer" >&2
       exit 2
       ;;
   esac
-  "$marathon" train "$agent" --initialize-from "$shipped/$runner.safetensors" --seed 1 --threads 1 --out "$runs/$agent-goes"
-  "$marathon" train "$agent" --config assets/configs/controller-steady.yaml --initialize-from "$runs/$agent-goes" \
+  "$marathon" train "$agent" "${from[@]}" --seed 1 --threads 1 --out "$runs/$agent-goes"
+  "$marathon" train "$agent" --config "assets/configs/$steady-steady.yaml" --initialize-from "$runs/$agent-goes" \
     --seed 1 --threads 1 --out "$runs/$agent"
   cp "$runs/$agent/policy.safetensors" "$shipped/$agent.safetensors"
 done

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the policies of this folder that are learned from others: MarathonMan (one for thirteen clips) and
-# MarathonManController. What they are learned from is trained before, but for the policies that are here; about two hours of
-# processor time in all.
+# MarathonManController. What they are learned from is trained before, but for the policies that are here; more than three hours
+# of processor time in all.
 #
 #     assets/policies/distill.sh [MarathonMan] [MarathonManController]
 set -euo pipefail
@@ -65,8 +65,8 @@ for policy in "${wanted[@]}"; do
       }
       # who goes falls most easily, and so is shown twice
       learn "$steer" "$steer" "$jump" --steps 10M --seed 1 --out "$runs/start.safetensors"
-      "$marathon" train MarathonManController --option mortal=0.7 --steps 47M --initialize-from "$runs/start.safetensors" \
-        --seed 1 --threads 1 --out "$runs/goes"
+      "$marathon" train MarathonManController --option mortal=0.7 --option knocked=0 --steps 47M \
+        --initialize-from "$runs/start.safetensors" --seed 1 --threads 1 --out "$runs/goes"
       # what he forgot meanwhile; the network of the run, as one that goes and jumps only
       "$marathon" export "$runs/goes" --out "$runs/goes.onnx"
       "$marathon" import "$runs/goes.onnx" --agent MarathonManController --option start=adaptive --option commands=sharp \
@@ -76,15 +76,23 @@ for policy in "${wanted[@]}"; do
         --out "$runs/knows.safetensors"
       "$marathon" train MarathonManController --initialize-from "$runs/knows.safetensors" --seed 1 --threads 1 --out "$runs/run"
       # and on: to stand still, to jump higher, to get up
-      "$marathon" train MarathonManController --initialize-from "$runs/run" --seed 2 --threads 1 --out "$runs/still"
-      "$marathon" train MarathonManController --option mortal=0.3 --steps 40M --initialize-from "$runs/still" --seed 3 --threads 1 \
-        --out "$runs/rises"
+      "$marathon" train MarathonManController --option knocked=0 --steps 36M --initialize-from "$runs/run" --seed 2 --threads 1 \
+        --out "$runs/still"
+      "$marathon" train MarathonManController --option mortal=0.3 --option knocked=0 --steps 40M --initialize-from "$runs/still" \
+        --seed 3 --threads 1 --out "$runs/rises"
       # falls as pushes cause them, then starts from a stand
       "$marathon" train MarathonManController --option mortal=0.3 --option knocked=0.2 --steps 40M --initialize-from "$runs/rises" \
         --seed 4 --threads 1 --out "$runs/knocked"
       "$marathon" train MarathonManController --option start=first --option mortal=0.5 --option knocked=0.1 --steps 18M \
-        --initialize-from "$runs/knocked" --seed 7 --threads 1 --out "$runs/last"
-      cp "$runs/last/policy.safetensors" "$shipped/MarathonManController.safetensors"
+        --initialize-from "$runs/knocked" --seed 7 --threads 1 --out "$runs/stands"
+      # all of it, for long; two runs of 130 million that were stopped after 30 and 40, and one that was not
+      "$marathon" train MarathonManController --steps 70M --initialize-from "$runs/stands" --seed 1 --threads 1 --out "$runs/all"
+      "$marathon" train MarathonManController --initialize-from "$runs/all" --seed 1 --threads 1 --out "$runs/last"
+      # who plays starts from a stand
+      "$marathon" export "$runs/last" --out "$runs/last.onnx"
+      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first --option commands=sharp \
+        --option price=20 --out "$runs/shipped.safetensors"
+      cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
       ;;
     *)
       echo "no policy $policy is learned from others here: MarathonMan, MarathonManController" >&2

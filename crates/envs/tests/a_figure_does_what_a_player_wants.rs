@@ -116,8 +116,18 @@ fn who_is_like_the_clip_is_paid() {
         assert!(likeness[AGENTS / 2] > 0.8 && likeness[AGENTS - 1] <= 1.0, "{clip}: {likeness:?}");
         let paid = |i: &usize| (0..AGENTS).any(|agent| of(agent, *i) != 0.0);
         let paid: Vec<&str> = (0..names.len()).filter(paid).map(|i| names[i].as_str()).collect();
-        // only a jump is paid for its height: 5 for each meter of the lower foot, up to 1.5
-        assert_eq!(paid, if clip == "jump" { vec!["skill", "leap"] } else { vec!["skill"] });
+        // a jump is paid for its height, 5 for each meter of the lower foot, up to 1.5; who gets up for that of his butt, up to 0.3
+        let for_height = match clip {
+            "jump" => vec!["leap"],
+            "backflip" => vec![],
+            _ => vec!["rise"],
+        };
+        assert_eq!(paid, [vec!["skill"], for_height].concat());
+        let rise = names.iter().position(|name| name == "rise").unwrap();
+        for agent in (0..AGENTS).filter(|agent| clip.starts_with("getup") && told(&step, *agent, RISING) > 0.5) {
+            let expected = 0.3 * (env.state(agent).unwrap().qpos[2] / 0.75).clamp(0.0, 1.0);
+            assert!((of(agent, rise) - expected).abs() < 0.03, "{agent}: {} {expected}", of(agent, rise));
+        }
         let feet = ["right_right_foot", "left_left_foot"];
         for agent in (0..AGENTS).filter(|_| clip == "jump") {
             let state = env.state(agent).unwrap();
@@ -125,6 +135,25 @@ fn who_is_like_the_clip_is_paid() {
                 feet.map(|foot| common::center(&model, &state, foot)[2]).into_iter().fold(f64::INFINITY, f64::min);
             let expected = 5.0 * (low - 0.06).clamp(0.0, 0.3);
             assert!((of(agent, leap) - expected).abs() < 1e-3, "{agent}: {} {expected}", of(agent, leap));
+        }
+    }
+}
+
+/// Who stands before the clip does has got up, however far from the clip he is; who lies has not.
+#[test]
+fn who_stands_has_got_up() {
+    let (standing, _) = made(&[("start", "first")]);
+    for clip in ["getup_facedown", "getup_faceup"] {
+        let (mut env, mut step) = made(&[("clip", clip), ("start", "first")]);
+        for agent in 0..AGENTS / 2 {
+            let mut state = env.state(agent).unwrap();
+            let stands = standing.state(agent).unwrap();
+            (state.qpos, state.qvel) = (stands.qpos, stands.qvel);
+            env.set_state(agent, &state).unwrap();
+        }
+        go(&mut env, &mut step);
+        for agent in 0..AGENTS {
+            assert_eq!(told(&step, agent, RISING) > 0.5, agent >= AGENTS / 2, "{clip} {agent}");
         }
     }
 }

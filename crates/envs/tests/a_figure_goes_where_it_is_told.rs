@@ -187,7 +187,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
     let mut over = [false; AGENTS];
     let mut directions: Vec<f64> = (0..AGENTS).map(|agent| heading(&env.state(agent).unwrap())).collect();
     let mut info = vec![0.0f32; AGENTS * 2];
-    let (mut checked, mut behind, mut reached) = (0, 0.0f64, 0);
+    let (mut checked, mut behind, mut reached, mut limited) = (0, 0.0f64, 0, 0);
     // what the agents are to have, in the world
     let mut targets: Vec<[f64; 2]> = (0..AGENTS)
         .map(|agent| {
@@ -210,7 +210,12 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             behind = behind.max(angle.abs());
             // an angle is as good as another one a whole turn away
             let (own, off) = (heading(&env.state(agent).unwrap()), |a: f64| a.sin().atan2(a.cos()));
-            let expected = (off(directions[agent] - own) + was[1] * dt).clamp(-MOST_BEHIND, MOST_BEHIND);
+            let velocity = center_velocity(&model, &env.state(agent).unwrap());
+            // by no more than 3 m/s^2 to the side allow at his speed
+            let most = 3.0 / velocity[0].hypot(velocity[1]);
+            let expected =
+                (off(directions[agent] - own) + was[1].clamp(-most, most) * dt).clamp(-MOST_BEHIND, MOST_BEHIND);
+            limited += usize::from(was[1].abs() > most);
             directions[agent] = own + expected;
             assert!((angle - expected).abs() < 1e-5, "agent {agent}: {angle}, expected {expected}");
             let [off_command, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
@@ -227,7 +232,6 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             let expected =
                 [own.cos() * target[0] + own.sin() * target[1], own.cos() * target[1] - own.sin() * target[0]];
             assert!((seen[0] - expected[0]).hypot(seen[1] - expected[1]) < 1e-4, "{seen:?}, expected {expected:?}");
-            let velocity = center_velocity(&model, &env.state(agent).unwrap());
             let off = |v: [f64; 2]| (velocity[0] - v[0]).hypot(velocity[1] - v[1]);
             assert!((off(told) - off_command).abs() < 1e-4, "{} {off_command}", off(told));
             let e = off(*target).powi(2);
@@ -251,6 +255,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
         }
     }
     assert!(checked > 20 * AGENTS && behind > 0.5 && reached > 50, "{checked} {behind} {reached}");
+    assert!(limited > 0 && limited < checked / 2, "{limited} of {checked}");
 }
 
 /// Agents that have just begun, and speeds of theirs: forward, and as commanded.

@@ -107,8 +107,9 @@ fn observation_reward_and_direction_are_those_of_the_page() {
             let velocities = part_velocities(&model, &state, &motion);
             assert_eq!(velocities.len(), 13);
             let squares: Vec<f64> = velocities.iter().map(|v| v.iter().map(|x| x * x).sum()).collect();
-            let still = (-squares.iter().sum::<f64>() / squares.len() as f64 / 0.04).exp();
-            let still = if i % 3 == 0 { 0.5 * still } else { 0.0 };
+            let square = squares.iter().sum::<f64>() / squares.len() as f64;
+            let still: f64 = [0.4, 0.04, 0.004].iter().map(|most| (-square / most).exp()).sum();
+            let still = if i % 3 == 0 { 0.3 * still } else { 0.0 };
             rested = rested.max(still);
             let effort: f64 =
                 actions[act * i..act * (i + 1)].iter().map(|a| f64::from(a * a)).sum::<f64>() / act as f64;

@@ -71,7 +71,10 @@ pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, RunError> {
 /// # Errors
 /// If the task has no such part, or decides otherwise.
 pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, RunError> {
-    let own = Setting::of(policy.meta()).factory()?.spec().clone();
+    let whole = Setting::of(policy.meta()).factory()?.spec().clone();
+    // the policy may be that of a role
+    let roles = whole.deciders().into_iter().map(|role| whole.of_role(&role));
+    let own = roles.into_iter().find(|spec| spec.id == policy.meta().agent).unwrap_or(whole);
     policy.check(&own)?;
     let wrong = |place: &str, found: String, expected: String| Err(RunError::file(path, place, found, expected));
     if own.act != task.act {

@@ -162,3 +162,29 @@ fn parse_option(text: &str) -> Result<(String, Value), String> {
         _ => Err("expected NAME=VALUE, such as clip=run".into()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use marathon_learn::Activation;
+
+    #[test]
+    fn who_plays_a_policy_has_not_what_only_helped_to_learn() {
+        let options =
+            Options::new().with("knocked", 0.2).with("mortal", 0.5).with("price", 20.0).with("start", "adaptive");
+        let spec = registry::factory_with("MarathonManController", &options, Isa::best()).unwrap().spec().clone();
+        let meta = PolicyMeta::of(&spec, vec![8], Activation::Tanh);
+        assert_eq!(meta.options.get("knocked"), Some(&Value::Number(0.2)));
+        let played = |setting: Setting| setting.factory().unwrap().spec().options.clone();
+        let options = played(Setting::of(&meta));
+        for (name, value) in [("knocked", 0.0), ("mortal", 0.0), ("price", 20.0)] {
+            assert_eq!(options.get(name), Some(&Value::Number(value)), "{name}");
+        }
+        assert_eq!(options.get("start"), Some(&Value::Text("adaptive".into())));
+        let options = played(Setting::of(&meta).from_the_first().unwrap());
+        assert_eq!(options.get("start"), Some(&Value::Text("first".into())));
+        // who can start in one way only does
+        let hopper = Setting::named("hopper").unwrap();
+        assert_eq!(hopper.clone().from_the_first().unwrap(), hopper);
+    }
+}

@@ -145,6 +145,11 @@ fn a_role_may_play_as_it_is() {
     let outcome = session.carry_out(false, &mut |_| Control::Continue).unwrap();
     let (old, new) = (policy_file::read(&path, None).unwrap(), outcome.policy);
     assert_eq!(new.params(), old.params());
+    // and from that of such a run
+    let again = RunOptions { initialize_from: Some(folder.path().join("run")), out: None, ..options };
+    drop(outcome.folder);
+    let (session, _) = Session::open(Some(Task::named("TerrainWalker2d").unwrap()), &again, None, true).unwrap();
+    assert_eq!(session.run.initialize_from, again.initialize_from);
     let [(name, builder)] = &outcome.others[..] else { panic!("one other role") };
     assert!(name == "builder" && builder.meta().act == 1);
     // its episodes are shorter than those of one that runs where nobody builds

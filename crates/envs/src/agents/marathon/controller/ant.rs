@@ -23,7 +23,6 @@ use marathon_physics::lanes::Real;
 use super::super::ant::AntV0;
 use super::super::heading;
 use super::super::imitation::turned_to;
-use super::RESTLESS;
 use crate::agent::senses::hypot;
 use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Terms, names};
 use crate::episode_rng::EpisodeRng;
@@ -64,6 +63,12 @@ const HOLDS: [usize; 2] = [100, 400];
 /// Shares of commands: to stand; of the others, to go straight ahead or back, and not to turn.
 const STANDING: f64 = 0.15;
 const STRAIGHT: f64 = 0.4;
+/// How long it is told to stand, decisions.
+const RESTS: [usize; 2] = [200, 800];
+/// Worth of each part of standing still, and the mean squares of the parts' velocities at which each is down to 1/e, m^2/s^2: one that
+/// fidgets is to come to rest, and one that rests to keep quite still.
+const STILL: f64 = 0.3;
+const RESTLESS: [f64; 3] = [0.4, 0.04, 0.004];
 
 /// The Ant told where to go.
 #[derive(Clone, Copy, Debug, Default)]
@@ -118,7 +123,8 @@ impl Agent for AntController {
         out[0] = if moves { random.around_zero(FASTEST) } else { 0.0 };
         out[1] = if sideways { random.around_zero(SIDEWAYS) } else { 0.0 };
         out[2] = if turns { random.around_zero(SHARPEST) } else { 0.0 };
-        random.whole(HOLDS[0], HOLDS[1])
+        let [least, most] = if moves { HOLDS } else { RESTS };
+        random.whole(least, most)
     }
 
     #[inline(always)]
@@ -174,8 +180,8 @@ impl Agent for AntController {
         // told to go nowhere and not to turn
         let told = s.command(0).abs().max(s.command(1).abs()).max(s.command(2).abs());
         let rest = told.neg_mul_add(T::lit(10.0), T::lit(1.0)).max(T::zero());
-        let [still] = super::stillness(s, PARTS.len(), [RESTLESS]);
-        terms.add("still", 0.5, rest * still);
+        let [fidgets, rests, stirs] = super::stillness(s, PARTS.len(), RESTLESS);
+        terms.add("still", STILL, rest * (fidgets + rests + stirs));
         terms.add("effort", -0.05, s.effort_mean(Motors::NONE));
     }
 

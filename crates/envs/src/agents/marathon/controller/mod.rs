@@ -43,9 +43,7 @@ pub const FASTEST: f64 = 4.0;
 const VELOCITIES: usize = 3;
 /// The target velocity, m/s.
 const TARGET: usize = VELOCITIES;
-/// How long it has been told to jump, s.
-const JUMPING: usize = TARGET + 1;
-const MEMORY: usize = JUMPING + 1;
+const MEMORY: usize = TARGET + 1;
 /// How fast the target velocity follows the command, m/s^2. Friction allows 9.8.
 const RAMP: f64 = 6.0;
 /// Terms of the reward.
@@ -56,9 +54,6 @@ const SHARPNESS: f64 = 4.0;
 /// is told to run.
 const PRICE: f64 = 0.5;
 const WORTHLESS: f64 = FASTEST;
-/// A jump at once is worth so much more, by 1/e less each so many seconds after the command.
-const AT_ONCE: f64 = 4.0;
-const LATE: f64 = 0.3;
 /// Worth of a fall.
 const FALL: f64 = -10.0;
 /// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
@@ -208,7 +203,6 @@ impl<F: Figure> Agent for Controller<F> {
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory[..MEMORY].fill(s.linear_velocity(F::TORSO)[0]);
-        memory[JUMPING] = T::zero();
         if self.is_opposed() {
             commander::begin(memory);
         }
@@ -218,13 +212,12 @@ impl<F: Figure> Agent for Controller<F> {
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory.copy_within(0..VELOCITIES - 1, 1);
         memory[0] = s.linear_velocity(F::TORSO)[0];
-        if self.is_opposed() {
+        let told = if self.is_opposed() {
             commander::remember(self, s, memory);
-        }
-        let number = |i: usize| if self.is_opposed() { memory[commander::PRESENT + i] } else { s.command(i) };
-        let has_jump = self.arguments.input == Input::Discrete;
-        let (told, jumps) = (number(0), if has_jump { T::lit(0.5).lt(number(1)) } else { T::none() });
-        memory[JUMPING] = T::masked(jumps, memory[JUMPING] + T::lit(s.dt()));
+            memory[commander::PRESENT]
+        } else {
+            s.command(0)
+        };
         let most = RAMP * s.dt();
         memory[TARGET] += clamp(told - memory[TARGET], -most, most);
     }
@@ -255,8 +248,7 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("pace", PRICE, T::lit(WORTHLESS) - off);
         terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
         let jump = self.jump(s);
-        let at_once = (s.memory(JUMPING) * T::lit(-1.0 / LATE)).exp().mul_add(T::lit(AT_ONCE), one);
-        terms.add("jump", 1.0, jump * at_once * F::leap(s));
+        terms.add("jump", 1.0, jump * F::leap(s));
         // told to go nowhere and not to jump
         let rest = (one - told.abs().max(jump) * T::lit(10.0)).max(zero);
         let [still] = stillness(s, F::PARTS.len(), [RESTLESS]);

@@ -50,11 +50,13 @@ const LOST: f64 = 0.5;
 /// Decisions from one skill to the next.
 const PAUSE: f64 = 10.0;
 /// Fastest that he begins a backflip, m/s, and lowest that his butt is when he stands, m.
-const SLOW: f64 = 0.8;
+const SLOW: f64 = 0.4;
 const UPRIGHT: f64 = 0.55;
 /// He has got up before the clip has: height of his butt, m, and cosine between its up axis and the vertical.
 pub const RISEN: f64 = 0.75;
 const ERECT: f64 = 0.8;
+/// Whoever is higher when the clip is over goes on getting up, m.
+const LOW: f64 = 0.4;
 /// How nearly he is as the clip is: cosine between the forward axes of the butt, and difference of its heights, m.
 const AS_THE_CLIP: [f64; 2] = [0.8, 0.12];
 /// Who takes so many decisions cannot get up.
@@ -127,11 +129,13 @@ impl Skills {
         }
 
         // what ends
-        let mut over = T::none();
+        let (mut over, mut past) = (T::none(), T::none());
         for (i, skill) in SKILLS.iter().enumerate() {
             let rows = s.clip_rows(CLIPS.len() + i);
             let end = (rows.start + skill.rows[1]).min(rows.end - 1);
-            over = T::or(over, T::and(self.is(memory, i), T::not(memory[Following::ROW].lt(T::lit(end as f64)))));
+            let reached =
+                |row: usize| T::and(self.is(memory, i), T::not(memory[Following::ROW].lt(T::lit(row as f64))));
+            (over, past) = (T::or(over, reached(end)), T::or(past, reached(rows.end - 1)));
         }
         // hands may touch the ground in a skill
         let lies = TRUNK.into_iter().fold(T::none(), |lies, part| T::or(lies, s.touched_ground(part)));
@@ -144,7 +148,9 @@ impl Skills {
 
         // what begins
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));
-        let failed = T::or(T::and(over, T::not(stands)), T::and(lost, T::not(waits)));
+        let low = s.height(BUTT).lt(T::lit(LOW));
+        let failed = T::or(T::and(past, low), T::and(lost, T::not(waits)));
+        let failed = T::and(failed, T::not(risen));
         let fallen = T::or(T::and(grounded, T::not(rises)), T::and(rises, failed));
         let free = T::and(T::and(T::not(on), T::lit(PAUSE).lt(lasted)), stands);
         let wants_flip = T::and(half.lt(backflip), Steer::speed(s).lt(T::lit(SLOW)));

@@ -106,6 +106,8 @@ const ACCELERATION: f64 = 4.0;
 const LEAD: f64 = 0.8;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
 const SIDEWAYS: f64 = 2.5;
+/// Most that the commanded direction asks him to accelerate to the side, m/s^2, while he is still faster than that.
+const LEANING: f64 = 3.0;
 /// Mean squares of the parts' velocities at which each half of what standing still is worth is down to 1/e, m^2/s^2: who shuffles is
 /// to come to rest, and who rests to keep quite still.
 const RESTLESS: [f64; 2] = [0.1, 0.01];
@@ -220,14 +222,18 @@ impl Steer {
     /// left.
     #[inline(always)]
     pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], told: T, turn: T, left: T) {
-        let by = |angle: T| turn.mul_add(T::lit(s.dt()), angle);
+        let speed = Self::speed(s);
+        // the direction turns no faster than someone of his speed can
+        let sharpest = T::lit(LEANING).div(speed.max(T::lit(LEANING / SHARPEST)));
+        let led = turn.max(-sharpest).min(sharpest);
+        let by = |angle: T| led.mul_add(T::lit(s.dt()), angle);
         let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
         let direction = heading::turned(s.heading(BUTT), direction, by, MOST_BEHIND);
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
         memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
         memory[MADE] += T::lit(1.0);
         // nobody changes a velocity of 3 m/s at once, or turns sharply at it
-        let (speed, most) = (Self::speed(s), ACCELERATION * s.dt());
+        let most = ACCELERATION * s.dt();
         let sharpest = T::lit(SIDEWAYS).div(turn.abs().max(T::lit(SIDEWAYS / FASTEST)));
         let told = told.min(sharpest);
         let beside = [-(left * direction[1]), left * direction[0]];
