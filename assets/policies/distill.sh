@@ -74,7 +74,8 @@ for policy in "${wanted[@]}"; do
       goes="--teacher=$runs/goes.safetensors"
       learn "$goes" "$goes" "$goes" "${skills[0]}" --steps 8M --lr 5e-4 --seed 2 --initialize-from "$runs/goes" \
         --out "$runs/knows.safetensors"
-      "$marathon" train MarathonManController --initialize-from "$runs/knows.safetensors" --seed 1 --threads 1 --out "$runs/run"
+      "$marathon" train MarathonManController --option knocked=0 --steps 20M --initialize-from "$runs/knows.safetensors" --seed 1 \
+        --threads 1 --out "$runs/run"
       # and on: to stand still, to jump higher, to get up
       "$marathon" train MarathonManController --option knocked=0 --steps 36M --initialize-from "$runs/run" --seed 2 --threads 1 \
         --out "$runs/still"
@@ -90,7 +91,7 @@ for policy in "${wanted[@]}"; do
       "$marathon" train MarathonManController --initialize-from "$runs/all" --seed 1 --threads 1 --out "$runs/last"
       # who plays starts from a stand
       "$marathon" export "$runs/last" --out "$runs/last.onnx"
-      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first --option commands=sharp \
+      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first \
         --option price=20 --out "$runs/shipped.safetensors"
       cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
       ;;

@@ -75,10 +75,12 @@ fn a_study_of_courses_judges_every_runner() {
     for (line, start) in
         lines.iter().zip(["Hopper,flat,yes", "Hopper,flat,no", "Hopper,adversary,yes", "Hopper,adversary,no"])
     {
-        assert!(line.starts_with(start) && line.matches(" m; ").count() == 5, "{rows}");
+        assert!(line.starts_with(start) && line.matches(" m; ").count() == 6, "{rows}");
     }
     assert_eq!(lines.len(), 4, "{rows}");
     assert!(folder.path().join("kept/TerrainHopper-adversary-heights-1/policy-builder.safetensors").is_file());
+    // each runner has met a builder of its own
+    assert!(folder.path().join("kept/TerrainHopper-flat-blind-1/adversary/policy-builder.safetensors").is_file());
     assert_eq!(study(&["--kept-only"]).replace(" --kept-only", ""), page);
     let error = fail(folder.path(), 2, &["study", "assault-course", "--grounds", "flt"]);
     assert!(error.contains("did you mean 'flat'?"), "{error}");

@@ -318,11 +318,14 @@ fn sharp_commands_are_extremes_half_of_the_time() {
     let share = |commands: &str| {
         let (env, obs) = begun(&[("commands", commands)]);
         let sharp = |row: &&[f32]| f64::from(row[1].abs()) > 0.999 * FRAC_PI_2 || row[0] > 2.999;
-        obs.chunks_exact(env.spec().obs).filter(sharp).count() as f64 / 64.0
+        let rests = |row: &&[f32]| row[0] == 0.0 && row[1] == 0.0;
+        let rows = || obs.chunks_exact(env.spec().obs);
+        [rows().filter(sharp).count(), rows().filter(rests).count()].map(|n| n as f64 / 64.0)
     };
-    // of the extremes, two thirds of a third and half of the turns
-    let (sharp, even) = (share("sharp"), share("even"));
-    assert!((0.2..0.55).contains(&sharp) && even < 0.05, "{sharp} {even}");
+    // a fifth rests; of the extremes, two thirds of a third and half of the turns
+    let ([sharp, rests], [even, stands]) = (share("sharp"), share("even"));
+    assert!((0.1..0.45).contains(&sharp) && even < 0.05, "{sharp} {even}");
+    assert!((0.15..0.4).contains(&rests) && stands < 0.15, "{rests} {stands}");
 }
 
 #[test]
