@@ -89,9 +89,9 @@ for policy in "${wanted[@]}"; do
       # all of it, for long; two runs of 130 million that were stopped after 30 and 40, and one that was not
       "$marathon" train MarathonManController --steps 70M --initialize-from "$runs/stands" --seed 1 --threads 1 --out "$runs/all"
       "$marathon" train MarathonManController --initialize-from "$runs/all" --seed 1 --threads 1 --out "$runs/last"
-      # who plays starts from a stand
+      # who plays starts from a stand, and is not asked for extremes half of the time
       "$marathon" export "$runs/last" --out "$runs/last.onnx"
-      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first \
+      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first --option commands=even \
         --option price=20 --out "$runs/shipped.safetensors"
       cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
       ;;
