@@ -25,6 +25,10 @@ pub trait AnyAgent: Send + Sync {
     fn model(&self) -> Result<Model, EnvError>;
     /// The named arguments that it takes, with the values that it has.
     fn options(&self) -> Vec<OptionInfo>;
+    /// Whether one of them has this name.
+    fn has_option(&self, name: &str) -> bool {
+        self.options().iter().any(|known| known.name == name)
+    }
     /// The agent with other values for some of its arguments.
     ///
     /// # Errors

@@ -213,7 +213,7 @@ impl Class {
 
 /// The clips that a teacher follows, if the student's task takes some.
 fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<String>, RunError> {
-    if registry::agent(&task.agent)?.options().iter().all(|option| option.name != CLIP) {
+    if !registry::agent(&task.agent)?.has_option(CLIP) {
         return Ok(None);
     }
     let of_teacher = Setting::of(teacher.meta());

@@ -77,8 +77,7 @@ pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Foll
 fn clips_of(policy: &Policy) -> Result<(Setting, Vec<String>), RunError> {
     let setting = Setting::of(policy.meta());
     let Ok(agent) = registry::agent(&setting.agent) else { return Ok((setting, Vec::new())) };
-    let known = agent.options();
-    if !agent.facts().follows_clips || known.iter().all(|option| option.name != START) {
+    if !agent.facts().follows_clips || !agent.has_option(START) {
         return Ok((setting, Vec::new()));
     }
     let clips = match setting.factory()?.spec().options.get(CLIP) {

@@ -73,7 +73,7 @@ impl Setting {
     /// # Errors
     /// If there is no such agent.
     pub fn from_the_first(self) -> Result<Self, RunError> {
-        if registry::agent(&self.agent)?.options().iter().all(|option| option.name != START) {
+        if !registry::agent(&self.agent)?.has_option(START) {
             return Ok(self);
         }
         self.with(&TaskOptions { given: vec![(START.into(), Value::Text(FIRST.into()))] })
@@ -87,7 +87,7 @@ impl Setting {
         let agent = registry::agent(&self.agent)?;
         for (name, value) in &options.given {
             let value = match value {
-                Value::Text(text) if name == CLIP && agent.options().iter().any(|known| known.name == CLIP) => {
+                Value::Text(text) if name == CLIP && agent.has_option(CLIP) => {
                     Value::Text(clips::read_all(text, &self.agent, &agent.model()?, &mut self.clips)?)
                 }
                 other => other.clone(),

@@ -37,9 +37,8 @@ pub fn render(args: &RenderArgs, policy: &Path, json: bool) -> Result<(), CliErr
 /// The arguments with which the policy's task follows the clip from its first frame on, and those of the user.
 fn task(args: &RenderArgs, clip: &Clip, policy: &PolicyMeta) -> Result<TaskOptions, CliError> {
     let agent = registry::agent(&policy.agent)?;
-    let takes = |name: &str| agent.options().iter().any(|known| known.name == name);
     let mut given = Vec::new();
-    if takes("clip") {
+    if agent.has_option("clip") {
         if args.task.given.iter().any(|(name, _)| name == "clip") {
             let found = path_word(&args.clip);
             return Err(CliError::Usage(format!("--option clip stands beside the clip {found}, expected one of them")));
@@ -51,7 +50,7 @@ fn task(args: &RenderArgs, clip: &Clip, policy: &PolicyMeta) -> Result<TaskOptio
     } else {
         check_own(&args.clip, clip, policy)?;
     }
-    if takes("start") {
+    if agent.has_option("start") {
         given.push(("start".into(), Value::Text("first".into())));
     }
     // the later one counts

@@ -9,7 +9,7 @@ use crate::interrupt;
 use marathon_config::{against, default_for};
 use marathon_envs::nearest;
 use marathon_envs::options::Value;
-use marathon_learn::{EvalOptions, evaluate};
+use marathon_learn::{EvalOptions, Evaluation, evaluate};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
@@ -76,6 +76,13 @@ struct Judged {
     difficulty: f64,
     distance: f64,
     falls: u64,
+}
+
+impl Judged {
+    fn of(course: &str, difficulty: &str, result: &Evaluation) -> Self {
+        let difficulty = difficulty.parse().unwrap_or_default();
+        Judged { course: course.into(), difficulty, distance: result.distance_mean, falls: result.falls }
+    }
 }
 
 /// Trains and measures, `only` some tasks, grounds and sights if any are named; with `kept_only`, tells of what is kept without training anything.
@@ -204,13 +211,7 @@ fn one(
     let mut found = judged(folder, options)?;
     let [course, _, difficulty] = ADVERSARY.map(|(_, value)| value);
     let (folder, _): (_, RunFile) = RunFolder::open(&path)?;
-    let met = summary(&folder)?.eval;
-    found.adversary = met.map(|met| Judged {
-        course: course.into(),
-        difficulty: difficulty.parse().unwrap_or_default(),
-        distance: met.distance_mean,
-        falls: met.falls,
-    });
+    found.adversary = kept::summary(&folder)?.eval.map(|met| Judged::of(course, difficulty, &met));
     kept::write(&file, &found)?;
     Ok(Some(found))
 }
@@ -230,22 +231,10 @@ fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
         let task = arguments(&[("course", course), ("difficulty", difficulty), ("levels", "fixed")]);
         let (policy, factory) = PolicySource { policy: folder.policy(), agent: None, task }.load()?;
         let result = evaluate(&*factory, Isa::best(), &policy, &judge)?;
-        courses.push(Judged {
-            course: course.into(),
-            difficulty: difficulty.parse().unwrap_or_default(),
-            distance: result.distance_mean,
-            falls: result.falls,
-        });
+        courses.push(Judged::of(course, difficulty, &result));
     }
-    let Summary { steps, cpu_seconds, .. } = summary(&folder)?;
+    let Summary { steps, cpu_seconds, .. } = kept::summary(&folder)?;
     Ok(Found { run, steps, cpu_seconds, courses, adversary: None })
-}
-
-/// The summary of a run.
-fn summary(folder: &RunFolder) -> Result<Summary, CliError> {
-    let file = folder.summary();
-    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
-    serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))
 }
 
 /// A line of the table.

@@ -7,7 +7,7 @@ use crate::interrupt;
 use marathon_config::Loaded;
 use marathon_learn::{Control, IterationStats};
 use marathon_runs::folder::{difference_of_runs, write_json};
-use marathon_runs::{LearnOptions, RunError, RunFile, RunOptions, Session, Task, TaskOptions};
+use marathon_runs::{LearnOptions, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
@@ -78,6 +78,16 @@ pub fn file(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().unwrap_or_default().to_os_string();
     name.push(".json");
     folder.with_file_name(name)
+}
+
+/// The summary of a run.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn summary(folder: &RunFolder) -> Result<Summary, CliError> {
+    let file = folder.summary();
+    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
+    serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))
 }
 
 /// Findings that are kept, if any are.

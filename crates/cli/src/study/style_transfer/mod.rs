@@ -139,8 +139,8 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
     let mut all = Vec::new();
     for id in registry::ids() {
         let agent = registry::agent(&id)?;
-        let (facts, options) = (agent.facts(), agent.options());
-        let own = facts.follows_clips && facts.clips.len() == 1 && options.iter().all(|option| option.name != "clip");
+        let facts = agent.facts();
+        let own = facts.follows_clips && facts.clips.len() == 1 && !agent.has_option("clip");
         if let Some(clip) = facts.clips.first().filter(|_| own) {
             let limit = facts.max_episode_steps as f64 * registry::factory(&id, Isa::best())?.spec().dt;
             let duration = clip.duration();
@@ -170,12 +170,9 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
 /// Reads a finished run, and judges the policies that it has left on the way.
 fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
-    let file = folder.summary();
-    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
-    let summary: Summary =
-        serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))?;
+    let summary = kept::summary(&folder)?;
     let Some(imitation) = summary.imitation.first().cloned() else {
-        return Err(CliError::file(&file, "imitation", "nothing", "what a finished run tells of its clip"));
+        return Err(CliError::file(&folder.summary(), "imitation", "nothing", "what a finished run tells of its clip"));
     };
     let history = History::read(&folder.progress())?;
     let column = |name: &str| history.column(name).into_iter().map(|cell| cell.unwrap_or(0.0));

@@ -167,7 +167,7 @@ impl Choice {
 
 /// Whether the task of an agent has courses of its own.
 pub fn has_own(agent: &str) -> bool {
-    registry::agent(agent).is_ok_and(|agent| agent.options().iter().any(|option| option.name == "course"))
+    registry::agent(agent).is_ok_and(|agent| agent.has_option("course"))
 }
 
 /// Refuses an agent that cannot do the player's part on a course.

@@ -140,18 +140,18 @@ impl Skills {
         // hands may touch the ground in a skill
         let lies = TRUNK.into_iter().fold(T::none(), |lies, part| T::or(lies, s.touched_ground(part)));
         let grounded = T::or(lies, T::and(T::not(on), on_the_ground(s)));
-        let stands = T::and(T::lit(UPRIGHT).lt(s.height(BUTT)), T::not(grounded));
+        let height = s.height(BUTT);
+        let stands = T::and(T::lit(UPRIGHT).lt(height), T::not(grounded));
         let upright = T::or(stands, T::and(T::not(rises), T::not(grounded)));
-        let erect = T::and(T::lit(RISEN).lt(s.height(BUTT)), T::lit(ERECT).lt(s.up(BUTT)[2]));
+        let erect = T::and(T::lit(RISEN).lt(height), T::lit(ERECT).lt(s.up(BUTT)[2]));
         let risen = T::and(rises, T::and(stands, erect));
         let ended = T::and(on, T::or(risen, T::and(over, upright)));
 
         // what begins
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));
-        let low = s.height(BUTT).lt(T::lit(LOW));
-        let failed = T::or(T::and(past, low), T::and(lost, T::not(waits)));
-        let failed = T::and(failed, T::not(risen));
-        let fallen = T::or(T::and(grounded, T::not(rises)), T::and(rises, failed));
+        let failed = T::or(T::and(past, height.lt(T::lit(LOW))), T::and(lost, T::not(waits)));
+        let fails = T::and(rises, T::and(failed, T::not(risen)));
+        let fallen = T::or(T::and(grounded, T::not(rises)), fails);
         let free = T::and(T::and(T::not(on), T::lit(PAUSE).lt(lasted)), stands);
         let wants_flip = T::and(half.lt(backflip), Steer::speed(s).lt(T::lit(SLOW)));
         let turns = T::and(free, wants_flip);
