@@ -11,7 +11,7 @@ use marathon_physics::lanes::Isa;
 const ID: &str = "MarathonManController-v0";
 const AGENTS: usize = 16;
 /// Most decisions of the jump, and of the backflip, which waits for up to 80 until he stands as the clip does.
-const JUMP: usize = 42;
+const JUMP: usize = 39;
 const BACKFLIP: usize = 80 + 66;
 /// Numbers of the command, and of what is told: which skill is on, and whether it is one of getting up.
 const COMMAND: usize = 5;
@@ -111,7 +111,8 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
 #[test]
 fn who_is_like_the_clip_is_paid() {
     let model = marathon_envs::agent("MarathonManController-v0").unwrap().model().unwrap();
-    for (clip, worth) in [("jump", 1.0), ("backflip", 1.0), ("getup_facedown", 0.5), ("getup_faceup", 0.5)] {
+    // a jump for its pose alone, and for the velocity that he is to have
+    for (clip, worth) in [("jump", 0.65), ("backflip", 1.0), ("getup_facedown", 0.5), ("getup_faceup", 0.5)] {
         let (mut env, mut step) = made(&[("clip", clip)]);
         go(&mut env, &mut step);
         let names = &env.spec().reward_terms;
@@ -124,12 +125,12 @@ fn who_is_like_the_clip_is_paid() {
         let paid = |i: &usize| (0..AGENTS).any(|agent| told(&step, agent, SKILL) > 0.5 && of(agent, *i) != 0.0);
         let paid: Vec<&str> = (0..names.len()).filter(paid).map(|i| names[i].as_str()).collect();
         // a jump is paid for its height, 5 for each meter of the lower foot, up to 1.5; who gets up for that of his butt, up to 0.3
-        let for_height = match clip {
-            "jump" => vec!["leap"],
-            "backflip" => vec![],
-            _ => vec!["rise"],
+        let expected = match clip {
+            "jump" => vec!["velocity", "pace", "drift", "skill", "leap"],
+            "backflip" => vec!["skill"],
+            _ => vec!["skill", "rise"],
         };
-        assert_eq!(paid, [vec!["skill"], for_height].concat());
+        assert_eq!(paid, expected);
         let rise = names.iter().position(|name| name == "rise").unwrap();
         for agent in (0..AGENTS).filter(|agent| clip.starts_with("getup") && told(&step, *agent, RISING) > 0.5) {
             let height = f64::from(step.obs[agent * env.spec().obs + part(&env, "height").start]);
@@ -145,6 +146,83 @@ fn who_is_like_the_clip_is_paid() {
             assert!((of(agent, leap) - expected).abs() < 1e-3, "{agent}: {} {expected}", of(agent, leap));
         }
     }
+}
+
+/// Whoever is told to jump on the run leaps: his gait goes on leading him, and pays him, for half a second.
+#[test]
+fn a_jump_on_the_run_goes_on_running() {
+    let (mut env, mut step) = made(&[("start", "first")]);
+    tell(&mut env, [2.0, 0.0, 0.0, 0.0, 0.0]);
+    for _ in 0..12 {
+        go(&mut env, &mut step);
+    }
+    // half of them go, the others stand
+    for agent in 0..AGENTS {
+        let mut state = env.state(agent).unwrap();
+        let [w, z] = [3, 6].map(|i| state.qpos[i]);
+        let (sin, cos) = (2.0 * z.atan2(w)).sin_cos();
+        let speed = if agent < AGENTS / 2 { 2.0 } else { 0.0 };
+        state.qvel.fill(0.0);
+        state.qvel[..2].copy_from_slice(&[speed * cos, speed * sin]);
+        env.set_state(agent, &state).unwrap();
+    }
+    tell(&mut env, [2.0, 0.0, 0.0, 1.0, 0.0]);
+    let names = &env.spec().reward_terms.clone();
+    let term = |name: &str| names.iter().position(|known| known == name).unwrap();
+    let [gait, skill, leap] = ["gait", "skill", "leap"].map(term);
+    let later = part(&env, "later_pose");
+    let (mut lengths, mut high) = ([0; AGENTS], 0.0_f32);
+    for decision in 0..24 {
+        go(&mut env, &mut step);
+        for agent in (0..AGENTS).filter(|agent| told(&step, *agent, SKILL) == 1.0).collect::<Vec<_>>() {
+            lengths[agent] += 1;
+            let [of_gait, of_clip, of_height] = [gait, skill, leap].map(|i| step.terms[agent * names.len() + i]);
+            let seen = &step.obs[agent * env.spec().obs..][later.clone()];
+            let runs = agent < AGENTS / 2;
+            assert_eq!((of_gait > 0.0, of_clip > 0.0), (runs, !runs), "{agent}, decision {decision}");
+            assert_eq!(seen.iter().all(|x| *x == 0.0), runs, "{agent}, decision {decision}");
+            high = high.max(of_height);
+        }
+    }
+    let (runs, stands) = lengths.split_at(AGENTS / 2);
+    assert!(runs.iter().all(|n| *n <= 20) && runs.contains(&20), "{lengths:?}");
+    assert!(stands.contains(&24), "{lengths:?}");
+}
+
+/// The clips of getting up lead him half as fast again as they were: three of their decisions in two of his.
+#[test]
+fn getting_up_makes_haste() {
+    let (mut env, mut step) = made(&[("clip", "getup_faceup"), ("start", "first")]);
+    let phase = part(&env, "phase").start;
+    let mut before: Option<Vec<f64>> = None;
+    let mut ways = vec![Vec::new(); AGENTS];
+    for _ in 0..60 {
+        go(&mut env, &mut step);
+        let angle = |agent: usize| {
+            let at = agent * env.spec().obs + phase;
+            f64::from(step.obs[at]).atan2(f64::from(step.obs[at + 1]))
+        };
+        let now: Vec<f64> = (0..AGENTS).map(angle).collect();
+        for agent in (0..AGENTS).filter(|agent| told(&step, *agent, RISING) > 0.5) {
+            if let Some(before) = &before {
+                ways[agent].push(now[agent] - before[agent]);
+            }
+        }
+        before = Some(now);
+    }
+    // whoever still lies as the clip does waits
+    let mut led = 0;
+    for ways in ways {
+        let moving: Vec<f64> = ways.into_iter().skip_while(|way| way.abs() < 1e-6).take(8).collect();
+        let least = moving.iter().copied().fold(f64::INFINITY, f64::min);
+        if moving.len() == 8 && least > 1e-6 {
+            let steps: Vec<f64> = moving.iter().map(|way| way / least).collect();
+            let sum: f64 = steps.iter().sum();
+            assert!(steps.iter().all(|x| (x - x.round()).abs() < 1e-2) && (sum - 12.0).abs() < 0.1, "{steps:?}");
+            led += 1;
+        }
+    }
+    assert!(led > AGENTS / 2, "{led}");
 }
 
 /// Who stands before the clip does has got up, however far from the clip he is; who lies has not.

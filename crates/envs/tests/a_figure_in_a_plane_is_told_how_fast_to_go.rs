@@ -1,5 +1,5 @@
 //! The paper's controllers: figures in a plane observe what they are told, the mean velocity is that of three decisions, and
-//! the reward is the original's formula with a term for standing still.
+//! the reward is the original's formula with terms for standing still and for a jump that is late.
 
 mod common;
 
@@ -55,7 +55,7 @@ fn the_reward_is_its_formula() {
         let mut env = env(id, input);
         let model = agent(id).unwrap().model().unwrap();
         let (n, act, k) = (env.spec().obs, env.spec().act, env.spec().reward_terms.len());
-        assert_eq!(env.spec().reward_terms[..7], TERMS);
+        assert_eq!(env.spec().reward_terms[..8], TERMS);
         let commands = env.spec().command.len();
         let mut told = vec![vec![0.0; commands]; AGENTS];
         for (agent, command) in told.iter_mut().enumerate() {
@@ -73,6 +73,7 @@ fn the_reward_is_its_formula() {
         let mut targets: Vec<f64> = past.iter().map(|past| past[0]).collect();
         let mut actions = vec![0.0; AGENTS * act];
         let (mut leapt, mut rested, mut over) = (0, 0.0f64, [false; AGENTS]);
+        let (mut aloft, mut jumped) = ([0; AGENTS], [false; AGENTS]);
         for decision in 0..60 {
             for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
                 // four of them do nothing
@@ -89,7 +90,7 @@ fn the_reward_is_its_formula() {
                 assert!((obs[n - 1] - targets[agent]).abs() < 1e-4, "{} {}", obs[n - 1], targets[agent]);
                 over[agent] = out.terminated[agent];
                 if over[agent] {
-                    assert_eq!(out.reward[agent], -10.0);
+                    assert_eq!(out.reward[agent], -40.0);
                     continue;
                 }
                 let (command, jump) = (told[agent][0], told[agent].get(1).copied().unwrap_or(0.0));
@@ -102,9 +103,13 @@ fn the_reward_is_its_formula() {
                 let speed2 = moving.iter().map(square).sum::<f64>() / moving.len() as f64;
                 let still = if command == 0.0 && jump == 0.0 { 1.5 * (-speed2 / 0.04).exp() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
+                // a tenth of a second off the ground makes a jump
+                aloft[agent] = if leap > 0.0 { aloft[agent] + 1 } else { 0 };
+                jumped[agent] |= aloft[agent] >= 10;
+                let late = if command == 0.0 && !jumped[agent] { 2.0 * jump } else { 0.0 };
                 let low = (1.1 - height(&model, &env, agent)).clamp(0.0, 1.1);
                 let [velocity, pace] = paid(targets[agent], mean);
-                let expected = [velocity, pace, 0.5 - tilt / PI, jump * leap, still, -low, -EFFORT * effort];
+                let expected = [velocity, pace, 0.5 - tilt / PI, jump * leap, -late, still, -low, -EFFORT * effort];
                 for (i, expected) in expected.into_iter().enumerate() {
                     let got = f64::from(out.terms[agent * k + i]);
                     assert!((got - expected).abs() < 2e-3, "agent {agent}, term {i}: {got}, expected {expected}");
@@ -117,10 +122,47 @@ fn the_reward_is_its_formula() {
     }
 }
 
+/// Whoever stands pays for each decision until it has been off the ground for a tenth of a second, and again when it is told anew.
+#[test]
+fn a_jump_that_is_late_costs() {
+    let id = "WalkerController-v0";
+    let mut env = env(id, "discrete");
+    let (act, k) = (env.spec().act, env.spec().reward_terms.len());
+    let mut out: Step = env.buffers();
+    env.reset(Some(2), &mut out.obs).unwrap();
+    let late = |out: &Step, agent: usize| out.terms[agent * k + 4];
+    let heights: Vec<f64> = (0..AGENTS).map(|agent| env.state(agent).unwrap().qpos[1]).collect();
+    let mut go = |env: &mut VecEnv, command: [f64; 2], aloft: bool| {
+        for agent in 0..AGENTS {
+            env.set_command(agent, Some(&command)).unwrap();
+            let mut state = env.state(agent).unwrap();
+            state.qvel.fill(0.0);
+            // a meter up, or pressed to the ground
+            state.qpos[1] = heights[agent] + if aloft { 1.0 } else { -0.005 };
+            env.set_state(agent, &state).unwrap();
+        }
+        env.step(&vec![0.0; AGENTS * act], &mut out.as_mut()).unwrap();
+        (0..AGENTS).map(|agent| late(&out, agent)).collect::<Vec<_>>()
+    };
+    let all = |x: f32| vec![x; AGENTS];
+    assert_eq!(go(&mut env, [0.0, 0.0], false), all(0.0));
+    for _ in 0..2 {
+        assert_eq!(go(&mut env, [0.0, 1.0], false), all(-2.0));
+        // who runs need not be told that it is late
+        assert_eq!(go(&mut env, [4.0, 1.0], false), all(0.0));
+        for _ in 0..9 {
+            assert_eq!(go(&mut env, [0.0, 1.0], true), all(-2.0));
+        }
+        assert_eq!(go(&mut env, [0.0, 1.0], true), all(0.0));
+        assert_eq!(go(&mut env, [0.0, 1.0], false), all(0.0));
+        assert_eq!(go(&mut env, [0.0, 0.0], false), all(0.0));
+    }
+}
+
 /// Price of the effort.
 const EFFORT: f64 = 0.05;
 /// Terms of the reward.
-const TERMS: [&str; 7] = ["velocity", "pace", "uprightness", "jump", "still", "height", "effort"];
+const TERMS: [&str; 8] = ["velocity", "pace", "uprightness", "jump", "late", "still", "height", "effort"];
 
 /// The target velocity after a decision of `dt` seconds: it follows the command by 6 m/s^2.
 fn follow(target: f64, told: f64, dt: f64) -> f64 {
@@ -150,7 +192,7 @@ fn an_adversary_commands() {
             assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id} {input}");
             assert_eq!(commander.act, plain.act..plain.act + 1 + buttons);
             assert!(commander.intermittent && spec.command.is_empty());
-            assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..7], &["fall".into()]].concat());
+            assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..8], &["fall".into()]].concat());
             assert_eq!(spec.reward_terms[commander.terms.clone()], ["disobedience", "felled"]);
 
             let (n, act, k) = (spec.obs, spec.act, spec.reward_terms.len());
@@ -186,11 +228,11 @@ fn an_adversary_commands() {
                             (f64::from(terms[0]) - velocity).abs() < 1e-3 && near(terms[1], pace),
                             "{id} {input}, agent {i}"
                         );
-                        assert!(near(terms[8], off / 4.0) && near(out.info[i], off));
+                        assert!(near(terms[9], off / 4.0) && near(out.info[i], off));
                         let down = out.terminated[i];
-                        let expected = if down { [-10.0, 10.0] } else { [0.0; 2] };
-                        assert_eq!([terms[7], terms[9]], expected, "{id} {input}, agent {i}");
-                        assert!(near(out.reward[i], terms[..8].iter().map(|x| f64::from(*x)).sum()));
+                        let expected = if down { [-40.0, 10.0] } else { [0.0; 2] };
+                        assert_eq!([terms[8], terms[10]], expected, "{id} {input}, agent {i}");
+                        assert!(near(out.reward[i], terms[..9].iter().map(|x| f64::from(*x)).sum()));
                     }
                     told[i] = next;
                     fallen[i] |= out.terminated[i];

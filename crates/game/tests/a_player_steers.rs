@@ -188,6 +188,32 @@ fn a_second_gamepad_leads_the_next_character() {
     assert!(told[0] == (-2.0, true) && !told[1].1, "{told:?}");
 }
 
+/// What the command line holds is held for as long as it says: keys are the first player's, a second gamepad the next one's.
+#[test]
+fn held_keys_and_sticks_steer() {
+    let holds = ["0.4-0.8:key:up", "0.8-1:key:down", "0.6-1.2:pad2:left-y=-0.56", "1.2-1.6:pad2:left-y"];
+    let mut app = game(&[&["--agents", "2"], &holds.map(|hold| ["--hold", hold]).concat()[..]].concat());
+    let mut told: [Vec<f64>; 2] = Default::default();
+    for _ in 0..100 {
+        frames(&mut app, 1);
+        for (told, (x, mine)) in told.iter_mut().zip(commands(&mut app)) {
+            told.extend(mine.then_some(x));
+        }
+    }
+    // frames of 20 ms, and a command arrives with a decision, which is as long
+    for (told, expected) in told.iter().zip([[(2.0, 20), (-2.0, 10), (0.0, 40)], [(-1.0, 30), (2.0, 20), (0.0, 10)]]) {
+        let runs = told.chunk_by(|a, b| a == b).map(|run| (run[0], run.len()));
+        for ((x, length), (wanted, frames)) in runs.clone().zip(expected) {
+            let long_enough = if wanted == 0.0 { length >= frames } else { length.abs_diff(frames) <= 2 };
+            assert!(
+                (x - wanted).abs() < 1e-6 && long_enough,
+                "{x} for {length} frames, expected {wanted} for {frames}"
+            );
+        }
+        assert_eq!(runs.count(), expected.len(), "{told:?}");
+    }
+}
+
 /// The Ant goes where the stick, the triggers and the keys A and D say; the mapping is what the command line says.
 #[test]
 fn who_can_step_aside_does_so_by_triggers_and_keys() {

@@ -2,6 +2,7 @@
 
 use crate::app::course::Part;
 use crate::app::cues::Cue;
+use crate::app::hands::Hold;
 use crate::app::steer::{Mapping, Mappings};
 use crate::ground::Ground;
 use crate::look::{CameraMode, Quality};
@@ -112,6 +113,10 @@ pub struct Args {
     /// Do at a time what a key does, such as 2.5:throw or 4:next-agent; may be given again.
     #[arg(long, value_name = "S:DEED")]
     pub press: Vec<Cue>,
+    /// Hold a key, a stick, a trigger or a button of a gamepad from a time to another, such as 1-2.5:key:up, 1-3:pad:left-y=0.5 or
+    /// 2-2.2:pad2:a; may be given again.
+    #[arg(long, value_name = "S-S:DEVICE:WHAT")]
+    pub hold: Vec<Hold>,
 
     /// How much a frame may cost; [default: medium, and low where a processor draws the window].
     #[arg(long, value_enum)]

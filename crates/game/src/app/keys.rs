@@ -174,6 +174,24 @@ const KEYS: [(KeyCode, &str); 64] = [
     (KeyCode::F12, "F12"),
 ];
 
+/// Buttons of a gamepad, and what they are called.
+const BUTTON_NAMES: [(GamepadButton, &str); 14] = [
+    (GamepadButton::South, "A"),
+    (GamepadButton::East, "B"),
+    (GamepadButton::West, "X"),
+    (GamepadButton::North, "Y"),
+    (GamepadButton::Start, "Start"),
+    (GamepadButton::Select, "Back"),
+    (GamepadButton::LeftTrigger, "LB"),
+    (GamepadButton::RightTrigger, "RB"),
+    (GamepadButton::LeftThumb, "L3"),
+    (GamepadButton::RightThumb, "R3"),
+    (GamepadButton::DPadUp, "D-pad up"),
+    (GamepadButton::DPadDown, "D-pad down"),
+    (GamepadButton::DPadLeft, "D-pad left"),
+    (GamepadButton::DPadRight, "D-pad right"),
+];
+
 /// Which key does what.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct Bindings {
@@ -265,23 +283,36 @@ fn key_name(key: KeyCode) -> &'static str {
 }
 
 fn button_name(button: GamepadButton) -> &'static str {
-    match button {
-        GamepadButton::South => "A",
-        GamepadButton::East => "B",
-        GamepadButton::West => "X",
-        GamepadButton::North => "Y",
-        GamepadButton::Start => "Start",
-        GamepadButton::Select => "Back",
-        GamepadButton::LeftTrigger => "LB",
-        GamepadButton::RightTrigger => "RB",
-        GamepadButton::LeftThumb => "L3",
-        GamepadButton::RightThumb => "R3",
-        GamepadButton::DPadUp => "D-pad up",
-        GamepadButton::DPadDown => "D-pad down",
-        GamepadButton::DPadLeft => "D-pad left",
-        GamepadButton::DPadRight => "D-pad right",
-        _ => "?",
-    }
+    BUTTON_NAMES.iter().find(|(known, _)| *known == button).map_or("?", |(_, name)| name)
+}
+
+/// The key of a name, such as `Up` or `page-up`.
+pub(super) fn key_named(name: &str) -> Option<KeyCode> {
+    KEYS.iter().find(|(_, known)| is_called(known, name)).map(|(key, _)| *key)
+}
+
+/// The button of a gamepad of a name, such as `A` or `d-pad-up`.
+pub(super) fn button_named(name: &str) -> Option<GamepadButton> {
+    BUTTON_NAMES.iter().find(|(_, known)| is_called(known, name)).map(|(button, _)| *button)
+}
+
+/// Names of all keys, as a command line has them.
+pub(super) fn key_names() -> impl Iterator<Item = String> {
+    KEYS.iter().map(|(_, name)| on_a_command_line(name))
+}
+
+/// Names of the buttons of a gamepad, as a command line has them.
+pub(super) fn button_names() -> impl Iterator<Item = String> {
+    BUTTON_NAMES.iter().map(|(_, name)| on_a_command_line(name))
+}
+
+fn is_called(known: &str, name: &str) -> bool {
+    on_a_command_line(known) == on_a_command_line(name)
+}
+
+/// A name without capitals and spaces.
+fn on_a_command_line(name: &str) -> String {
+    name.to_lowercase().replace(' ', "-")
 }
 
 /// Turns keys and buttons into deeds.

@@ -8,6 +8,7 @@ mod cues;
 mod error;
 mod feed;
 mod film;
+mod hands;
 mod hud;
 mod imitate;
 mod keys;
@@ -30,6 +31,7 @@ pub use course::{Choice, Course, KEPT, List, MOST_STEPS, Part, Place, ROWS, Run,
 pub use cues::{Cue, Cues};
 pub use error::GameError;
 pub use feed::{Board, Feed, Sight};
+pub use hands::{Hands, Hold};
 pub use hud::Hud;
 pub use imitate::{GhostAt, Imitation, Reading};
 pub use keys::{Bindings, Deed, Do, KeysPlugin};
@@ -236,6 +238,7 @@ impl Plugin for GamePlugin {
         .insert_resource(Start(args.camera.into()))
         .insert_resource(Given { quality: args.quality.is_some(), size: args.size.is_some(), rate: args.max_fps > 0 })
         .insert_resource(Cues::new(args.press.clone()))
+        .insert_resource(Hands::new(&args.hold))
         .init_resource::<Focus>()
         .init_resource::<show::Script>()
         .init_resource::<Imitation>()
@@ -244,7 +247,8 @@ impl Plugin for GamePlugin {
         .init_resource::<notes::Notes>()
         .init_resource::<menu::Menu>()
         .init_resource::<hud::Monitor>()
-        .add_systems(Startup, open)
+        .add_systems(Startup, (open, hands::connect))
+        .add_systems(PreUpdate, hands::play.before(bevy::input::InputSystems))
         .add_systems(PreUpdate, (cues::perform, steer::steer.after(bevy::input::InputSystems).before(keys::read)))
         .add_systems(
             Update,

@@ -67,8 +67,8 @@ pub struct Obedience {
     pub turns: Vec<Turn>,
     /// Told to stand.
     pub stand: Stand,
-    /// Told to jump from a stand; none for tasks without such a button.
-    pub jump: Option<Jump>,
+    /// Told to jump from a stand, and at half and all of the highest speed; empty for tasks without such a button.
+    pub jumps: Vec<Jump>,
     /// Told to turn over backward from a stand; none for tasks without such a button.
     pub backflip: Option<Flip>,
     /// Pushed at half of the highest speed.
@@ -128,6 +128,8 @@ pub struct Stand {
 /// A button that is held for a second, and let go.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Jump {
+    /// Commanded speed, m/s.
+    pub speed: f64,
     /// Agents that had not fallen before.
     pub agents: u64,
     /// Those of them that were off the ground within 0.35 s.
@@ -233,7 +235,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
     let setting = Setting::of(policy.meta()).from_the_first()?;
     let commands = Commands::of(policy, &setting)?;
     let trial = || Trial::new(&setting, policy, options, commands.speed);
-    let levels = commands.levels();
+    let (levels, half) = (commands.levels(), 0.5 * commands.range[1]);
     let mut responses = Vec::new();
     for from in levels {
         for to in levels.into_iter().filter(|to| *to != from) {
@@ -247,17 +249,18 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
             turns.push(turn(trial()?, &commands, speed, sharpest)?);
         }
     }
-    let jump = match commands.button {
-        Some(button) => Some(jump(trial()?, &commands, button)?),
-        None => None,
-    };
+    let mut jumps = Vec::new();
+    if let Some(button) = commands.button {
+        for speed in [commands.rest[commands.speed], half, commands.range[1]] {
+            jumps.push(jump(trial()?, &commands, button, speed)?);
+        }
+    }
     let backflip = match commands.backflip {
         Some(button) => Some(flip(trial()?, &commands, button)?),
         None => None,
     };
     let lying = trial()?;
     let rise = if lying.can_rise() { Some(rise(lying, &commands)?) } else { None };
-    let half = 0.5 * commands.range[1];
     let pushes = PUSHES.into_iter().map(|velocity| push(trial()?, &commands, half, velocity));
     Ok(Obedience {
         task: policy.meta().agent.clone(),
@@ -267,7 +270,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
         responses,
         turns,
         stand: stand(trial()?, &commands)?,
-        jump,
+        jumps,
         backflip,
         pushes: pushes.collect::<Result<_, RunError>>()?,
         rise,
@@ -366,16 +369,17 @@ fn still(moments: &[Moment]) -> [f64; 2] {
     [moments.iter().map(way).fold(0.0, f64::max), speed.get()]
 }
 
-/// A jump from a stand.
-fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump, RunError> {
+/// A jump at a speed, which holds before and afterward.
+fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) -> Result<Jump, RunError> {
     let dt = trial.dt();
-    trial.command(|_| commands.rest.clone())?;
+    let goes = commands.at(speed, 0.0);
+    trial.command(|_| goes.clone())?;
     let before = trial.play(BEFORE)?;
-    let mut pressed = commands.rest.clone();
+    let mut pressed = goes.clone();
     pressed[button] = 1.0;
     trial.command(|_| pressed.clone())?;
     let mut tracks = trial.play(PRESSED)?;
-    trial.command(|_| commands.rest.clone())?;
+    trial.command(|_| goes.clone())?;
     join(&mut tracks, trial.play(AFTER - PRESSED)?);
     let start = |agent| before.iter().find(|track| track.agent == agent).and_then(|track| track.moments.last());
     let time = |track: &Track| {
@@ -390,6 +394,7 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Jump
     };
     let times: Vec<f64> = tracks.iter().map(time).collect();
     Ok(Jump {
+        speed,
         agents: tracks.len() as u64,
         prompt: times.iter().filter(|time| **time <= PROMPT + 1e-9).count() as u64,
         falls: falls(&tracks),

@@ -54,10 +54,11 @@ impl Obedience {
                 t.turn, t.speed, t.reached_turn, t.reached_speed, t.falls, t.agents
             );
         }
-        if let Some(j) = &self.jump {
+        for j in &self.jumps {
             let _ = write!(
                 out,
-                "\ntold to jump: {} of {} are off the ground within {PROMPT} s, half of them within {}; {} high, {} fall",
+                "\ntold to jump at {:.2} m/s: {} of {} are off the ground within {PROMPT} s, half of them within {}; {} high, {} fall",
+                j.speed,
                 j.prompt,
                 j.agents,
                 seconds(&j.latency),

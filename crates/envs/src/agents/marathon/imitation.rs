@@ -126,14 +126,17 @@ pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f6
     }
 }
 
-/// What the terms add up to.
+/// What the terms add up to, and those that are for the pose alone.
 #[inline(always)]
-pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
-    let mut sum = T::zero();
-    for ((_, weight, ..), value) in TERMS.into_iter().zip(values(s, anatomy, 1.0)) {
-        sum = value.mul_add(T::lit(weight), sum);
+pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 2] {
+    let [mut all, mut posture] = [T::zero(); 2];
+    for ((_, weight, _, of_pose), value) in TERMS.into_iter().zip(values(s, anatomy, 1.0)) {
+        all = value.mul_add(T::lit(weight), all);
+        if of_pose {
+            posture = value.mul_add(T::lit(weight), posture);
+        }
     }
-    sum
+    [all, posture]
 }
 
 /// The values of the terms, without their weights.

@@ -11,7 +11,7 @@
 //! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
 //! | `target_velocity` | what the velocity should be by now: it follows the command by 6 m/s^2, m/s |
 //!
-//! r = exp(-4 e^2) + 2 - 0.5 e + forward bonus + jump - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
+//! r = exp(-4 e^2) + 2 - 0.5 e + forward bonus + jump - late - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
 //! and effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not stand still. The
 //! Walker also pays for a low torso. Standing is worth something whatever is told, so that a fall is never a way out.
 
@@ -43,11 +43,17 @@ pub const FASTEST: f64 = 4.0;
 const VELOCITIES: usize = 3;
 /// The target velocity, m/s.
 const TARGET: usize = VELOCITIES;
-const MEMORY: usize = TARGET + 1;
+/// For how many decisions no foot has been on the ground; whether the figure was told to jump, and has yet to do it, 0 or 1.
+const ALOFT: usize = TARGET + 1;
+const TOLD: usize = ALOFT + 1;
+const WAITS: usize = TOLD + 1;
+const MEMORY: usize = WAITS + 1;
+/// Time off the ground that makes a jump, s: whoever steps from foot to foot has none on the ground now and then.
+const JUMPED: f64 = 0.1;
 /// How fast the target velocity follows the command, m/s^2. Friction allows 9.8.
 const RAMP: f64 = 6.0;
 /// Terms of the reward.
-const TERMS: [&str; 7] = ["velocity", "pace", "uprightness", "jump", "still", "height", "effort"];
+const TERMS: [&str; 8] = ["velocity", "pace", "uprightness", "jump", "late", "still", "height", "effort"];
 /// Sharpness of the worth of the right velocity, s^2/m^2.
 const SHARPNESS: f64 = 4.0;
 /// Price of a difference of 1 m/s, and the difference at which a decision is worth nothing, m/s: that of a figure that stands while it
@@ -55,7 +61,9 @@ const SHARPNESS: f64 = 4.0;
 const PRICE: f64 = 0.5;
 const WORTHLESS: f64 = FASTEST;
 /// Worth of a fall.
-const FALL: f64 = -10.0;
+const FALL: f64 = -40.0;
+/// Worth of each decision until a figure that stands has jumped as told.
+const LATE: f64 = -2.0;
 /// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
 const STILL: f64 = 1.5;
 const RESTLESS: f64 = 0.04;
@@ -203,6 +211,7 @@ impl<F: Figure> Agent for Controller<F> {
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory[..MEMORY].fill(s.linear_velocity(F::TORSO)[0]);
+        memory[ALOFT..MEMORY].fill(T::zero());
         if self.is_opposed() {
             commander::begin(memory);
         }
@@ -212,14 +221,21 @@ impl<F: Figure> Agent for Controller<F> {
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         memory.copy_within(0..VELOCITIES - 1, 1);
         memory[0] = s.linear_velocity(F::TORSO)[0];
-        let told = if self.is_opposed() {
+        let (told, jump) = if self.is_opposed() {
             commander::remember(self, s, memory);
-            memory[commander::PRESENT]
+            (memory[commander::PRESENT], memory[commander::PRESENT + 1])
         } else {
-            s.command(0)
+            (s.command(0), self.jump(s))
         };
         let most = RAMP * s.dt();
         memory[TARGET] += clamp(told - memory[TARGET], -most, most);
+        let one = T::lit(1.0);
+        memory[ALOFT] = T::masked(T::zero().lt(F::leap(s)), memory[ALOFT] + one);
+        let jumped = T::lit(JUMPED / s.dt() - 0.5).lt(memory[ALOFT]);
+        // a jump that is told anew is waited for anew
+        let waits = memory[WAITS].max(one - memory[TOLD]);
+        memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
+        memory[TOLD] = jump;
     }
 
     #[inline(always)]
@@ -249,8 +265,10 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
         let jump = self.jump(s);
         terms.add("jump", 1.0, jump * F::leap(s));
+        let stands = (one - told.abs() * T::lit(10.0)).max(zero);
+        terms.add("late", LATE, s.memory(WAITS) * stands);
         // told to go nowhere and not to jump
-        let rest = (one - told.abs().max(jump) * T::lit(10.0)).max(zero);
+        let rest = stands * (one - jump);
         let [still] = stillness(s, F::PARTS.len(), [RESTLESS]);
         terms.add("still", STILL, rest * still);
         terms.add("height", -1.0, F::low(s));

@@ -26,7 +26,7 @@ use super::body::{
 use super::clips::{self, ALL, ClipNames};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, OBSERVATION, PACE, PHASE, SHARPEST, Steer, SteerArguments, TARGET,
+    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, Haste, OBSERVATION, PACE, SHARPEST, Steer, SteerArguments, TARGET,
     TERMS,
 };
 use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
@@ -39,6 +39,8 @@ use crate::episode_rng::EpisodeRng;
 
 /// Fastest that he is told to step aside, m/s.
 const ASIDE: f64 = 0.8;
+/// What leads him: faster than what leads the steered figure, but a run that ends at once fells him.
+const HASTE: Haste = Haste { speeding: 5.0, slowing: 3.0, lead: 1.2, quick: true };
 /// Decisions of the clip ahead that he sees.
 const AHEAD: usize = 4;
 /// His skills, behind the variables of the steered figure.
@@ -226,7 +228,7 @@ impl Agent for Controller {
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         let reach = T::lit(self.arguments.reach.0);
         let (on, clip) = (SKILL.on(c.memory), c.reference(1));
-        let gait = Steer::next_pose(c.memory[PHASE], c.memory[PACE], c.dt, DAMPING_TIME);
+        let gait = Steer::next_pose(|slot| c.memory[slot], HASTE, c.dt, DAMPING_TIME);
         let mut targets = [T::zero(); JOINTS.len()];
         for (joint, target) in targets.iter_mut().enumerate() {
             let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
@@ -254,17 +256,18 @@ impl Agent for Controller {
         let flips = T::lit(0.5).lt(backflip);
         let [speed, left, turn] = [speed, left, turn].map(|x| T::masked(T::not(flips), x));
         let before = [DIRECTION, DIRECTION + 1].map(|slot| memory[slot]);
-        Steer::lead(s, memory, speed, turn, left);
+        Steer::lead(s, memory, [speed, left], turn, HASTE);
         let rose = SKILL.rises(memory);
         let was_on = SKILL.remember(s, memory, [jump, backflip]);
         let on = SKILL.on(memory);
-        // the direction outlasts a skill, but who has risen goes where he faces
+        // the direction outlasts a skill, and a jump the velocity, but who has risen goes where he faces
         let (heading, [x, y, _]) = (s.heading(BUTT), s.center_of_mass_velocity());
         let risen = T::and(rose, T::not(on));
+        let led = T::or(T::not(on), SKILL.is(memory, JUMP));
         for i in 0..2 {
             let kept = T::select(T::or(on, was_on), before[i], memory[DIRECTION + i]);
             memory[DIRECTION + i] = T::select(risen, heading[i], kept);
-            memory[TARGET + i] = T::select(on, [x, y][i], memory[TARGET + i]);
+            memory[TARGET + i] = T::select(led, memory[TARGET + i], [x, y][i]);
         }
         memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
     }
@@ -276,7 +279,7 @@ impl Agent for Controller {
         let facing = SKILL.facing(s, &all);
         let (turned, next, r) = (turned_to(facing), s.reference(1), s.readings());
         let pose = |i, of_gait| T::select(on, next.qpos(FIRST_QPOS + i), of_gait);
-        Steer::observe_going(s, facing, [0, 2], pose, out);
+        Steer::observe_going(s, facing, [0, 2], pose, HASTE, out);
         out.group("phase");
         for x in s.reference(0).phase_angles() {
             out.scalar(T::masked(on, x));
@@ -290,7 +293,8 @@ impl Agent for Controller {
         }
         out.group("skill");
         for i in 0..SKILLS.len() {
-            out.scalar(T::masked(SKILL.is(&all, i), T::lit(1.0)));
+            let is = if i == JUMP { SKILL.jumps(&all) } else { SKILL.is(&all, i) };
+            out.scalar(T::masked(is, T::lit(1.0)));
         }
         let masked = |[x, y, z]: [T; 3]| [x, y, z].map(|x| T::masked(on, x));
         for (name, ahead) in [("in_1", 1), ("in_4", AHEAD)] {
@@ -312,12 +316,15 @@ impl Agent for Controller {
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let all = memory(s);
         let told = s.command(1).abs() + s.command(2).abs() + s.command(0);
-        Steer::add_terms(s, T::not(SKILL.on(&all)), told, terms);
-        terms.add("skill", 1.0, SKILL.worth(&all) * imitation::similarity(s, &ANATOMY));
+        let (jumps, gait) = (SKILL.is(&all, JUMP), T::not(SKILL.on(&all)));
+        // a jump need not stand where the clip's does
+        Steer::add_terms(s, [T::or(gait, jumps), gait], told, terms);
+        let [similar, posture] = imitation::similarity(s, &ANATOMY);
+        terms.add("skill", 1.0, SKILL.worth(&all) * T::select(jumps, posture, similar));
         // a hop looks much like a jump
         let [right, left] = FEET.map(|foot| s.height(foot));
         let high = clamp(right.min(left) - T::lit(STANDING_FOOT), 0.0, HIGH);
-        terms.add("leap", LEAP, T::masked(SKILL.is(&all, JUMP), high));
+        terms.add("leap", LEAP, T::masked(SKILL.jumps(&all), high));
         let risen = clamp(s.height(BUTT) * T::lit(1.0 / RISEN), 0.0, 1.0);
         terms.add("rise", RISE, T::masked(SKILL.rises(&all), risen));
     }
@@ -350,8 +357,9 @@ impl Agent for Controller {
         let (speed, left) = (s.command(0), s.command(1));
         out.scalar(Steer::slip(s, [speed * c - left * d, speed.mul_add(d, left * c)]));
         out.scalar(Steer::off(s, direction).abs());
-        out.scalar(s.memory(SKILL.slot));
-        out.scalar(T::masked(SKILL.rises(&memory(s)), T::lit(1.0)));
+        let all = memory(s);
+        out.scalar(SKILL.number(&all));
+        out.scalar(T::masked(SKILL.rises(&all), T::lit(1.0)));
     }
 }
 

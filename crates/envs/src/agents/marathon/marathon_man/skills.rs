@@ -1,8 +1,8 @@
 //! What Marathon Man does beside going: he jumps and turns over backward on a button, and gets up after a fall.
 //!
-//! A skill is a piece of a clip. It begins where he is and as he faces; its place follows him, since a jump from a run goes
-//! farther than the clip's. To get up or to turn over, he first becomes as the clip is at its beginning, for as long as he needs, up
-//! to [`SETTLING`].
+//! A skill is a piece of a clip. It begins where he is and as he faces; its place follows him. To get up or to turn over, he first
+//! becomes as the clip is at its beginning, for as long as he needs, up to [`SETTLING`]. A jump on the run is no piece of a clip,
+//! whose person crouches first and lands in a crouch: it is a leap, in which his gait goes on.
 
 use marathon_physics::lanes::Real;
 
@@ -21,11 +21,11 @@ pub struct Skill {
     pub worth: f64,
 }
 
-/// All of them. The jump leaves the ground 13 decisions after its beginning, 0.33 s, and is back on it after 31; the backflip
+/// All of them. The jump leaves the ground 10 decisions after its beginning, 0.25 s, and is back on it after 28; the backflip
 /// after 28 and 46, and what he waits. Who lies earns less than who stands. The person of the clips first lies for a while, and
 /// stands for another at the end.
 pub const SKILLS: [Skill; 4] = [
-    Skill { clip: "jump", rows: [18, 60], worth: 1.0 },
+    Skill { clip: "jump", rows: [21, 60], worth: 1.0 },
     Skill { clip: "backflip", rows: [0, 66], worth: 1.0 },
     Skill { clip: "getup_facedown", rows: [8, 100], worth: 0.5 },
     Skill { clip: "getup_faceup", rows: [48, 142], worth: 0.5 },
@@ -44,9 +44,14 @@ const FACE_UP: usize = 3;
 pub const SLOTS: usize = 2;
 /// Shortest and longest that he takes to be as the clip is at its beginning, decisions; he comes to a stop for longer than he lies.
 const SETTLING: [f64; 2] = [12.0, 80.0];
-const LYING: f64 = 40.0;
+const LYING: f64 = 30.0;
 /// Mean distance of the parts from the clip's at which an attempt to get up has failed and he begins again, m.
 const LOST: f64 = 0.5;
+/// Who is faster than this leaps when told to jump, m/s, and for how long, decisions.
+const RUNNING: f64 = 1.0;
+const LEAPING: f64 = 20.0;
+/// What the first slot says of a leap: the number behind those of the skills.
+const LEAP: f64 = 1.0 + SKILLS.len() as f64;
 /// Decisions from one skill to the next.
 const PAUSE: f64 = 10.0;
 /// Fastest that he begins a backflip, m/s, and lowest that his butt is when he stands, m.
@@ -70,10 +75,28 @@ pub struct Skills {
 }
 
 impl Skills {
-    /// Lanes in which a skill is on.
+    /// Lanes in which a skill is on that is a piece of a clip.
     #[inline(always)]
     pub fn on<T: Real>(&self, memory: &[T]) -> T::Mask {
-        T::lit(0.5).lt(memory[self.slot])
+        T::and(T::lit(0.5).lt(memory[self.slot]), T::not(self.leaps(memory)))
+    }
+
+    /// Lanes in which he jumps on the run.
+    #[inline(always)]
+    pub fn leaps<T: Real>(&self, memory: &[T]) -> T::Mask {
+        T::lit(LEAP - 0.5).lt(memory[self.slot])
+    }
+
+    /// Lanes in which he jumps, standing or on the run.
+    #[inline(always)]
+    pub fn jumps<T: Real>(&self, memory: &[T]) -> T::Mask {
+        T::or(self.is(memory, JUMP), self.leaps(memory))
+    }
+
+    /// Number of the skill, counted from 1, or 0.
+    #[inline(always)]
+    pub fn number<T: Real>(&self, memory: &[T]) -> T {
+        T::select(self.leaps(memory), T::lit(1.0 + JUMP as f64), memory[self.slot])
     }
 
     /// Lanes in which skill number `i` is on.
@@ -86,7 +109,7 @@ impl Skills {
     /// Lanes in which he gets up.
     #[inline(always)]
     pub fn rises<T: Real>(&self, memory: &[T]) -> T::Mask {
-        T::lit(FACE_DOWN as f64 + 0.5).lt(memory[self.slot])
+        T::and(T::lit(FACE_DOWN as f64 + 0.5).lt(memory[self.slot]), T::not(self.leaps(memory)))
     }
 
     /// Lanes in which he cannot get up.
@@ -114,8 +137,15 @@ impl Skills {
         memory[slot + 1] += T::lit(1.0);
         let lasted = memory[slot + 1];
 
-        // the clip goes on, but not before he lies as it does
+        // the clip goes on, half as fast again for who gets up, but not before he lies as it does
         s.follow(memory);
+        let once: [T; Following::SLOTS] = std::array::from_fn(|i| memory[i]);
+        s.follow(memory);
+        let half_of_lasted = lasted * half;
+        let hurries = T::and(rises, T::lit(0.25).lt(half_of_lasted - half_of_lasted.floor()));
+        for (i, kept) in once.into_iter().enumerate() {
+            memory[i] = T::select(hurries, memory[i], kept);
+        }
         let down = self.is(memory, FACE_DOWN);
         let first = |i: usize| T::lit((s.clip_rows(CLIPS.len() + i).start + SKILLS[i].rows[0]) as f64);
         let flips = self.is(memory, BACKFLIP);
@@ -145,19 +175,22 @@ impl Skills {
         let upright = T::or(stands, T::and(T::not(rises), T::not(grounded)));
         let erect = T::and(T::lit(RISEN).lt(height), T::lit(ERECT).lt(s.up(BUTT)[2]));
         let risen = T::and(rises, T::and(stands, erect));
-        let ended = T::and(on, T::or(risen, T::and(over, upright)));
+        let leaps = self.leaps(memory);
+        let landed = T::and(leaps, T::not(lasted.lt(T::lit(LEAPING))));
+        let ended = T::or(landed, T::and(on, T::or(risen, T::and(over, upright))));
 
         // what begins
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));
         let failed = T::or(T::and(past, height.lt(T::lit(LOW))), T::and(lost, T::not(waits)));
         let fails = T::and(rises, T::and(failed, T::not(risen)));
         let fallen = T::or(T::and(grounded, T::not(rises)), fails);
-        let free = T::and(T::and(T::not(on), T::lit(PAUSE).lt(lasted)), stands);
+        let free = T::and(T::and(T::not(T::or(on, leaps)), T::lit(PAUSE).lt(lasted)), stands);
         let wants_flip = T::and(half.lt(backflip), Steer::speed(s).lt(T::lit(SLOW)));
         let turns = T::and(free, wants_flip);
         let jumps = T::and(free, T::and(half.lt(jump), T::not(half.lt(backflip))));
         let on_the_back = T::zero().lt(s.forward(BUTT)[2]);
-        let wanted = T::select(jumps, T::lit(1.0 + JUMP as f64), T::lit(1.0 + BACKFLIP as f64));
+        let jump = T::select(T::lit(RUNNING).lt(Steer::speed(s)), T::lit(LEAP), T::lit(1.0 + JUMP as f64));
+        let wanted = T::select(jumps, jump, T::lit(1.0 + BACKFLIP as f64));
         let rising = T::select(on_the_back, T::lit(1.0 + FACE_UP as f64), T::lit(1.0 + FACE_DOWN as f64));
         let (next, enters) = (T::select(fallen, rising, wanted), T::or(fallen, T::or(jumps, turns)));
         // an attempt after a failed one counts on

@@ -100,10 +100,10 @@ pub(super) const PACE: usize = PHASE + 1;
 /// Slots that count the episode's decisions, and that hold the row of the clips where it started.
 const MADE: usize = PACE + 1;
 pub(super) const BEGUN: usize = MADE + 1;
-/// How fast the target velocity and the pace change, m/s^2, and how far the pace is from his speed at most, m/s: a run does not
-/// lead who stands.
-const ACCELERATION: f64 = 4.0;
-const LEAD: f64 = 0.8;
+/// What leads the steered figure.
+const HASTE: Haste = Haste { speeding: 4.0, slowing: 4.0, lead: 0.8, quick: false };
+/// He slows down where he is told to be slower than his target by more than this, m/s: a turn bends the target, too.
+const SLOWER: f64 = 0.3;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
 const SIDEWAYS: f64 = 2.5;
 /// Most that the commanded direction asks him to accelerate to the side, m/s^2, while he is still faster than that.
@@ -113,6 +113,28 @@ const LEANING: f64 = 3.0;
 const RESTLESS: [f64; 2] = [0.1, 0.01];
 /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
 const TURNING_RADIUS: f64 = 0.4;
+
+/// How fast what leads him changes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Haste {
+    /// Most that the target velocity and the pace change, m/s^2.
+    pub speeding: f64,
+    /// The same while he slows down.
+    pub slowing: f64,
+    /// Most that the pace is off his speed, m/s: a run does not lead who stands.
+    pub lead: f64,
+    /// The gait goes round as fast as for the target velocity, if that is faster than the pace: he starts with short, quick steps.
+    pub quick: bool,
+}
+
+impl Haste {
+    /// The speed whose steps are as quick as his are to be, m/s.
+    #[inline(always)]
+    pub fn cadence<T: Real>(self, memory: impl Fn(usize) -> T) -> T {
+        let pace = memory(PACE);
+        if self.quick { pace.max(hypot(memory(TARGET), memory(TARGET + 1))) } else { pace }
+    }
+}
 
 /// What Marathon Man is told where nobody commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -213,15 +235,15 @@ impl Steer {
 
     /// Where the gait will be after `dt` seconds.
     #[inline(always)]
-    fn next_phase<T: Real>(phase: T, pace: T, dt: f64) -> T {
-        let next = gaits().frequency(pace).mul_add(T::lit(dt), phase);
+    fn next_phase<T: Real>(phase: T, cadence: T, dt: f64) -> T {
+        let next = gaits().frequency(cadence).mul_add(T::lit(dt), phase);
         next - next.floor()
     }
 
-    /// Moves the commanded direction, the target velocity and the gait on by a decision, for a speed, a turn, and a velocity to the
-    /// left.
+    /// Moves the commanded direction, the target velocity and the gait on by a decision, for velocities ahead and to the left, and
+    /// a turn.
     #[inline(always)]
-    pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], told: T, turn: T, left: T) {
+    pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], [told, left]: [T; 2], turn: T, haste: Haste) {
         let speed = Self::speed(s);
         // the direction turns no faster than someone of his speed can
         let sharpest = T::lit(LEANING).div(speed.max(T::lit(LEANING / SHARPEST)));
@@ -230,50 +252,54 @@ impl Steer {
         let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
         let direction = heading::turned(s.heading(BUTT), direction, by, MOST_BEHIND);
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
-        memory[PHASE] = Self::next_phase(memory[PHASE], memory[PACE], s.dt());
+        memory[PHASE] = Self::next_phase(memory[PHASE], haste.cadence(|slot| memory[slot]), s.dt());
         memory[MADE] += T::lit(1.0);
         // nobody changes a velocity of 3 m/s at once, or turns sharply at it
-        let most = ACCELERATION * s.dt();
+        let [speeding, slowing] = [haste.speeding, haste.slowing].map(|rate| T::lit(rate * s.dt()));
         let sharpest = T::lit(SIDEWAYS).div(turn.abs().max(T::lit(SIDEWAYS / FASTEST)));
         let told = told.min(sharpest);
+        let slows = told.lt(hypot(memory[TARGET], memory[TARGET + 1]) - T::lit(SLOWER));
+        let most = T::select(slows, slowing, speeding);
         let beside = [-(left * direction[1]), left * direction[0]];
         let missing = [0, 1].map(|i| told.mul_add(direction[i], -memory[TARGET + i]) + beside[i]);
-        let share = T::lit(most).div(hypot(missing[0], missing[1]).max(T::lit(most)));
+        let share = most.div(hypot(missing[0], missing[1]).max(most));
         for i in 0..2 {
             memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
         }
         let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(turn.abs() * T::lit(TURNING_RADIUS));
-        let asked = speed + clamp(asked - speed, -LEAD, LEAD);
-        memory[PACE] += clamp(asked - memory[PACE], -most, most);
+        let asked = speed + clamp(asked - speed, -haste.lead, haste.lead);
+        memory[PACE] += (asked - memory[PACE]).max(-slowing).min(speeding);
     }
 
-    /// Adds the terms of the reward for the velocity, the direction, the gait and stillness, where they count. `told`: how much he is
-    /// told to go or turn, 0 if he is to stand.
+    /// Adds the terms of the reward for the velocity where `moves`, and for the direction, the gait and stillness where `goes`.
+    /// `told`: how much he is told to go or turn, 0 if he is to stand.
     #[inline(always)]
-    pub(super) fn add_terms<T: Real>(s: &Senses<T>, counts: T::Mask, told: T, terms: &mut Terms<T>) {
+    pub(super) fn add_terms<T: Real>(s: &Senses<T>, [moves, goes]: [T::Mask; 2], told: T, terms: &mut Terms<T>) {
         let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
         let angle = Self::off(s, Self::direction(s));
         let [pose, tempo] = Self::out_of_step(s);
-        let mut add = |name, weight, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
-        add("velocity", 0.3, slip * slip * T::lit(-5.0));
-        add("pace", 0.2, slip * slip * T::lit(-0.5));
-        add("drift", 0.05, slip * slip * T::lit(-100.0));
-        add("heading", 0.2, angle * angle * T::lit(-4.0));
-        add("gait", 0.2, pose * T::lit(-5.0));
-        add("tempo", 0.05, tempo * T::lit(-1.0));
-        let rest = T::and(counts, told.lt(T::lit(0.01)));
+        let mut add = |name, weight, counts, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
+        add("velocity", 0.3, moves, slip * slip * T::lit(-5.0));
+        add("pace", 0.2, moves, slip * slip * T::lit(-0.5));
+        add("drift", 0.05, moves, slip * slip * T::lit(-100.0));
+        add("heading", 0.2, goes, angle * angle * T::lit(-4.0));
+        add("gait", 0.2, goes, pose * T::lit(-5.0));
+        add("tempo", 0.05, goes, tempo * T::lit(-1.0));
+        let rest = T::and(goes, told.lt(T::lit(0.01)));
         let [shuffles, stirs] = stillness(s, PARTS.len(), RESTLESS);
         terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 
     /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
     /// `numbers`: those of the command that are the speed and the turn. `next`: the next angle of a hinge, given the gait's.
+    /// `haste`: what leads him.
     #[inline(always)]
     pub(super) fn observe_going<T: Real>(
         s: &Senses<T>,
         facing: [T; 2],
         numbers: [usize; 2],
         next: impl Fn(usize, T) -> T,
+        haste: Haste,
         out: &mut Obs<T>,
     ) {
         let turned = turned_to(facing);
@@ -299,7 +325,7 @@ impl Steer {
         for x in [pace, cos, sin] {
             out.scalar(x);
         }
-        let gait = Self::next_pose(phase, pace, s.dt(), 0.0);
+        let gait = Self::next_pose(|slot| s.memory(slot), haste, s.dt(), 0.0);
         out.group("next_pose");
         for i in 0..JOINTS.len() {
             out.scalar(next(i, gait(i)) - s.readings().qpos(FIRST_QPOS + i));
@@ -315,14 +341,20 @@ impl Steer {
     /// What he observes where nothing but the gait leads him: vectors are in his heading.
     #[inline(always)]
     pub(super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, out);
+        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, HASTE, out);
     }
 
     /// Angles of the gait's next pose, led by some seconds.
     #[inline(always)]
-    pub(super) fn next_pose<T: Real>(phase: T, pace: T, dt: f64, lead: f64) -> impl Fn(usize) -> T {
+    pub(super) fn next_pose<T: Real>(
+        memory: impl Fn(usize) -> T,
+        haste: Haste,
+        dt: f64,
+        lead: f64,
+    ) -> impl Fn(usize) -> T {
         let gaits = gaits();
-        let next = gaits.moment(Self::next_phase(phase, pace, dt), pace, lead);
+        let (phase, pace) = (memory(PHASE), memory(PACE));
+        let next = gaits.moment(Self::next_phase(phase, haste.cadence(memory), dt), pace, lead);
         move |joint| gaits.angle(&next, joint)
     }
 
@@ -419,8 +451,7 @@ impl Agent for Steer {
             Control::Pd => {
                 let reach = T::lit(self.arguments.reach.0);
                 // the servo's damping, which slows every motion, is not to slow the gait
-                let [phase, pace] = [PHASE, PACE].map(|slot| c.memory[slot]);
-                let next = Self::next_pose(phase, pace, c.dt, DAMPING_TIME);
+                let next = Self::next_pose(|slot| c.memory[slot], HASTE, c.dt, DAMPING_TIME);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
                     c.ctrl[i] = c.action[i].mul_add(reach, next(joint));
                 }
@@ -438,7 +469,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        Self::lead(s, memory, s.command(0), s.command(1), T::zero());
+        Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), HASTE);
     }
 
     #[inline(always)]
@@ -448,7 +479,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        Self::add_terms(s, T::not(T::none()), Self::told(s), terms);
+        Self::add_terms(s, [T::not(T::none()); 2], Self::told(s), terms);
     }
 
     #[inline(always)]
