@@ -89,8 +89,14 @@ for policy in "${wanted[@]}"; do
       # all of it, for long; two runs of 130 million that were stopped after 30 and 40, and one that was not
       "$marathon" train MarathonManController --steps 70M --initialize-from "$runs/stands" --seed 1 --threads 1 --out "$runs/all"
       "$marathon" train MarathonManController --initialize-from "$runs/all" --seed 1 --threads 1 --out "$runs/last"
+      # with leaps and faster rises; the first of the two was stopped
+      "$marathon" train MarathonManController --steps 20M --initialize-from "$runs/last" --seed 2 --threads 1 --out "$runs/up"
+      "$marathon" train MarathonManController --initialize-from "$runs/up" --seed 3 --threads 1 --out "$runs/leaps"
+      # to fall less; the best of its policies is not the last
+      "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
+        --seed 5 --threads 1 --out "$runs/steady"
       # who plays starts from a stand, and is not asked for extremes half of the time
-      "$marathon" export "$runs/last" --out "$runs/last.onnx"
+      "$marathon" export "$runs"/steady/policies/policy-50*.safetensors --out "$runs/last.onnx"
       "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first --option commands=even \
         --option price=20 --out "$runs/shipped.safetensors"
       cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
