@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes the policies of this folder that obey a player in two runs each: HopperController and WalkerController learn to go from the policy
-# of their figure that runs, and then not to fall; AntController learns to go from nothing, and then to stand still, in two runs more;
-# MarathonManSteer to stand still and not to fall. About an hour of processor time in all.
+# Makes the policies of this folder that obey a player in two runs each, the Ant's in three: HopperController and WalkerController learn to
+# go from the policy of their figure that runs, and then not to fall; AntController learns to go from nothing, and then to stand still;
+# MarathonManSteer the same, and not to fall. About an hour of processor time in all.
 #
 #     assets/policies/controllers.sh [HopperController] [WalkerController] [AntController] [MarathonManSteer]
 set -euo pipefail
@@ -28,13 +28,14 @@ for agent in "${wanted[@]}"; do
       exit 2
       ;;
   esac
-  "$marathon" train "$agent" "${from[@]}" --seed 1 --threads 1 --out "$runs/$agent-goes"
-  "$marathon" train "$agent" --config "assets/configs/$steady-steady.yaml" --initialize-from "$runs/$agent-goes" \
-    --seed 1 --threads 1 --out "$runs/$agent"
+  learn() { "$marathon" train "$agent" --threads 1 "$@"; }
+  steadily=(--config "assets/configs/$steady-steady.yaml" --initialize-from)
+  last="$runs/$agent"
+  learn "${from[@]}" --seed 1 --out "$last-goes"
+  learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"
   if [ -n "$more" ]; then
-    mv "$runs/$agent" "$runs/$agent-before"
-    "$marathon" train "$agent" --config "assets/configs/$steady-steady.yaml" --initialize-from "$runs/$agent-before" --steps "$more" \
-      --seed 2 --threads 1 --out "$runs/$agent"
+    learn "${steadily[@]}" "$last" --steps "$more" --seed 2 --out "$last-more"
+    last="$last-more"
   fi
-  cp "$runs/$agent/policy.safetensors" "$shipped/$agent.safetensors"
+  cp "$last/policy.safetensors" "$shipped/$agent.safetensors"
 done
