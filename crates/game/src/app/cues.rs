@@ -27,9 +27,14 @@ impl FromStr for Cue {
         }
         let values = Deed::value_variants().iter().filter_map(Deed::to_possible_value);
         let names: Vec<String> = values.map(|value| value.get_name().to_string()).collect();
-        let hint = nearest(name, names.iter().map(String::as_str)).map(|n| format!(", did you mean '{n}'?"));
-        Err(format!("there is no '{name}'{}; known: {}", hint.unwrap_or_default(), names.join(", ")))
+        Err(format!("there is no '{name}'{}", known(name, &names)))
     }
+}
+
+/// What an error about an unknown name ends with: the nearest name that is known, and all of them.
+pub(super) fn known(name: &str, names: &[String]) -> String {
+    let hint = nearest(name, names.iter().map(String::as_str)).map(|n| format!(", did you mean '{n}'?"));
+    format!("{}; known: {}", hint.unwrap_or_default(), names.join(", "))
 }
 
 /// The cues that are still to come, the last first.

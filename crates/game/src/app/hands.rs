@@ -4,7 +4,7 @@
 //! A hold becomes what a device's driver would send, so that it takes the same way as a player's: through Bevy's input, the
 //! bindings and the mappings.
 
-use crate::app::keys;
+use crate::app::{cues, keys};
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{
     GamepadAxis, GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent,
@@ -12,7 +12,6 @@ use bevy::input::gamepad::{
 };
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
-use marathon_envs::nearest;
 use std::str::FromStr;
 
 /// Axes of a gamepad, and triggers, which move like axes, from 0 on.
@@ -71,8 +70,7 @@ impl FromStr for Hold {
         let Some(control) = control else {
             let of_pad = || AXES.iter().map(|(name, _)| name.to_string()).chain(keys::button_names()).collect();
             let names: Vec<String> = if number.is_some() { of_pad() } else { keys::key_names().collect() };
-            let hint = nearest(name, names.iter().map(String::as_str)).map(|n| format!(", did you mean '{n}'?"));
-            return Err(format!("a {device} has no '{name}'{}; known: {}", hint.unwrap_or_default(), names.join(", ")));
+            return Err(format!("a {device} has no '{name}'{}", cues::known(name, &names)));
         };
         let amount = match amount {
             None => 1.0,
