@@ -110,6 +110,12 @@ fn errors_say_what_to_do() {
     assert!(text.contains("there is no mapping for it, only for marathon_man, humanoid, walker2d"), "{text}");
     let text = import("bend.txt", "humanoid", "a.json", 2);
     assert!(text.contains("--out is a.json, expected a name that ends with .motion"), "{text}");
+    for balance in ["-1", "101", "nan"] {
+        let balance = format!("--balance={balance}");
+        let options = ["motion", "import", "none.bvh", "--model", "humanoid", "--out", "a.motion", &balance];
+        let text = fail(temp.path(), 2, &options);
+        assert!(text.contains("--balance is ") && text.contains("expected a factor from 0 to 100"), "{text}");
+    }
     // what is wrong with the options is told before a long file is read
     let text = import("none.bvh", "humanoid", "a.json", 2);
     assert!(text.contains("--out is a.json"), "{text}");

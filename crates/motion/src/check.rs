@@ -57,6 +57,8 @@ mod bound {
     pub const SLIDE: f64 = 0.03;
     /// Share of the weight that nothing gives, and that what flies does not fall by.
     pub const MISSING: f64 = 0.5;
+    /// Weight times m.
+    pub const UNBALANCED: f64 = 0.15;
     /// Joints that are worth a note.
     pub const HARDEST: usize = 3;
     /// kg m^2/s.
@@ -163,7 +165,7 @@ impl Report {
     /// What physics says to the clip, one sentence each: what the motors could not do, and where nothing pushes the figure
     /// as it moves. Motion capture is never free of it, so a clip can be sound nevertheless.
     pub fn notes(&self) -> Vec<String> {
-        let Some(Efforts { joints, missing, flights }) = &self.efforts else { return Vec::new() };
+        let Some(Efforts { joints, missing, unbalanced, flights }) = &self.efforts else { return Vec::new() };
         let mut out = Vec::new();
         for effort in joints.iter().filter(|effort| effort.beyond > 0.0).take(bound::HARDEST) {
             out.push(format!(
@@ -178,6 +180,10 @@ impl Report {
         if missing.value > bound::MISSING {
             let share = 1e2 * missing.value;
             out.push(format!("frame {}: {share:.0} % of the weight is pushed by nothing", missing.frame));
+        }
+        if unbalanced.value > bound::UNBALANCED {
+            let (frame, moment) = (unbalanced.frame, unbalanced.value);
+            out.push(format!("frame {frame}: a moment of the weight times {moment:.2} m is held by nothing"));
         }
         for flight in flights {
             let [x, y, z] = flight.acceleration;

@@ -67,6 +67,8 @@ pub struct Efforts {
     pub joints: Vec<Effort>,
     /// Force at the root that neither motors nor ground give, as a share of the weight, where it is largest.
     pub missing: Worst,
+    /// Moment at the root that neither motors nor ground give, as a share of the weight times a meter, where it is largest.
+    pub unbalanced: Worst,
     /// Flights of a tenth of a second or more.
     pub flights: Vec<Flight>,
 }
@@ -86,13 +88,13 @@ pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, Motio
     let strengths = strengths(model);
     let weight = model.bodies.iter().map(|body| body.mass).sum::<f64>() * 9.81;
     let root = model.joints.first().map_or(0, |joint| joint.body);
-    let lifts: Vec<bool> = (model.dofs.iter().enumerate())
-        .map(|(i, dof)| {
-            let joint = &model.joints[dof.joint];
-            let linear = joint.kind == JointType::Slide || joint.kind == JointType::Free && i - joint.dof_adr < 3;
-            dof.body == root && linear
-        })
-        .collect();
+    // degrees of freedom that nothing drives: those that move the root, and those that turn it
+    let of_root = |i: usize| model.dofs[i].body == root;
+    let linear = |i: usize| {
+        let joint = &model.joints[model.dofs[i].joint];
+        joint.kind == JointType::Slide || joint.kind == JointType::Free && i - joint.dof_adr < 3
+    };
+    let (lifts, turns): (Vec<usize>, Vec<usize>) = (0..model.nv).filter(|i| of_root(*i)).partition(|i| linear(*i));
     let mut states = Vec::with_capacity(clip.frames());
     let mut needs = Vec::with_capacity(clip.frames());
     for i in 0..clip.frames() {
@@ -104,15 +106,17 @@ pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, Motio
         carry(model, &pose, &near, &strengths, weight, &mut forces);
         needs.push(forces);
     }
-    let mut missing = Worst::default();
+    let [mut missing, mut unbalanced] = [Worst::default(), Worst::default()];
     let mut hardest: Vec<Option<(f64, Effort)>> = vec![None; model.nv];
     let mut beyond = vec![0usize; model.nv];
     let half = libm::round(0.5 * WINDOW / clip.dt()) as usize;
     for i in 0..clip.frames() {
         let window = &needs[i.saturating_sub(half)..(i + half + 1).min(needs.len())];
         let mean = |dof: usize| window.iter().map(|forces| forces[dof]).sum::<f64>() / window.len() as f64;
-        let left = (0..model.nv).filter(|dof| lifts[*dof]).map(|dof| mean(dof) * mean(dof)).sum::<f64>();
-        missing.meet(left.sqrt() / weight, i, || model.bodies[root].name.clone());
+        for (worst, dofs) in [(&mut missing, &lifts), (&mut unbalanced, &turns)] {
+            let left = dofs.iter().map(|dof| mean(*dof) * mean(*dof)).sum::<f64>();
+            worst.meet(left.sqrt() / weight, i, || model.bodies[root].name.clone());
+        }
         for dof in 0..model.nv {
             let Some([low, high]) = strengths[dof] else { continue };
             let force = mean(dof);
@@ -132,7 +136,7 @@ pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, Motio
     let mut joints: Vec<(f64, Effort)> = hardest.into_iter().enumerate().filter_map(with_share).collect();
     joints.sort_by(|a, b| b.0.total_cmp(&a.0));
     let joints = joints.into_iter().map(|(_, effort)| effort).collect();
-    Ok(Efforts { joints, missing, flights: flights(&states, clip.dt()) })
+    Ok(Efforts { joints, missing, unbalanced, flights: flights(&states, clip.dt()) })
 }
 
 /// Flights in frames that tell whether all is high above the ground, and the momentum.

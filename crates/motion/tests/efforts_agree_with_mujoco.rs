@@ -51,10 +51,17 @@ fn forces_and_momentum_are_mujocos() {
 
 /// A box of 2 kg that a motor of 3 N m can turn against its heavy arm, at heights of a function of time.
 fn thrown_box(height: impl Fn(f64) -> f64) -> (Model, Clip) {
-    let xml = "<mujoco model='box'><worldbody><body name='box'><freejoint name='root'/><geom type='box' size='.5 .5 .1' mass='2'/>\
-        <body name='arm'><joint name='arm' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 .5 0 0' size='.02' mass='1'/>\
-        </body></body></worldbody><actuator><motor joint='arm' ctrllimited='true' ctrlrange='-1 1' gear='3'/></actuator></mujoco>";
-    let model = Model::from_xml_str_with(xml, "box.xml", &|_| Err(String::new())).expect("a model");
+    box_with_arm(0.5, height)
+}
+
+/// The same with an arm of a length in meters.
+fn box_with_arm(length: f64, height: impl Fn(f64) -> f64) -> (Model, Clip) {
+    let xml = format!(
+        "<mujoco model='box'><worldbody><body name='box'><freejoint name='root'/><geom type='box' size='.5 .5 .1' mass='2'/>\
+        <body name='arm'><joint name='arm' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 {length} 0 0' size='.02' mass='1'/>\
+        </body></body></worldbody><actuator><motor joint='arm' ctrllimited='true' ctrlrange='-1 1' gear='3'/></actuator></mujoco>"
+    );
+    let model = Model::from_xml_str_with(&xml, "box.xml", &|_| Err(String::new())).expect("a model");
     let row = |i: usize| vec![0.0, 0.0, height(i as f64 / 60.0), 1.0, 0.0, 0.0, 0.0, 0.0];
     let rows: Vec<Vec<f64>> = (0..30).map(row).collect();
     let about = About { model: "box".into(), ..About::default() };
@@ -85,6 +92,21 @@ fn the_ground_carries_what_lies_on_it_and_the_arm_takes_its_torque() {
     let [arm] = &found.joints[..] else { panic!("{:?}", found.joints) };
     assert!(arm.joint == "arm" && (arm.needed - 9.81 * 0.25).abs() < 0.01 && arm.strength == 3.0, "{arm:?}");
     assert_eq!(arm.beyond, 0.0);
+}
+
+#[test]
+fn nothing_holds_what_leans_out_beyond_its_support() {
+    // the arm's middle is at half of its length: the center of mass at a sixth, and the box's edge at 0.5 m
+    let moment = |length: f64| {
+        let (model, leaning) = box_with_arm(length, |_| 0.1);
+        efforts("leaning".as_ref(), &leaning, &model).expect("efforts").unbalanced.value
+    };
+    let [within, beyond, far] = [2.4, 4.0, 6.0].map(moment);
+    assert!(within < 0.01, "{within}");
+    // a sixth to a quarter of it counts as a missing force instead, which the same least squares weigh
+    for (found, exact) in [(beyond, 4.0 / 6.0 - 0.5), (far, 6.0 / 6.0 - 0.5)] {
+        assert!(found > 0.7 * exact && found < exact, "{found} of {exact}");
+    }
 }
 
 #[test]

@@ -1,11 +1,13 @@
-//! Retargeting respects limits, ground, contacts and bones; the identity mapping gives the clip again; what ships is sound.
+//! Retargeting respects limits, ground, contacts, bones and balance; the identity mapping gives the clip again; what ships is sound.
 
 mod common;
 
 use common::{all_shipped, file, model, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
-use marathon_motion::{Animation, Mapping, check, import, retarget, soles};
+use marathon_motion::{About, Animation, Clip, Fit, Layout, Mapping, check, efforts, fit, import, retarget, soles};
+use marathon_physics::Model;
+use std::path::Path;
 
 #[test]
 fn shipped_clips_have_nothing_to_warn_of() {
@@ -146,6 +148,68 @@ fn a_recording_of_another_skeleton_unit_and_pose_moves_the_same_limbs() {
         let report = check("mixamo.bvh".as_ref(), &clip, &model, &soles(&model)).unwrap();
         assert_eq!(report.warnings(), Vec::<String>::new(), "{character}");
     }
+}
+
+/// A clip of Marathon Man again, as the law of balance makes it with a factor.
+fn balanced(model: &Model, clip: &Clip, factor: f64) -> (Clip, Fit) {
+    let path = Path::new("clip");
+    let animation = Animation::of_clip(path, model, clip).unwrap();
+    let animation = if animation.wraps() { animation.looped() } else { animation };
+    let parts: Vec<String> = (model.bodies.iter().filter(|body| body.mass > 0.0))
+        .map(|body| format!(r#""{0}": {{"joint": "{0}", "rotation": 0.3, "position": 1}}"#, body.name))
+        .collect();
+    let text = format!(
+        r#"{{"mapping": 1, "model": "marathon_man", "hips": ["left_thigh", "right_thigh"],
+        "soles": ["left_foot", "right_foot"], "parts": {{{}}}}}"#,
+        parts.join(", ")
+    );
+    let mapping = Mapping::parse("m.json".as_ref(), text.as_bytes(), animation.skeleton(), model).unwrap();
+    let mapping = mapping.balanced(factor);
+    let again = retarget(path, &animation, model, &mapping).unwrap();
+    let fit = fit(path, &animation, model, &mapping, &again).unwrap();
+    (again, fit)
+}
+
+#[test]
+fn nobody_falls_over_faster_than_weight_and_ground_let_him() {
+    let model = model("marathon_man");
+    let clip = shipped("marathon_man", "cartwheel");
+    let [(moment, _), (lawful, fit)] = [0.0, 1.0].map(|factor| {
+        let (again, fit) = balanced(&model, &clip, factor);
+        (efforts("clip".as_ref(), &again, &model).unwrap().unbalanced.value, fit)
+    });
+    println!("{moment}, {lawful}, {fit:?}");
+    assert!(moment > 0.4 && lawful < 0.5 * moment, "a moment of {moment}, with the law {lawful}");
+    assert!(fit.position < 0.03, "{fit:?}");
+}
+
+#[test]
+fn nobody_begins_to_turn_in_the_air() {
+    let model = model("marathon_man");
+    let stand = shipped("marathon_man", "stand");
+    let dt = 1.0 / 60.0;
+    // a second in the air, upright in the first half, falling forward in the second
+    let rows: Vec<Vec<f64>> = (0..=60)
+        .map(|i| {
+            let time = f64::from(i) * dt;
+            let mut qpos = stand.frame(0).to_vec();
+            qpos[2] += 0.2 + 0.5 * 9.81 * time * (1.0 - time);
+            let pitch = DQuat::from_rotation_y(2.0 * (time - 0.5).max(0.0));
+            let turned = pitch * DQuat::from_xyzw(qpos[4], qpos[5], qpos[6], qpos[3]);
+            qpos[3..7].copy_from_slice(&[turned.w, turned.x, turned.y, turned.z]);
+            qpos
+        })
+        .collect();
+    let about = About { model: "marathon_man".into(), ..About::default() };
+    let clip = Clip::new("clip".as_ref(), about, Layout::of(&model), dt, None, &rows).unwrap();
+    let [free, lawful] = [0.0, 10.0].map(|factor| {
+        let (again, fit) = balanced(&model, &clip, factor);
+        let flights = efforts("clip".as_ref(), &again, &model).unwrap().flights;
+        println!("{factor}: {flights:?} {fit:?}");
+        let [flight] = &flights[..] else { panic!("{flights:?}") };
+        flight.gained[1].abs()
+    });
+    assert!(free > 15.0 && lawful < 0.3 * free, "{free} kg m^2/s gained, with the law {lawful}");
 }
 
 #[test]

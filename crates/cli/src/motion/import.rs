@@ -41,6 +41,9 @@ fn check_edits(edits: &Edits) -> Result<(), CliError> {
     if !(0.0..=10.0).contains(&edits.smooth) {
         return Err(CliError::Usage(format!("--smooth is {}, expected 0 to 10 seconds", edits.smooth)));
     }
+    if !(0.0..=100.0).contains(&edits.balance) {
+        return Err(CliError::Usage(format!("--balance is {}, expected a factor from 0 to 100", edits.balance)));
+    }
     if let Some(&[from, to]) = edits.trim.as_deref()
         && !(from >= 0.0 && to > from)
     {
@@ -74,6 +77,7 @@ fn write(path: &Path, animation: Animation, model: &Model, edits: &Edits, json: 
         }
         None => Mapping::built_in(path, animation.skeleton(), model)?,
     };
+    let mapping = mapping.balanced(edits.balance);
     let mut clip = marathon_motion::retarget(path, &animation, model, &mapping)?;
     let fit = marathon_motion::fit(path, &animation, model, &mapping, &clip)?;
     if edits.mirror {

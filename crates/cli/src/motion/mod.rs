@@ -73,6 +73,9 @@ pub struct Edits {
     /// Standard deviation of a Gaussian filter over the recording, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub smooth: f64,
+    /// Factor on the law of balance, that nobody turns in the air, or falls over, but as weight and ground let them.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub balance: f64,
     /// Exchange left and right.
     #[arg(long)]
     pub mirror: bool,

@@ -97,6 +97,8 @@ pub struct Mapping {
     pub(crate) soles: Vec<usize>,
     /// Factor on the smoothing of the result, and on the law of its center of mass.
     pub(crate) smooth: f64,
+    /// Factor on the law of its balance, on top of that.
+    pub(crate) balance: f64,
 }
 
 /// Mappings that come with the crate, by the model's name. Their joints are those of [`roles`].
@@ -135,6 +137,13 @@ impl Mapping {
         let text =
             format!("{{\"mapping\": 1, \"model\": {name}, \"hips\": {hips:?}, \"smooth\": 0, \"parts\": {{{parts}}}}}");
         Self::parse(path, text.as_bytes(), skeleton, model)
+    }
+
+    /// The same mapping with another factor on the law of balance, that only the ground, where it is touched, can change how the
+    /// figure turns. It is 1 at first. The larger, the more the result is what a figure could do, and the less what the recording
+    /// shows.
+    pub fn balanced(self, factor: f64) -> Self {
+        Mapping { balance: factor, ..self }
     }
 
     /// The bodies that stand, by index.
@@ -177,7 +186,7 @@ impl Mapping {
         if !(0.0..=100.0).contains(&smooth) {
             return Err(MotionError::value(path, "smooth", smooth, "a factor from 0 to 100"));
         }
-        Ok(Mapping { smooth, parts: parts.into_iter().map(|(_, part)| part).collect(), hips, soles })
+        Ok(Mapping { smooth, balance: 1.0, parts: parts.into_iter().map(|(_, part)| part).collect(), hips, soles })
     }
 }
 

@@ -6,6 +6,7 @@
 //! mass moves as gravity and the ground let it.
 
 mod align;
+mod balance;
 mod band;
 mod fit;
 mod mapping;
@@ -75,7 +76,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         couples: &[],
         targets,
         held,
-        airborne: &[],
+        support: &[],
         dt,
         calm: CALM * mapping.smooth,
     };
@@ -93,7 +94,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     }
     // a figure whose root is fixed is carried by what it is fixed to
     let travels = matches!(model.joints[0].kind, JointType::Free | JointType::Slide);
-    let mut airborne = Vec::new();
+    let mut support = Vec::new();
     for pass in 0..PASSES {
         if let Some(cycle) = &cycle {
             repeat(cycle, &layout, &mut frames, margin);
@@ -101,11 +102,11 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         if pass > 0 {
             held = contact::held(model, &touches, &mapping.soles, &frames, dt);
             if travels {
-                airborne = weight::airborne(model, &touches, &frames);
+                support = weight::support(model, &touches, &frames);
             }
         }
         let rough = problem(&all, &none);
-        let fine = Problem { couples: &couples, held: &held, airborne: &airborne, calm: mapping.smooth, ..rough };
+        let fine = Problem { couples: &couples, held: &held, support: &support, calm: mapping.smooth, ..rough };
         if pass == 0 {
             rough.solve(&mut frames, 25)
         } else {
@@ -117,7 +118,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let mut calm = mapping.smooth;
     while calm > 0.0 && calm < CALM * mapping.smooth && fastest(model, &frames, dt) > FASTEST {
         calm *= 2.0;
-        Problem { couples: &couples, held: &held, airborne: &airborne, calm, ..problem(&all, &none) }
+        Problem { couples: &couples, held: &held, support: &support, calm, ..problem(&all, &none) }
             .solve(&mut frames, 25);
     }
 

@@ -49,8 +49,8 @@ pub(super) struct Problem<'a> {
     pub targets: &'a [Target],
     /// Per frame and touch: whether it is held.
     pub held: &'a [Vec<bool>],
-    /// Per frame: whether nothing is on the ground; empty if the center of mass may do anything.
-    pub airborne: &'a [bool],
+    /// Per frame: what is on the ground; empty if the center of mass may do anything.
+    pub support: &'a [Vec<DVec3>],
     /// Seconds between frames.
     pub dt: f64,
     /// Factor on the weights of velocities and accelerations.
@@ -194,6 +194,7 @@ impl Problem<'_> {
             self.apart_rows(i, &poses[i], sink);
         }
         self.weight_rows(&poses, sink);
+        self.balance_rows(&poses, sink);
         for i in 1..frames.len() {
             self.still_rows(i, &frames[i - 1], &frames[i], sink);
         }

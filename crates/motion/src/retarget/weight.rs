@@ -3,9 +3,9 @@
 //! Recordings break this law, and retargeting does: a foot that is put where it belongs shifts the whole figure, and a flight
 //! at the proportions of another person is too high for its time. A figure with motors cannot follow that. In the air the
 //! center of mass is to fall; on the ground, which only pushes, it may be accelerated within a cone of friction.
+//! What the ground does to the turning of the figure is in [`balance`](super::balance).
 
 use super::problem::{Problem, Row, Sink};
-use crate::contact::clearance;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use glam::DVec3;
@@ -18,15 +18,16 @@ const FALL: f64 = 0.12;
 /// Of accelerations on the ground, s^2/m: people move smoothly.
 const EFFORT: f64 = 0.001;
 /// Gravity, m/s^2.
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 /// Friction of a foot on the ground, in directions along x and y.
 const FRICTION: f64 = 1.0;
 /// Height up to which a part may be on the ground, m.
 const NEAR: f64 = 0.02;
 
-/// Per frame: whether nothing is on the ground.
-pub(super) fn airborne(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> Vec<bool> {
-    frames.iter().map(|frame| clearance(touches, &Pose::of(model, frame)) > NEAR).collect()
+/// Per frame: the points that may be on the ground; none in a flight.
+pub(super) fn support(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> Vec<Vec<DVec3>> {
+    let near = |pose: Pose| touches.iter().map(|touch| touch.lowest(&pose)).filter(|point| point.z <= NEAR).collect();
+    frames.iter().map(|frame| near(Pose::of(model, frame))).collect()
 }
 
 /// Center of mass of a pose, and how it moves with each degree of freedom.
@@ -46,7 +47,7 @@ impl Problem<'_> {
     pub(super) fn weight_rows(&self, poses: &[Pose], sink: &mut Sink) {
         let (model, nv) = (self.model, self.model.nv);
         let factor = self.mapping.smooth;
-        if self.airborne.is_empty() || factor == 0.0 {
+        if self.support.is_empty() || factor == 0.0 {
             return;
         }
         let [law, fall, effort] = [LAW, FALL, EFFORT].map(|weight| factor * weight);
@@ -69,7 +70,7 @@ impl Problem<'_> {
                 let residual = weight * along.dot(felt);
                 sink(if even { Row::Even(residual, &by) } else { Row::Bound(residual, &by) });
             };
-            if self.airborne[i] {
+            if self.support[i].is_empty() {
                 [DVec3::X, DVec3::Y, DVec3::Z].into_iter().for_each(|axis| row(fall, axis, true));
                 continue;
             }
