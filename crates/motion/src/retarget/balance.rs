@@ -48,6 +48,16 @@ fn points(model: &Model, pose: &Pose) -> Vec<Point> {
     points
 }
 
+/// What is asked of the moment about a line.
+struct Law {
+    /// A point of the line, and its direction.
+    about: DVec3,
+    axis: DVec3,
+    weight: f64,
+    /// About an edge of the support, where gravity counts and the moment may be positive; else it is to be nothing.
+    of_edge: bool,
+}
+
 impl Problem<'_> {
     /// What the turning of figures with a free root may do.
     pub(super) fn balance_rows(&self, poses: &[Pose], sink: &mut Sink) {
@@ -60,9 +70,9 @@ impl Problem<'_> {
             let near = [&all[i - 1], &all[i], &all[i + 1]];
             let support = &self.support[i];
             if support.is_empty() {
-                let center = near[1].iter().map(|point| point.share * point.at).sum::<DVec3>();
+                let about = near[1].iter().map(|point| point.share * point.at).sum::<DVec3>();
                 for axis in DVec3::AXES {
-                    self.moment_row(i, near, center, axis, factor * TURN, false, sink);
+                    self.moment_row(i, near, &Law { about, axis, weight: factor * TURN, of_edge: false }, sink);
                 }
                 continue;
             }
@@ -70,35 +80,26 @@ impl Problem<'_> {
                 let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / EDGES as f64);
                 let out = DVec3::new(cos, sin, 0.0);
                 let furthest = support.iter().map(|point| point.dot(out)).fold(f64::NEG_INFINITY, f64::max);
-                self.moment_row(i, near, (furthest + MARGIN) * out, DVec3::Z.cross(out), factor * EDGE, true, sink);
+                let (about, axis) = ((furthest + MARGIN) * out, DVec3::Z.cross(out));
+                self.moment_row(i, near, &Law { about, axis, weight: factor * EDGE, of_edge: true }, sink);
             }
         }
     }
 
-    /// The moment of gravity and accelerations about a line through a point: it may be positive if it is of an edge, or else is to be
-    /// nothing.
-    #[allow(clippy::too_many_arguments)]
-    fn moment_row(
-        &self,
-        i: usize,
-        near: [&Vec<Point>; 3],
-        about: DVec3,
-        axis: DVec3,
-        weight: f64,
-        of_edge: bool,
-        sink: &mut Sink,
-    ) {
+    /// The moment in frame `i` of what moves the points, which are those of the frame before it, of it, and of the one after.
+    fn moment_row(&self, i: usize, near: [&Vec<Point>; 3], law: &Law, sink: &mut Sink) {
+        let &Law { about, axis, weight, of_edge } = law;
         let nv = self.model.nv;
         let rate = 1.0 / (self.dt * self.dt);
+        let gravity = if of_edge { GRAVITY * DVec3::Z } else { DVec3::ZERO };
         let mut by = vec![0.0; 3 * nv];
-        let (mut moment, mut falling) = (0.0, DVec3::ZERO);
+        let (mut moment, mut force) = (0.0, DVec3::ZERO);
         let [before, now, after] = near;
         for ((before, now), after) in before.iter().zip(now).zip(after) {
-            let felt =
-                rate * (before.at - 2.0 * now.at + after.at) + if of_edge { GRAVITY * DVec3::Z } else { DVec3::ZERO };
+            let felt = rate * (before.at - 2.0 * now.at + after.at) + gravity;
             let arm = now.at - about;
             moment += now.share * arm.cross(felt).dot(axis);
-            falling += now.share * felt;
+            force += now.share * felt;
             // of the force, then of its arm
             let lever = now.share * rate * axis.cross(arm);
             for (k, (point, sign)) in [(before, 1.0), (now, -2.0), (after, 1.0)].into_iter().enumerate() {
@@ -109,18 +110,17 @@ impl Problem<'_> {
         }
         if !of_edge {
             // the center of mass moves, too
-            let pull = falling.cross(axis);
+            let pull = force.cross(axis);
             for point in now {
                 point.by.iter().for_each(|(dof, shift)| by[nv + dof] -= point.share * pull.dot(*shift));
             }
         }
         let first = (i - 1) * nv;
-        let by: Vec<(usize, f64)> = by
-            .into_iter()
-            .enumerate()
+        let by: Vec<(usize, f64)> = (by.into_iter().enumerate())
             .filter(|(_, by)| *by != 0.0)
             .map(|(dof, by)| (first + dof, weight * by))
             .collect();
-        sink(if of_edge { Row::Bound(weight * moment, &by) } else { Row::Even(weight * moment, &by) });
+        let residual = weight * moment;
+        sink(if of_edge { Row::Bound(residual, &by) } else { Row::Even(residual, &by) });
     }
 }
