@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the policies of this folder that are learned from others: MarathonMan (one for sixteen clips) and
-# MarathonManController. What they are learned from is trained before, but for the policies that are here; more than four hours
+# MarathonManController. What they are learned from is trained before, but for the policies that are here; more than seven hours
 # of processor time in all.
 #
 #     assets/policies/distill.sh [MarathonMan] [MarathonManController]
@@ -53,10 +53,8 @@ for policy in "${wanted[@]}"; do
       learn "$left" "$left" "$right" "$flip" "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 8M --lr 3e-4 --seed 5 \
         --initialize-from "$runs/four.safetensors" --out "$runs/five.safetensors"
       # then three that are harder; of the others it is its own teacher, of all of them or of some
+      "$marathon" export "$runs/five.safetensors" --out "$runs/five.onnx"
       of_itself() {
-        if [ ! -f "$runs/five.onnx" ]; then
-          "$marathon" export "$runs/five.safetensors" --out "$runs/five.onnx" >&2
-        fi
         "$marathon" import "$runs/five.onnx" --agent MarathonMan --option future=3 --option start=adaptive --option "clip=$2" \
           --out "$runs/$1.safetensors" >&2
         echo "--teacher=$runs/$1.safetensors"

@@ -73,7 +73,7 @@ pub struct Edits {
     /// Standard deviation of a Gaussian filter over the recording, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub smooth: f64,
-    /// Factor on the law of balance, that nobody turns in the air, or falls over, but as weight and ground let them.
+    /// Factor on the law of balance: only the ground, where it is touched, changes how the figure turns.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     pub balance: f64,
     /// Exchange left and right.

@@ -5,7 +5,7 @@
 //! A recording that breaks this law asks a figure to fall over faster than anybody falls, or to turn on nothing.
 
 use super::problem::{Problem, Row, Sink};
-use super::weight::GRAVITY;
+use super::weight::{GRAVITY, center};
 use crate::kinematics::Pose;
 use crate::rotation::quat;
 use glam::DVec3;
@@ -48,14 +48,34 @@ fn points(model: &Model, pose: &Pose) -> Vec<Point> {
     points
 }
 
-/// What is asked of the moment about a line.
-struct Law {
-    /// A point of the line, and its direction.
-    about: DVec3,
-    axis: DVec3,
-    weight: f64,
-    /// About an edge of the support, where gravity counts and the moment may be positive; else it is to be nothing.
-    of_edge: bool,
+/// What moves the figure in a frame, gravity taken off: a force and its moment about the world's origin, per mass.
+struct Wrench {
+    force: DVec3,
+    moment: DVec3,
+    /// How both change with each degree of freedom of the frame before, of the frame, and of the one after.
+    by: Vec<[DVec3; 2]>,
+}
+
+/// The wrench on points in three frames that are `dt` apart.
+fn wrench(near: [&Vec<Point>; 3], nv: usize, dt: f64) -> Wrench {
+    let rate = 1.0 / (dt * dt);
+    let [before, now, after] = near;
+    let (mut force, mut moment, mut by) = (DVec3::ZERO, DVec3::ZERO, vec![[DVec3::ZERO; 2]; 3 * nv]);
+    for ((before, now), after) in before.iter().zip(now).zip(after) {
+        let push = now.share * (rate * (before.at - 2.0 * now.at + after.at) + GRAVITY * DVec3::Z);
+        force += push;
+        moment += now.at.cross(push);
+        for (k, (point, sign)) in [(before, 1.0), (now, -2.0), (after, 1.0)].into_iter().enumerate() {
+            for (dof, shift) in &point.by {
+                let change = now.share * rate * sign * shift;
+                let [of_force, of_moment] = &mut by[k * nv + dof];
+                *of_force += change;
+                *of_moment += now.at.cross(change);
+            }
+        }
+        now.by.iter().for_each(|(dof, shift)| by[nv + dof][1] += shift.cross(push));
+    }
+    Wrench { force, moment, by }
 }
 
 impl Problem<'_> {
@@ -65,14 +85,26 @@ impl Problem<'_> {
         if self.support.is_empty() || factor == 0.0 {
             return;
         }
+        let nv = self.model.nv;
         let all: Vec<Vec<Point>> = poses.iter().map(|pose| points(self.model, pose)).collect();
         for i in 1..poses.len().saturating_sub(1) {
-            let near = [&all[i - 1], &all[i], &all[i + 1]];
+            let Wrench { force, moment, by } = wrench([&all[i - 1], &all[i], &all[i + 1]], nv, self.dt);
+            // the moment about a line, and its changes, given those of a point of the line
+            let along = |about: DVec3, axis: DVec3, weight: f64, moved: &[DVec3]| {
+                let mut row: Vec<f64> = by.iter().map(|[f, m]| weight * axis.dot(m - about.cross(*f))).collect();
+                for (row, moved) in row[nv..].iter_mut().zip(moved) {
+                    *row -= weight * axis.dot(moved.cross(force));
+                }
+                let row = row.into_iter().enumerate().filter(|(_, by)| *by != 0.0);
+                let row: Vec<(usize, f64)> = row.map(|(dof, by)| ((i - 1) * nv + dof, by)).collect();
+                (weight * axis.dot(moment - about.cross(force)), row)
+            };
             let support = &self.support[i];
             if support.is_empty() {
-                let about = near[1].iter().map(|point| point.share * point.at).sum::<DVec3>();
+                let (about, moved) = center(self.model, &poses[i]);
                 for axis in DVec3::AXES {
-                    self.moment_row(i, near, &Law { about, axis, weight: factor * TURN, of_edge: false }, sink);
+                    let (residual, row) = along(about, axis, factor * TURN, &moved);
+                    sink(Row::Even(residual, &row));
                 }
                 continue;
             }
@@ -80,47 +112,9 @@ impl Problem<'_> {
                 let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / EDGES as f64);
                 let out = DVec3::new(cos, sin, 0.0);
                 let furthest = support.iter().map(|point| point.dot(out)).fold(f64::NEG_INFINITY, f64::max);
-                let (about, axis) = ((furthest + MARGIN) * out, DVec3::Z.cross(out));
-                self.moment_row(i, near, &Law { about, axis, weight: factor * EDGE, of_edge: true }, sink);
+                let (residual, row) = along((furthest + MARGIN) * out, DVec3::Z.cross(out), factor * EDGE, &[]);
+                sink(Row::Bound(residual, &row));
             }
         }
-    }
-
-    /// The moment in frame `i` of what moves the points, which are those of the frame before it, of it, and of the one after.
-    fn moment_row(&self, i: usize, near: [&Vec<Point>; 3], law: &Law, sink: &mut Sink) {
-        let &Law { about, axis, weight, of_edge } = law;
-        let nv = self.model.nv;
-        let rate = 1.0 / (self.dt * self.dt);
-        let gravity = if of_edge { GRAVITY * DVec3::Z } else { DVec3::ZERO };
-        let mut by = vec![0.0; 3 * nv];
-        let (mut moment, mut force) = (0.0, DVec3::ZERO);
-        let [before, now, after] = near;
-        for ((before, now), after) in before.iter().zip(now).zip(after) {
-            let felt = rate * (before.at - 2.0 * now.at + after.at) + gravity;
-            let arm = now.at - about;
-            moment += now.share * arm.cross(felt).dot(axis);
-            force += now.share * felt;
-            // of the force, then of its arm
-            let lever = now.share * rate * axis.cross(arm);
-            for (k, (point, sign)) in [(before, 1.0), (now, -2.0), (after, 1.0)].into_iter().enumerate() {
-                point.by.iter().for_each(|(dof, shift)| by[k * nv + dof] += sign * lever.dot(*shift));
-            }
-            let pull = now.share * felt.cross(axis);
-            now.by.iter().for_each(|(dof, shift)| by[nv + dof] += pull.dot(*shift));
-        }
-        if !of_edge {
-            // the center of mass moves, too
-            let pull = force.cross(axis);
-            for point in now {
-                point.by.iter().for_each(|(dof, shift)| by[nv + dof] -= point.share * pull.dot(*shift));
-            }
-        }
-        let first = (i - 1) * nv;
-        let by: Vec<(usize, f64)> = (by.into_iter().enumerate())
-            .filter(|(_, by)| *by != 0.0)
-            .map(|(dof, by)| (first + dof, weight * by))
-            .collect();
-        let residual = weight * moment;
-        sink(if of_edge { Row::Bound(residual, &by) } else { Row::Even(residual, &by) });
     }
 }

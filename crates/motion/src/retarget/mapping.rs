@@ -6,7 +6,7 @@
 //! | `model` | name of the model |
 //! | `hips` | the bodies of the left and the right thigh, in this order: they tell the figure's front and the length of its legs |
 //! | `soles` | bodies that stand: what they touch does not slide |
-//! | `smooth` | factor on the smoothing of the result and on the law of its center of mass; 1 if absent, 0 for recordings that are smooth already |
+//! | `smooth` | factor on the smoothing of the result and on the laws of its center of mass and its balance; 1 if absent, 0 for recordings that are smooth already |
 //! | `parts` | by name of a body, geom or site of the model: the joint that it follows |
 //!
 //! A part has:
@@ -95,9 +95,9 @@ pub struct Mapping {
     pub(crate) hips: [usize; 2],
     /// Bodies.
     pub(crate) soles: Vec<usize>,
-    /// Factor on the smoothing of the result, and on the law of its center of mass.
+    /// Factor on the smoothing of the result, and on the laws of its center of mass and its balance.
     pub(crate) smooth: f64,
-    /// Factor on the law of its balance, on top of that.
+    /// Another factor on the law of its balance.
     pub(crate) balance: f64,
 }
 

@@ -31,7 +31,7 @@ pub(super) fn support(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> 
 }
 
 /// Center of mass of a pose, and how it moves with each degree of freedom.
-fn center(model: &Model, pose: &Pose) -> (DVec3, Vec<DVec3>) {
+pub(super) fn center(model: &Model, pose: &Pose) -> (DVec3, Vec<DVec3>) {
     let total: f64 = model.bodies.iter().map(|body| body.mass).sum();
     let (mut at, mut by) = (DVec3::ZERO, vec![DVec3::ZERO; model.nv]);
     for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass > 0.0) {
