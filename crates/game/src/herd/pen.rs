@@ -1,122 +1,15 @@
-//! The simulation behind the ragdolls: pens of sixteen, stepped together in the lanes of the physics.
-//!
-//! A ragdoll sits in a lane of a pen of its kind. Which lane, and who sits beside it, does not touch its bits. Every
-//! kind has its own clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
+//! Sixteen lanes that are stepped together: what the physics and the task do to those who live in them.
 
-use crate::asset::RagdollPrefab;
-use crate::ground::Ground;
-use crate::ragdoll::{Character, Controls, End, Episode, Held, Restart};
+use super::{Event, Herd, HerdError, Resident, Still};
+use crate::ragdoll::{Character, Controls, End, Held, Restart};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
-use marathon_envs::{Autoreset, BLOCK, EnvError, Role, Spec, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{Autoreset, BLOCK, Role, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, Variation};
-use marathon_runs::{RunError, Setting};
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-use thiserror::Error;
-
-/// Seconds that a prefab is simulated for at a time, about.
-const PREFAB_DT: f64 = 0.01;
-
-/// Why a character cannot be simulated, or told what to do.
-#[derive(Debug, Error)]
-pub(crate) enum HerdError {
-    #[error(transparent)]
-    Env(#[from] EnvError),
-    #[error(transparent)]
-    Setting(#[from] RunError),
-    #[error(transparent)]
-    Sim(#[from] marathon_physics::SimError),
-    #[error("a body without a task takes no command")]
-    Command,
-    #[error("a body without a task has no ground of its own")]
-    Ground,
-}
-
-/// A task as the policy of its role number `role` knows it. The first role's may be that of the task in which one has it all.
-pub(crate) fn part_of(spec: &Spec, role: usize) -> Option<Spec> {
-    let part = spec.of_role(spec.deciders().get(role)?);
-    Some(if role == 0 { Spec { id: spec.id.clone(), ..part } } else { part })
-}
-
-/// All ragdolls of one kind.
-pub(crate) struct Herd {
-    pub character: Character,
-    /// The task of an agent.
-    pub setting: Setting,
-    pub ground: Ground,
-    pub model: Arc<Model>,
-    pub spec: Option<Arc<Spec>>,
-    pub feet: Vec<Arc<str>>,
-    /// Physics steps per decision.
-    substeps: usize,
-    pub dt: f64,
-    /// Time between decisions.
-    pub period: Duration,
-    /// Time of the newest states.
-    pub time: Duration,
-    pub pens: Vec<Pen>,
-}
-
-impl Herd {
-    /// A herd of an agent of the registry, in a task of its, on a ground, without ragdolls yet.
-    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, HerdError> {
-        setting.with_clips(|| {
-            let agent = ground.agent_with(&setting.agent, &setting.options)?;
-            let spec = agent.clone().shards(Isa::best())?.spec().clone();
-            Ok(Herd {
-                character: Character::Agent(name.into()),
-                setting: setting.clone(),
-                ground,
-                model: Arc::new(agent.model()?),
-                feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
-                substeps: spec.frame_skip,
-                dt: spec.dt,
-                period: Duration::from_secs_f64(spec.dt),
-                spec: Some(Arc::new(spec)),
-                time,
-                pens: Vec::new(),
-            })
-        })
-    }
-
-    /// A herd of a body, without ragdolls yet.
-    pub fn of_prefab(prefab: &Handle<RagdollPrefab>, model: Arc<Model>, time: Duration) -> Self {
-        let substeps = (PREFAB_DT / model.opt.timestep).round().max(1.0) as usize;
-        let dt = substeps as f64 * model.opt.timestep;
-        Herd {
-            character: Character::Prefab(prefab.clone()),
-            setting: Setting::default(),
-            ground: Ground::Level,
-            model,
-            feet: Vec::new(),
-            substeps,
-            dt,
-            period: Duration::from_secs_f64(dt),
-            spec: None,
-            time,
-            pens: Vec::new(),
-        }
-    }
-
-    /// Gives a ragdoll a free lane.
-    pub fn admit(&mut self, resident: Resident) -> Result<(usize, usize), HerdError> {
-        let free = |pen: &Pen| pen.lanes.iter().position(Option::is_none);
-        let pen = match self.pens.iter().position(|pen| free(pen).is_some()) {
-            Some(pen) => pen,
-            None => {
-                self.pens.push(Pen::new(self)?);
-                self.pens.len() - 1
-            }
-        };
-        let lane = free(&self.pens[pen]).unwrap_or_default();
-        self.pens[pen].admit(lane, resident, self.time);
-        Ok((pen, lane))
-    }
-}
 
 /// What steps sixteen ragdolls.
 enum Engine {
@@ -144,126 +37,9 @@ pub(crate) struct Pen {
     out: Step,
 }
 
-/// A ragdoll in its lane.
-#[derive(Debug)]
-pub(crate) struct Resident {
-    pub seed: u64,
-    pub number: u64,
-    /// Of the task's first role, and of its second.
-    pub policies: [Option<Arc<Policy>>; 2],
-    pub controls: Option<Controls>,
-    pub held: Option<Held>,
-    /// What it is told in place of its own schedule.
-    pub command: Option<Vec<f64>>,
-    pub restart: Restart,
-    pub episode: Episode,
-    /// Elevations of its model's height fields.
-    pub grounds: Arc<Vec<Vec<f32>>>,
-    /// States that frames are drawn from, oldest first.
-    pub trail: VecDeque<Still>,
-    /// What has happened since it was last asked.
-    pub events: Vec<Event>,
-    pushes: Vec<Shove>,
-    /// Decisions that it still lies limp; `None` if it is up.
-    lying: Option<u64>,
-    begin_now: bool,
-}
-
-/// A state at a time.
-#[derive(Clone, Debug)]
-pub(crate) struct Still {
-    pub time: Duration,
-    pub qpos: Vec<f64>,
-    pub qvel: Vec<f64>,
-    /// Where the clip is that it follows, if it does.
-    pub reference: Option<Vec<f64>>,
-    /// It did not come out of the one before, but of a reset.
-    pub fresh: bool,
-    /// Action and command of the decision that has led here; a fresh one has the command alone.
-    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
-    pub action: Vec<f32>,
-    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
-    pub command: Vec<f64>,
-    /// Elevations of the height fields.
-    pub grounds: Arc<Vec<Vec<f32>>>,
-}
-
-/// A push in the axes of the physics.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shove {
-    pub body: usize,
-    pub force: [f64; 3],
-    pub torque: [f64; 3],
-    /// Decisions that it lasts.
-    pub decisions: u64,
-}
-
-/// What happens to a ragdoll.
-#[derive(Clone, Debug)]
-pub(crate) enum Event {
-    Foot { foot: usize, down: bool },
-    Ended(End, Episode),
-    Began(u64),
-}
-
-impl Resident {
-    pub fn new((seed, number): (u64, u64), restart: Restart) -> Self {
-        Resident {
-            seed,
-            number,
-            restart,
-            policies: [None, None],
-            controls: None,
-            held: None,
-            command: None,
-            episode: Episode::default(),
-            grounds: Arc::default(),
-            trail: VecDeque::new(),
-            events: Vec::new(),
-            pushes: Vec::new(),
-            lying: None,
-            begin_now: false,
-        }
-    }
-
-    /// Pushes it at the coming decisions.
-    pub fn push(&mut self, shove: Shove) {
-        self.pushes.push(shove);
-    }
-
-    /// Ends its episode at the next decision.
-    pub fn begin_now(&mut self) {
-        self.begin_now = true;
-    }
-
-    /// Its state at a time: the two between which it lies, and the share of the later one.
-    pub fn between(&self, time: Duration) -> Option<(&Still, &Still, f64)> {
-        let later = self.trail.iter().position(|s| s.time >= time).unwrap_or(self.trail.len().saturating_sub(1));
-        let b = self.trail.get(later)?;
-        let a = if b.fresh { b } else { self.trail.get(later.wrapping_sub(1)).unwrap_or(b) };
-        let span = b.time.saturating_sub(a.time).as_secs_f64();
-        let share = if span > 0.0 { (time.saturating_sub(a.time).as_secs_f64() / span).min(1.0) } else { 1.0 };
-        Some((a, b, share))
-    }
-
-    /// Forgets what no frame from this time on needs.
-    pub fn forget(&mut self, before: Duration) {
-        while self.trail.len() > 2 && self.trail[1].time <= before {
-            self.trail.pop_front();
-        }
-    }
-
-    fn begin(&mut self) {
-        self.episode = Episode { number: self.episode.number + 1, ..default() };
-        self.lying = None;
-        self.begin_now = false;
-        self.pushes.clear();
-        self.events.push(Event::Began(self.episode.number));
-    }
-}
-
 impl Pen {
-    fn new(herd: &Herd) -> Result<Self, HerdError> {
+    /// With sixteen free lanes.
+    pub(super) fn new(herd: &Herd) -> Result<Self, HerdError> {
         let (engine, n_obs, out) = match &herd.character {
             Character::Agent(name) => {
                 let (setting, id) = (&herd.setting, herd.spec.as_ref().map_or(name, |spec| &spec.id));
@@ -302,7 +78,8 @@ impl Pen {
         self.lanes.iter().all(Option::is_none)
     }
 
-    fn admit(&mut self, lane: usize, mut resident: Resident, time: Duration) {
+    /// Gives a ragdoll a lane that is free.
+    pub(super) fn admit(&mut self, lane: usize, mut resident: Resident, time: Duration) {
         if let Engine::Env(env) = self.engine.get() {
             // the lane exists, and so does its agent
             let _ = env.reseed_agent(lane, resident.seed, resident.number as usize);
