@@ -388,7 +388,7 @@ def test_what_cannot_be_served_is_told():
     taken = (*COURSES, "--spawn-env=Hopper-v0", "--behavior-name=TerrainWalker2d-v0.builder")
     assert "two behaviors are called 'TerrainWalker2d-v0.builder'" in fails("--mlagents-port", port, *taken)
     assert "--mlagents-port is missing" in fails(code=2)
-    assert "did you mean --num-spawn-envs?" in fails("--mlagents-port", port, "--num-spawn-env=1", code=2)
+    assert "did you mean '--num-spawn-envs'?" in fails("--mlagents-port", port, "--num-spawn-env=1", code=2)
 
 
 def test_gym_wrapper(launch):

@@ -3,8 +3,8 @@
 use super::error::{ConfigError, shown};
 use super::names;
 use super::section::{Entry, Section};
-use marathon_envs::nearest;
 use marathon_learn::{RewardConfig, TrainConfig};
+use marathon_physics::hint::nearest;
 use std::path::Path;
 
 /// The two formats of ML-Agents.

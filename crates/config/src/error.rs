@@ -1,6 +1,6 @@
 //! What can be wrong with a configuration file.
 
-use marathon_envs::nearest;
+use marathon_physics::hint::{did_you_mean, nearest};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ pub enum ConfigError {
         problem: String,
     },
     /// A key that neither ML-Agents nor Marathon knows.
-    #[error("{place}: unknown key; {}", suggestion(nearest, known))]
+    #[error("{place}: unknown key{}", suggestion(nearest, known))]
     UnknownKey {
         /// The key.
         place: Place,
@@ -69,7 +69,7 @@ pub enum ConfigError {
         expected: String,
     },
     /// The file says nothing about an agent.
-    #[error("{}: nothing about agent {agent}; {}the file has {names}; expected one of {accepted}, or {default}", path.display(), did_you_mean(nearest))]
+    #[error("{}: nothing about agent {agent}; the file has {names}; expected one of {accepted}, or {default}{}", path.display(), did_you_mean(nearest.as_ref()))]
     NoSuchBehavior {
         /// The file.
         path: PathBuf,
@@ -97,14 +97,8 @@ pub enum ConfigError {
 }
 
 fn suggestion(nearest: &Option<String>, known: &str) -> String {
-    match nearest {
-        Some(nearest) => format!("did you mean '{nearest}'?"),
-        None => format!("expected one of {known}"),
-    }
-}
-
-fn did_you_mean(nearest: &Option<String>) -> String {
-    nearest.as_ref().map(|n| format!("did you mean '{n}'? ")).unwrap_or_default()
+    let hint = did_you_mean(nearest.as_ref());
+    if hint.is_empty() { format!("; expected one of {known}") } else { hint }
 }
 
 impl ConfigError {

@@ -7,8 +7,8 @@ use super::document::Map;
 use super::error::{ConfigError, Place};
 use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
 use super::section::{Range, Section};
-use marathon_envs::nearest;
 use marathon_learn::{Algorithm, Novelty, RewardConfig, RewardKind};
+use marathon_physics::hint::nearest;
 use std::path::Path;
 
 /// Keys of a section.

@@ -3,6 +3,7 @@
 //! [`AnyAgent`] is the object-safe face of an agent; every [`Agent`] has it by a blanket implementation, so that the
 //! [`Registry`](crate::Registry) holds agents of any crate.
 
+use marathon_physics::hint::nearest;
 use std::sync::Arc;
 
 use marathon_physics::Model;
@@ -10,7 +11,7 @@ use marathon_physics::lanes::Isa;
 
 use crate::agent::bindings::Blueprint;
 use crate::agent::{Agent, Facts, ModelSource, OptionInfo, Options};
-use crate::error::{EnvError, nearest};
+use crate::error::EnvError;
 use crate::lanes::AgentFactory;
 use crate::shard::AgentShards;
 

@@ -1,6 +1,7 @@
 //! What can go wrong before an environment runs.
 
 use marathon_physics::SimError;
+use marathon_physics::hint::among;
 use marathon_physics::mjcf::MjcfError;
 use thiserror::Error;
 
@@ -8,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum EnvError {
     /// No agent of this name is registered.
-    #[error("agent '{name}' does not exist; {}known: {known}", did_you_mean(.nearest))]
+    #[error("agent '{name}' does not exist{}", among(.nearest.as_ref(), known))]
     UnknownAgent {
         /// What was asked for.
         name: String,
@@ -26,7 +27,7 @@ pub enum EnvError {
         suggestion: String,
     },
     /// An agent does not take an argument.
-    #[error("agent '{id}' takes no option '{name}'; {}known: {known}", did_you_mean(.nearest))]
+    #[error("agent '{id}' takes no option '{name}'{}", among(.nearest.as_ref(), known))]
     UnknownOption {
         /// Registry name of the agent.
         id: String,
@@ -120,23 +121,4 @@ pub enum EnvError {
     /// A snapshot does not fit the environment it is loaded into.
     #[error("snapshot: {0}")]
     Snapshot(String),
-}
-
-fn did_you_mean(nearest: &Option<String>) -> String {
-    nearest.as_ref().map(|n| format!("did you mean '{n}'? ")).unwrap_or_default()
-}
-
-/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // comparing takes quadratic time, and nobody mistypes a name that long
-    if name.len() > 200 {
-        return None;
-    }
-    let name = name.to_lowercase();
-    known
-        .into_iter()
-        .map(|k| (strsim::damerau_levenshtein(&name, &k.to_lowercase()), k))
-        .filter(|(distance, k)| *distance <= 2.max(k.chars().count() / 3))
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, k)| k)
 }

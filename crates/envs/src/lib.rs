@@ -42,7 +42,7 @@ pub use agent::{
 };
 pub use any_agent::{AnyAgent, Elsewhere};
 pub use episode_rng::EpisodeRng;
-pub use error::{EnvError, nearest};
+pub use error::EnvError;
 pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};

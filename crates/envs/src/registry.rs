@@ -3,6 +3,7 @@
 //! The global registry starts with the crate's own agents; [`register`] adds others. A [`Registry`] of one's own works
 //! the same way for those who want no global state.
 
+use marathon_physics::hint::nearest;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use marathon_physics::lanes::Isa;
@@ -10,7 +11,7 @@ use marathon_physics::lanes::Isa;
 use crate::agent::Options;
 use crate::agents;
 use crate::any_agent::AnyAgent;
-use crate::error::{EnvError, nearest};
+use crate::error::EnvError;
 use crate::shard::{AgentShards, ShardFactory};
 
 /// Agents by name.

@@ -7,7 +7,7 @@
 use crate::behavior::BehaviorOptions;
 use crate::error::PlayerError;
 use crate::player::PlayerOptions;
-use marathon_envs::nearest;
+use marathon_physics::hint::{did_you_mean, nearest};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -172,8 +172,7 @@ fn usage(text: String) -> PlayerError {
 }
 
 fn unknown(flag: &str) -> PlayerError {
-    let near =
-        nearest(flag, VALUED.into_iter().chain(BARE)).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
+    let near = did_you_mean(nearest(flag, VALUED.into_iter().chain(BARE)));
     usage(format!("there is no flag {flag}{near} See --help for all"))
 }
 
@@ -224,8 +223,8 @@ mod tests {
             ("", "--mlagents-port is missing"),
             ("--mlagents-port", "needs a value"),
             ("--mlagents-port 70000", "is '70000', expected a whole number from 1 to 65535"),
-            ("--mlagents-port 1 --spawn-envs=Hopper-v0", "no flag --spawn-envs; did you mean --spawn-env?"),
-            ("--mlagents-port 1 --num-spawn-env 3", "did you mean --num-spawn-envs?"),
+            ("--mlagents-port 1 --spawn-envs=Hopper-v0", "no flag --spawn-envs; did you mean '--spawn-env'?"),
+            ("--mlagents-port 1 --num-spawn-env 3", "did you mean '--num-spawn-envs'?"),
             ("--mlagents-port 1 --num-spawn-envs 0", "expected a whole number from 1 to 1000000"),
             ("--mlagents-port 1 --option mass", "expected NAME=VALUE"),
             ("--mlagents-port 1 --behavior-name a?team=1", "expected a name without '?'"),

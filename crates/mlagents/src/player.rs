@@ -8,7 +8,7 @@ use crate::log::Log;
 use crate::parameters::Parameters;
 use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
 use crate::wire::{RlInitializationOutput, RlInput, RlOutput, UnityMessage, UnityOutput, command};
-use marathon_envs::nearest;
+use marathon_physics::hint::{among, nearest};
 use prost::Message;
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -289,10 +289,9 @@ impl Player {
         if known.contains(name) {
             return;
         }
-        let near =
-            nearest(name, known.iter().copied()).map(|near| format!("did you mean '{near}'? ")).unwrap_or_default();
         let list = known.iter().copied().collect::<Vec<_>>().join(", ");
-        self.log.line(format_args!("warning: environment parameter '{name}' has no effect; {near}known: {list}"));
+        let known = among(nearest(name, known), &list);
+        self.log.line(format_args!("warning: environment parameter '{name}' has no effect{known}"));
     }
 }
 

@@ -81,14 +81,3 @@ impl MotionError {
         Self::Syntax { path: path.into(), line: error.line(), column: error.column(), problem }
     }
 }
-
-/// "; did you mean X?" for the known name closest to a wrong one, or nothing if none is close.
-pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let lower = name.to_lowercase();
-    known
-        .into_iter()
-        .map(|known| (strsim::jaro_winkler(&lower, &known.to_lowercase()), known))
-        .filter(|(score, _)| *score > 0.8)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(String::new(), |(_, known)| format!("; did you mean {known}?"))
-}

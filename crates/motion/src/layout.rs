@@ -1,6 +1,7 @@
 //! Which entry of `qpos` belongs to which joint.
 
-use crate::error::{MotionError, did_you_mean};
+use crate::error::MotionError;
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::model::{JointType, Model};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -114,7 +115,7 @@ impl Layout {
                     let hint = if names().any(|name| name == ours.name) {
                         "; the motion was made for another order of joints".into()
                     } else {
-                        did_you_mean(&ours.name, names())
+                        did_you_mean(nearest(&ours.name, names()))
                     };
                     return wrong(format!(
                         "joint {i} is {:?} ({:?}), expected {:?} ({:?}){hint}",

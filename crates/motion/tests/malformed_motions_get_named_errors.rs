@@ -126,12 +126,12 @@ fn of_mappings() {
         (
             "\"torso\":",
             "\"torzo\":",
-            "m.json: parts: found \"torzo\", expected a body, geom or site of humanoid; did you mean torso?",
+            "m.json: parts: found \"torzo\", expected a body, geom or site of humanoid; did you mean 'torso'?",
         ),
         (
             "\"left_hip\"",
             "\"left_hipp\"",
-            "m.json: parts.left_thigh.joint: found \"left_hipp\", expected a joint of the skeleton; did you mean left_hip?",
+            "m.json: parts.left_thigh.joint: found \"left_hipp\", expected a joint of the skeleton; did you mean 'left_hip'?",
         ),
         (
             "\"rotation\": 0.3",
@@ -142,12 +142,12 @@ fn of_mappings() {
         (
             "\"hips\": [\"left_thigh\"",
             "\"hips\": [\"left_tigh\"",
-            "m.json: hips: found left_tigh, expected bodies that are among the parts; did you mean left_thigh?",
+            "m.json: hips: found left_tigh, expected bodies that are among the parts; did you mean 'left_thigh'?",
         ),
         (
             "\"soles\": [\"left_foot\"",
             "\"soles\": [\"left_fot\"",
-            "m.json: soles: found left_fot, expected bodies of the model; did you mean left_foot?",
+            "m.json: soles: found left_fot, expected bodies of the model; did you mean 'left_foot'?",
         ),
         ("\"position\": 3", "\"positon\": 3", "m.json:"),
     ];

@@ -5,6 +5,8 @@
 //!   [`Work`] the scratch memory of a step. [`Sim::step`] advances a group.
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
+//! * [`hint`] finds the name that an error about an unknown one may suggest.
+//!
 //! Each folder imports only from folders above it in this list:
 //!
 //! | folder | what it holds |
@@ -26,6 +28,7 @@
 //! | `readings` | what can be read off a group after a step |
 //! | `batch` | any number of agents on any number of threads |
 
+pub mod hint;
 pub mod lanes;
 
 mod algebra;

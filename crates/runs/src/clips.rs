@@ -5,6 +5,7 @@ use crate::text::nearest_path;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
 use marathon_motion::{About, Clip, Mapping, MotionError, import, retarget};
 use marathon_physics::Model;
+use marathon_physics::hint::did_you_mean;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -95,8 +96,7 @@ fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError>
 /// What to say of a path that is neither a file of `what` nor the name of a clip. `near`: what may have been meant.
 pub fn missing(path: &Path, what: &str, near: Option<String>) -> RunError {
     let found = if path.is_dir() { "a folder" } else { "no such file" };
-    let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-    let names = known::all_names().join(", ");
+    let (near, names) = (did_you_mean(near), known::all_names().join(", "));
     RunError::file(path, "clip", found, format!("a file of {what}{near} or the name of a clip: {names}"))
 }
 

@@ -2,9 +2,9 @@
 
 use crate::error::RunError;
 use marathon_config::{Loaded, parse, parse_roles};
-use marathon_envs::error::nearest;
 use marathon_envs::registry;
 use marathon_learn::RoleConfig;
+use marathon_physics::hint::{did_you_mean, nearest};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -18,9 +18,8 @@ pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
     if let Ok(agent) = registry::agent(agent) {
         let known: Vec<&str> = agent.options().iter().map(|option| option.name).collect();
         if let Some((name, value)) = loaded.options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
-            let near = nearest(name, known.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
-            let expected =
-                format!("an option of {}: {}{}", agent.facts().id, known.join(", "), near.unwrap_or_default());
+            let near = did_you_mean(nearest(name, known.iter().copied()));
+            let expected = format!("an option of {}: {}{near}", agent.facts().id, known.join(", "));
             return Err(RunError::file(path, format!("marathon.options.{name}"), value, expected));
         }
     }

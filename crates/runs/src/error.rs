@@ -5,6 +5,7 @@ use marathon_config::ConfigError;
 use marathon_envs::EnvError;
 use marathon_learn::Error;
 use marathon_motion::MotionError;
+use marathon_physics::hint::did_you_mean;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -171,7 +172,7 @@ impl RunError {
                 spelling.resume(folder)
             ),
             RunError::NoRun { folder, found, nearest } => {
-                let nearest = nearest.as_ref().map(|run| format!("; did you mean '{run}'?")).unwrap_or_default();
+                let nearest = did_you_mean(nearest.as_ref());
                 format!(
                     "{}: {}: found {found}, expected the folder of a run{nearest}",
                     folder.display(),

@@ -8,6 +8,7 @@ use marathon_config::Loaded;
 use marathon_envs::Options;
 use marathon_learn::policy::options;
 use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_versions, write_atomic, write_description};
+use marathon_physics::hint::did_you_mean;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -445,9 +446,7 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
         let is_policy = entry.extension().is_some_and(|end| end == "safetensors" || end == "onnx");
         is_policy || entry.join(RUN).is_file()
     };
-    let near = text::nearest_path(given, &[Path::new(RUNS)], fits)
-        .map(|name| format!("; did you mean '{name}'?"))
-        .unwrap_or_default();
+    let near = did_you_mean(text::nearest_path(given, &[Path::new(RUNS)], fits));
     let expected = format!("a policy file or the folder of a run{near}");
     Err(RunError::file(given, "policy", found, expected))
 }

@@ -3,9 +3,10 @@
 use crate::error::CliError;
 use crate::program;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
-use marathon_envs::{nearest, registry};
+use marathon_envs::registry;
 use marathon_motion::Clip;
 use marathon_physics::Model;
+use marathon_physics::hint::nearest;
 use marathon_runs::clips::missing;
 use marathon_runs::text::{nearest_path, path_word};
 use std::path::Path;

@@ -7,9 +7,9 @@ use super::record::{EPISODES, Record};
 use crate::error::CliError;
 use crate::interrupt;
 use marathon_config::{against, default_for};
-use marathon_envs::nearest;
 use marathon_envs::options::Value;
 use marathon_learn::{EvalOptions, Evaluation, evaluate};
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
@@ -163,8 +163,7 @@ fn about() -> String {
 fn chosen(flag: &str, asked: &[String], all: &[&'static str]) -> Result<Vec<&'static str>, CliError> {
     for name in asked {
         if !all.contains(&name.as_str()) {
-            let near = nearest(name, all.iter().copied()).map(|near| format!("; did you mean '{near}'?"));
-            let (near, known) = (near.unwrap_or_default(), all.join(", "));
+            let (near, known) = (did_you_mean(nearest(name, all.iter().copied())), all.join(", "));
             return Err(CliError::Usage(format!("{flag}: found '{name}', expected some of {known}{near}")));
         }
     }

@@ -1,11 +1,12 @@
 //! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
 
+use marathon_physics::hint::{among, nearest};
 use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
 
 use super::{Facts, ModelSource};
-use crate::error::{EnvError, nearest};
+use crate::error::EnvError;
 
 /// Name of the keyframe that holds the start pose and velocity.
 const SPAWN: &str = "spawn";
@@ -138,9 +139,8 @@ impl<T: Real> Bindings<T> {
     pub fn new(facts: &Facts, blueprint: &Blueprint) -> Result<Self, EnvError> {
         let model = &blueprint.model;
         let missing = |role: &str, name: &str, kind: &str, known: Vec<&str>| {
-            let hint = nearest(name, known.iter().copied()).map(|n| format!("; did you mean '{n}'?"));
-            let (hint, known) = (hint.unwrap_or_default(), known.join(", "));
-            let problem = format!("{role} '{name}' is not a {kind} of its model{hint} known: {known}");
+            let known = among(nearest(name, known.iter().copied()), &known.join(", "));
+            let problem = format!("{role} '{name}' is not a {kind} of its model{known}");
             EnvError::Agent { id: facts.id.clone(), problem }
         };
         let geom = |role: &str, name: &str| -> Result<usize, EnvError> {

@@ -3,7 +3,7 @@
 use crate::app::keys::{Deed, Do};
 use bevy::prelude::*;
 use clap::ValueEnum;
-use marathon_envs::nearest;
+use marathon_physics::hint::{among, nearest};
 use std::str::FromStr;
 
 /// A deed at a time: `2.5:throw` on the command line.
@@ -33,8 +33,7 @@ impl FromStr for Cue {
 
 /// What an error about an unknown name ends with: the nearest name that is known, and all of them.
 pub(super) fn known(name: &str, names: &[String]) -> String {
-    let hint = nearest(name, names.iter().map(String::as_str)).map(|n| format!(", did you mean '{n}'?"));
-    format!("{}; known: {}", hint.unwrap_or_default(), names.join(", "))
+    among(nearest(name, names.iter().map(String::as_str)), &names.join(", "))
 }
 
 /// The cues that are still to come, the last first.

@@ -1,5 +1,6 @@
 //! What can keep the game from starting, with the remedy.
 
+use marathon_physics::hint::did_you_mean;
 use marathon_runs::{Flags, RunError};
 use std::path::PathBuf;
 use thiserror::Error;
@@ -8,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum GameError {
     /// A file that is not there.
-    #[error("{}: there is no such file or folder{}", .path.display(), hint(.nearest))]
+    #[error("{}: there is no such file or folder{}", .path.display(), did_you_mean(.nearest.as_ref()))]
     Missing {
         /// Where it was looked for.
         path: PathBuf,
@@ -82,8 +83,4 @@ impl From<marathon_learn::Error> for GameError {
     fn from(error: marathon_learn::Error) -> Self {
         RunError::from(error).into()
     }
-}
-
-fn hint(nearest: &Option<String>) -> String {
-    nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default()
 }

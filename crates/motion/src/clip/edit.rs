@@ -1,11 +1,12 @@
 //! Changes of a clip: trim, loop, resample, smooth, mirror, move.
 
 use super::{Clip, Cycle, quaternions};
-use crate::error::{MotionError, did_you_mean};
+use crate::error::MotionError;
 use crate::layout::{JointKind, Layout};
 use crate::rotation::{about_z, cubic, exp, heading, hermite, log, quat, wxyz};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::model::JointType;
 use std::path::Path;
 
@@ -258,7 +259,7 @@ fn partners(path: &Path, model: &Model) -> Result<Vec<(usize, f64)>, MotionError
     for (i, name) in names.iter().enumerate() {
         let other = swapped(name);
         let Some(partner) = names.iter().position(|name| *name == other) else {
-            let hint = did_you_mean(&other, names.iter().copied());
+            let hint = did_you_mean(nearest(&other, names.iter().copied()));
             return wrong(format!("joint {name:?} has no mirror image: there is no joint {other:?}{hint}"));
         };
         let kind = layout.joints[i].kind;

@@ -19,10 +19,11 @@
 //! | `position` | weight of its position, 1/m; 0 if absent |
 //! | `rest` | `[w, x, y, z]`, a turn of the part's reference orientation, in the model's axes, that makes it fit the skeleton's rest pose. If absent, the part is turned so that the bone to the next part points as in the skeleton |
 
-use crate::error::{MotionError, did_you_mean};
+use crate::error::MotionError;
 use crate::roles;
 use crate::skeleton::Skeleton;
 use marathon_physics::Model;
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::model::JointType;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -170,7 +171,7 @@ impl Mapping {
         parts.sort_by_key(|(_, part)| (part.body, !part.whole));
         let hip = |name: &String| {
             parts.iter().position(|(known, part)| known == name && part.whole).ok_or_else(|| {
-                let hint = did_you_mean(name, parts.iter().map(|(name, _)| name.as_str()));
+                let hint = did_you_mean(nearest(name, parts.iter().map(|(name, _)| name.as_str())));
                 MotionError::value(path, "hips", name, format!("bodies that are among the parts{hint}"))
             })
         };
@@ -178,7 +179,12 @@ impl Mapping {
         let soles = file.soles.iter().map(|name| {
             let names = || model.bodies.iter().map(|body| body.name.as_str());
             names().position(|known| known == name).ok_or_else(|| {
-                MotionError::value(path, "soles", name, format!("bodies of the model{}", did_you_mean(name, names())))
+                MotionError::value(
+                    path,
+                    "soles",
+                    name,
+                    format!("bodies of the model{}", did_you_mean(nearest(name, names()))),
+                )
             })
         });
         let soles = soles.collect::<Result<_, _>>()?;
@@ -195,7 +201,7 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
     let joint = |field: &str, wanted: &str| {
         let names = || skeleton.bones.iter().map(|bone| bone.name.as_str());
         roles::find(skeleton, wanted).ok_or_else(|| {
-            let hint = did_you_mean(wanted, names());
+            let hint = did_you_mean(nearest(wanted, names()));
             let all = names().collect::<Vec<_>>().join(", ");
             let expected = format!("a joint of the skeleton{hint}; it has {all}");
             MotionError::value(path, &key(field), format!("{wanted:?}"), expected)
@@ -249,6 +255,6 @@ fn find(path: &Path, name: &str, model: &Model) -> Result<(usize, [f64; 3], bool
     }
     let names = model.bodies.iter().map(|body| body.name.as_str());
     let names = names.chain(model.geoms.iter().map(|geom| geom.name.as_str()));
-    let hint = did_you_mean(name, names.chain(model.sites.iter().map(|site| site.name.as_str())));
+    let hint = did_you_mean(nearest(name, names.chain(model.sites.iter().map(|site| site.name.as_str()))));
     Err(MotionError::value(path, "parts", format!("{name:?}"), format!("a body, geom or site of {}{hint}", model.name)))
 }

@@ -13,6 +13,7 @@ use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::{
     actuator, asset, contact, custom, equality, geom, inertia, schema, sensor, set0, settings, statistics, tendon, tree,
 };
+use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
 use std::collections::BTreeMap;
 
@@ -309,8 +310,7 @@ fn color(
         Some(None) if shape.colorless() => Ok([1.0; 4]),
         Some(_) => Ok(shape.rgba),
         None => {
-            let nearest = super::error::nearest(name, materials.keys().copied());
-            let hint = nearest.map(|n| format!("; did you mean '{n}'?")).unwrap_or_default();
+            let hint = did_you_mean(nearest(name, materials.keys().copied()));
             Err(element.invalid(format!("there is no material '{}'{hint}", super::error::shorten(name))))
         }
     }

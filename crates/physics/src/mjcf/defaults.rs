@@ -1,8 +1,9 @@
 //! `<default>` classes: which settings lie under an element of a given class.
 
 use super::document::Element;
-use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
+use super::error::{MjcfError, MjcfErrorKind, shorten};
 use super::value::Attrs;
+use crate::hint::nearest;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the outermost class.
@@ -105,7 +106,7 @@ impl<'a> Defaults<'a> {
             attribute: attribute.to_owned(),
             kind: "default class".to_owned(),
             found: shorten(&attr.value),
-            nearest: nearest(&attr.value, self.classes.keys().copied()),
+            nearest: nearest(&attr.value, self.classes.keys().copied()).map(Into::into),
         }))
     }
 

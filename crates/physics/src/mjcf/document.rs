@@ -1,6 +1,7 @@
 //! The XML document: elements with their places, `<include>` already expanded.
 
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use crate::hint::nearest;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::rc::Rc;
@@ -178,7 +179,7 @@ impl Loader<'_> {
             return Err(attr.place.error(MjcfErrorKind::UnknownAttribute {
                 element: include.label(),
                 attribute: shorten(&attr.name),
-                nearest: super::error::nearest(&attr.name, ["file"]),
+                nearest: nearest(&attr.name, ["file"]).map(Into::into),
             }));
         }
         let Some(attr) = include.attr("file") else {

@@ -1,5 +1,6 @@
 //! What can be wrong with a model file, and where.
 
+use crate::hint::did_you_mean;
 use std::fmt;
 
 /// An error in an MJCF model: the file, the line and what was found there.
@@ -34,7 +35,7 @@ pub enum MjcfErrorKind {
     #[error("{0}")]
     Syntax(String),
     /// MJCF has no such element at this place.
-    #[error("{element} is not an element of <{parent}>{}", hint(.nearest))]
+    #[error("{element} is not an element of <{parent}>{}", did_you_mean(.nearest.as_ref()))]
     UnknownElement {
         /// The element found.
         element: String,
@@ -44,7 +45,7 @@ pub enum MjcfErrorKind {
         nearest: Option<String>,
     },
     /// MJCF has no such attribute in this element.
-    #[error("{element} has no attribute '{attribute}'{}", hint(.nearest))]
+    #[error("{element} has no attribute '{attribute}'{}", did_you_mean(.nearest.as_ref()))]
     UnknownAttribute {
         /// The element found.
         element: String,
@@ -76,7 +77,7 @@ pub enum MjcfErrorKind {
         expected: String,
     },
     /// An attribute refers to something that does not exist.
-    #[error("{element} attribute '{attribute}': there is no {kind} '{found}'{}", hint(.nearest))]
+    #[error("{element} attribute '{attribute}': there is no {kind} '{found}'{}", did_you_mean(.nearest.as_ref()))]
     UnknownName {
         /// The element found.
         element: String,
@@ -99,27 +100,8 @@ pub enum MjcfErrorKind {
     },
 }
 
-fn hint(nearest: &Option<String>) -> String {
-    nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default()
-}
-
 fn in_attribute(attribute: &Option<String>) -> String {
     attribute.as_ref().map(|a| format!(" attribute '{a}'")).unwrap_or_default()
-}
-
-/// The candidate most similar to `name`, if any is similar enough to be worth suggesting.
-pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    // a suggestion for a very long name is of no use and costs quadratic time
-    if name.is_empty() || name.len() > 64 {
-        return None;
-    }
-    candidates
-        .into_iter()
-        .filter(|c| !c.is_empty() && c.len() <= 64)
-        .map(|c| (strsim::damerau_levenshtein(name, c), c))
-        .min_by_key(|&(distance, _)| distance)
-        .filter(|&(distance, c)| distance <= 1 + name.len().min(c.len()) / 3)
-        .map(|(_, c)| c.to_owned())
 }
 
 /// `text`, shortened to what fits in a message.

@@ -1,7 +1,8 @@
 //! Names of a model's objects, and the references to them.
 
 use super::document::Element;
-use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
+use super::error::{MjcfError, MjcfErrorKind, shorten};
+use crate::hint::nearest;
 use std::collections::BTreeMap;
 
 /// The names of one kind of objects, such as joints.
@@ -74,7 +75,7 @@ impl<'a> Names<'a> {
             attribute: attribute.to_owned(),
             kind: self.kind.to_owned(),
             found: shorten(found),
-            nearest: nearest(found, self.index.keys().copied()),
+            nearest: nearest(found, self.index.keys().copied()).map(Into::into),
         })
     }
 }

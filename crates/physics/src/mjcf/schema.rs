@@ -4,7 +4,8 @@
 //! Nothing is skipped silently.
 
 use super::document::{Attr, Element};
-use super::error::{MjcfError, MjcfErrorKind, nearest, shorten};
+use super::error::{MjcfError, MjcfErrorKind, shorten};
+use crate::hint::nearest;
 
 /// One element that may stand inside another.
 struct Rule {
@@ -450,7 +451,7 @@ fn unknown_element<'a>(element: &Element, parent: &Element, names: impl Iterator
     element.place.error(MjcfErrorKind::UnknownElement {
         element: element.label(),
         parent: shorten(&parent.name),
-        nearest: nearest(&element.name, names),
+        nearest: nearest(&element.name, names).map(Into::into),
     })
 }
 
@@ -487,7 +488,7 @@ fn attributes(element: &Element, rule: &Rule, except: &str) -> Result<(), MjcfEr
                 return Err(attr.place.error(MjcfErrorKind::UnknownAttribute {
                     element: element.label(),
                     attribute: shorten(&attr.name),
-                    nearest: nearest(&attr.name, names),
+                    nearest: nearest(&attr.name, names).map(Into::into),
                 }));
             }
         }

@@ -1,7 +1,8 @@
 //! Attribute values: a text becomes numbers, a flag or a keyword, with defaults of classes laid underneath.
 
 use super::document::{Attr, Element};
-use super::error::{MjcfError, nearest};
+use super::error::MjcfError;
+use crate::hint::{did_you_mean, nearest};
 
 /// The attributes of an element on top of those of its default classes.
 ///
@@ -127,8 +128,7 @@ pub(crate) fn keyword<T: Copy>(element: &Element, attr: &Attr, choices: &[(&str,
         return Ok(value);
     }
     let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
-    let hint = nearest(&attr.value, words.iter().copied());
-    let hint = hint.map(|n| format!("; did you mean '{n}'?")).unwrap_or_default();
+    let hint = did_you_mean(nearest(&attr.value, words.iter().copied()));
     Err(element.bad_value(attr, format!("one of {}{hint}", words.join(", "))))
 }
 

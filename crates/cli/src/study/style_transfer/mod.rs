@@ -9,8 +9,9 @@ use crate::error::CliError;
 use crate::interrupt;
 use findings::Found;
 use marathon_config::{Loaded, default_for};
-use marathon_envs::{nearest, registry};
+use marathon_envs::registry;
 use marathon_learn::EvalOptions;
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::report::csv::History;
@@ -155,7 +156,7 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
     for clip in clips {
         let known = || all.iter().map(|job| job.clip.as_str());
         if known().all(|name| name != clip) {
-            let near = nearest(clip, known()).map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
+            let near = did_you_mean(nearest(clip, known()));
             let known: Vec<&str> = known().collect();
             return Err(CliError::Usage(format!(
                 "--clips: found '{clip}', expected some of {}{near}",

@@ -1,5 +1,6 @@
 //! Clips by name: those that come with the crate, and those of a caller.
 
+use marathon_physics::hint::{among, nearest};
 use std::path::Path;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
@@ -7,7 +8,6 @@ use marathon_motion::Clip;
 
 use crate::agent::Value;
 use crate::agent::options::OptionValue;
-use crate::error::nearest;
 
 /// A clip that comes with the crate.
 struct Shipped {
@@ -130,8 +130,7 @@ impl ClipNames {
         let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
         let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
         let Some(missing) = missing else { return Ok(()) };
-        let near = nearest(missing, known.iter().copied());
-        let near = near.map(|name| format!("; did you mean '{name}'?")).unwrap_or_default();
-        Err(format!("option clip is '{missing}', expected a clip that is known{near} known: {}", known.join(", ")))
+        let known = among(nearest(missing, known.iter().copied()), &known.join(", "));
+        Err(format!("option clip is '{missing}', expected a clip that is known{known}"))
     }
 }

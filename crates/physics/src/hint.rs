@@ -1,0 +1,49 @@
+//! What errors say about a name that nothing has: the nearest name that something has, and all of them.
+
+/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error. The first of several.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // comparing takes quadratic time, and nobody mistypes a name that long
+    const LONGEST: usize = 200;
+    if name.is_empty() || name.len() > LONGEST {
+        return None;
+    }
+    let name = name.to_lowercase();
+    known
+        .into_iter()
+        .filter(|known| !known.is_empty() && known.len() <= LONGEST)
+        .map(|known| (strsim::damerau_levenshtein(&name, &known.to_lowercase()), known))
+        .filter(|(distance, known)| *distance <= 2.max(known.chars().count() / 3))
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, known)| known)
+}
+
+/// `"; did you mean 'hip'?"`, or nothing without a name.
+pub fn did_you_mean(near: Option<impl AsRef<str>>) -> String {
+    near.map(|near| format!("; did you mean '{}'?", near.as_ref())).unwrap_or_default()
+}
+
+/// `"; did you mean 'hip'? known: hip, knee"`, or `"; known: hip, knee"` without a name.
+pub fn among(near: Option<impl AsRef<str>>, known: &str) -> String {
+    let hint = did_you_mean(near);
+    if hint.is_empty() { format!("; known: {known}") } else { format!("{hint} known: {known}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hint_is_a_name_that_may_have_been_meant() {
+        let known = ["hip", "Knee", "", "ankle_left", "ankle_right"];
+        let near = |name| nearest(name, known);
+        assert_eq!([near("hpi"), near("knee"), near("ankle_lfet")], [Some("hip"), Some("Knee"), Some("ankle_left")]);
+        assert_eq!([near(""), near("shoulder"), near(&"hip".repeat(100))], [None; 3]);
+    }
+
+    #[test]
+    fn a_hint_fits_behind_a_sentence() {
+        assert_eq!(among(Some("hip"), "hip, knee"), "; did you mean 'hip'? known: hip, knee");
+        assert_eq!(among(None::<&str>, "hip, knee"), "; known: hip, knee");
+        assert_eq!(did_you_mean(None::<&str>), "");
+    }
+}
