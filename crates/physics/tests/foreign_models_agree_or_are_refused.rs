@@ -251,7 +251,7 @@ bound on the largest relative error of all of these. Left out, and drawn again, 
 definite answer: accelerations above 1e8, or a change of position by 1e-9 that changes the contacts or moves the
 acceleration by more than 1e-4.
 
-What is refused is refused with the message shown, before anything is simulated.
+The loader refuses a model with the message shown, before anything is simulated.
 
 ";
 

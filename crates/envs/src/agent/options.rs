@@ -71,7 +71,7 @@ impl From<&str> for Value {
 }
 
 /// Arguments that help to learn: whoever plays a policy has their defaults, whatever it learned with.
-pub const OF_LEARNING: [&str; 2] = ["mortal", "knocked"];
+pub const OF_LEARNING: [&str; 3] = ["mortal", "knocked", "relive"];
 
 /// Arguments by name, in the order in which they were given. Equal ones may have been given in another order.
 #[derive(Clone, Debug, Default)]

@@ -45,7 +45,7 @@ const HASTE: Haste = Haste { speeding: 5.0, slowing: 3.0, lead: 1.2, quick: true
 const AHEAD: usize = 4;
 /// His skills, behind the variables of the steered figure.
 const SKILL: Skills = Skills { slot: BEGUN + 1 };
-/// Slot of whether a fall ends the episode, and number of all slots.
+/// Slot of whether a fall ends the episode, and number of all slots but those of [falls lived again](super::relive).
 const MORTAL: usize = SKILL.slot + SLOTS;
 const MEMORY: usize = MORTAL + 1;
 /// Share of the episodes that start in the midst of a skill.
@@ -84,6 +84,8 @@ crate::options! {
         knocked: Scale = Scale(0.0),
         /// What an episode's end costs that is a failure.
         price: Scale = Scale(0.0),
+        /// Share of the episodes of the gait that start 0.75 to 1.5 s before the last fall from it, once there is one.
+        relive: Scale = Scale(0.0),
     }
 }
 
@@ -130,8 +132,8 @@ impl Controller {
 
     /// The steered figure within.
     fn steer(&self) -> Steer {
-        let ControllerArguments { reach, start, commands, .. } = self.arguments.clone();
-        Steer { arguments: SteerArguments { reach, start, commands, ..SteerArguments::default() } }
+        let ControllerArguments { reach, start, commands, relive, .. } = self.arguments.clone();
+        Steer::of(SteerArguments { reach, start, commands, relive, ..SteerArguments::default() }, MEMORY)
     }
 }
 
@@ -161,7 +163,7 @@ impl Agent for Controller {
             ],
             clips: known_clips().into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: MEMORY,
+            memory: MEMORY + self.steer().relive.slots(),
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
@@ -197,6 +199,7 @@ impl Agent for Controller {
             }
             return;
         }
+        self.steer().relive.carry(start);
         let skill = known[start.random.whole(0, known.len() - 1)];
         let rows = start.clips().nth(CLIPS.len() + skill).expect("a row of clips for each clip");
         let [first, last] = SKILLS[skill].rows.map(|row| (rows.start + row).min(rows.end - 1));
@@ -270,6 +273,9 @@ impl Agent for Controller {
             memory[TARGET + i] = T::select(led, memory[TARGET + i], [x, y][i]);
         }
         memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
+        let felled = T::and(SKILL.rises(memory), T::not(rose));
+        let goes = T::not(T::or(on, SKILL.leaps(memory)));
+        self.steer().relive.remember(s, memory, goes, felled);
     }
 
     #[inline(always)]

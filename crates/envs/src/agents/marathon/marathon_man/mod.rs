@@ -21,6 +21,7 @@ pub mod clips;
 mod controller;
 mod courses;
 pub mod gait;
+mod relive;
 pub mod reward;
 mod skills;
 mod sparse;
@@ -140,10 +141,15 @@ fn has_joints(model: &Model) -> Result<(), String> {
     }
 }
 
+/// Decisions in so many seconds, one at least.
+fn decisions(seconds: Scale) -> usize {
+    (seconds.0 / DECISION).round().max(1.0) as usize
+}
+
 impl MarathonMan {
     /// Decisions after which an episode is truncated.
     fn max_episode_steps(&self) -> usize {
-        (self.arguments.seconds.0 / DECISION).round().max(1.0) as usize
+        decisions(self.arguments.seconds)
     }
 }
 

@@ -38,7 +38,8 @@ use super::body::{
 };
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
-use super::{DECISION, FRAME_SKIP, MAX_EPISODE_STEPS, observe_soles};
+use super::relive::Relive;
+use super::{DECISION, FRAME_SKIP, SECONDS, decisions, observe_soles};
 use crate::agent::options::Choice;
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
@@ -165,6 +166,11 @@ crate::options! {
         commands: Commands = Commands::Even,
         /// What a fall costs.
         price: Scale = Scale(0.0),
+        /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one: learners come to do better what
+        /// felled them.
+        relive: Scale = Scale(0.0),
+        /// How long an episode is at most, s: the shorter, the more of them follow a fall.
+        seconds: Scale = Scale(SECONDS),
     }
 }
 
@@ -188,12 +194,25 @@ fn fitting_clip(command: &[f64]) -> usize {
 }
 
 /// Marathon Man told where to go.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Steer {
     pub(super) arguments: SteerArguments,
+    pub(super) relive: Relive,
+}
+
+impl Default for Steer {
+    fn default() -> Self {
+        Self::of(SteerArguments::default(), BEGUN + 1)
+    }
 }
 
 impl Steer {
+    /// `relived`: the first variable of the falls that are lived again.
+    pub(super) fn of(arguments: SteerArguments, relived: usize) -> Self {
+        let relive = Relive { slot: relived, share: arguments.relive.0 };
+        Steer { arguments, relive }
+    }
+
     /// Angle from his heading to a direction, rad.
     #[inline(always)]
     pub(super) fn off<T: Real>(s: &Senses<T>, direction: [T; 2]) -> T {
@@ -373,7 +392,7 @@ impl Agent for Steer {
             summary: "a figure of 21 motors: walk, run, turn and stand as told, in the style of clips".into(),
             model: model(self.arguments.control).into(),
             frame_skip: FRAME_SKIP,
-            max_episode_steps: MAX_EPISODE_STEPS,
+            max_episode_steps: decisions(self.arguments.seconds),
             observation: Some(OBSERVATION),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
             reward_terms: names(TERMS),
@@ -387,7 +406,7 @@ impl Agent for Steer {
             ],
             clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: BEGUN + 1,
+            memory: self.relive.slot + self.relive.slots(),
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
@@ -398,7 +417,7 @@ impl Agent for Steer {
     }
 
     fn with_options(&self, options: &Options) -> Option<Self> {
-        Some(Steer { arguments: self.arguments.with(options) })
+        Some(Self::of(self.arguments.with(options), self.relive.slot))
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
@@ -406,6 +425,7 @@ impl Agent for Steer {
     }
 
     fn reset(&self, start: &mut Start) {
+        self.relive.carry(start);
         let adaptive = self.arguments.start == StartAt::Adaptive;
         let [made, begun] = [MADE, BEGUN].map(|slot| start.previous[slot]);
         let early = made > 0.0 && made * DECISION < EARLY;
@@ -425,6 +445,7 @@ impl Agent for Steer {
         start.start_in_clip(row);
         start.memory[PHASE] = (start.phase(row) - beginnings()[clip]).rem_euclid(1.0);
         start.memory[BEGUN] = row as f64;
+        self.relive.start(start);
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -470,6 +491,8 @@ impl Agent for Steer {
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), HASTE);
+        let felled = on_the_ground(s);
+        self.relive.remember(s, memory, T::not(felled), felled);
     }
 
     #[inline(always)]
