@@ -17,11 +17,11 @@ runs=$(mktemp -d)
 trap 'rm -rf "$runs"' EXIT
 
 for agent in "${wanted[@]}"; do
-  from=() more=''
+  from=()
   case "$agent" in
     HopperController) from=(--initialize-from "$shipped/hopper.safetensors") steady=controller ;;
     WalkerController) from=(--initialize-from "$shipped/walker2d.safetensors") steady=controller ;;
-    AntController) steady=ant_controller more=50M ;;
+    AntController) steady=ant_controller ;;
     MarathonManSteer) steady=marathon_man_steer ;;
     *)
       echo "no policy $agent is made here: HopperController, WalkerController, AntController, MarathonManSteer" >&2
@@ -32,22 +32,27 @@ for agent in "${wanted[@]}"; do
   steadily=(--config "assets/configs/$steady-steady.yaml" --initialize-from)
   last="$runs/$agent"
   learn "${from[@]}" --seed 1 --out "$last-goes"
-  if [ "$agent" = MarathonManSteer ]; then
-    # to stand still, with less noise; then not to fall
-    learn "${steadily[@]}" "$last-goes" --option relive=0 --option seconds=20 --seed 1 --out "$last-stands"
-    learn "${steadily[@]}" "$last-stands"/policies/policy-80*.safetensors --seed 2 --out "$last"
-    assets/policies/average.py "$last-mean.safetensors" "$last"/policies/*.safetensors
-    # who plays starts from a stand, and is not asked for extremes half of the time
-    "$marathon" export "$last-mean.safetensors" --out "$last-mean.onnx"
-    "$marathon" import "$last-mean.onnx" --agent "$agent" --option start=first --option commands=even --option price=20 \
-      --option seconds=20 --out "$last-shipped.safetensors"
-    cp "$last-shipped.safetensors" "$shipped/$agent.safetensors"
-    continue
-  fi
-  learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"
-  if [ -n "$more" ]; then
-    learn "${steadily[@]}" "$last" --steps "$more" --seed 2 --out "$last-more"
-    last="$last-more"
-  fi
-  cp "$last/policy.safetensors" "$shipped/$agent.safetensors"
+  case "$agent" in
+    AntController)
+      learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"
+      learn "${steadily[@]}" "$last" --steps 50M --seed 2 --out "$last-more"
+      policy="$last-more/policy.safetensors"
+      ;;
+    MarathonManSteer)
+      # to stand still, with less noise; then not to fall
+      learn "${steadily[@]}" "$last-goes" --option relive=0 --option seconds=20 --seed 1 --out "$last-stands"
+      learn "${steadily[@]}" "$last-stands"/policies/policy-80*.safetensors --seed 2 --out "$last"
+      assets/policies/average.py "$last-mean.safetensors" "$last"/policies/*.safetensors
+      # who plays starts from a stand, and is not asked for extremes half of the time
+      policy="$last-shipped.safetensors"
+      "$marathon" export "$last-mean.safetensors" --out "$last-mean.onnx"
+      "$marathon" import "$last-mean.onnx" --agent "$agent" --option start=first --option commands=even --option price=20 \
+        --option seconds=20 --out "$policy"
+      ;;
+    *)
+      learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"
+      policy="$last/policy.safetensors"
+      ;;
+  esac
+  cp "$policy" "$shipped/$agent.safetensors"
 done

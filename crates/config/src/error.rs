@@ -97,8 +97,10 @@ pub enum ConfigError {
 }
 
 fn suggestion(nearest: &Option<String>, known: &str) -> String {
-    let hint = did_you_mean(nearest.as_ref());
-    if hint.is_empty() { format!("; expected one of {known}") } else { hint }
+    match nearest {
+        Some(_) => did_you_mean(nearest.as_ref()),
+        None => format!("; expected one of {known}"),
+    }
 }
 
 impl ConfigError {

@@ -1,12 +1,11 @@
 //! Every key of a configuration file reaches the trainer, in both formats of ML-Agents. This file has PPO's.
 
+mod common;
+
+use common::read;
 use marathon_config::{Loaded, default_for, parse};
 use marathon_learn::{Activation, Algorithm, Init, Moving, Ratio, RewardKind, Schedule, TrainConfig};
 use std::path::{Path, PathBuf};
-
-fn read(text: &str, agent: &str) -> Loaded {
-    parse(Path::new("test.yaml"), text.as_bytes(), agent).unwrap_or_else(|e| panic!("{e}"))
-}
 
 fn asset(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/configs").join(name)

@@ -1,14 +1,12 @@
 //! Every key of a configuration file reaches the trainer: those of trainers other than PPO, and of rewards beside the task's.
 
-use marathon_config::{Loaded, parse};
+mod common;
+
+use common::read;
+use marathon_config::Loaded;
 use marathon_learn::{
     Acktr, Activation, Algorithm, Form, Imitation, Novelty, RewardConfig, RewardKind, Sac, Schedule, TrainConfig,
 };
-use std::path::Path;
-
-fn read(text: &str, agent: &str) -> Loaded {
-    parse(Path::new("test.yaml"), text.as_bytes(), agent).unwrap_or_else(|e| panic!("{e}"))
-}
 
 #[test]
 fn other_trainers_start_from_the_settings_of_baselines() {

@@ -3,10 +3,10 @@
 //! [`AnyAgent`] is the object-safe face of an agent; every [`Agent`] has it by a blanket implementation, so that the
 //! [`Registry`](crate::Registry) holds agents of any crate.
 
-use marathon_physics::hint::nearest;
 use std::sync::Arc;
 
 use marathon_physics::Model;
+use marathon_physics::hint::nearest;
 use marathon_physics::lanes::Isa;
 
 use crate::agent::bindings::Blueprint;

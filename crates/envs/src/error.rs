@@ -1,7 +1,7 @@
 //! What can go wrong before an environment runs.
 
 use marathon_physics::SimError;
-use marathon_physics::hint::among;
+use marathon_physics::hint::listed;
 use marathon_physics::mjcf::MjcfError;
 use thiserror::Error;
 
@@ -9,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum EnvError {
     /// No agent of this name is registered.
-    #[error("agent '{name}' does not exist{}", among(.nearest.as_ref(), known))]
+    #[error("agent '{name}' does not exist{}", listed(.nearest.as_ref(), known))]
     UnknownAgent {
         /// What was asked for.
         name: String,
@@ -27,7 +27,7 @@ pub enum EnvError {
         suggestion: String,
     },
     /// An agent does not take an argument.
-    #[error("agent '{id}' takes no option '{name}'{}", among(.nearest.as_ref(), known))]
+    #[error("agent '{id}' takes no option '{name}'{}", listed(.nearest.as_ref(), known))]
     UnknownOption {
         /// Registry name of the agent.
         id: String,

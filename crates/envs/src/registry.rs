@@ -3,9 +3,9 @@
 //! The global registry starts with the crate's own agents; [`register`] adds others. A [`Registry`] of one's own works
 //! the same way for those who want no global state.
 
-use marathon_physics::hint::nearest;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
+use marathon_physics::hint::nearest;
 use marathon_physics::lanes::Isa;
 
 use crate::agent::Options;

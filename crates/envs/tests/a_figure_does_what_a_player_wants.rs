@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::options;
-use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions, factory, registry};
+use common::{begun, options};
+use marathon_envs::{Step, VecEnv, factory, registry};
 use marathon_physics::lanes::Isa;
 
 const ID: &str = "MarathonManController-v0";
@@ -20,17 +20,7 @@ const SKILL: usize = 2;
 const RISING: usize = 3;
 
 fn made(list: &[(&str, &str)]) -> (VecEnv, Step) {
-    let options = VecEnvOptions {
-        agents: AGENTS,
-        isa: Some(Isa::F64),
-        autoreset: Autoreset::Disabled,
-        options: options(list),
-        ..Default::default()
-    };
-    let mut env = VecEnv::new(ID, &options).unwrap();
-    let mut step = env.buffers();
-    env.reset(Some(11), &mut step.obs).unwrap();
-    (env, step)
+    begun(ID, AGENTS, 11, list)
 }
 
 /// Lets the servos follow what leads him.

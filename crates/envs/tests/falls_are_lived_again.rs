@@ -4,29 +4,14 @@
 
 mod common;
 
-use common::options;
-use marathon_envs::{AgentState, Autoreset, Step, VecEnv, VecEnvOptions};
-use marathon_physics::lanes::Isa;
+use common::begun;
+use marathon_envs::{AgentState, Step, VecEnv};
 use std::ops::RangeInclusive;
 
 const AGENTS: usize = 16;
 /// Decisions from a state that is kept to a fall, and how far noise takes an angle, rad.
 const BEFORE: RangeInclusive<usize> = 30..=60;
 const NOISE: f64 = 0.0101;
-
-fn made(id: &str, list: &[(&str, &str)]) -> (VecEnv, Step) {
-    let options = VecEnvOptions {
-        agents: AGENTS,
-        isa: Some(Isa::F64),
-        autoreset: Autoreset::Disabled,
-        options: options(list),
-        ..Default::default()
-    };
-    let mut env = VecEnv::new(id, &options).unwrap();
-    let mut step = env.buffers();
-    env.reset(Some(5), &mut step.obs).unwrap();
-    (env, step)
-}
 
 /// An episode of each: a force carries his weight, and lets him go after some decisions. Returns where each of those was that fell,
 /// decision by decision, and starts their next episodes.
@@ -59,7 +44,7 @@ fn is_from(start: &AgentState, state: &AgentState) -> bool {
 }
 
 fn starts_before_the_fall(id: &str, list: &[(&str, &str)]) {
-    let (mut env, mut step) = made(id, list);
+    let (mut env, mut step) = begun(id, AGENTS, 5, list);
     let ways = fall(&mut env, &mut step, 70);
     let mut relived = Vec::new();
     for (agent, way) in ways.iter().enumerate() {
@@ -97,7 +82,7 @@ fn so_does_the_figure_in_a_players_hands() {
 
 #[test]
 fn without_it_nobody_does() {
-    let (mut env, mut step) = made("MarathonManSteer-v0", &[]);
+    let (mut env, mut step) = begun("MarathonManSteer-v0", AGENTS, 5, &[]);
     let ways = fall(&mut env, &mut step, 70);
     for (agent, way) in ways.iter().enumerate() {
         let (start, Some(way)) = (env.state(agent).unwrap(), way) else { continue };

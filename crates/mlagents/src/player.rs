@@ -8,7 +8,7 @@ use crate::log::Log;
 use crate::parameters::Parameters;
 use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
 use crate::wire::{RlInitializationOutput, RlInput, RlOutput, UnityMessage, UnityOutput, command};
-use marathon_physics::hint::{among, nearest};
+use marathon_physics::hint::among;
 use prost::Message;
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -289,8 +289,7 @@ impl Player {
         if known.contains(name) {
             return;
         }
-        let list = known.iter().copied().collect::<Vec<_>>().join(", ");
-        let known = among(nearest(name, known), &list);
+        let known = among(name, &Vec::from_iter(known));
         self.log.line(format_args!("warning: environment parameter '{name}' has no effect{known}"));
     }
 }

@@ -23,9 +23,15 @@ pub fn did_you_mean(near: Option<impl AsRef<str>>) -> String {
 }
 
 /// `"; did you mean 'hip'? known: hip, knee"`, or `"; known: hip, knee"` without a name.
-pub fn among(near: Option<impl AsRef<str>>, known: &str) -> String {
-    let hint = did_you_mean(near);
-    if hint.is_empty() { format!("; known: {known}") } else { format!("{hint} known: {known}") }
+pub fn listed(near: Option<impl AsRef<str>>, known: &str) -> String {
+    let end = if near.is_some() { "" } else { ";" };
+    format!("{}{end} known: {known}", did_you_mean(near))
+}
+
+/// What [`listed`] says of a name and all that are known.
+pub fn among<S: AsRef<str>>(name: &str, known: &[S]) -> String {
+    let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
+    listed(nearest(name, known.iter().copied()), &known.join(", "))
 }
 
 #[cfg(test)]
@@ -42,8 +48,8 @@ mod tests {
 
     #[test]
     fn a_hint_fits_behind_a_sentence() {
-        assert_eq!(among(Some("hip"), "hip, knee"), "; did you mean 'hip'? known: hip, knee");
-        assert_eq!(among(None::<&str>, "hip, knee"), "; known: hip, knee");
+        assert_eq!(among("hpi", &["hip", "knee"]), "; did you mean 'hip'? known: hip, knee");
+        assert_eq!(among("shoulder", &["hip", "knee"]), "; known: hip, knee");
         assert_eq!(did_you_mean(None::<&str>), "");
     }
 }

@@ -1,7 +1,7 @@
 //! A compiled model file: what is in it, by name and by index.
 
 use crate::error;
-use marathon_physics::hint::{among, nearest};
+use marathon_physics::hint::among;
 use marathon_physics::model::{Joint, JointType};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -256,7 +256,6 @@ fn table<const N: usize>(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f6
 fn find(what: &str, name: &str, known: Vec<&str>) -> PyResult<usize> {
     known.iter().position(|k| *k == name && !name.is_empty()).ok_or_else(|| {
         let named: Vec<&str> = known.into_iter().filter(|k| !k.is_empty()).collect();
-        let known = among(nearest(name, named.iter().copied()), &named.join(", "));
-        error::value(format!("the model has no {what} '{name}'{known}"))
+        error::value(format!("the model has no {what} '{name}'{}", among(name, &named)))
     })
 }

@@ -1,6 +1,6 @@
 //! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
 
-use marathon_physics::hint::{among, nearest};
+use marathon_physics::hint::among;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
@@ -139,8 +139,7 @@ impl<T: Real> Bindings<T> {
     pub fn new(facts: &Facts, blueprint: &Blueprint) -> Result<Self, EnvError> {
         let model = &blueprint.model;
         let missing = |role: &str, name: &str, kind: &str, known: Vec<&str>| {
-            let known = among(nearest(name, known.iter().copied()), &known.join(", "));
-            let problem = format!("{role} '{name}' is not a {kind} of its model{known}");
+            let problem = format!("{role} '{name}' is not a {kind} of its model{}", among(name, &known));
             EnvError::Agent { id: facts.id.clone(), problem }
         };
         let geom = |role: &str, name: &str| -> Result<usize, EnvError> {

@@ -99,6 +99,21 @@ pub fn make(id: &str, agents: usize, threads: usize, isa: Option<Isa>, autoreset
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// An environment of so many agents at the start, in double precision and with these arguments, whose episodes begin when told to.
+pub fn begun(id: &str, agents: usize, seed: u64, list: &[(&str, &str)]) -> (VecEnv, Step) {
+    let options = VecEnvOptions {
+        agents,
+        isa: Some(Isa::F64),
+        autoreset: Autoreset::Disabled,
+        options: options(list),
+        ..Default::default()
+    };
+    let mut env = VecEnv::new(id, &options).unwrap();
+    let mut step = env.buffers();
+    env.reset(Some(seed), &mut step.obs).unwrap();
+    (env, step)
+}
+
 /// Resets and plays `decisions` decisions with [`action`]; calls `each` after every one.
 pub fn play(env: &mut VecEnv, decisions: usize, scale: f32, mut each: impl FnMut(usize, &Step)) -> Step {
     let mut out = env.buffers();

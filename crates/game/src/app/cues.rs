@@ -3,7 +3,7 @@
 use crate::app::keys::{Deed, Do};
 use bevy::prelude::*;
 use clap::ValueEnum;
-use marathon_physics::hint::{among, nearest};
+use marathon_physics::hint::among;
 use std::str::FromStr;
 
 /// A deed at a time: `2.5:throw` on the command line.
@@ -27,13 +27,8 @@ impl FromStr for Cue {
         }
         let values = Deed::value_variants().iter().filter_map(Deed::to_possible_value);
         let names: Vec<String> = values.map(|value| value.get_name().to_string()).collect();
-        Err(format!("there is no '{name}'{}", known(name, &names)))
+        Err(format!("there is no '{name}'{}", among(name, &names)))
     }
-}
-
-/// What an error about an unknown name ends with: the nearest name that is known, and all of them.
-pub(super) fn known(name: &str, names: &[String]) -> String {
-    among(nearest(name, names.iter().map(String::as_str)), &names.join(", "))
 }
 
 /// The cues that are still to come, the last first.

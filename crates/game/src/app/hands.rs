@@ -4,7 +4,7 @@
 //! A hold becomes what a device's driver would send, so that it takes the same way as a player's: through Bevy's input, the
 //! bindings and the mappings.
 
-use crate::app::{cues, keys};
+use crate::app::keys;
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{
     GamepadAxis, GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent,
@@ -12,6 +12,7 @@ use bevy::input::gamepad::{
 };
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
+use marathon_physics::hint::among;
 use std::str::FromStr;
 
 /// Axes of a gamepad, and triggers, which move like axes, from 0 on.
@@ -70,7 +71,7 @@ impl FromStr for Hold {
         let Some(control) = control else {
             let of_pad = || AXES.iter().map(|(name, _)| name.to_string()).chain(keys::button_names()).collect();
             let names: Vec<String> = if number.is_some() { of_pad() } else { keys::key_names().collect() };
-            return Err(format!("a {device} has no '{name}'{}", cues::known(name, &names)));
+            return Err(format!("a {device} has no '{name}'{}", among(name, &names)));
         };
         let amount = match amount {
             None => 1.0,

@@ -179,12 +179,8 @@ impl Mapping {
         let soles = file.soles.iter().map(|name| {
             let names = || model.bodies.iter().map(|body| body.name.as_str());
             names().position(|known| known == name).ok_or_else(|| {
-                MotionError::value(
-                    path,
-                    "soles",
-                    name,
-                    format!("bodies of the model{}", did_you_mean(nearest(name, names()))),
-                )
+                let hint = did_you_mean(nearest(name, names()));
+                MotionError::value(path, "soles", name, format!("bodies of the model{hint}"))
             })
         });
         let soles = soles.collect::<Result<_, _>>()?;

@@ -1,10 +1,10 @@
 //! Clips by name: those that come with the crate, and those of a caller.
 
-use marathon_physics::hint::{among, nearest};
 use std::path::Path;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use marathon_motion::Clip;
+use marathon_physics::hint::among;
 
 use crate::agent::Value;
 use crate::agent::options::OptionValue;
@@ -130,7 +130,6 @@ impl ClipNames {
         let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
         let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
         let Some(missing) = missing else { return Ok(()) };
-        let known = among(nearest(missing, known.iter().copied()), &known.join(", "));
-        Err(format!("option clip is '{missing}', expected a clip that is known{known}"))
+        Err(format!("option clip is '{missing}', expected a clip that is known{}", among(missing, &known)))
     }
 }

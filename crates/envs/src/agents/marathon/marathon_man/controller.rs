@@ -29,7 +29,7 @@ use super::steer::{
     BEGUN, CLIPS, Commands, DIRECTION, FASTEST, Haste, OBSERVATION, PACE, SHARPEST, Steer, SteerArguments, TARGET,
     TERMS,
 };
-use super::{FRAME_SKIP, MAX_EPISODE_STEPS};
+use super::{FRAME_SKIP, SECONDS, decisions};
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
     Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms,
@@ -115,6 +115,8 @@ impl Does {
 pub struct Controller {
     arguments: ControllerArguments,
     does: Does,
+    /// The steered figure within.
+    steer: Steer,
 }
 
 impl Default for Controller {
@@ -127,13 +129,9 @@ impl Controller {
     fn of(arguments: ControllerArguments) -> Self {
         let named = |clip: &str| arguments.clip.0 == ALL || arguments.clip.names().contains(&clip);
         let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
-        Controller { arguments, does }
-    }
-
-    /// The steered figure within.
-    fn steer(&self) -> Steer {
-        let ControllerArguments { reach, start, commands, relive, .. } = self.arguments.clone();
-        Steer::of(SteerArguments { reach, start, commands, relive, ..SteerArguments::default() }, MEMORY)
+        let ControllerArguments { reach, start, commands, relive, .. } = arguments;
+        let steer = Steer::of(SteerArguments { reach, start, commands, relive, ..SteerArguments::default() }, MEMORY);
+        Controller { arguments, does, steer }
     }
 }
 
@@ -145,7 +143,7 @@ impl Agent for Controller {
                 .into(),
             model: model(Control::Pd).into(),
             frame_skip: FRAME_SKIP,
-            max_episode_steps: MAX_EPISODE_STEPS,
+            max_episode_steps: decisions(Scale(SECONDS)),
             observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
             reward_terms: names(TERMS.iter().chain(&["skill", "leap", "rise"])),
@@ -163,7 +161,7 @@ impl Agent for Controller {
             ],
             clips: known_clips().into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: MEMORY + self.steer().relive.slots(),
+            memory: MEMORY + self.steer.relive.slots(),
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
@@ -188,7 +186,7 @@ impl Agent for Controller {
         let first = self.arguments.start == StartAt::First;
         let mortal = f64::from(u8::from(start.random.uniform(0.0, 1.0) < self.arguments.mortal.0));
         if gait && (first || known.is_empty() || start.random.uniform(0.0, 1.0) >= SKILLED) {
-            self.steer().reset(start);
+            self.steer.reset(start);
             start.memory[MORTAL] = mortal;
             if start.random.uniform(0.0, 1.0) < self.arguments.knocked.0 {
                 let angle = start.random.around_zero(PI);
@@ -199,7 +197,7 @@ impl Agent for Controller {
             }
             return;
         }
-        self.steer().relive.carry(start);
+        self.steer.relive.carry(start);
         let skill = known[start.random.whole(0, known.len() - 1)];
         let rows = start.clips().nth(CLIPS.len() + skill).expect("a row of clips for each clip");
         let [first, last] = SKILLS[skill].rows.map(|row| (rows.start + row).min(rows.end - 1));
@@ -213,7 +211,7 @@ impl Agent for Controller {
 
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
         let mut going = [0.0; 2];
-        let mut hold = self.steer().command(random, step, &mut going);
+        let mut hold = self.steer.command(random, step, &mut going);
         let (mut left, mut jump, mut backflip) = (0.0, 0.0, 0.0);
         let kind = random.uniform(0.0, 1.0);
         if kind < JUMPING && self.does.skills[JUMP] {
@@ -245,7 +243,7 @@ impl Agent for Controller {
     #[inline(always)]
     fn begin<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let begins = [0, 1, 2, 3].map(|i| memory[i]);
-        self.steer().begin(s, memory);
+        self.steer.begin(s, memory);
         memory[..4].copy_from_slice(&begins);
         for (i, x) in SKILL.facing(s, memory).into_iter().enumerate() {
             memory[DIRECTION + i] = x;
@@ -275,7 +273,7 @@ impl Agent for Controller {
         memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
         let felled = T::and(SKILL.rises(memory), T::not(rose));
         let goes = T::not(T::or(on, SKILL.leaps(memory)));
-        self.steer().relive.remember(s, memory, goes, felled);
+        self.steer.relive.remember(s, memory, goes, felled);
     }
 
     #[inline(always)]

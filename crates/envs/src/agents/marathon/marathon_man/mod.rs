@@ -51,8 +51,6 @@ const FRAME_SKIP: usize = 5;
 const DECISION: f64 = 1.0 / 40.0;
 /// How long an episode is at most, s, unless an option says otherwise.
 const SECONDS: f64 = 20.0;
-/// The same in decisions.
-const MAX_EPISODE_STEPS: usize = (SECONDS / DECISION) as usize;
 /// How far ahead later frames of the clip are, decisions, and what their observations are called.
 const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
 /// Numbers of such a frame.

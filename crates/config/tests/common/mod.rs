@@ -1,0 +1,9 @@
+//! Shared by the tests of configurations that are valid.
+
+use marathon_config::{Loaded, parse};
+use std::path::Path;
+
+/// What a file says about an agent.
+pub fn read(text: &str, agent: &str) -> Loaded {
+    parse(Path::new("test.yaml"), text.as_bytes(), agent).unwrap_or_else(|e| panic!("{e}"))
+}
