@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the policies of this folder that obey a player in two runs each, two of them in three: HopperController and WalkerController learn to
 # go from the policy of their figure that runs, and then not to fall; AntController learns to go from nothing, and then to stand still;
-# MarathonManSteer the same, and not to fall, in three runs. About an hour and a half of processor time in all. Needs python3.
+# MarathonManSteer the same, and not to fall, in three runs. About an hour and a half of processor time in all.
 #
 #     assets/policies/controllers.sh [HopperController] [WalkerController] [AntController] [MarathonManSteer]
 set -euo pipefail
@@ -42,12 +42,10 @@ for agent in "${wanted[@]}"; do
       # to stand still, with less noise; then not to fall
       learn "${steadily[@]}" "$last-goes" --option relive=0 --option seconds=20 --seed 1 --out "$last-stands"
       learn "${steadily[@]}" "$last-stands"/policies/policy-80*.safetensors --seed 2 --out "$last"
-      assets/policies/average.py "$last-mean.safetensors" "$last"/policies/*.safetensors
       # who plays starts from a stand, and is not asked for extremes half of the time
       policy="$last-shipped.safetensors"
-      "$marathon" export "$last-mean.safetensors" --out "$last-mean.onnx"
-      "$marathon" import "$last-mean.onnx" --agent "$agent" --option start=first --option commands=even --option price=20 \
-        --option seconds=20 --out "$policy"
+      "$marathon" average "$last" --option start=first --option commands=even --option price=20 --option seconds=20 \
+        --out "$policy"
       ;;
     *)
       learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"

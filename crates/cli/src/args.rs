@@ -43,6 +43,8 @@ pub enum Command {
     Train(TrainArgs),
     /// Learn from policies: one that does what several do.
     Distill(DistillArgs),
+    /// Average policies that a run has kept: the mean can be better than each of them.
+    Average(AverageArgs),
     /// Play whole episodes with a policy's best actions and report how it did.
     Eval(EvalArgs),
     /// Draw a policy in action: a strip of frames, an animation or a film.
@@ -120,6 +122,26 @@ pub struct DistillArgs {
     pub out: PathBuf,
     #[command(flatten)]
     pub options: DistillOptions,
+}
+
+const AVERAGE_HELP: &str = "\
+Steps of learning are noisy to the end, and the mean of what they lead to is less so. Policies must be near each other, as
+those that one run has kept in policies/. Policies of runs with different beginnings have no useful mean.
+
+  marathon average runs/marathon_man_steer-1 --out mean.safetensors";
+
+/// Options of `average`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = AVERAGE_HELP)]
+pub struct AverageArgs {
+    /// Policy files; the folder of a run stands for all policies that the run has kept.
+    #[arg(value_name = "POLICY", required = true)]
+    pub policies: Vec<PathBuf>,
+    #[command(flatten)]
+    pub task: TaskOptions,
+    /// File to write, .safetensors or .onnx.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
 }
 
 /// Options of `eval`.

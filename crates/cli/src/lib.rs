@@ -70,6 +70,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Distill(distill) => commands::distill::run(distill, args.json),
         Command::Eval(eval) => commands::eval::run(eval, args.json),
         Command::Render(render) => commands::render::run(render, args.json),
+        Command::Average(average) => commands::average::run(average, args.json),
         Command::Export(export) => commands::convert::export(export, args.json),
         Command::Import(import) => commands::convert::import(import, args.json),
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),

@@ -115,3 +115,27 @@ fn damaged_policies_never_panic() {
     std::fs::remove_file(&path).unwrap();
     assert!(Policy::load(&path).err().unwrap().to_string().contains("puck.safetensors: read"));
 }
+
+#[test]
+fn the_mean_of_policies_lies_between_them() {
+    let policies = [100.0, 0.0, -40.0].map(|shift| shifted(&trained(Activation::Tanh), shift));
+    let mean = Policy::mean(&policies).unwrap();
+    assert_eq!(mean.params()[0], ((policies.iter().map(|p| f64::from(p.params()[0])).sum::<f64>()) / 3.0) as f32);
+    assert!((mean.params()[0] - policies[1].params()[0] - 20.0).abs() < 1e-4);
+    assert_eq!(mean.normalizer(), policies[1].normalizer());
+    assert_eq!(mean.meta(), policies[2].meta());
+    // it acts
+    assert!(mean.act(&[0.1; 6]).iter().all(|a| a.abs() <= 1.0));
+
+    assert_eq!(Policy::mean(&[]).unwrap_err().to_string(), "mean is for no policies, expected one or more");
+    let other = trained(Activation::Elu);
+    let error = Policy::mean(&[other, policies[0].clone()]).unwrap_err().to_string();
+    assert_eq!(error, "activation is for elu, expected tanh");
+}
+
+/// A policy whose weights are larger by `shift`.
+fn shifted(policy: &Policy, shift: f32) -> Policy {
+    let params = policy.params().iter().map(|x| x + shift).collect();
+    let (mean, std) = (policy.normalizer().mean().to_vec(), policy.normalizer().std().to_vec());
+    Policy::from_parts(policy.meta().clone(), params, (mean, std), policy.log_std().to_vec()).unwrap()
+}

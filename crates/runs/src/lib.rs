@@ -5,6 +5,7 @@
 //! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
 //! names of options; each front end spells them in its own way ([`Spelling`]).
 
+pub mod average;
 pub mod clips;
 pub mod configuration;
 pub mod controller;

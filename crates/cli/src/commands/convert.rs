@@ -22,7 +22,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
     if !policy_file::is_onnx(&out) {
         return Err(CliError::Usage(format!("--out is {}, expected a name that ends with .onnx", path_word(&out))));
     }
-    save(&policy, &args.policy, &out)?;
+    save(&policy, &[&args.policy], &out)?;
     tell(&policy, &out, json);
     Ok(())
 }
@@ -38,23 +38,23 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     }
     let (policy, _) = policy_file::load(&args.network, args.agent.as_deref(), &args.task)?;
     let out = args.out.clone().unwrap_or_else(|| args.network.with_extension("safetensors"));
-    save(&policy, &args.network, &out)?;
+    save(&policy, &[&args.network], &out)?;
     tell(&policy, &out, json);
     Ok(())
 }
 
-/// Writes what was read from `input`, which is kept.
-fn save(policy: &Policy, input: &Path, out: &Path) -> Result<(), CliError> {
-    if let (Ok(a), Ok(b)) = (input.canonicalize(), out.canonicalize())
-        && a == b
-    {
+/// Writes what was made of `inputs`, which are kept.
+pub fn save(policy: &Policy, inputs: &[&Path], out: &Path) -> Result<(), CliError> {
+    let is_out = |out: &Path| inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == out));
+    if out.canonicalize().is_ok_and(|out| is_out(&out)) {
         let found = path_word(out);
-        return Err(CliError::Usage(format!("--out is {found}, the file that is read; expected another")));
+        return Err(CliError::Usage(format!("--out is {found}, a file that is read; expected another")));
     }
     Ok(policy_file::save(policy, out)?)
 }
 
-fn tell(policy: &Policy, out: &Path, json: bool) {
+/// Says what was written.
+pub fn tell(policy: &Policy, out: &Path, json: bool) {
     let meta = policy.meta();
     if json {
         print_json(&serde_json::json!({

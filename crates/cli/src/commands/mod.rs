@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod average;
 pub mod convert;
 pub mod distill;
 pub mod eval;

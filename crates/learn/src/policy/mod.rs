@@ -16,6 +16,7 @@ mod block;
 mod cast;
 pub mod evaluation;
 mod file;
+mod mean;
 mod onnx;
 pub mod options;
 

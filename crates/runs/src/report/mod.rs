@@ -14,7 +14,7 @@ use crate::folder::{RunFile, RunFolder};
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot, TrainOutput};
 use progress::Progress;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tensorboard::EventLog;
 
 /// Asked after every iteration whether to go on.
@@ -123,7 +123,7 @@ impl<'a> Reporter<'a> {
     /// Removes policies of later steps, which are to come again, and the oldest.
     fn prune(&self, steps: u64) {
         let (mut kept, later): (Vec<_>, Vec<_>) =
-            kept_policies(self.folder).into_iter().partition(|(n, _)| *n <= steps);
+            kept_policies(&self.folder.policies()).into_iter().partition(|(n, _)| *n <= steps);
         kept.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
         let old = kept.into_iter().skip(self.run.keep_checkpoints);
         for (_, path) in old.chain(later) {
@@ -146,9 +146,9 @@ impl Observer for Reporter<'_> {
     }
 }
 
-/// Policies in `policies/` with their steps.
-pub fn kept_policies(folder: &RunFolder) -> Vec<(u64, PathBuf)> {
-    let entries = std::fs::read_dir(folder.policies()).into_iter().flatten().flatten();
+/// Policies in a run's `policies/` with their steps.
+pub fn kept_policies(folder: &Path) -> Vec<(u64, PathBuf)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let of = |path: PathBuf| {
         let steps = path.file_stem()?.to_str()?.strip_prefix("policy-")?.parse().ok()?;
         Some((steps, path))

@@ -1,0 +1,19 @@
+//! `marathon average`: the mean of policies.
+
+use crate::args::AverageArgs;
+use crate::commands::convert::{save, tell};
+use crate::error::CliError;
+use marathon_runs::average::average;
+use std::path::{Path, PathBuf};
+
+/// Averages policies and writes the mean.
+///
+/// # Errors
+/// If a file is no policy, the policies do not fit each other, or the mean cannot be written.
+pub fn run(args: &AverageArgs, json: bool) -> Result<(), CliError> {
+    let (policy, paths) = average(&args.policies, &args.task)?;
+    let inputs: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    save(&policy, &inputs, &args.out)?;
+    tell(&policy, &args.out, json);
+    Ok(())
+}

@@ -1,0 +1,53 @@
+//! The mean of policies that a run has kept. Steps of learning are noisy to the end; the mean of what they lead to is less so.
+
+use crate::error::RunError;
+use crate::policy_file;
+use crate::report::kept_policies;
+use crate::setting::TaskOptions;
+use marathon_learn::{Error, Policy};
+use std::path::{Path, PathBuf};
+
+/// The mean of policies, and their files. A folder is that of a run, and stands for all that the run has kept in `policies/`, in
+/// the order of their steps. The mean is for the task of the last policy, with the arguments that the user gives.
+///
+/// # Errors
+/// If a file is no policy, there are fewer than two, one has another task, network or map of actions than the last, or the task
+/// does not take the arguments.
+pub fn average(given: &[PathBuf], options: &TaskOptions) -> Result<(Policy, Vec<PathBuf>), RunError> {
+    let mut paths = Vec::new();
+    for path in given {
+        match path.is_dir() {
+            true => paths.extend(kept_by(path)?),
+            false => paths.push(path.clone()),
+        }
+    }
+    let [others @ .., last] = &paths[..] else {
+        return Err(RunError::option("policies", "is none, expected two or more"));
+    };
+    if others.is_empty() {
+        return Err(RunError::file(last, "policies", "one", "two or more"));
+    }
+    let (last, factory) = policy_file::load(last, None, options)?;
+    let mut policies = Vec::new();
+    for path in others {
+        let policy = policy_file::read(path, Some(factory.spec()))?;
+        policy.check_alike(&last).map_err(|error| match error {
+            Error::Mismatch { what, found, expected } => RunError::file(path, what, found, expected),
+            other => other.into(),
+        })?;
+        policies.push(policy);
+    }
+    policies.push(last);
+    Ok((Policy::mean(&policies)?, paths))
+}
+
+/// The policies that a run has kept, in the order of their steps.
+fn kept_by(run: &Path) -> Result<Vec<PathBuf>, RunError> {
+    let folder = run.join("policies");
+    let mut kept = kept_policies(&folder);
+    if kept.is_empty() {
+        return Err(RunError::file(&folder, "policies", "none", "those that a run has kept"));
+    }
+    kept.sort();
+    Ok(kept.into_iter().map(|(_, path)| path).collect())
+}
