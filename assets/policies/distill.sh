@@ -53,10 +53,8 @@ for policy in "${wanted[@]}"; do
       learn "$left" "$left" "$right" "$flip" "$flip" "$flip" "$flip" "$flip" "$wheel" --steps 8M --lr 3e-4 --seed 5 \
         --initialize-from "$runs/four.safetensors" --out "$runs/five.safetensors"
       # then three that are harder; of the others it is its own teacher, of all of them or of some
-      "$marathon" export "$runs/five.safetensors" --out "$runs/five.onnx"
       of_itself() {
-        "$marathon" import "$runs/five.onnx" --agent MarathonMan --option future=3 --option start=adaptive --option "clip=$2" \
-          --out "$runs/$1.safetensors" >&2
+        "$marathon" import "$runs/five.safetensors" --option "clip=$2" --out "$runs/$1.safetensors" >&2
         echo "--teacher=$runs/$1.safetensors"
       }
       walk=$(teacher Walk) run=$(teacher Run) roll=$(teacher Roll --steps 80M) spin=$(teacher Spin) dance=$(teacher Dance)
@@ -84,9 +82,7 @@ for policy in "${wanted[@]}"; do
       "$marathon" train MarathonManController --option mortal=0.7 --option knocked=0 --steps 47M \
         --initialize-from "$runs/start.safetensors" --seed 1 --threads 1 --out "$runs/goes"
       # what he forgot meanwhile; the network of the run, as one that goes and jumps only
-      "$marathon" export "$runs/goes" --out "$runs/goes.onnx"
-      "$marathon" import "$runs/goes.onnx" --agent MarathonManController --option start=adaptive --option commands=sharp \
-        --option clip=walk,walk_left,walk_right,run,stand,jump --out "$runs/goes.safetensors"
+      "$marathon" import "$runs/goes" --option clip=walk,walk_left,walk_right,run,stand,jump --out "$runs/goes.safetensors"
       goes="--teacher=$runs/goes.safetensors"
       learn "$goes" "$goes" "$goes" "${skills[0]}" --steps 8M --lr 5e-4 --seed 2 --initialize-from "$runs/goes" \
         --out "$runs/knows.safetensors"
@@ -112,8 +108,7 @@ for policy in "${wanted[@]}"; do
       "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
         --seed 5 --threads 1 --out "$runs/steady"
       # who plays starts from a stand, and is not asked for extremes half of the time
-      "$marathon" export "$runs"/steady/policies/policy-50*.safetensors --out "$runs/last.onnx"
-      "$marathon" import "$runs/last.onnx" --agent MarathonManController --option start=first --option commands=even \
+      "$marathon" import "$runs"/steady/policies/policy-50*.safetensors --option start=first --option commands=even \
         --option price=20 --out "$runs/shipped.safetensors"
       cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
       ;;

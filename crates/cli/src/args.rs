@@ -51,7 +51,7 @@ pub enum Command {
     Render(RenderArgs),
     /// Write a policy as ONNX, for Unity ML-Agents, ONNX Runtime and others.
     Export(ExportArgs),
-    /// Turn an ONNX network of another trainer into a policy.
+    /// Turn an ONNX network of another trainer into a policy, or a policy into one for other options.
     Import(ImportArgs),
     /// Record a policy's decisions for ML-Agents' imitation learning: a .demo file.
     RecordDemo(RecordDemoArgs),
@@ -209,21 +209,25 @@ pub struct ExportArgs {
 const IMPORT_HELP: &str = "\
 Reads multi-layer perceptrons with one observation as input and actions as output, as ML-Agents, PyTorch and
 Stable-Baselines3 write them: normalization, layers with swish, tanh, elu or relu, a final tanh, bounds.
-`eval` and `render` take such files as they are.";
+`eval` and `render` take such files as they are.
+
+A policy of Marathon is written again for the options that are given:
+
+  marathon import runs/marathon_man_steer-1 --option start=first --out steer.safetensors";
 
 /// Options of `import`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = IMPORT_HELP)]
 pub struct ImportArgs {
-    /// Network to read.
-    #[arg(value_name = "F.onnx")]
+    /// Network to read, or a policy file, or the folder of a run.
+    #[arg(value_name = "NETWORK")]
     pub network: PathBuf,
     /// Agent that it is for [default: the one that the file names, if Marathon has written it].
     #[arg(long, value_name = "AGENT")]
     pub agent: Option<String>,
     #[command(flatten)]
     pub task: TaskOptions,
-    /// File to write [default: beside the network, .safetensors].
+    /// File to write [default: beside a network, .safetensors].
     #[arg(long, value_name = "F.safetensors")]
     pub out: Option<PathBuf>,
 }

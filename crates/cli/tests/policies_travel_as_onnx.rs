@@ -1,16 +1,19 @@
-//! `marathon export` and `marathon import`: a policy that went to ONNX and came back does as it did, and `eval` takes either.
+//! `marathon export` and `marathon import`: a policy that went to ONNX and came back does as it did, and `eval` takes either. A policy
+//! can be handed on for other options.
 
 mod common;
 
 use common::{assert_no_leftovers, fail, json, succeed};
-use serde_json::Value;
+use marathon_envs::options::Value;
+use marathon_learn::Policy;
+use serde_json::Value as Json;
 use std::path::Path;
 
 fn shipped(name: &str) -> String {
     format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))
 }
 
-fn eval(folder: &Path, policy: &str) -> Value {
+fn eval(folder: &Path, policy: &str) -> Json {
     json(&succeed(folder, &["eval", policy, "--episodes", "16", "--json"]))
 }
 
@@ -23,10 +26,28 @@ fn there_and_back() {
     let text = succeed(folder, &["import", "hopper.onnx"]);
     assert!(text.starts_with("wrote hopper.safetensors: Hopper-v0, 31 -> "), "{text}");
     let (before, after) = (eval(folder, &shipped("hopper")), eval(folder, "hopper.safetensors"));
-    let mean = |report: &Value| report["return_mean"].as_f64().unwrap();
+    let mean = |report: &Json| report["return_mean"].as_f64().unwrap();
     // the bits of a division may differ, and with them single episodes
     assert!((mean(&before) / mean(&after) - 1.0).abs() < 0.05, "{before} {after}");
     assert_eq!(eval(folder, "hopper.onnx")["return_mean"], after["return_mean"]);
+    assert_no_leftovers(folder);
+}
+
+/// A policy that was trained for one thing is handed on for another.
+#[test]
+fn a_policy_is_written_for_other_options() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let walk = shipped("MarathonManWalk");
+    succeed(folder, &["import", &walk, "--option", "start=first", "--out", "walk.safetensors"]);
+    let [before, after] = [Path::new(&walk), &folder.join("walk.safetensors")].map(|path| Policy::load(path).unwrap());
+    assert_eq!((before.params(), before.normalizer()), (after.params(), after.normalizer()));
+    let start = |policy: &Policy| policy.meta().options.get("start").cloned();
+    assert_eq!(start(&before), Some(Value::Text("adaptive".into())));
+    assert_eq!(start(&after), Some(Value::Text("first".into())));
+    let error = fail(folder, 1, &["import", &walk, "--option", "start=frist", "--out", "x.safetensors"]);
+    assert!(error.contains("frist") && error.contains("first"), "{error}");
+    assert!(!folder.join("x.safetensors").exists());
     assert_no_leftovers(folder);
 }
 
@@ -37,7 +58,7 @@ fn mistakes_are_told() {
     let error = fail(folder, 2, &["export", &shipped("hopper"), "--out", "hopper.pt"]);
     assert!(error.contains("--out is hopper.pt, expected a name that ends with .onnx"), "{error}");
     let error = fail(folder, 2, &["import", &shipped("hopper")]);
-    assert!(error.contains("expected a name that ends with .onnx"), "{error}");
+    assert!(error.contains("--out is missing, expected a file for the policy of"), "{error}");
     std::fs::write(folder.join("x.onnx"), b"").unwrap();
     let error = fail(folder, 1, &["import", "x.onnx"]);
     assert!(error.contains("x.onnx: agent: found none, expected one"), "{error}");

@@ -27,17 +27,22 @@ pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Turns an ONNX file into a policy.
+/// Turns an ONNX file into a policy, or a policy into one that is for other options.
 ///
 /// # Errors
 /// If the file is not of a network that a policy of the agent can be, or the policy cannot be written.
 pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
-    if !policy_file::is_onnx(&args.network) {
-        let found = path_word(&args.network);
-        return Err(CliError::Usage(format!("the network is {found}, expected a name that ends with .onnx")));
-    }
     let (policy, _) = policy_file::load(&args.network, args.agent.as_deref(), &args.task)?;
-    let out = args.out.clone().unwrap_or_else(|| args.network.with_extension("safetensors"));
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None if policy_file::is_onnx(&args.network) => args.network.with_extension("safetensors"),
+        None => {
+            return Err(CliError::Usage(format!(
+                "--out is missing, expected a file for the policy of {}",
+                path_word(&args.network)
+            )));
+        }
+    };
     save(&policy, &[&args.network], &out)?;
     tell(&policy, &out, json);
     Ok(())
