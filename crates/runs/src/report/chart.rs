@@ -95,11 +95,19 @@ impl Chart {
                     mesh.x_labels(9).x_label_formatter(&of_x).draw()?;
                     for (i, (name, points)) in lines.iter().enumerate() {
                         let color = COLORS[i % COLORS.len()];
-                        chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2 * SCALE)))?;
+                        let (points, stroke) = (points.iter().copied(), color.stroke_width(2 * SCALE));
+                        // as many lines again have the same colors, and dashes
+                        let name = if i < COLORS.len() {
+                            chart.draw_series(LineSeries::new(points, stroke))?;
+                            name.clone()
+                        } else {
+                            chart.draw_series(DashedLineSeries::new(points, 9 * SCALE, 6 * SCALE, stroke))?;
+                            format!("{name} (dashed)")
+                        };
                         // the names below, where no line runs
                         let (column, row) = (i as u32 % 2, i as u32 / 2);
                         let place = at(78 + column * (SIZE[0] - 110) / 2, SIZE[1] - 8 - names + LINE_NAME * row);
-                        root.draw_text(name, &style(14, color, FontStyle::Bold), place)?;
+                        root.draw_text(&name, &style(14, color, FontStyle::Bold), place)?;
                     }
                 }
                 Chart::Bars(_, bars) => {

@@ -26,7 +26,7 @@ const EPISODES: usize = 16;
 /// Policies on the way that are judged have at least so many times the steps of the one before.
 const APART: f64 = 1.1;
 /// Most lines that can be told apart in a picture.
-const LINES: usize = 8;
+const LINES: usize = 16;
 
 /// A clip and the task that has it.
 struct Job {
