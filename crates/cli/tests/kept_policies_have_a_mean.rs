@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{assert_no_leftovers, fail, read_json, succeed, tensors};
+use common::{assert_no_leftovers, fail, read_json, shipped, succeed, tensors};
 use marathon_envs::options::Value;
 use marathon_learn::Policy;
 use std::path::{Path, PathBuf};
@@ -70,7 +70,6 @@ fn every_number_is_the_mean() {
 fn the_mean_is_for_the_task_that_the_user_says() {
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
-    let shipped = |name: &str| format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"));
     let walk = shipped("MarathonManWalk");
     succeed(folder, &["average", &walk, &walk, "--option", "start=first", "--out", "walk.safetensors"]);
     let [before, after] = [Path::new(&walk), &folder.join("walk.safetensors")].map(|path| Policy::load(path).unwrap());
@@ -91,7 +90,7 @@ fn what_has_no_mean_is_refused() {
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
     let kept = run(folder);
-    let shipped = format!("{}/../../assets/policies/hopper.safetensors", env!("CARGO_MANIFEST_DIR"));
+    let hopper = shipped("hopper");
     let cases: [(&[&str], i32, &str); 5] = [
         (
             &["run/policies/policy-4096.safetensors"],
@@ -103,7 +102,7 @@ fn what_has_no_mean_is_refused() {
             1,
             "run/policies/policies: policies: found none, expected those that a run has kept",
         ),
-        (&[&shipped, "run"], 1, "hopper.safetensors: hidden layers: found [32, 32], expected [24, 24]"),
+        (&[&hopper, "run"], 1, "hopper.safetensors: hidden layers: found [32, 32], expected [24, 24]"),
         (&["run", "run/polices.safetensors"], 1, "run/polices.safetensors: policy: found no such file"),
         (&["run", "--out", "./run/policies/policy-8192.safetensors"], 2, "a file that is read; expected another"),
     ];
@@ -114,6 +113,9 @@ fn what_has_no_mean_is_refused() {
         assert!(error.contains(expected), "{error}");
     }
     assert!(!folder.join("x.safetensors").exists());
+    // nor is the policy of a run overwritten by what is made of it
+    let error = fail(folder, 2, &["import", "run", "--out", "run/policy.safetensors"]);
+    assert!(error.contains("a file that is read; expected another"), "{error}");
     assert!(before == kept.iter().map(|path| std::fs::read(path).unwrap()).collect::<Vec<_>>());
     assert_no_leftovers(folder);
 }

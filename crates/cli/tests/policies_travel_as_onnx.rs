@@ -3,15 +3,11 @@
 
 mod common;
 
-use common::{assert_no_leftovers, fail, json, succeed};
+use common::{assert_no_leftovers, fail, json, shipped, succeed};
 use marathon_envs::options::Value;
 use marathon_learn::Policy;
 use serde_json::Value as Json;
 use std::path::Path;
-
-fn shipped(name: &str) -> String {
-    format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))
-}
 
 fn eval(folder: &Path, policy: &str) -> Json {
     json(&succeed(folder, &["eval", policy, "--episodes", "16", "--json"]))

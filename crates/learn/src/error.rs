@@ -91,6 +91,13 @@ impl Error {
             other => other,
         }
     }
+    /// What does not fit, as an error of the file that holds it.
+    pub fn of_file(self, path: &Path) -> Self {
+        match self {
+            Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),
+            other => other,
+        }
+    }
     pub(crate) fn config(field: &'static str, found: impl ToString, expected: impl ToString) -> Self {
         Error::Config { field, found: found.to_string(), expected: expected.to_string() }
     }

@@ -1,10 +1,11 @@
 //! The mean of policies that a run has kept. Steps of learning are noisy to the end; the mean of what they lead to is less so.
 
 use crate::error::RunError;
+use crate::folder::POLICIES;
 use crate::policy_file;
 use crate::report::kept_policies;
 use crate::setting::TaskOptions;
-use marathon_learn::{Error, Policy};
+use marathon_learn::Policy;
 use std::path::{Path, PathBuf};
 
 /// The mean of policies, and their files. A folder is that of a run, and stands for all that the run has kept in `policies/`, in
@@ -31,10 +32,7 @@ pub fn average(given: &[PathBuf], options: &TaskOptions) -> Result<(Policy, Vec<
     let mut policies = Vec::new();
     for path in others {
         let policy = policy_file::read(path, Some(factory.spec()))?;
-        policy.check_alike(&last).map_err(|error| match error {
-            Error::Mismatch { what, found, expected } => RunError::file(path, what, found, expected),
-            other => other.into(),
-        })?;
+        policy.check_alike(&last).map_err(|error| error.of_file(path))?;
         policies.push(policy);
     }
     policies.push(last);
@@ -43,11 +41,9 @@ pub fn average(given: &[PathBuf], options: &TaskOptions) -> Result<(Policy, Vec<
 
 /// The policies that a run has kept, in the order of their steps.
 fn kept_by(run: &Path) -> Result<Vec<PathBuf>, RunError> {
-    let folder = run.join("policies");
-    let mut kept = kept_policies(&folder);
+    let kept = kept_policies(run);
     if kept.is_empty() {
-        return Err(RunError::file(&folder, "policies", "none", "those that a run has kept"));
+        return Err(RunError::file(&run.join(POLICIES), "policies", "none", "those that a run has kept"));
     }
-    kept.sort();
     Ok(kept.into_iter().map(|(_, path)| path).collect())
 }

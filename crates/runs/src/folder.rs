@@ -23,6 +23,8 @@ const VERSION: u32 = 2;
 const RUN: &str = "run.json";
 const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";
+/// Folder of the policies on the way.
+pub const POLICIES: &str = "policies";
 /// Where runs go unless the user says otherwise.
 const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
@@ -276,7 +278,7 @@ impl RunFolder {
     }
     /// Policies on the way.
     pub fn policies(&self) -> PathBuf {
-        self.path.join("policies")
+        self.path.join(POLICIES)
     }
 
     /// Files with events for TensorBoard, in their order.

@@ -4,6 +4,7 @@ use crate::args::{ExportArgs, ImportArgs};
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::Policy;
+use marathon_runs::folder::policy_path;
 use marathon_runs::text::path_word;
 use marathon_runs::{TaskOptions, policy_file};
 use std::path::Path;
@@ -48,10 +49,12 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Writes what was made of `inputs`, which are kept.
+/// Writes what was made of `inputs`, files or folders of runs, whose policies are kept.
 pub fn save(policy: &Policy, inputs: &[&Path], out: &Path) -> Result<(), CliError> {
-    let is_out = |out: &Path| inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == out));
-    if out.canonicalize().is_ok_and(|out| is_out(&out)) {
+    let file = |input: &Path| policy_path(input).ok()?.canonicalize().ok();
+    if let Ok(old) = out.canonicalize()
+        && inputs.iter().any(|input| file(input).as_ref() == Some(&old))
+    {
         let found = path_word(out);
         return Err(CliError::Usage(format!("--out is {found}, a file that is read; expected another")));
     }

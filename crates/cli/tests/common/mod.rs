@@ -98,6 +98,11 @@ pub fn python() -> PathBuf {
     python
 }
 
+/// A policy that comes with Marathon.
+pub fn shipped(name: &str) -> String {
+    format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))
+}
+
 /// All files under a folder.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all = Vec::new();

@@ -78,10 +78,7 @@ impl Policy {
     /// As [`Policy::load`], or if the policy is for another agent.
     pub fn load_for(path: &Path, spec: &Spec) -> Result<Self, Error> {
         let policy = Self::load(path)?;
-        policy.check(spec).map_err(|e| match e {
-            Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),
-            other => other,
-        })?;
+        policy.check(spec).map_err(|e| e.of_file(path))?;
         Ok(policy)
     }
 }

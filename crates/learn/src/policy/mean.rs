@@ -1,6 +1,6 @@
 //! The mean of policies, number by number.
 
-use super::Policy;
+use super::{Policy, agree};
 use crate::error::Error;
 use crate::nets::normalize::Normalizer;
 
@@ -27,13 +27,8 @@ impl Policy {
         let (obs_mean, obs_std) = (mean(|policy| policy.normalizer.mean()), mean(|policy| policy.normalizer.std()));
         let mut meta = last.meta.clone();
         meta.evaluation = None;
-        Ok(Policy {
-            normalizer: Normalizer::new(obs_mean, obs_std, meta.observation_clip),
-            params: mean(Policy::params),
-            log_std: mean(Policy::log_std),
-            net: last.net.clone(),
-            meta,
-        })
+        let normalizer = Normalizer::new(obs_mean, obs_std, meta.observation_clip);
+        Ok(Policy::assemble(meta, last.net.clone(), mean(Policy::params), normalizer, mean(Policy::log_std)))
     }
 
     /// Whether every number of the policy means what it means in another one: the same agent, network and map of actions.
@@ -41,12 +36,8 @@ impl Policy {
     /// # Errors
     /// Names what differs.
     pub fn check_alike(&self, other: &Policy) -> Result<(), Error> {
-        for ((what, found), (_, expected)) in self.form().into_iter().zip(other.form()) {
-            if found != expected {
-                return Err(Error::Mismatch { what: what.into(), found, expected });
-            }
-        }
-        Ok(())
+        let pairs = self.form().into_iter().zip(other.form());
+        agree(pairs.map(|((what, found), (_, expected))| (what, found, expected)))
     }
 
     fn form(&self) -> [(&'static str, String); 9] {

@@ -240,11 +240,14 @@ impl Policy {
             ("seconds between decisions", meta.control_dt.to_string(), spec.dt.to_string()),
             ("frame_skip", meta.frame_skip.to_string(), spec.frame_skip.to_string()),
         ];
-        for (what, found, expected) in pairs {
-            if found != expected {
-                return Err(Error::Mismatch { what: what.into(), found, expected });
-            }
-        }
-        Ok(())
+        agree(pairs)
+    }
+}
+
+/// Whether what is found is what is expected, each under its name.
+fn agree(pairs: impl IntoIterator<Item = (&'static str, String, String)>) -> Result<(), Error> {
+    match pairs.into_iter().find(|(_, found, expected)| found != expected) {
+        Some((what, found, expected)) => Err(Error::Mismatch { what: what.into(), found, expected }),
+        None => Ok(()),
     }
 }

@@ -10,7 +10,7 @@ pub mod tensorboard;
 
 use crate::clips::Clips;
 use crate::error::RunError;
-use crate::folder::{RunFile, RunFolder};
+use crate::folder::{POLICIES, RunFile, RunFolder};
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot, TrainOutput};
 use progress::Progress;
@@ -122,10 +122,9 @@ impl<'a> Reporter<'a> {
 
     /// Removes policies of later steps, which are to come again, and the oldest.
     fn prune(&self, steps: u64) {
-        let (mut kept, later): (Vec<_>, Vec<_>) =
-            kept_policies(&self.folder.policies()).into_iter().partition(|(n, _)| *n <= steps);
-        kept.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
-        let old = kept.into_iter().skip(self.run.keep_checkpoints);
+        let (kept, later): (Vec<_>, Vec<_>) =
+            kept_policies(self.folder.path()).into_iter().partition(|(n, _)| *n <= steps);
+        let old = kept.into_iter().rev().skip(self.run.keep_checkpoints);
         for (_, path) in old.chain(later) {
             // one too many harms nobody
             let _ = std::fs::remove_file(path);
@@ -146,14 +145,16 @@ impl Observer for Reporter<'_> {
     }
 }
 
-/// Policies in a run's `policies/` with their steps.
-pub fn kept_policies(folder: &Path) -> Vec<(u64, PathBuf)> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+/// Policies in the `policies/` of a run's folder, in the order of their steps, with these.
+pub fn kept_policies(run: &Path) -> Vec<(u64, PathBuf)> {
+    let entries = std::fs::read_dir(run.join(POLICIES)).into_iter().flatten().flatten();
     let of = |path: PathBuf| {
         let steps = path.file_stem()?.to_str()?.strip_prefix("policy-")?.parse().ok()?;
         Some((steps, path))
     };
-    entries.filter_map(|entry| of(entry.path())).collect()
+    let mut kept: Vec<_> = entries.filter_map(|entry| of(entry.path())).collect();
+    kept.sort();
+    kept
 }
 
 /// Notes in policies the clips that their task needs.
