@@ -23,10 +23,11 @@ const LAST_BETA: f64 = 1e-5;
 const LAST_EPSILON: f64 = 0.1;
 
 /// Keys of the section that only Marathon reads, with any algorithm.
-const COMMON: [&str; 17] = [
+const COMMON: [&str; 18] = [
     "agents",
     "horizon",
     "rollouts",
+    "policy_average",
     "actor_hidden",
     "critic_hidden",
     "activation",
@@ -123,6 +124,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
             horizon: horizon as usize,
             rollouts: marathon.count("rollouts", 1..=1 << 31, base.run.rollouts as u64)? as usize,
             total_steps: settings.max_steps.saturating_mul(scale),
+            policy_average: marathon.number("policy_average", Range::Fraction, base.run.policy_average)?,
             seed: marathon.count("seed", 0..=u64::MAX, seed.unwrap_or(base.run.seed))?,
             threads: marathon.count("threads", 0..=65_536, base.run.threads as u64)? as usize,
         },

@@ -28,6 +28,7 @@ struct Flat {
     horizon: usize,
     rollouts: usize,
     total_steps: u64,
+    policy_average: f64,
     seed: u64,
     threads: usize,
     actor_hidden: Vec<usize>,
@@ -75,6 +76,7 @@ fn flat(loaded: &Loaded) -> Flat {
         horizon: run.horizon,
         rollouts: run.rollouts,
         total_steps: run.total_steps,
+        policy_average: run.policy_average,
         seed: run.seed,
         threads: run.threads,
         actor_hidden: network.actor_hidden,
@@ -209,6 +211,7 @@ fn every_key_of_marathon_counts() {
     marathon:
       agents: 48
       horizon: 7
+      policy_average: 0.2
       minibatches: 6
       actor_hidden: [33, 17]
       critic_hidden: [65]
@@ -240,6 +243,7 @@ fn every_key_of_marathon_counts() {
     );
     let expected = Flat {
         rollouts: 1,
+        policy_average: 0.2,
         reward_strength: 1.0,
         agents: 48,
         horizon: 7,

@@ -20,15 +20,29 @@ impl Policy {
             });
         };
         policies.iter().try_for_each(|policy| policy.check_alike(last))?;
-        let mean = |of: fn(&Policy) -> &[f32]| -> Vec<f32> {
-            let sum = |i: usize| policies.iter().map(|policy| f64::from(of(policy)[i])).sum::<f64>();
-            (0..of(last).len()).map(|i| (sum(i) / policies.len() as f64) as f32).collect()
-        };
-        let (obs_mean, obs_std) = (mean(|policy| policy.normalizer.mean()), mean(|policy| policy.normalizer.std()));
-        let mut meta = last.meta.clone();
-        meta.evaluation = None;
-        let normalizer = Normalizer::new(obs_mean, obs_std, meta.observation_clip);
-        Ok(Policy::assemble(meta, last.net.clone(), mean(Policy::params), normalizer, mean(Policy::log_std)))
+        let mut sums = vec![0.0; last.numbers().count()];
+        for policy in policies {
+            sums.iter_mut().zip(policy.numbers()).for_each(|(sum, x)| *sum += x);
+        }
+        sums.iter_mut().for_each(|sum| *sum /= policies.len() as f64);
+        let mut mean = last.with_numbers(&sums);
+        mean.meta.evaluation = None;
+        Ok(mean)
+    }
+
+    /// Every number of the policy: weights, means and deviations of observations, logarithms of deviations of actions.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let lists = [&self.params, self.normalizer.mean(), self.normalizer.std(), &self.log_std];
+        lists.into_iter().flatten().copied().map(f64::from)
+    }
+
+    /// The same policy with other [`numbers`](Self::numbers), as many.
+    pub(crate) fn with_numbers(&self, numbers: &[f64]) -> Policy {
+        let mut rest = numbers.iter().map(|x| *x as f32);
+        let mut next = |n: usize| rest.by_ref().take(n).collect::<Vec<_>>();
+        let (params, obs_mean, obs_std) = (next(self.params.len()), next(self.meta.obs), next(self.meta.obs));
+        let normalizer = Normalizer::new(obs_mean, obs_std, self.meta.observation_clip);
+        Policy::assemble(self.meta.clone(), self.net.clone(), params, normalizer, next(self.log_std.len()))
     }
 
     /// Whether every number of the policy means what it means in another one: the same agent, network and map of actions.

@@ -24,6 +24,8 @@ const VERSION: u32 = 2;
 const DESCRIPTION: &str = "checkpoint.json";
 /// Lists of a role beside those of its learner.
 const OBSERVATIONS: [&str; 2] = ["obs_mean", "obs_var"];
+/// The mean of the last policies, which lies with the lists of the learner.
+const AVERAGE: &str = "policy_average";
 
 /// Everything a run needs to go on.
 #[derive(Clone, Debug, PartialEq)]
@@ -170,8 +172,12 @@ impl Checkpoint {
     pub(super) fn of(trainer: &Trainer) -> Self {
         let Trainer { shared, replica, clocks, .. } = trainer;
         let (mut roles, mut about_roles) = (Vec::new(), Vec::new());
-        for (role, RoleReplica { learner, statistics }) in shared.roles.iter().zip(&replica.roles) {
-            let Saved { scalars, lists } = learner.save();
+        for (role, RoleReplica { learner, statistics, average }) in shared.roles.iter().zip(&replica.roles) {
+            let mut saved = learner.save();
+            if let Some(average) = average {
+                saved.list(AVERAGE, average);
+            }
+            let Saved { scalars, lists } = saved;
             let about = AboutRole {
                 learner: scalars.into_iter().collect(),
                 observation_count: statistics.observations.count,
@@ -273,14 +279,23 @@ impl Checkpoint {
                 }
             }
         }
-        let blocks = new.run.blocks();
+        let (blocks, averages) = (new.run.blocks(), new.run.policy_average > 0.0);
         self.agents.check("checkpoint", StatesShape { blocks, obs: &lengths, act: spec.act })?;
         let replica = &mut trainer.replica;
         let about = self.about;
         let about_roles = [about.first].into_iter().chain(about.others.into_iter().map(|(_, role)| role));
-        for ((role, about), lists) in replica.roles.iter_mut().zip(about_roles).zip(self.roles) {
+        let roles = replica.roles.iter_mut().zip(&trainer.shared.roles);
+        for (((role, part), about), lists) in roles.zip(about_roles).zip(self.roles) {
             let RoleLists { learner, obs_mean, obs_var } = lists;
-            role.learner.load(&Saved { scalars: about.learner.into_iter().collect(), lists: learner })?;
+            let saved = Saved { scalars: about.learner.into_iter().collect(), lists: learner };
+            role.learner.load(&saved)?;
+            // a run that no longer averages hands out its last policy
+            if averages && saved.get::<f64>(AVERAGE).is_ok() {
+                let policy = part.last_policy(role, &replica.progress, new);
+                let mut average = vec![0.0; policy.numbers().count()];
+                saved.copy(AVERAGE, &mut average)?;
+                role.average = Some(average);
+            }
             role.statistics.observations = Moments { count: about.observation_count, mean: obs_mean, var: obs_var };
             role.statistics.returns =
                 Moments { count: about.return_count, mean: vec![about.return_mean], var: vec![about.return_var] };

@@ -4,7 +4,7 @@ use super::flat::{self, FlatConfig};
 use crate::algorithms::a2c::A2c;
 use crate::algorithms::acktr::Acktr;
 use crate::algorithms::sac::Sac;
-use crate::algorithms::{Algorithm, Common, Setup};
+use crate::algorithms::{Algorithm, Common, Setup, check};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::nets::NetworkConfig;
@@ -94,6 +94,10 @@ pub struct RunConfig {
     pub rollouts: usize,
     /// Agent-steps of the whole run; training ends with the first rollout that reaches them.
     pub total_steps: u64,
+    /// Latest part of the run so far, in steps, whose policies are averaged for the one that the run hands out; 0: the last
+    /// policy alone.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub policy_average: f64,
     /// Seed of everything random.
     pub seed: u64,
     /// Threads; 0 means one per processor. The result does not depend on it.
@@ -102,8 +106,21 @@ pub struct RunConfig {
 
 impl Default for RunConfig {
     fn default() -> Self {
-        Self { agents: 256, horizon: 64, rollouts: 1, total_steps: 10_000_000, seed: 1, threads: 0 }
+        Self {
+            agents: 256,
+            horizon: 64,
+            rollouts: 1,
+            total_steps: 10_000_000,
+            policy_average: 0.0,
+            seed: 1,
+            threads: 0,
+        }
     }
+}
+
+/// Whether a setting is off that files of earlier versions do not have.
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 impl TrainConfig {
@@ -239,7 +256,7 @@ impl RunConfig {
                 return Err(Error::config(field, n, "at least 1"));
             }
         }
-        Ok(())
+        check::fraction("policy_average", self.policy_average)
     }
 }
 

@@ -100,6 +100,7 @@ pub struct FlatConfig {
     minibatches: usize,
     epochs: usize,
     total_steps: u64,
+    policy_average: f64,
 
     actor_hidden: Vec<usize>,
     critic_hidden: Vec<usize>,
@@ -152,6 +153,7 @@ impl Default for FlatConfig {
             minibatches: 8,
             epochs: 4,
             total_steps: 10_000_000,
+            policy_average: 0.0,
             actor_hidden: vec![64, 64],
             critic_hidden: vec![64, 64],
             activation: Activation::Tanh,
@@ -278,6 +280,7 @@ impl From<&FlatConfig> for TrainConfig {
                 horizon: flat.horizon,
                 rollouts: flat.rollouts,
                 total_steps: flat.total_steps,
+                policy_average: flat.policy_average,
                 seed: flat.seed,
                 threads: flat.threads,
             },

@@ -122,7 +122,7 @@ impl Player {
     /// If the messages are damaged or belong to another task, network or slice.
     pub fn play(&mut self, orders: &[u8], state: &[u8]) -> Result<Vec<u8>, Error> {
         let cpu = clock::thread_cpu();
-        let RoleReplica { learner, statistics } = &mut self.replica;
+        let RoleReplica { learner, statistics, .. } = &mut self.replica;
         let orders = Message::Orders.open(orders)?;
         *learner.params_mut() = orders.finite("params", &[learner.params().len()])?;
         statistics.observations.mean = orders.get("obs_mean", &[self.spec.obs])?;
@@ -198,7 +198,7 @@ impl<'a> Remote<'a> {
     /// Has one horizon played; fills the rollouts and brings the collectors into the states in which their agents are then.
     /// `None` if the run is to end: nothing has changed then, except after an error.
     pub(super) fn collect(&mut self, run: &Shared, replica: &Replica) -> Option<Spent> {
-        let RoleReplica { learner, statistics } = &replica.roles[0];
+        let RoleReplica { learner, statistics, .. } = &replica.roles[0];
         let locked = || run.collectors.iter().map(|c| c.lock().expect("no worker has panicked"));
         let mut orders = TensorWriter::default();
         orders.list("params", learner.params());

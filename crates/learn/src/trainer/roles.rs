@@ -70,8 +70,14 @@ impl RoleParts {
         self.config.setup(&self.spec, isa, self.demonstrations.as_ref())
     }
 
-    /// Its policy in a run that has this configuration.
+    /// The policy that the run hands out for it.
     pub fn policy(&self, replica: &RoleReplica, progress: &Progress, config: &TrainConfig) -> Policy {
+        let last = self.last_policy(replica, progress, config);
+        replica.average.as_ref().map_or_else(|| last.clone(), |average| last.with_numbers(average))
+    }
+
+    /// Its last policy in a run that has this configuration.
+    pub fn last_policy(&self, replica: &RoleReplica, progress: &Progress, config: &TrainConfig) -> Policy {
         let network = &self.config.network;
         let mut meta = PolicyMeta::of(&self.spec, network.actor_hidden.clone(), network.activation);
         meta.observation_clip = self.config.statistics.observation_clip as f32;
@@ -115,6 +121,8 @@ pub struct RoleReplica {
     pub learner: Box<dyn Learner>,
     /// What it has seen.
     pub statistics: Statistics,
+    /// The first worker's: the mean of the numbers of its last policies, if the run averages them.
+    pub average: Option<Vec<f64>>,
 }
 
 impl RoleReplica {
@@ -123,12 +131,13 @@ impl RoleReplica {
         Self {
             learner: role.config.algorithm.learner(&role.setup(isa), blocks),
             statistics: Statistics::new(role.spec.obs, role.config.statistics),
+            average: None,
         }
     }
 
     /// Another worker's.
     pub fn copy(&self) -> Self {
-        Self { learner: self.learner.replica(), statistics: self.statistics.clone() }
+        Self { learner: self.learner.replica(), statistics: self.statistics.clone(), average: None }
     }
 
     /// What it plays with.
