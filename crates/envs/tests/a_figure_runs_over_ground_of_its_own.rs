@@ -452,6 +452,98 @@ fn an_adversary_builds_ahead_of_the_runner() {
     }
 }
 
+/// An adversary that earns regret: when the runner's run is over, a reference runs over the same ground from the start, with the
+/// actions of its own, and the adversary earns what the reference earns more.
+#[test]
+fn a_reference_runs_over_the_same_ground() {
+    for id in FIGURES {
+        let options = [("course", "adversary"), ("difficulty", "0.3"), ("builder", "regret")];
+        let [mut env, mut other] = [(); 2].map(|()| env(id, &options, Autoreset::Disabled));
+        let spec = env.spec().clone();
+        let [runner, builder, reference] = &spec.roles[..] else { panic!("three roles: {:?}", spec.roles) };
+        assert_eq!((&runner.obs, runner.act.len()), (&reference.obs, reference.act.len()), "{id}");
+        assert_eq!([&runner.name, &builder.name, &reference.name], ["runner", "builder", "reference"]);
+        let (act, k, own) = (spec.act, spec.reward_terms.len(), runner.act.len());
+        assert_eq!((spec.reward_terms[k - 2].as_str(), spec.reward_terms[k - 1].as_str()), ("regret", "reference"));
+        let (mut out, mut seen) = (env.buffers(), other.buffers());
+        env.reset(Some(1), &mut out.obs).unwrap();
+        other.reset(Some(1), &mut seen.obs).unwrap();
+        let model = agent(id).unwrap().model().unwrap();
+        let torso_at = |env: &VecEnv, i| center(&model, &env.state(i).unwrap(), torso(id))[0];
+        let who = |env: &VecEnv| {
+            [0, 1, 2].map(|role| {
+                let mut decides = [false; AGENTS];
+                env.decides(role, &mut decides).unwrap();
+                decides
+            })
+        };
+        // per agent: in which decision the reference began, what each has earned, and the runner's way
+        let (mut began, mut earned) = ([None; AGENTS], [[0.0_f32; 3]; AGENTS]);
+        let (mut ground, mut way) = (vec![Vec::new(); AGENTS], [0.0; AGENTS]);
+        let mut over = [false; AGENTS];
+        for decision in 0..spec.max_episode_steps {
+            let mut actions = vec![0.0; AGENTS * act];
+            actions.chunks_exact_mut(act).enumerate().for_each(|(i, row)| action(i, decision, 1.0, row));
+            let decides = who(&env);
+            // whoever does not run decides nothing: in the other world that says anything
+            let before: Vec<f64> = (0..AGENTS).map(|i| torso_at(&env, i)).collect();
+            env.step(&actions, &mut out.as_mut()).unwrap();
+            for (i, row) in actions.chunks_exact_mut(act).enumerate() {
+                if began[i].is_some() || !decides[0][i] {
+                    row[..own].fill(0.7);
+                } else {
+                    row[own..2 * own].fill(-0.7);
+                }
+            }
+            other.step(&actions, &mut seen.as_mut()).unwrap();
+            let running: Vec<usize> = (0..AGENTS).filter(|i| !over[*i]).collect();
+            if running.is_empty() {
+                break;
+            }
+            for i in running {
+                assert_eq!(env.state(i).unwrap(), other.state(i).unwrap(), "{id}, agent {i}, decision {decision}");
+                let terms = &out.terms[k * i..k * (i + 1)];
+                let [theirs, of_runner] = [terms[k - 1], terms[..k - 2].iter().sum::<f32>()];
+                assert_eq!(terms[k - 2], theirs - of_runner, "{id}");
+                assert_eq!(out.reward[i], of_runner);
+                for (sum, x) in earned[i].iter_mut().zip([of_runner, terms[k - 2], theirs]) {
+                    *sum += x;
+                }
+                if decision > 0 && !decides[0][i] && began[i].is_none() {
+                    // it is back at the start, on the ground that there is
+                    began[i] = Some(decision);
+                    assert!(
+                        before[i] != 0.0 && torso_at(&env, i).abs() < 0.2,
+                        "{id}, agent {i}: {}",
+                        torso_at(&env, i)
+                    );
+                    ground[i] = env.ground(i, 0).unwrap();
+                    way[i] = out.info[spec.info.len() * i];
+                }
+                let now = who(&env).map(|decides| decides[i]);
+                over[i] = out.terminated[i] || out.truncated[i];
+                match began[i] {
+                    None => assert!(theirs == 0.0 && !now[2] && !over[i], "{id}, agent {i}: {now:?}"),
+                    Some(_) => {
+                        // all decide where an episode ends
+                        let reference = (now[0] == over[i]) && now[2];
+                        assert!(of_runner == 0.0 && reference, "{id}, agent {i}: {now:?}");
+                        assert_eq!(env.ground(i, 0).unwrap(), ground[i], "{id}, agent {i}");
+                        assert_eq!(out.info[spec.info.len() * i], way[i]);
+                    }
+                }
+                // the runner's part is over before it is the reference's turn
+                if !now[0] && began[i].is_none() {
+                    assert!(now == [false; 3], "{id}, agent {i}: {now:?}");
+                }
+            }
+        }
+        assert!(began.iter().all(Option::is_some) && over == [true; AGENTS], "{id}: {began:?} {over:?}");
+        assert!(earned.iter().all(|[own, regret, theirs]| (regret - (theirs - own)).abs() < 1e-2), "{id}");
+        assert!(earned.iter().all(|[own, _, theirs]| *own != 0.0 && *theirs != 0.0), "{id}");
+    }
+}
+
 /// What an adversary has built belongs to snapshots, and depends neither on threads nor on other agents.
 #[test]
 fn built_ground_is_saved_and_restored() {

@@ -22,6 +22,10 @@ pub(crate) struct Face {
     role: Role,
     /// For which agents it decides next.
     decides: Vec<bool>,
+    /// For which agents its part of the episode has just ended: where it has failed, and where it has not.
+    leaves: [Vec<bool>; 2],
+    /// In whose episodes it has no part any more.
+    left: Vec<bool>,
     /// What it has earned since its last info.
     earned: Vec<f32>,
     ids: Vec<i32>,
@@ -42,6 +46,8 @@ impl Face {
             },
             number,
             decides: vec![true; agents],
+            leaves: [vec![false; agents], vec![false; agents]],
+            left: vec![false; agents],
             earned: vec![0.0; agents],
             ids: ids.by_ref().take(agents).collect(),
             info: AgentInfo { observations: vec![observation(&vec![0.0; role.obs.len()])], ..Default::default() },
@@ -127,19 +133,21 @@ impl Face {
         }
     }
 
-    /// Takes note of who decides next.
+    /// Takes note of who decides next, and whose part has ended.
     pub fn look(&mut self, env: &VecEnv) -> Result<(), EnvError> {
+        env.leaves(self.number, self.leaves.each_mut().map(|leaves| &mut leaves[..]))?;
         env.decides(self.number, &mut self.decides)
     }
 
     /// All episodes have begun anew.
     pub fn begin(&mut self) {
         self.decides.fill(true);
+        self.leaves.iter_mut().chain([&mut self.left]).for_each(|list| list.fill(false));
         self.earned.fill(0.0);
     }
 
     /// Appends an encoded [`AgentInfoList`](crate::wire::AgentInfoList): infos of the agents for which the role decides, and of
-    /// those whose episode ended one more. With `fresh_ids`, the number for the next new episode, agents change their numbers
+    /// those whose episode, or the role's part of it, ended one more. With `fresh_ids`, the number for the next new episode, agents change their numbers
     /// between episodes.
     pub fn report(
         &mut self,
@@ -151,13 +159,20 @@ impl Face {
     ) {
         for (i, ended) in ended.iter().enumerate() {
             let row = i * spec.obs..(i + 1) * spec.obs;
-            if *ended {
-                self.describe(i, &out.final_obs[row.clone()], Some(out.truncated[i]));
+            let leaves = self.leaves[0][i] || self.leaves[1][i];
+            if (*ended || leaves) && !self.left[i] {
+                // whether it is over for another reason than a failure
+                let late = if *ended { out.truncated[i] } else { self.leaves[1][i] };
+                self.describe(i, &out.final_obs[row.clone()], Some(late));
                 put(infos, &self.info);
                 if let Some(next) = &mut fresh_ids {
                     self.ids[i] = **next;
                     **next = next.wrapping_add(1).max(0);
                 }
+            }
+            self.left[i] = (self.left[i] || leaves) && !ended;
+            if *ended {
+                self.earned[i] = 0.0;
             }
             if self.decides[i] {
                 self.describe(i, &out.obs[row], None);

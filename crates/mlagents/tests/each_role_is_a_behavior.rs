@@ -7,7 +7,7 @@ mod common;
 mod tag;
 
 use common::{FakeTrainer, act, close, listen, reset};
-use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions};
 use marathon_mlagents::channels::PARAMETERS;
 use marathon_mlagents::wire::{AgentInfo, AgentInfoList, UnityMessage};
 use marathon_mlagents::{Behavior, BehaviorOptions, Log, Parameters, Player, PlayerError, PlayerOptions};
@@ -32,9 +32,19 @@ fn converse(
     fresh_ids: bool,
     trainer: impl FnOnce(FakeTrainer) + Send + 'static,
 ) -> (Result<(), PlayerError>, String) {
+    converse_about(tags(AGENTS), name, fresh_ids, trainer)
+}
+
+/// The same about any task.
+fn converse_about(
+    task: BehaviorOptions,
+    name: &str,
+    fresh_ids: bool,
+    trainer: impl FnOnce(FakeTrainer) + Send + 'static,
+) -> (Result<(), PlayerError>, String) {
     let (port, accept) = listen();
     let trainer = thread::spawn(move || trainer(accept()));
-    let options = PlayerOptions { port, behaviors: vec![tags(AGENTS)], fresh_ids, ..Default::default() };
+    let options = PlayerOptions { port, behaviors: vec![task], fresh_ids, ..Default::default() };
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.log"));
     let log = Log::to_file(&path).expect("a log");
     let result = Player::connect(&options, log).and_then(|mut player| player.run());
@@ -200,6 +210,92 @@ fn roles_see_do_and_earn_what_is_theirs() {
     result.unwrap();
     assert!(log.contains(&format!("{RUNNER}: agents: 5; observations: 9; actions: 2")), "{log}");
     assert!(log.contains(&format!("{OPPONENT}: agents: 5; observations: 8; actions: 2")), "{log}");
+}
+
+/// A role whose part ends before the episode is done then, with what it has seen and earned until then. It has no infos before
+/// the next episode.
+#[test]
+fn a_role_that_leaves_is_done() {
+    const ROLES: [&str; 3] =
+        ["TerrainWalker2d-v0?team=0", "TerrainWalker2d-v0.builder?team=0", "TerrainWalker2d-v0.reference?team=0"];
+    let given = Options::new().with("course", "adversary").with("builder", "regret");
+    let task = BehaviorOptions {
+        env: "TerrainWalker2d-v0".into(),
+        agents: AGENTS,
+        options: given.clone(),
+        ..Default::default()
+    };
+    let (result, _) = converse_about(task, "leaves", false, move |mut trainer| {
+        trainer.greet(SEED, 1);
+        trainer.answer(&reset(Vec::new()));
+        let options =
+            VecEnvOptions { agents: AGENTS, autoreset: Autoreset::Disabled, options: given, ..Default::default() };
+        let mut env = VecEnv::new("TerrainWalker2d-v0", &options).expect("the task");
+        let (spec, mut out) = (env.spec().clone(), env.buffers());
+        env.reset(Some(SEED as u64), &mut out.obs).expect("a start");
+        let mut actions = vec![0.0; AGENTS * spec.act];
+        let (mut decides, mut left) = ([[true; AGENTS]; 3], [false; AGENTS]);
+        let (mut earned, mut done) = ([[0.0_f32; AGENTS]; 3], [0; 3]);
+        let mut message = trainer.receive().expect("first observations");
+        for decision in 0..1500 {
+            let rows = |role: usize| {
+                let asked = (0..AGENTS).filter(|i| decides[role][*i]);
+                let wave = |i: usize, a: usize| ((decision * 3 + i * 5 + role + 7 * a) as f32).sin();
+                asked
+                    .map(|i| (i, (0..spec.roles[role].act.len()).map(|a| wave(i, a)).collect::<Vec<f32>>()))
+                    .collect::<Vec<_>>()
+            };
+            let chosen = [0, 1, 2].map(rows);
+            for (role, rows) in spec.roles.iter().zip(&chosen) {
+                rows.iter().for_each(|(i, row)| actions[spec.act * i..][role.act.clone()].copy_from_slice(row));
+            }
+            let told = ROLES.into_iter().zip(chosen).filter(|(_, rows)| !rows.is_empty());
+            let told: Vec<_> =
+                told.map(|(name, rows)| (name, rows.into_iter().map(|(_, row)| row).collect())).collect();
+            trainer.answer(&act(&told, Vec::new()));
+            env.step(&actions, &mut out.as_mut()).expect("a decision");
+            let over: Vec<bool> = out.terminated.iter().zip(&out.truncated).map(|(a, b)| *a || *b).collect();
+            let (mut failed, mut finished) = ([false; AGENTS], [false; AGENTS]);
+            env.leaves(0, [&mut failed, &mut finished]).expect("a role");
+            env.reset_agents(&over, &mut out.obs).expect("a start");
+            message = trainer.receive().expect("a decision");
+            for (number, (role, name)) in spec.roles.iter().zip(ROLES).enumerate() {
+                env.decides(number, &mut decides[number]).expect("a role");
+                let mut told = infos(&message, name).into_iter();
+                for i in 0..AGENTS {
+                    let terms = &out.terms[spec.reward_terms.len() * i..];
+                    earned[number][i] += terms[role.terms.clone()].iter().sum::<f32>();
+                    let leaves = number == 0 && (failed[i] || finished[i]);
+                    if leaves || over[i] && !(number == 0 && left[i]) {
+                        let info = told.next().expect("an end");
+                        assert!(
+                            info.done && (info.reward - earned[number][i]).abs() < 1e-3,
+                            "{name} {i}: {}",
+                            info.reward
+                        );
+                        assert_eq!(info.max_step_reached, if leaves { finished[i] } else { out.truncated[i] });
+                        assert_eq!(numbers(&info), &out.final_obs[spec.obs * i..][role.obs.clone()]);
+                        done[number] += 1;
+                    }
+                    if over[i] || leaves {
+                        earned[number][i] = 0.0;
+                    }
+                    if decides[number][i] {
+                        assert!(!told.next().expect("a state").done);
+                        earned[number][i] = 0.0;
+                    }
+                }
+                assert_eq!(told.next(), None, "{name}, decision {decision}");
+            }
+            for i in 0..AGENTS {
+                left[i] = (left[i] || failed[i] || finished[i]) && !over[i];
+            }
+        }
+        assert!(done[1] == done[2] && done[1] > 5 && (done[1]..=done[1] + AGENTS).contains(&done[0]), "{done:?}");
+        assert_eq!(waiting(&message, ROLES[0]), decides[0].iter().filter(|decides| **decides).count());
+        trainer.answer(&close());
+    });
+    result.unwrap();
 }
 
 #[test]

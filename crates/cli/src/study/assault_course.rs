@@ -29,14 +29,18 @@ const SIGHTS: [&str; 2] = ["heights", "blind"];
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// Grounds to learn on.
-const GROUNDS: [Ground; 6] = [
+const GROUNDS: [Ground; 7] = [
     ("flat", &[("course", "flat"), ("levels", "fixed")]),
     ("random", &[("course", "mixed"), ("levels", "random"), ("difficulty", "1")]),
     ("curriculum", &[("course", "mixed"), ("levels", "curriculum"), ("difficulty", "1")]),
     ("adversary", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1")]),
     ("bounded", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")]),
     ("rising", &[("course", "adversary"), ("levels", "curriculum"), ("difficulty", "1")]),
+    ("regret", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1"), REGRET]),
 ];
+
+/// Two runners take turns, so a run has twice the decisions.
+const REGRET: (&str, &str) = ("builder", "regret");
 
 /// Courses that policies are judged on: what the table calls them, kind, difficulty.
 const COURSES: [(&str, &str, &str); 5] = [
@@ -144,11 +148,12 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
 
 fn about() -> String {
     format!(
-        "Figures learn to run by PPO with `terrain-fast.yaml` on six kinds of [ground](../environments/terrain.md): *flat*; *random*, \
+        "Figures learn to run by PPO with `terrain-fast.yaml` on seven kinds of [ground](../environments/terrain.md): *flat*; *random*, \
          mixed courses of any difficulty; *curriculum*, mixed courses that become harder; *adversary*, built ahead by a second \
          learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter; *rising*, the same \
-         with steps whose bound rises with the runner's way, from level ground on. Each learns with and without seeing the ground \
-         ahead.\n\n\
+         with steps whose bound rises with the runner's way, from level ground on; *regret*, built by one that earns what a reference \
+         runner, a third learner, earns more on the same ground, with as many decisions for each of the two. Each learns with and without \
+         seeing the ground ahead.\n\n\
          The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
          courses of full difficulty, and on the original's meters, of up to 0.5 m. The courses made by hand and the meters are \
          nobody's training ground. *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
@@ -182,13 +187,11 @@ fn one(
 ) -> Result<Option<Found>, CliError> {
     let sight = ("heights".into(), Value::Bool(heights));
     let with_sight = |list| TaskOptions { given: [arguments(list).given, vec![sight.clone()]].concat() };
-    let job = kept::Job {
-        task: task.into(),
-        arguments: with_sight(ground),
-        seed,
-        loaded: default_for(task),
-        initialize_from: None,
-    };
+    let mut loaded = default_for(task);
+    if ground.contains(&REGRET) {
+        loaded.config.run.total_steps *= 2;
+    }
+    let job = kept::Job { task: task.into(), arguments: with_sight(ground), seed, loaded, initialize_from: None };
     let (file, expected) = (kept::file(folder), job.expected(options)?);
     if let Some(found) = kept::read::<Found>(&file)? {
         kept::check(&file, &found.run, &expected)?;

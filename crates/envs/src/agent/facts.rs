@@ -236,6 +236,11 @@ impl Motors {
         Motors(1 << motor)
     }
 
+    /// All motors but those from a number on to before another, at most 127.
+    pub const fn except(first: usize, end: usize) -> Motors {
+        Motors(!(!0 << first & !(!0 << end)))
+    }
+
     /// All motors from a number on, at most 127.
     pub const fn from(first: usize) -> Motors {
         Motors(!0 << first)

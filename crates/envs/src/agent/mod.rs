@@ -106,6 +106,15 @@ pub trait Agent: Send + Sync + 'static {
         T::not(T::none())
     }
 
+    /// Lanes in which a role's part of the episode ends with the decision just made while others go on: those in which it has
+    /// failed, and those in which it has not. What it earns later counts for nothing, and it is not to decide again before the
+    /// next episode.
+    #[inline(always)]
+    fn leaves<T: Real>(&self, s: &Senses<T>, role: usize) -> [T::Mask; 2] {
+        let _ = (s, role);
+        [T::none(); 2]
+    }
+
     /// Reports numbers that are neither observed nor rewarded, as many as [`Facts::info`] names: for a user's logs.
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {

@@ -115,6 +115,16 @@ impl<'a, T: Real> Terms<'a, T> {
         }
     }
 
+    /// Keeps what has been added in some lanes only; returns its sum in the others: what is earned in a part of the episode that
+    /// is another role's.
+    #[inline(always)]
+    pub fn keep(&mut self, lanes: T::Mask) -> T {
+        let others = T::masked(T::not(lanes), self.sum());
+        let len = self.len.min(self.values.len());
+        self.values[..len].iter_mut().for_each(|term| *term = T::masked(lanes, *term));
+        others
+    }
+
     /// Sum of the terms that have been added: what an opponent's reward may be the inverse of.
     #[inline(always)]
     pub fn sum(&self) -> T {

@@ -9,4 +9,6 @@ pub struct Site<'a> {
     /// Elevations by height field, as [`Start::set_ground`](crate::Start::set_ground) takes them. What is not a finite number is
     /// not carried out.
     pub grounds: &'a mut [Vec<f32>],
+    /// Whether the agent's body is to go back to where it spawns before the decision is carried out.
+    pub restart: bool,
 }

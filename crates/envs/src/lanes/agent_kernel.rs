@@ -141,7 +141,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
             Occasion::Start(lanes) => (Some(lanes), 0, None, None),
             Occasion::Rehearsal(Named { terms, groups }) => (Some(!0), 0, Some(terms), Some(groups)),
         };
-        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, decides, .. } = group;
+        let LaneGroup { physics, memory, start, action, commands, obs, terms, info, feet, decides, leaves, .. } = group;
         let mut s = Senses {
             readings: Readings::new(&task.sim, physics, work),
             bindings: &task.bindings,
@@ -182,6 +182,9 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         }
         for (role, lanes) in decides.iter_mut().enumerate() {
             *lanes = T::bits(agent.decides(&s, role));
+        }
+        for (role, lanes) in leaves.iter_mut().enumerate() {
+            *lanes = agent.leaves(&s, role).map(T::bits);
         }
         Perceived {
             observed: obs.len(),

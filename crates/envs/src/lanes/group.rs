@@ -31,6 +31,8 @@ pub(crate) struct LaneGroup<T: Real> {
     pub feet: Vec<u32>,
     /// Per role, the lanes in which it decides next.
     pub decides: Vec<u32>,
+    /// Per role, the lanes in which its part has just ended: where it has failed, and where not.
+    pub leaves: Vec<[u32; 2]>,
     reward: T,
     forward: T,
 }
@@ -66,6 +68,7 @@ impl<T: Real> LaneGroup<T> {
             info: vec![T::zero(); task.spec.info.len()],
             feet: vec![0; task.bindings.feet.len()],
             decides: vec![0; task.facts.roles.len()],
+            leaves: vec![[0; 2]; task.facts.roles.len()],
             reward: T::zero(),
             forward: T::zero(),
         };
@@ -218,7 +221,9 @@ impl<T: Real> LaneGroup<T> {
             let fields = 0..task.blueprint.model.hfields.len();
             let before: Vec<Vec<f32>> = fields.map(|field| physics.elevations(&task.sim, lane, field)).collect();
             let (action, mut own, mut grounds) = (read(action), read(memory), before.clone());
-            task.agent.build(&mut Site { action: &action, memory: &mut own, grounds: &mut grounds });
+            let mut site = Site { action: &action, memory: &mut own, grounds: &mut grounds, restart: false };
+            task.agent.build(&mut site);
+            let restart = site.restart;
             for (v, x) in memory.iter_mut().zip(own) {
                 v.set(lane, T::scalar(x));
             }
@@ -227,7 +232,20 @@ impl<T: Real> LaneGroup<T> {
                     physics.set_ground(&task.sim, lane, field, now);
                 }
             }
+            if restart {
+                self.restart(task, lane);
+            }
         }
+    }
+
+    /// Puts an agent's body where it spawns, in mid-episode.
+    fn restart(&mut self, task: &Task<T>, lane: usize) {
+        let blueprint = &task.blueprint;
+        self.physics.reset_lane(&task.sim, lane, &blueprint.spawn, &blueprint.spawn_velocity);
+        // its way there is none that it has gone
+        let along_x = &task.bindings.along_x;
+        let at = |(i, axis): &(usize, T::Scalar)| T::widen(self.physics.qpos[*i].get(lane)) * T::widen(*axis);
+        self.forward.set(lane, T::scalar(-along_x.iter().map(at).sum::<f64>()));
     }
 
     /// Writes the results of a decision into a block's arrays.

@@ -150,6 +150,8 @@ impl<T: Real> Shard for LaneShard<T> {
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
         out.decides.clear();
         out.decides.resize(task.spec.roles.len(), 0);
+        out.leaves.clear();
+        out.leaves.resize(task.spec.roles.len(), [0; 2]);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
             let mut last = 0;
@@ -164,6 +166,9 @@ impl<T: Real> Shard for LaneShard<T> {
             out.truncated |= ((ended.truncated | last) << first) as u16;
             out.diverged |= (ended.diverged << first) as u16;
             for (all, lanes) in out.decides.iter_mut().zip(&group.decides) {
+                *all |= (lanes << first) as u16;
+            }
+            for (all, lanes) in out.leaves.iter_mut().flatten().zip(group.leaves.iter().flatten()) {
                 *all |= (lanes << first) as u16;
             }
             // a broken state is put away at once: it must not slow its group down until the caller resets it

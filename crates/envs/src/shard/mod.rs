@@ -43,6 +43,9 @@ pub struct BlockStep {
     pub info: Vec<f32>,
     /// Per role of [`Spec::roles`], a bit per agent whose role decides next.
     pub decides: Vec<u16>,
+    /// Per role of [`Spec::roles`], a bit per agent whose role's part of the episode has ended with this decision before the
+    /// episode: where it has failed, and where it has not.
+    pub leaves: Vec<[u16; 2]>,
 }
 
 impl BlockStep {

@@ -78,6 +78,12 @@ impl BlockStep {
         sum
     }
 
+    /// Agents whose role number `i` has come to its end before their episode, a bit each: those where it has failed, and
+    /// those where it has not.
+    pub fn leaving(&self, i: usize) -> [u16; 2] {
+        self.leaves.get(i).copied().unwrap_or_default()
+    }
+
     /// Agents whose role number `i` decides next, a bit each: all, where the task has one role.
     pub fn deciding(&self, i: usize) -> u16 {
         self.decides.get(i).copied().unwrap_or(!0)

@@ -9,17 +9,20 @@ pub(super) struct Deciders {
     roles: usize,
     /// A bit per agent, `[block][role]`.
     masks: Vec<u16>,
+    /// Those whose part has just ended before their episode: where it has failed, and where not, `[block][role]`.
+    leaves: Vec<[u16; 2]>,
 }
 
 impl Deciders {
     /// Everybody, of so many roles; none where one has it all.
     pub fn new(roles: usize, blocks: usize) -> Self {
-        Deciders { roles, masks: vec![!0; roles * blocks] }
+        Deciders { roles, masks: vec![!0; roles * blocks], leaves: vec![[0; 2]; roles * blocks] }
     }
 
     /// Takes note that agents begin an episode, at whose start all roles decide.
     pub fn begin(&mut self, block: usize, mask: u16) {
         self.of(block).iter_mut().for_each(|decides| *decides |= mask);
+        self.leaves[block * self.roles..][..self.roles].iter_mut().flatten().for_each(|leaves| *leaves &= !mask);
     }
 
     /// Takes note of a decision, in which episodes of the agents in `begun` have ended or begun.
@@ -27,11 +30,15 @@ impl Deciders {
         for (role, decides) in self.of(block).iter_mut().enumerate() {
             *decides = out.deciding(role) | begun;
         }
+        for (role, leaves) in self.leaves[block * self.roles..][..self.roles].iter_mut().enumerate() {
+            *leaves = out.leaving(role).map(|mask| mask & !begun);
+        }
     }
 
     /// Lets everybody decide, as nobody knows.
     pub fn forget(&mut self) {
         self.masks.fill(!0);
+        self.leaves.fill([0; 2]);
     }
 
     fn of(&mut self, block: usize) -> &mut [u16] {
@@ -48,6 +55,24 @@ impl VecEnv {
     /// If there is no such role, or the array's length is wrong.
     pub fn decides(&self, role: usize, out: &mut [bool]) -> Result<(), EnvError> {
         self.check("decides [agents]", out.len(), 1)?;
+        self.ask(role, |deciders, at| deciders.masks.get(at).copied().unwrap_or(!0), out)
+    }
+
+    /// Writes for which agents a role's part of the episode has ended with the last decision while others go on, `[agents]`: those in
+    /// which it has failed, and those in which it has not, see [`Agent::leaves`](crate::Agent::leaves).
+    ///
+    /// # Errors
+    /// The same.
+    pub fn leaves(&self, role: usize, [failed, finished]: [&mut [bool]; 2]) -> Result<(), EnvError> {
+        for (which, out) in [failed, finished].into_iter().enumerate() {
+            self.check("leaves [agents]", out.len(), 1)?;
+            self.ask(role, |deciders, at| deciders.leaves.get(at).map_or(0, |leaves| leaves[which]), out)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a mask of a role for all agents.
+    fn ask(&self, role: usize, mask: impl Fn(&Deciders, usize) -> u16, out: &mut [bool]) -> Result<(), EnvError> {
         let roles = self.spec.roles.len();
         if role >= roles.max(1) {
             let expected = "less than the number of roles";
@@ -55,8 +80,8 @@ impl VecEnv {
         }
         for (worker, rows) in self.workers.iter().zip(out.chunks_mut(self.stride)) {
             for (block, rows) in rows.chunks_mut(BLOCK).enumerate() {
-                let mask = worker.deciders.masks.get(block * roles + role).copied().unwrap_or(!0);
-                rows.iter_mut().enumerate().for_each(|(i, decides)| *decides = mask >> i & 1 == 1);
+                let mask = mask(&worker.deciders, block * roles + role);
+                rows.iter_mut().enumerate().for_each(|(i, bit)| *bit = mask >> i & 1 == 1);
             }
         }
         Ok(())

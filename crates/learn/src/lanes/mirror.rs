@@ -27,8 +27,8 @@ pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
     for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms, &mut out.info] {
         rows(row, agents);
     }
-    let BlockStep { terminated, truncated, diverged, decides, .. } = out;
-    for mask in [terminated, truncated, diverged].into_iter().chain(decides) {
+    let BlockStep { terminated, truncated, diverged, decides, leaves, .. } = out;
+    for mask in [terminated, truncated, diverged].into_iter().chain(decides).chain(leaves.iter_mut().flatten()) {
         *mask = repeat(*mask, agents);
     }
 }

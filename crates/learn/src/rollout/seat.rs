@@ -42,6 +42,8 @@ pub struct Seat {
     pub(crate) tallies: [Vec<[f32; BLOCK]>; 4],
     /// Agents whose next action it chooses, a bit each, per block.
     pub(crate) decides: Vec<u16>,
+    /// Agents in whose episode its part is over, a bit each, per block.
+    pub(crate) left: Vec<u16>,
     /// Work space.
     obs_sums: [Aligned<f32>; 2],
     space: ActingSpace,
@@ -63,6 +65,7 @@ impl Seat {
             obs: Aligned::new(blocks * n),
             tallies: [(); 4].map(|()| vec![[0.0; BLOCK]; blocks]),
             decides: vec![!0; blocks],
+            left: vec![0; blocks],
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
             space: with.acting.space(role.act.len()),
             tape: with.values.as_ref().map(|values| values.net.inference_tape()),
@@ -171,29 +174,37 @@ impl Seat {
         self.decides[b] = out.deciding(self.number);
 
         // ended episodes
-        let done = out.terminated | out.truncated | out.diverged;
-        (rollout.done[item], rollout.failed[item]) = (done, out.terminated | out.diverged);
+        let over = out.terminated | out.truncated | out.diverged;
+        let [fallen, finished] = out.leaving(self.number);
+        // its part may be over before the episode
+        let left = self.left[b];
+        let failed = out.terminated | out.diverged | fallen;
+        let done = over | fallen | finished;
+        (rollout.done[item], rollout.failed[item]) = (done, failed);
         if done == 0 {
             return;
         }
-        let cut = out.truncated & !(out.terminated | out.diverged);
+        self.left[b] = (left | done) & !over;
+        let cut = (out.truncated | finished) & !failed & !left;
         let goes_on = with.streams.iter().any(|stream| stream.ignores_done);
         let whole = if goes_on { done & !out.diverged } else { cut };
         if whole != 0 {
             rollout.cut.push((item, [cut, whole]));
             rollout.cut_obs.extend_from_slice(obs);
         }
-        for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
+        for i in (0..BLOCK).filter(|i| (done & !left) >> i & 1 == 1) {
             sums.episodes += 1.0;
             sums.returns += returns[i] as f64;
             sums.lengths += lengths[i] as f64;
             sums.speeds += distances[i] as f64 / lengths[i] as f64;
-            sums.falls += (out.terminated >> i & 1) as f64;
+            sums.falls += ((out.terminated | fallen) >> i & 1) as f64;
             sums.diverged += (out.diverged >> i & 1) as f64;
+        }
+        for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
             (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
         }
         // all decide at the start of an episode
-        self.decides[b] |= done;
+        self.decides[b] |= over;
     }
 
     /// Completes a rollout: values, and with them advantages.

@@ -28,7 +28,8 @@ pub struct SeatStates {
     pub obs: Vec<f32>,
     /// Running sums of the agents, `[tally][block][16]`.
     pub tallies: Vec<f32>,
-    /// Agents whose next action it chooses, a bit each, per block; nothing where it chooses all.
+    /// Agents whose next action it chooses, a bit each, per block, and above them those in whose episode its part is over; nothing
+    /// where one role chooses all.
     pub decides: Vec<u32>,
 }
 
@@ -59,7 +60,7 @@ impl AgentStates {
                     for (all, tally) in tallies.iter_mut().zip(&seat.tallies) {
                         all.extend_from_slice(&tally[b]);
                     }
-                    states.decides.extend(several.then_some(seat.decides[b] as u32));
+                    states.decides.extend(several.then_some(seat.decides[b] as u32 | (seat.left[b] as u32) << BLOCK));
                 }
                 if several {
                     states.action.extend_from_slice(collector.action(b));
@@ -121,7 +122,7 @@ impl AgentStates {
                     all[b].copy_from_slice(&states.tallies[k * tally + i * BLOCK..][..BLOCK]);
                 }
                 if let Some(decides) = states.decides.get(i) {
-                    seat.decides[b] = *decides as u16;
+                    (seat.decides[b], seat.left[b]) = (*decides as u16, (*decides >> BLOCK) as u16);
                 }
             }
             if !self.action.is_empty() {

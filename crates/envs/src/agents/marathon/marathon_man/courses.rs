@@ -5,7 +5,7 @@ use marathon_physics::lanes::Real;
 use super::super::terrain::{Runner, Terrain};
 use super::body::{ACTIONS, BUTT, FEET, JOINTS};
 use super::steer::{BEGUN, DIRECTION, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
-use crate::agent::{Agent, Motors, Obs, Part, Senses, Start, Terms};
+use crate::agent::{Agent, Obs, Part, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
 /// Slowest that he is told to run, m/s.
@@ -27,7 +27,7 @@ impl Runner for Steer {
     const MEMORY: usize = BEGUN + 1;
     const IN_SPACE: bool = true;
     const BODY: &'static [&'static str] = &OBSERVED;
-    const GROUND: Motors = Motors::number(ACTIONS.len());
+    const MOTORS: usize = ACTIONS.len();
     const JOINT: &'static str = JOINTS[0].name;
     const HALF_WIDTH: f64 = 8.0;
 
@@ -60,7 +60,7 @@ impl Runner for Steer {
     }
 
     #[inline(always)]
-    fn add_terms<T: Real>(s: &Senses<T>, whole: T, _: Motors, terms: &mut Terms<T>) {
+    fn add_terms<T: Real>(s: &Senses<T>, whole: T, _: [T; 2], terms: &mut Terms<T>) {
         Steer::add_terms(s, [T::lit(0.5).lt(whole); 2], Steer::told(s), terms);
     }
 }

@@ -6,8 +6,9 @@
 use marathon_physics::lanes::Real;
 
 use super::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
+use super::regret::{REFERENCE, REGRET};
 use super::runners::Runner;
-use super::{BUILT, DIFFICULTY, DUE, SINCE, STEP};
+use super::{BUILT, DIFFICULTY, DUE, PHASE, SINCE, STEP};
 use crate::agent::{Obs, RoleFacts, Senses, Site, names};
 
 /// Names of the roles.
@@ -23,29 +24,42 @@ const STEPS: f64 = 10.0;
 const POINTS_SEEN: usize = 12;
 const SPACING: f64 = 0.5;
 
-/// The two roles: the figure with its own actions, observations and terms, and the builder.
-pub(super) fn roles(actions: Vec<String>, observations: &[&str], terms: &[String]) -> Vec<RoleFacts> {
+/// The roles: the figure with its own actions, observations and terms; the builder, whose action is the last of the others; and,
+/// where it earns `regret`, a reference, which has the rest of them.
+pub(super) fn roles(
+    [actions, others]: [&[String]; 2],
+    observations: &[&str],
+    terms: &[String],
+    regret: bool,
+) -> Vec<RoleFacts> {
     let runner = RoleFacts {
         name: RUNNER.into(),
         observations: names(observations),
-        actions,
+        actions: actions.to_vec(),
         reward_terms: terms.to_vec(),
-        intermittent: false,
+        intermittent: regret,
     };
     let builder = RoleFacts {
         name: BUILDER.into(),
         observations: names([SEEN]),
         actions: names([ACTION]),
-        reward_terms: names([EARNED]),
+        reward_terms: names([if regret { REGRET } else { EARNED }]),
         intermittent: true,
     };
-    vec![runner, builder]
+    let reference = RoleFacts {
+        name: REFERENCE.into(),
+        actions: others.iter().take(actions.len()).cloned().collect(),
+        reward_terms: names([REFERENCE]),
+        ..runner.clone()
+    };
+    [runner, builder].into_iter().chain(regret.then_some(reference)).collect()
 }
 
 /// What the builder sees: the ground from the torso to the end of what is built, as seen from the ground below the torso; the
-/// torso's height above it, velocity, forward axis; the last step, m; seconds since the last meter.
+/// torso's height above it, velocity, forward axis; the last step, m; seconds since the last meter. If it earns regret, whether
+/// the reference runs, too.
 #[inline(always)]
-pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, regrets: bool, out: &mut Obs<T>) {
     let ([x, y, z], [vx, _, vz], [fx, _, fz]) =
         (s.position(F::TORSO), s.linear_velocity(F::TORSO), s.forward(F::TORSO));
     let below = s.ground_height(x, y);
@@ -56,6 +70,9 @@ pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     [z - below, vx, vz, fx, fz, s.memory(F::MEMORY + STEP), s.memory(F::MEMORY + SINCE) * T::lit(s.dt())]
         .into_iter()
         .for_each(|x| out.scalar(x));
+    if regrets {
+        out.scalar(s.memory(F::MEMORY + PHASE));
+    }
 }
 
 /// Builds the next meter, and goes on level behind it. `first`: the course's first variable in the memory.
@@ -95,7 +112,8 @@ mod tests {
         for action in actions {
             memory[FIRST + DUE] = 1.0;
             memory[FIRST + DIFFICULTY] = difficulty;
-            build(&mut Site { action: &[0.3, *action], memory: &mut memory, grounds: &mut grounds }, FIRST);
+            let (memory, grounds) = (&mut memory, &mut grounds);
+            build(&mut Site { action: &[0.3, *action], memory, grounds, restart: false }, FIRST);
             assert!(memory[FIRST + DUE] == 0.0 && memory[..FIRST] == [0.0; FIRST]);
         }
         (memory.split_off(FIRST), grounds)

@@ -15,10 +15,11 @@
 //! Marathon Man's `full` is the reward of the task in which he is [steered](super::marathon_man::steer); his task is
 //! [there](super::marathon_man::TerrainMarathonMan), too.
 //!
-//! With the course `adversary` the task has two roles: the figure, and a builder who earns -r.
+//! With the course `adversary` the task has two roles: the figure, and a builder who earns -r; with `builder=regret` three.
 
 mod builder;
 pub mod course;
+mod regret;
 mod runners;
 
 pub use runners::Runner;
@@ -70,7 +71,14 @@ const HURT: usize = 8;
 const DUE: usize = 9;
 const BUILT: usize = 10;
 const STEP: usize = 11;
-const MEMORY: usize = 12;
+/// Whether the reference runs, whether it is to begin, decisions of the present run, whether that was its first one, and the
+/// runner's way, m.
+const PHASE: usize = 12;
+const RESTART: usize = 13;
+const RUN: usize = 14;
+const FIRST_OF_RUN: usize = 15;
+const WAY: usize = 16;
+const MEMORY: usize = 17;
 
 /// Way that makes the next course harder, and way that makes it easier, m, and by how much.
 const FAR: f64 = 16.0;
@@ -83,7 +91,10 @@ const TOO_EARLY: f64 = 4.0;
 /// Price of a fall that ends nothing.
 const PAIN: f64 = -5.0;
 /// Way that earns 1 with the sparse reward, m.
-const WAY: f64 = 20.0;
+const PRIZE: f64 = 20.0;
+/// Most motors that all roles of a figure have together, and most variables of its own.
+const MOST_MOTORS: usize = 64;
+const MOST_MEMORY: usize = 64;
 /// How near to the edge of a course an episode ends, m.
 const EDGE: f64 = 0.2;
 /// Thickness of the ground below the start's height, m.
@@ -144,6 +155,20 @@ impl Choice for Levels {
         &[(Levels::Fixed, "fixed"), (Levels::Random, "random"), (Levels::Curriculum, "curriculum")];
 }
 
+/// What an adversary earns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earns {
+    /// What the runner loses.
+    Inverse,
+    /// What a reference runner earns more on the same ground.
+    Regret,
+}
+
+impl Choice for Earns {
+    const EXPECTED: &'static str = "inverse or regret";
+    const NAMED: &'static [(Self, &'static str)] = &[(Earns::Inverse, "inverse"), (Earns::Regret, "regret")];
+}
+
 crate::options! {
     /// Arguments of a figure that runs over uneven ground.
     pub struct TerrainArguments {
@@ -161,6 +186,9 @@ crate::options! {
         falls: Falls = Falls::End,
         /// What it is rewarded for: `full`, `velocity`, or `sparse`.
         reward: Reward = Reward::Full,
+        /// What an adversary earns: the `inverse` of the runner's reward, or its `regret`: what a reference runner, who learns, too,
+        /// earns more on the same ground.
+        builder: Earns = Earns::Inverse,
     }
 }
 
@@ -181,6 +209,12 @@ impl<F: Runner> Terrain<F> {
         s.memory(F::MEMORY + slot)
     }
 
+    /// The variables of the course.
+    #[inline(always)]
+    fn course<'s, T: Real>(s: &Senses<'s, T>) -> &'s [T] {
+        &s.memory[F::MEMORY..]
+    }
+
     /// The figure's model with a height field in place of the floor.
     fn model(&self) -> String {
         const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
@@ -188,7 +222,9 @@ impl<F: Runner> Terrain<F> {
         let text = own.text().expect("the figures' models are texts");
         let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
         let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
-        let idle = if self.built() { idle::actuators(F::JOINT, &[builder::ACTION]) } else { String::new() };
+        let others = self.others();
+        let others: Vec<&str> = others.iter().map(String::as_str).collect();
+        let idle = if self.built() { idle::actuators(F::JOINT, &others) } else { String::new() };
         let (width, rows) = (F::HALF_WIDTH, Self::ROWS);
         let field = format!(
             "{idle}<asset><hfield name=\"course\" nrow=\"{rows}\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n"
@@ -201,21 +237,67 @@ impl<F: Runner> Terrain<F> {
         self.arguments.course == Kind::Adversary
     }
 
-    /// Motors that count as effort: all but the adversary's.
+    /// Whether it earns what a reference earns more than the runner.
+    fn regrets(&self) -> bool {
+        self.built() && self.arguments.builder == Earns::Regret
+    }
+
+    /// Actuators of roles without a body, behind the figure's own: the reference's, and the adversary's.
+    fn others(&self) -> Vec<String> {
+        let own = if self.regrets() { self.figure.facts().actions } else { Vec::new() };
+        let theirs = own.into_iter().map(|name| format!("{}_{name}", regret::REFERENCE));
+        theirs.chain(self.built().then(|| builder::ACTION.into())).collect()
+    }
+
+    /// Effort of who has the motors, and the penalty for those at their limits.
     #[inline(always)]
-    fn ignored(&self) -> Motors {
-        if self.built() { F::GROUND } else { Motors::NONE }
+    fn hard<T: Real>(&self, s: &Senses<T>) -> [T; 2] {
+        let of = |ignored| [s.effort(ignored), s.joints_at_limit_penalty(ignored)];
+        let own = of(Motors::except(0, F::MOTORS));
+        if !self.regrets() {
+            return own;
+        }
+        let (theirs, second) = (of(Motors::except(F::MOTORS, 2 * F::MOTORS)), Self::is(s, PHASE));
+        [T::select(second, theirs[0], own[0]), T::select(second, theirs[1], own[1])]
+    }
+
+    /// Lanes in which a variable of the course is set.
+    #[inline(always)]
+    fn is<T: Real>(s: &Senses<T>, slot: usize) -> T::Mask {
+        T::lit(0.5).lt(Self::own(s, slot))
+    }
+
+    /// Lanes in which the figure has failed. `memory`: the course's variables.
+    #[inline(always)]
+    fn failed<T: Real>(&self, memory: &[T]) -> T::Mask {
+        let lies = T::lit(0.5).lt(memory[LIES]);
+        match self.arguments.falls {
+            Falls::End => lies,
+            Falls::Hurt => T::and(lies, memory[AT].lt(T::lit(TOO_EARLY))),
+        }
     }
 
     /// Level of the next course after an episode that has left its memory; 0 for the first one.
     fn next_level(previous: &[f64]) -> f64 {
         let previous = &previous[F::MEMORY..];
-        let change = match previous[FARTHEST] {
+        let way = if previous[PHASE] > 0.5 { WAY } else { FARTHEST };
+        let change = match previous[way] {
             far if far >= FAR => RUNG,
             near if near < NEAR => -RUNG,
             _ => 0.0,
         };
         (previous[LEVEL] + change).clamp(0.0, 1.0)
+    }
+
+    /// Sets the figure's own variables as at the start of an episode in some lanes.
+    #[inline(always)]
+    fn begin_again<T: Real>(&self, s: &Senses<T>, own: &mut [T], lanes: T::Mask) {
+        let mut begun = [T::zero(); MOST_MEMORY];
+        self.figure.begin(s, &mut begun[..F::MEMORY]);
+        F::aim(&mut begun[..F::MEMORY]);
+        for (own, begun) in own.iter_mut().zip(begun) {
+            *own = T::select(lanes, begun, *own);
+        }
     }
 
     /// Writes what the figure sees of the ground.
@@ -238,17 +320,13 @@ impl<F: Runner> Terrain<F> {
         out.scalar(cells - cells.floor());
     }
 
-    /// Lanes that have made no new meter for too long.
+    /// Lanes that have made no new meter for too long, or have come to the end of the course or to within 0.2 m of its edge.
     #[inline(always)]
-    fn stuck<T: Real>(s: &Senses<T>) -> T::Mask {
-        T::lit(PATIENCE / s.dt()).lt(Self::own(s, SINCE))
-    }
-
-    /// Lanes that have come to the end of the course, or to within 0.2 m of its edge.
-    #[inline(always)]
-    fn through<T: Real>(s: &Senses<T>) -> T::Mask {
+    fn stopped<T: Real>(s: &Senses<T>, memory: &[T]) -> T::Mask {
+        let stuck = T::lit(PATIENCE / s.dt()).lt(memory[SINCE]);
         let aside = s.position(F::TORSO)[1].abs();
-        T::or(T::lit(TO - 1.0).lt(Self::own(s, AT)), T::lit(F::HALF_WIDTH - EDGE).lt(aside))
+        let through = T::or(T::lit(TO - 1.0).lt(memory[AT]), T::lit(F::HALF_WIDTH - EDGE).lt(aside));
+        T::or(stuck, through)
     }
 }
 
@@ -262,6 +340,7 @@ impl<F: Runner> Agent for Terrain<F> {
             Reward::Sparse => names(["distance"]),
         };
         let (mut actions, mut roles, mut price) = (own.actions.clone(), Vec::new(), None);
+        let mut max_episode_steps = own.max_episode_steps;
         if reward == Reward::Full {
             price = Some(F::FALL);
         }
@@ -275,9 +354,13 @@ impl<F: Runner> Agent for Terrain<F> {
                 (false, _) => &[],
             };
             let seen = [F::BODY, &["foot_heights"], ahead].concat();
-            roles = builder::roles(actions.clone(), &seen, &terms);
-            actions.push(builder::ACTION.into());
-            terms.push(builder::EARNED.into());
+            let others = self.others();
+            roles = builder::roles([&actions, &others], &seen, &terms, self.regrets());
+            actions.extend(others);
+            terms.extend(roles.iter().skip(1).flat_map(|role| role.reward_terms.clone()));
+            if self.regrets() {
+                max_episode_steps *= 2;
+            }
         }
         Facts {
             id: F::ID.into(),
@@ -290,6 +373,7 @@ impl<F: Runner> Agent for Terrain<F> {
             info: names(["distance", "difficulty"]),
             metrics: names(["forward", "difficulty"]),
             memory: F::MEMORY + MEMORY,
+            max_episode_steps,
             termination_reward: price,
             ..own
         }
@@ -324,7 +408,19 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
-        self.figure.ctrl(c);
+        if !self.regrets() {
+            return self.figure.ctrl(c);
+        }
+        // the figure does what the reference wants, once that has the motors
+        let second = regret::runs(&c.memory[F::MEMORY..]);
+        let mut action = [T::zero(); MOST_MOTORS];
+        let action = &mut action[..c.action.len()];
+        action.copy_from_slice(c.action);
+        for (own, theirs) in action.iter_mut().zip(&c.action[F::MOTORS..]).take(F::MOTORS) {
+            *own = T::select(second, *theirs, *own);
+        }
+        let Ctrl { ctrl, memory, command, qpos, qvel, dt, reference, .. } = c;
+        self.figure.ctrl(&mut Ctrl { action, ctrl, memory, command, qpos, qvel, dt: *dt, reference: *reference });
     }
 
     #[inline(always)]
@@ -355,6 +451,13 @@ impl<F: Runner> Agent for Terrain<F> {
         memory[HIT] = (lies - memory[LIES]).max(zero);
         memory[LIES] = lies;
         memory[HURT] = memory[HURT].max(lies);
+        if self.regrets() {
+            memory[RUN] += one;
+            let over = regret::is_over(memory, Self::stopped(s, memory), s.dt());
+            let over = T::or(self.failed(memory), over);
+            regret::remember(memory, over);
+            self.begin_again(s, own, T::lit(0.5).lt(memory[FIRST_OF_RUN]));
+        }
     }
 
     #[inline(always)]
@@ -369,62 +472,87 @@ impl<F: Runner> Agent for Terrain<F> {
             Self::observe_ahead(s, out);
         }
         if self.built() {
-            builder::observe::<F, T>(s, out);
+            builder::observe::<F, T>(s, self.regrets(), out);
         }
     }
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         match self.arguments.reward {
             Reward::Full => {
-                F::add_terms(s, T::lit(1.0) - Self::own(s, HURT), self.ignored(), terms);
+                F::add_terms(s, T::lit(1.0) - Self::own(s, HURT), self.hard(s), terms);
                 terms.add("pain", PAIN, Self::own(s, HIT));
                 if self.built() {
-                    terms.add("fall", F::FALL, T::masked(self.terminated(s), T::lit(1.0)));
+                    terms.add("fall", F::FALL, T::masked(self.failed(Self::course(s)), T::lit(1.0)));
                 }
             }
             Reward::Velocity => terms.add("velocity", 1.0, s.normalized_velocity(F::TORSO, FASTEST)),
             Reward::Sparse => {
                 let over = T::or(self.terminated(s), T::or(self.truncated(s), s.time_is_up()));
-                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / WAY)));
+                let over = T::or(over, Self::is(s, RESTART));
+                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / PRIZE)));
             }
         }
-        if self.built() {
+        if self.regrets() {
+            let theirs = terms.keep(T::not(Self::is(s, PHASE)));
+            let earned = terms.sum();
+            terms.add(regret::REGRET, 1.0, theirs - earned);
+            terms.add(regret::REFERENCE, 1.0, theirs);
+        } else if self.built() {
             let earned = terms.sum();
             terms.add(builder::EARNED, -1.0, earned);
         }
     }
 
     fn build(&self, site: &mut Site) {
-        builder::build(site, F::MEMORY);
-    }
-
-    #[inline(always)]
-    fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
-        if self.built() { T::lit(0.5).lt(memory[F::MEMORY + DUE]) } else { T::none() }
-    }
-
-    #[inline(always)]
-    fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
-        if role == 0 { T::not(T::none()) } else { T::lit(0.5).lt(Self::own(s, DUE)) }
-    }
-
-    #[inline(always)]
-    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
-        let lies = T::lit(0.5).lt(Self::own(s, LIES));
-        match self.arguments.falls {
-            Falls::End => lies,
-            Falls::Hurt => T::and(lies, Self::own(s, AT).lt(T::lit(TOO_EARLY))),
+        match site.memory[F::MEMORY + RESTART] > 0.5 {
+            true => regret::restart(site, F::MEMORY),
+            false => builder::build(site, F::MEMORY),
         }
     }
 
     #[inline(always)]
+    fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
+        let memory = &memory[F::MEMORY..];
+        let due = if self.built() { T::lit(0.5).lt(memory[DUE]) } else { T::none() };
+        // what the adversary decides about the second run comes to nothing
+        T::or(T::and(due, T::not(regret::runs(memory))), T::lit(0.5).lt(memory[RESTART]))
+    }
+
+    #[inline(always)]
+    fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
+        match role {
+            0 => T::not(T::or(Self::is(s, PHASE), Self::is(s, RESTART))),
+            1 => Self::is(s, DUE),
+            _ => Self::is(s, PHASE),
+        }
+    }
+
+    #[inline(always)]
+    fn leaves<T: Real>(&self, s: &Senses<T>, role: usize) -> [T::Mask; 2] {
+        let over = if role == 0 { Self::is(s, RESTART) } else { T::none() };
+        let failed = self.failed(Self::course(s));
+        [T::and(over, failed), T::and(over, T::not(failed))]
+    }
+
+    #[inline(always)]
+    fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        let failed = self.failed(Self::course(s));
+        if self.regrets() { T::and(failed, Self::is(s, PHASE)) } else { failed }
+    }
+
+    #[inline(always)]
     fn truncated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
-        T::or(Self::stuck(s), Self::through(s))
+        let memory = Self::course(s);
+        let stopped = Self::stopped(s, memory);
+        match self.regrets() {
+            true => T::and(regret::is_over(memory, stopped, s.dt()), regret::runs(memory)),
+            false => stopped,
+        }
     }
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar(Self::own(s, FARTHEST));
+        out.scalar(T::select(Self::is(s, PHASE), Self::own(s, WAY), Self::own(s, FARTHEST)));
         out.scalar(Self::own(s, DIFFICULTY));
     }
 }

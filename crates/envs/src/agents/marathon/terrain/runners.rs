@@ -5,7 +5,7 @@ use marathon_physics::lanes::Real;
 use super::super::ant::{self, AntV0};
 use super::super::hopper::{self, FOOT, HopperV0};
 use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
-use crate::agent::{Agent, Motors, Obs, Part, ResetNoise, Senses, Start, Terms};
+use crate::agent::{Agent, Obs, Part, ResetNoise, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
 /// Price of the joints driven at their limit: 0.8 for each.
@@ -38,8 +38,8 @@ pub trait Runner: Agent + Clone + Default {
     const IN_SPACE: bool = false;
     /// What it observes of its body, by name.
     const BODY: &'static [&'static str];
-    /// The motor behind its own: the adversary's.
-    const GROUND: Motors;
+    /// How many motors it has; those of other roles are behind them.
+    const MOTORS: usize;
     /// One of its joints: the adversary's motor needs one that it does not move.
     const JOINT: &'static str;
     /// Half the width of its courses, m: tracks of figures in a plane that are beside each other do not overlap in a picture.
@@ -61,13 +61,14 @@ pub trait Runner: Agent + Clone + Default {
         usize::MAX
     }
 
-    /// Adds its terms of the reward `full`. `whole`: 1, or 0 after a fall. `ignored`: motors that are not its own.
+    /// Adds its terms of the reward `full`. `whole`: 1, or 0 after a fall. `hard`: its effort, and its penalty for motors at
+    /// their limits.
     #[inline(always)]
-    fn add_terms<T: Real>(s: &Senses<T>, whole: T, ignored: Motors, terms: &mut Terms<T>) {
+    fn add_terms<T: Real>(s: &Senses<T>, whole: T, hard: [T; 2], terms: &mut Terms<T>) {
         terms.add("velocity", 1.0, s.velocity(Self::TORSO));
         terms.add("uprightness", 1.0, whole * s.forward_bonus(Self::TORSO));
-        terms.add("effort", Self::EFFORT, whole * s.effort(ignored));
-        terms.add("joints_at_limit", JOINTS_AT_LIMIT, s.joints_at_limit_penalty(ignored));
+        terms.add("effort", Self::EFFORT, whole * hard[0]);
+        terms.add("joints_at_limit", JOINTS_AT_LIMIT, hard[1]);
     }
 }
 
@@ -79,7 +80,7 @@ impl Runner for HopperV0 {
     const SOLES: &'static [Part] = &[FOOT];
     const EFFORT: f64 = -0.3;
     const BODY: &'static [&'static str] = &BODY;
-    const GROUND: Motors = Motors::number(4);
+    const MOTORS: usize = 4;
     const JOINT: &'static str = "rootx";
     const HALF_WIDTH: f64 = 0.4;
 
@@ -97,7 +98,7 @@ impl Runner for Walker2dV0 {
     const SOLES: &'static [Part] = &[LEFT_FOOT, RIGHT_FOOT];
     const EFFORT: f64 = -0.1;
     const BODY: &'static [&'static str] = &BODY;
-    const GROUND: Motors = Motors::number(6);
+    const MOTORS: usize = 6;
     const JOINT: &'static str = "rootx";
     const HALF_WIDTH: f64 = 0.4;
 
@@ -115,7 +116,7 @@ impl Runner for AntV0 {
     const SOLES: &'static [Part] = &ant::SOLES;
     const EFFORT: f64 = -0.5;
     const BODY: &'static [&'static str] = &BODY;
-    const GROUND: Motors = Motors::number(8);
+    const MOTORS: usize = 8;
     const JOINT: &'static str = "hip_1";
     // it may stray from its line
     const HALF_WIDTH: f64 = 8.0;
