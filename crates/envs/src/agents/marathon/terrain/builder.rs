@@ -6,9 +6,9 @@
 use marathon_physics::lanes::Real;
 
 use super::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
-use super::regret::{REFERENCE, REGRET};
+use super::regret::{REFERENCE, REGRET, SECOND};
 use super::runners::Runner;
-use super::{BUILT, DIFFICULTY, DUE, PHASE, SINCE, STEP};
+use super::{BUILT, DIFFICULTY, DUE, SINCE, STEP};
 use crate::agent::{Obs, RoleFacts, Senses, Site, names};
 
 /// Names of the roles.
@@ -71,7 +71,7 @@ pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, regrets: bool, out: &mu
         .into_iter()
         .for_each(|x| out.scalar(x));
     if regrets {
-        out.scalar(s.memory(F::MEMORY + PHASE));
+        out.scalar(s.memory(F::MEMORY + SECOND));
     }
 }
 

@@ -17,11 +17,13 @@
 //!
 //! With the course `adversary` the task has two roles: the figure, and a builder who earns -r; with `builder=regret` three.
 
+mod arguments;
 mod builder;
 pub mod course;
 mod regret;
 mod runners;
 
+pub use arguments::TerrainArguments;
 pub use runners::Runner;
 
 use marathon_physics::lanes::Real;
@@ -31,11 +33,11 @@ use super::ant::AntV0;
 use super::hopper::HopperV0;
 use super::idle;
 use super::walker2d::Walker2dV0;
-use crate::agent::options::Choice;
 use crate::agent::{
     Agent, Ctrl, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Site, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
+use arguments::{Earns, Falls, Levels, Reward};
 use course::{FROM, Kind, POINTS, ROW, TO};
 
 /// Points at which the ground is seen, and how far one is from the next and the first behind the figure, m.
@@ -71,14 +73,7 @@ const HURT: usize = 8;
 const DUE: usize = 9;
 const BUILT: usize = 10;
 const STEP: usize = 11;
-/// Whether the reference runs, whether it is to begin, decisions of the present run, whether that was its first one, and the
-/// runner's way, m.
-const PHASE: usize = 12;
-const RESTART: usize = 13;
-const RUN: usize = 14;
-const FIRST_OF_RUN: usize = 15;
-const WAY: usize = 16;
-const MEMORY: usize = 17;
+const MEMORY: usize = 12;
 
 /// Way that makes the next course harder, and way that makes it easier, m, and by how much.
 const FAR: f64 = 16.0;
@@ -91,7 +86,7 @@ const TOO_EARLY: f64 = 4.0;
 /// Price of a fall that ends nothing.
 const PAIN: f64 = -5.0;
 /// Way that earns 1 with the sparse reward, m.
-const PRIZE: f64 = 20.0;
+const WAY: f64 = 20.0;
 /// Most motors that all roles of a figure have together, and most variables of its own.
 const MOST_MOTORS: usize = 64;
 const MOST_MEMORY: usize = 64;
@@ -106,91 +101,6 @@ pub type TerrainHopper = Terrain<HopperV0>;
 pub type TerrainWalker2d = Terrain<Walker2dV0>;
 /// The Ant on courses.
 pub type TerrainAnt = Terrain<AntV0>;
-
-/// What a figure is rewarded for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reward {
-    /// Speed and posture less effort.
-    Full,
-    /// Speed.
-    Velocity,
-    /// The way, at the end.
-    Sparse,
-}
-
-impl Choice for Reward {
-    const EXPECTED: &'static str = "full, velocity or sparse";
-    const NAMED: &'static [(Self, &'static str)] =
-        &[(Reward::Full, "full"), (Reward::Velocity, "velocity"), (Reward::Sparse, "sparse")];
-}
-
-/// What a fall does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Falls {
-    /// It ends the episode.
-    End,
-    /// It hurts, and from then on neither posture nor effort counts.
-    Hurt,
-}
-
-impl Choice for Falls {
-    const EXPECTED: &'static str = "end or hurt";
-    const NAMED: &'static [(Self, &'static str)] = &[(Falls::End, "end"), (Falls::Hurt, "hurt")];
-}
-
-/// How difficult each course is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Levels {
-    /// As difficult as the option says.
-    Fixed,
-    /// Anything up to that.
-    Random,
-    /// At first level, then harder after a long way and easier after a short one.
-    Curriculum,
-}
-
-impl Choice for Levels {
-    const EXPECTED: &'static str = "fixed, random or curriculum";
-    const NAMED: &'static [(Self, &'static str)] =
-        &[(Levels::Fixed, "fixed"), (Levels::Random, "random"), (Levels::Curriculum, "curriculum")];
-}
-
-/// What an adversary earns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Earns {
-    /// What the runner loses.
-    Inverse,
-    /// What a reference runner earns more on the same ground.
-    Regret,
-}
-
-impl Choice for Earns {
-    const EXPECTED: &'static str = "inverse or regret";
-    const NAMED: &'static [(Self, &'static str)] = &[(Earns::Inverse, "inverse"), (Earns::Regret, "regret")];
-}
-
-crate::options! {
-    /// Arguments of a figure that runs over uneven ground.
-    pub struct TerrainArguments {
-        /// What the ground is made of: `flat`, `slopes`, `steps`, `stairs`, `gaps`, `rubble`, `boxes`, `mixed` of these, the
-        /// original's `meters`, made by hand: `bumps`, `blocks`, or built by an `adversary` that learns, too.
-        course: Kind = Kind::Mixed,
-        /// How difficult the most difficult courses are, from 0 to 1.
-        difficulty: Scale = Scale(0.5),
-        /// How difficult each course is: `fixed`, `random` up to the difficulty, or `curriculum`: 5 % harder after 16 m, 5 %
-        /// easier after less than 8 m.
-        levels: Levels = Levels::Fixed,
-        /// Whether it sees the ground ahead.
-        heights: bool = true,
-        /// What a fall does: `end` the episode, or `hurt`.
-        falls: Falls = Falls::End,
-        /// What it is rewarded for: `full`, `velocity`, or `sparse`.
-        reward: Reward = Reward::Full,
-        /// What an adversary earns: the `inverse` of the runner's reward, or its `regret`: what a reference runner, who learns, too,
-        /// earns more on the same ground.
-        builder: Earns = Earns::Inverse,
-    }
-}
 
 /// A figure that runs over uneven ground.
 #[derive(Clone, Debug, Default)]
@@ -257,14 +167,14 @@ impl<F: Runner> Terrain<F> {
         if !self.regrets() {
             return own;
         }
-        let (theirs, second) = (of(Motors::except(F::MOTORS, 2 * F::MOTORS)), Self::is(s, PHASE));
+        let (theirs, second) = (of(Motors::except(F::MOTORS, 2 * F::MOTORS)), regret::runs(Self::course(s)));
         [T::select(second, theirs[0], own[0]), T::select(second, theirs[1], own[1])]
     }
 
-    /// Lanes in which a variable of the course is set.
+    /// Lanes in which the runner's run is over, and the reference is to begin.
     #[inline(always)]
-    fn is<T: Real>(s: &Senses<T>, slot: usize) -> T::Mask {
-        T::lit(0.5).lt(Self::own(s, slot))
+    fn handed_over<T: Real>(&self, s: &Senses<T>) -> T::Mask {
+        if self.regrets() { regret::is_due(Self::course(s)) } else { T::none() }
     }
 
     /// Lanes in which the figure has failed. `memory`: the course's variables.
@@ -280,8 +190,7 @@ impl<F: Runner> Terrain<F> {
     /// Level of the next course after an episode that has left its memory; 0 for the first one.
     fn next_level(previous: &[f64]) -> f64 {
         let previous = &previous[F::MEMORY..];
-        let way = if previous[PHASE] > 0.5 { WAY } else { FARTHEST };
-        let change = match previous[way] {
+        let change = match regret::way_of_runner(previous).unwrap_or(previous[FARTHEST]) {
             far if far >= FAR => RUNG,
             near if near < NEAR => -RUNG,
             _ => 0.0,
@@ -372,7 +281,7 @@ impl<F: Runner> Agent for Terrain<F> {
             roles,
             info: names(["distance", "difficulty"]),
             metrics: names(["forward", "difficulty"]),
-            memory: F::MEMORY + MEMORY,
+            memory: F::MEMORY + if self.regrets() { regret::MEMORY } else { MEMORY },
             max_episode_steps,
             termination_reward: price,
             ..own
@@ -452,11 +361,10 @@ impl<F: Runner> Agent for Terrain<F> {
         memory[LIES] = lies;
         memory[HURT] = memory[HURT].max(lies);
         if self.regrets() {
-            memory[RUN] += one;
+            regret::go_on(memory);
             let over = regret::is_over(memory, Self::stopped(s, memory), s.dt());
-            let over = T::or(self.failed(memory), over);
-            regret::remember(memory, over);
-            self.begin_again(s, own, T::lit(0.5).lt(memory[FIRST_OF_RUN]));
+            let begins = regret::remember(memory, T::or(self.failed(memory), over));
+            self.begin_again(s, own, begins);
         }
     }
 
@@ -488,12 +396,12 @@ impl<F: Runner> Agent for Terrain<F> {
             Reward::Velocity => terms.add("velocity", 1.0, s.normalized_velocity(F::TORSO, FASTEST)),
             Reward::Sparse => {
                 let over = T::or(self.terminated(s), T::or(self.truncated(s), s.time_is_up()));
-                let over = T::or(over, Self::is(s, RESTART));
-                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / PRIZE)));
+                let over = T::or(over, self.handed_over(s));
+                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / WAY)));
             }
         }
         if self.regrets() {
-            let theirs = terms.keep(T::not(Self::is(s, PHASE)));
+            let theirs = terms.keep(T::not(regret::runs(Self::course(s))));
             let earned = terms.sum();
             terms.add(regret::REGRET, 1.0, theirs - earned);
             terms.add(regret::REFERENCE, 1.0, theirs);
@@ -504,32 +412,39 @@ impl<F: Runner> Agent for Terrain<F> {
     }
 
     fn build(&self, site: &mut Site) {
-        match site.memory[F::MEMORY + RESTART] > 0.5 {
-            true => regret::restart(site, F::MEMORY),
-            false => builder::build(site, F::MEMORY),
+        if !(self.regrets() && regret::restart(site, F::MEMORY)) {
+            builder::build(site, F::MEMORY);
         }
     }
 
     #[inline(always)]
     fn builds<T: Real>(&self, memory: &[T]) -> T::Mask {
+        if !self.built() {
+            return T::none();
+        }
         let memory = &memory[F::MEMORY..];
-        let due = if self.built() { T::lit(0.5).lt(memory[DUE]) } else { T::none() };
-        // what the adversary decides about the second run comes to nothing
-        T::or(T::and(due, T::not(regret::runs(memory))), T::lit(0.5).lt(memory[RESTART]))
+        let due = T::lit(0.5).lt(memory[DUE]);
+        match self.regrets() {
+            // what the adversary decides about the second run comes to nothing
+            true => T::or(T::and(due, T::not(regret::runs(memory))), regret::is_due(memory)),
+            false => due,
+        }
     }
 
     #[inline(always)]
     fn decides<T: Real>(&self, s: &Senses<T>, role: usize) -> T::Mask {
+        let memory = Self::course(s);
         match role {
-            0 => T::not(T::or(Self::is(s, PHASE), Self::is(s, RESTART))),
-            1 => Self::is(s, DUE),
-            _ => Self::is(s, PHASE),
+            0 if self.regrets() => T::not(T::or(regret::runs(memory), regret::is_due(memory))),
+            0 => T::not(T::none()),
+            1 => T::lit(0.5).lt(memory[DUE]),
+            _ => regret::runs(memory),
         }
     }
 
     #[inline(always)]
     fn leaves<T: Real>(&self, s: &Senses<T>, role: usize) -> [T::Mask; 2] {
-        let over = if role == 0 { Self::is(s, RESTART) } else { T::none() };
+        let over = if role == 0 { self.handed_over(s) } else { T::none() };
         let failed = self.failed(Self::course(s));
         [T::and(over, failed), T::and(over, T::not(failed))]
     }
@@ -537,7 +452,7 @@ impl<F: Runner> Agent for Terrain<F> {
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
         let failed = self.failed(Self::course(s));
-        if self.regrets() { T::and(failed, Self::is(s, PHASE)) } else { failed }
+        if self.regrets() { T::and(failed, regret::runs(Self::course(s))) } else { failed }
     }
 
     #[inline(always)]
@@ -552,7 +467,7 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar(T::select(Self::is(s, PHASE), Self::own(s, WAY), Self::own(s, FARTHEST)));
+        out.scalar(if self.regrets() { regret::way(Self::course(s)) } else { Self::own(s, FARTHEST) });
         out.scalar(Self::own(s, DIFFICULTY));
     }
 }

@@ -9,8 +9,16 @@
 use marathon_physics::lanes::Real;
 
 use super::course::LEVEL_TO;
-use super::{AT, BUILT, DUE, FARTHEST, FIRST_OF_RUN, HIT, HURT, LIES, MARK, PHASE, RESTART, RUN, SINCE, WAY};
+use super::{AT, BUILT, DUE, FARTHEST, HIT, HURT, LIES, MARK, SINCE};
 use crate::agent::Site;
+
+/// Slots of the memory, behind those of every course: whether the reference runs, whether it is to begin, decisions of the present
+/// run, and the runner's way, m.
+pub(super) const SECOND: usize = super::MEMORY;
+const DUE_TO_BEGIN: usize = SECOND + 1;
+const RUN: usize = SECOND + 2;
+const WAY: usize = SECOND + 3;
+pub(super) const MEMORY: usize = SECOND + 4;
 
 /// Name of the role, and of what it earns; what the names of its actuators begin with.
 pub(super) const REFERENCE: &str = "reference";
@@ -19,10 +27,27 @@ pub(super) const REGRET: &str = "regret";
 /// Longest run, s.
 const LONGEST: f64 = 10.0;
 
-/// Lanes in which the reference runs. `memory`: the course's variables.
+/// Lanes in which the reference runs. `memory`: the course's variables, here and below.
 #[inline(always)]
 pub(super) fn runs<T: Real>(memory: &[T]) -> T::Mask {
-    T::lit(0.5).lt(memory[PHASE])
+    T::lit(0.5).lt(memory[SECOND])
+}
+
+/// Lanes in which the reference is to begin.
+#[inline(always)]
+pub(super) fn is_due<T: Real>(memory: &[T]) -> T::Mask {
+    T::lit(0.5).lt(memory[DUE_TO_BEGIN])
+}
+
+/// The runner's way, m.
+#[inline(always)]
+pub(super) fn way<T: Real>(memory: &[T]) -> T {
+    T::select(runs(memory), memory[WAY], memory[FARTHEST])
+}
+
+/// The same after an episode that has left its memory, if the reference has run in it.
+pub(super) fn way_of_runner(memory: &[f64]) -> Option<f64> {
+    memory.get(SECOND).filter(|second| **second > 0.5).map(|_| memory[WAY])
 }
 
 /// Lanes in which the present run is over though nobody has fallen. `stopped`: those in which any run would be.
@@ -33,23 +58,33 @@ pub(super) fn is_over<T: Real>(memory: &[T], stopped: T::Mask, dt: f64) -> T::Ma
     T::or(stopped, T::or(late, T::and(runs(memory), beyond)))
 }
 
-/// Takes note of a decision of the present run, which is `over` with it in some lanes.
+/// Counts a decision of the present run.
 #[inline(always)]
-pub(super) fn remember<T: Real>(memory: &mut [T], over: T::Mask) {
-    let (second, one) = (runs(memory), T::lit(1.0));
-    memory[RESTART] = T::masked(T::and(over, T::not(second)), one);
-    // the adversary is asked what it makes of the second run
-    let begins = T::and(second, memory[RUN].lt(T::lit(1.5)));
-    memory[FIRST_OF_RUN] = T::masked(begins, one);
-    memory[DUE] = T::select(begins, one, T::masked(T::not(over), memory[DUE]));
+pub(super) fn go_on<T: Real>(memory: &mut [T]) {
+    memory[RUN] += T::lit(1.0);
 }
 
-/// Ends the runner's run, and has the reference begin.
-pub(super) fn restart(site: &mut Site, first: usize) {
+/// Takes note of a decision with which the present run is `over` in some lanes. Returns those in which it was the reference's first.
+#[inline(always)]
+pub(super) fn remember<T: Real>(memory: &mut [T], over: T::Mask) -> T::Mask {
+    let (second, one) = (runs(memory), T::lit(1.0));
+    memory[DUE_TO_BEGIN] = T::masked(T::and(over, T::not(second)), one);
+    // the adversary is asked what it makes of the second run
+    let begins = T::and(second, memory[RUN].lt(T::lit(1.5)));
+    memory[DUE] = T::select(begins, one, T::masked(T::not(over), memory[DUE]));
+    begins
+}
+
+/// Ends the runner's run and has the reference begin, if it is to.
+pub(super) fn restart(site: &mut Site, first: usize) -> bool {
     let memory = &mut site.memory[first..];
-    (memory[PHASE], memory[RESTART], memory[WAY]) = (1.0, 0.0, memory[FARTHEST]);
-    for slot in [AT, FARTHEST, MARK, SINCE, LIES, HIT, HURT, RUN] {
-        memory[slot] = 0.0;
+    let due = memory[DUE_TO_BEGIN] > 0.5;
+    if due {
+        (memory[SECOND], memory[DUE_TO_BEGIN], memory[WAY]) = (1.0, 0.0, memory[FARTHEST]);
+        for slot in [AT, FARTHEST, MARK, SINCE, LIES, HIT, HURT, RUN] {
+            memory[slot] = 0.0;
+        }
+        site.restart = true;
     }
-    site.restart = true;
+    due
 }
