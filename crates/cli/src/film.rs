@@ -96,13 +96,13 @@ impl Shot {
     }
 }
 
-/// Plays a policy with its best actions and films it.
+/// Plays the policies of all roles with their best actions and films them.
 ///
 /// # Errors
 /// If a ghost is asked for and the agents follow no clip, or the picture cannot be written.
-pub fn shoot(policy: &Policy, spec: &Spec, shot: &Shot, cast: &Cast, out: &Path) -> Result<Report, CliError> {
+pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &Path) -> Result<Report, CliError> {
     interrupt::install("leaving without a picture")?;
-    let mut stage = Stage::new(policy, spec, cast)?;
+    let mut stage = Stage::new(policies, spec, cast)?;
     let lanes = if cast.ghost == Some(Ghost::Beside) { 2 * cast.agents } else { cast.agents };
     let renderer = Renderer::new(shot.width, shot.height)?;
     let mut camera = Follow::new(&stage.scene, lanes, shot.width, shot.height);
@@ -154,6 +154,8 @@ pub fn shoot(policy: &Policy, spec: &Spec, shot: &Shot, cast: &Cast, out: &Path)
 struct Stage<'a> {
     play: Play<'a>,
     scene: Scene,
+    /// Height fields of the model.
+    fields: usize,
     /// Seconds between decisions.
     dt: f64,
     decisions: usize,
@@ -202,7 +204,7 @@ impl Errors {
 }
 
 impl<'a> Stage<'a> {
-    fn new(policy: &'a Policy, spec: &Spec, cast: &Cast) -> Result<Self, CliError> {
+    fn new(policies: &'a [Policy], spec: &Spec, cast: &Cast) -> Result<Self, CliError> {
         let options = VecEnvOptions {
             agents: cast.agents,
             seed: cast.seed,
@@ -210,7 +212,7 @@ impl<'a> Stage<'a> {
             ..Default::default()
         };
         let model = registry::agent(&spec.id)?.model()?;
-        let play = Play::new(policy, &options)?;
+        let play = Play::with_roles(&policies.iter().collect::<Vec<_>>(), &options)?;
         if cast.ghost.is_some() && play.reference(0)?.is_none() {
             let text =
                 format!("--ghost: {} follows no clip, expected an agent that does, such as MarathonMan", spec.id);
@@ -219,6 +221,7 @@ impl<'a> Stage<'a> {
         let mut stage = Self {
             play,
             scene: Scene::new(&model),
+            fields: model.hfields.len(),
             dt: spec.dt,
             decisions: 0,
             distances: vec![0.0; cast.agents],
@@ -227,11 +230,17 @@ impl<'a> Stage<'a> {
             ghost: cast.ghost,
             errors: cast.ghost.map(|_| Errors::new(&model)),
         };
-        let fields = model.hfields.len();
-        let grounds = (0..cast.agents).map(|agent| stage.play.grounds(agent, fields)).collect::<Result<_, _>>()?;
-        stage.scene.set_grounds(grounds);
+        stage.look_at_grounds()?;
         stage.compare()?;
         Ok(stage)
+    }
+
+    /// Shows the agents' grounds as they are now.
+    fn look_at_grounds(&mut self) -> Result<(), CliError> {
+        let (play, fields) = (&mut self.play, self.fields);
+        let grounds = (0..self.fallen.len()).map(|agent| play.grounds(agent, fields)).collect::<Result<_, _>>()?;
+        self.scene.set_grounds(grounds);
+        Ok(())
     }
 
     fn step(&mut self) -> Result<(), CliError> {
@@ -245,6 +254,10 @@ impl<'a> Stage<'a> {
             if fallen.is_none() {
                 self.distances[i] += f64::from(step.forward[i]);
             }
+        }
+        // one of several roles may build
+        if !self.play.spec().roles.is_empty() {
+            self.look_at_grounds()?;
         }
         self.recent.push(self.distance());
         let keep = (SPEED_WINDOW / self.dt).round() as usize + 1;

@@ -110,7 +110,7 @@ fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<F
         autoreset: Autoreset::Disabled,
         ..VecEnvOptions::default()
     };
-    let mut play = Play::of(setting, policy, &vec_options)?;
+    let mut play = Play::of(setting, &[policy], &vec_options)?;
     let model = registry::agent(&setting.agent)?.model()?;
     let tracking = Tracking::new(&model);
     let dt = policy.meta().control_dt;

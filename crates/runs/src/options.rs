@@ -125,6 +125,14 @@ impl PolicySource {
     pub fn load(&self) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
         policy_file::load(&self.policy, self.agent.as_deref(), &self.task)
     }
+
+    /// The same with the policies of all roles of the task, in their order; those of the others lie beside the first one.
+    ///
+    /// # Errors
+    /// The same, and if one of them is missing.
+    pub fn load_all(&self) -> Result<(Vec<Policy>, Arc<dyn ShardFactory>), RunError> {
+        policy_file::load_all(&self.policy, self.agent.as_deref(), &self.task)
+    }
 }
 
 /// Time of a film.

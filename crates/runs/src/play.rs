@@ -2,17 +2,28 @@
 
 use crate::error::RunError;
 use crate::setting::Setting;
-use marathon_envs::{AgentState, Spec, Step, VecEnv, VecEnvOptions};
-use marathon_learn::{BlockPolicy, Policy};
+use marathon_envs::{AgentState, Role, Spec, Step, VecEnv, VecEnvOptions};
+use marathon_learn::{BlockPolicy, Error, Policy};
 use marathon_physics::lanes::Isa;
 
 /// Agents of a policy's task, and what became of their last decision. A decision has two halves: [`Play::decide`] chooses
 /// actions, [`Play::step`] carries them out.
 pub struct Play<'a> {
     env: VecEnv,
-    pilot: BlockPolicy<&'a Policy>,
+    /// One for each role.
+    pilots: Vec<Pilot<'a>>,
     actions: Vec<f32>,
     step: Step,
+}
+
+/// A role with its policy.
+struct Pilot<'a> {
+    role: Role,
+    policy: BlockPolicy<&'a Policy>,
+    /// What it sees and does, `[agents][..]`, and for which agents it decides.
+    obs: Vec<f32>,
+    actions: Vec<f32>,
+    decides: Vec<bool>,
 }
 
 impl<'a> Play<'a> {
@@ -21,29 +32,66 @@ impl<'a> Play<'a> {
     /// # Errors
     /// If the policy's task does not exist, or the options make no sense.
     pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
-        Self::of(&Setting::of(policy.meta()), policy, options)
+        Self::of(&Setting::of(policy.meta()), &[policy], options)
+    }
+
+    /// The same with a policy for each role of the task, in their order.
+    ///
+    /// # Errors
+    /// The same, and if there is not one policy for each role.
+    pub fn with_roles(policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
+        let Some(first) = policies.first() else {
+            return Err(RunError::option("policies", "is none, expected one or more"));
+        };
+        Self::of(&Setting::of(first.meta()), policies, options)
     }
 
     /// The same in a task with other arguments.
     ///
     /// # Errors
     /// The same.
-    pub fn of(setting: &Setting, policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
+    pub fn of(setting: &Setting, policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
         let mut env = setting.vec_env(options)?;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
-        Ok(Play {
-            env,
-            pilot: BlockPolicy::new(policy, Isa::best()),
-            actions: vec![0.0; options.agents * policy.meta().act],
-            step,
-        })
+        let (roles, n) = (env.spec().deciders(), options.agents);
+        if roles.len() != policies.len() {
+            let (found, expected) =
+                (format!("{} policies", policies.len()), format!("{}, one for each role", roles.len()));
+            return Err(Error::Mismatch { what: env.spec().id.clone(), found, expected }.into());
+        }
+        let pilot = |(role, policy): (Role, &&'a Policy)| Pilot {
+            policy: BlockPolicy::new(*policy, Isa::best()),
+            obs: vec![0.0; n * role.obs.len()],
+            actions: vec![0.0; n * role.act.len()],
+            decides: vec![true; n],
+            role,
+        };
+        let pilots = roles.into_iter().zip(policies).map(pilot).collect();
+        Ok(Play { pilots, actions: vec![0.0; n * env.spec().act], step, env })
     }
 
-    /// Chooses the best actions, `[agents][act]`, for what the agents observe now.
+    /// Chooses the best actions, `[agents][act]`, for what the agents observe now. A role that does not decide goes on with its
+    /// last action.
     pub fn decide(&mut self) -> &[f32] {
-        self.pilot.act_rows(&self.step.obs, None, &mut self.actions);
-        &self.actions
+        let Self { env, pilots, actions, step } = self;
+        if let [pilot] = &mut pilots[..] {
+            pilot.policy.act_rows(&step.obs, None, actions);
+            return actions;
+        }
+        let spec = env.spec();
+        for (number, Pilot { role, policy, obs, actions: chosen, decides }) in pilots.iter_mut().enumerate() {
+            env.decides(number, decides).expect("a role of the task");
+            for (own, whole) in obs.chunks_exact_mut(role.obs.len()).zip(step.obs.chunks_exact(spec.obs)) {
+                own.copy_from_slice(&whole[role.obs.clone()]);
+            }
+            policy.act_rows(obs, None, chosen);
+            let rows = actions.chunks_exact_mut(spec.act).zip(chosen.chunks_exact(role.act.len()));
+            for ((whole, chosen), _) in rows.zip(decides).filter(|(_, decides)| **decides) {
+                whole[role.act.clone()].copy_from_slice(chosen);
+            }
+        }
+        actions
     }
 
     /// Carries the chosen actions out.

@@ -3,6 +3,7 @@
 use crate::error::RunError;
 use crate::folder::policy_path;
 use crate::setting::{Setting, TaskOptions};
+use crate::text;
 use marathon_envs::{ShardFactory, Spec};
 use marathon_learn::{Policy, PolicyMeta, write_atomic};
 use std::path::Path;
@@ -19,6 +20,46 @@ pub fn load(
     agent: Option<&str>,
     options: &TaskOptions,
 ) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
+    let setting = setting(given, agent, options)?;
+    let factory = setting.factory()?;
+    let mut policy = read(given, Some(factory.spec()))?;
+    policy.set_task(factory.spec().options.clone(), setting.clips);
+    Ok((policy, factory))
+}
+
+/// The same with the policies of all roles of the task, in their order. Those of the others lie beside the first one, as training
+/// leaves them: `policy.safetensors`, `policy-builder.safetensors`.
+///
+/// # Errors
+/// The same, and if one of them is missing or is for another role.
+pub fn load_all(
+    given: &Path,
+    agent: Option<&str>,
+    options: &TaskOptions,
+) -> Result<(Vec<Policy>, Arc<dyn ShardFactory>), RunError> {
+    let setting = setting(given, agent, options)?;
+    let factory = setting.factory()?;
+    let (path, spec) = (policy_path(given)?, factory.spec());
+    let mut policies = Vec::new();
+    for role in spec.deciders() {
+        let mut own = path.clone();
+        if !policies.is_empty() {
+            let name = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+            own.set_file_name(format!("{}-{}.{}", name(path.file_stem()), role.name, name(path.extension())));
+        }
+        if !own.exists() {
+            let expected = format!("that of the role '{}' beside {}", role.name, text::path_word(&path));
+            return Err(RunError::file(&own, "policy", "no such file", expected));
+        }
+        let mut policy = read(&own, Some(&spec.of_role(&role)))?;
+        policy.set_task(spec.options.clone(), setting.clips.clone());
+        policies.push(policy);
+    }
+    Ok((policies, factory))
+}
+
+/// The task that a policy is to play in.
+fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<Setting, RunError> {
     let noted = task_of(given)?;
     let setting = match (agent.map(Setting::named).transpose()?, noted) {
         (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
@@ -27,11 +68,7 @@ pub fn load(
         // the message says what is missing
         (None, None) => Setting::named(&read(given, None)?.meta().agent)?,
     };
-    let setting = setting.with(options)?;
-    let factory = setting.factory()?;
-    let mut policy = read(given, Some(factory.spec()))?;
-    policy.set_task(factory.spec().options.clone(), setting.clips);
-    Ok((policy, factory))
+    setting.with(options)
 }
 
 /// The task that a file notes for its policy; none, if another program has written it.

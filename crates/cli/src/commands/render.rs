@@ -15,9 +15,9 @@ const MAX_AGENTS: usize = 64;
 /// If there is no such policy, an option makes no sense, or the picture cannot be written.
 pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = shot(args)?;
-    let (policy, factory) = args.source.load()?;
+    let (policies, factory) = args.source.load_all()?;
     let cast = Cast { agents: args.agents, seed: args.seed, start: args.film.start, ghost: args.ghost };
-    let report = shoot(&policy, factory.spec(), &shot, &cast, &args.out)?;
+    let report = shoot(&policies, factory.spec(), &shot, &cast, &args.out)?;
     if json {
         print_json(&report);
     } else {

@@ -25,7 +25,7 @@ pub fn render(args: &RenderArgs, policy: &Path, json: bool) -> Result<(), CliErr
     let (policy, factory) = PolicySource { policy: policy.into(), agent: None, task }.load()?;
     let ghost = Some(args.ghost.unwrap_or(Ghost::Inside));
     let cast = Cast { agents: 1, seed: EvalOptions::default().seed, start: 0.0, ghost };
-    let report = shoot(&policy, factory.spec(), &shot, &cast, &args.out)?;
+    let report = shoot(&[policy], factory.spec(), &shot, &cast, &args.out)?;
     if json {
         print_json(&report);
     } else {

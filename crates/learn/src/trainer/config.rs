@@ -94,8 +94,8 @@ pub struct RunConfig {
     pub rollouts: usize,
     /// Agent-steps of the whole run; training ends with the first rollout that reaches them.
     pub total_steps: u64,
-    /// Latest part of the run so far, in steps, whose policies are averaged for the one that the run hands out; 0: the last
-    /// policy alone.
+    /// Latest part of the run so far whose policies are averaged for the one that the run hands out, as a share of its steps,
+    /// from 0 to below 1; 0: the last policy alone.
     #[serde(skip_serializing_if = "is_zero")]
     pub policy_average: f64,
     /// Seed of everything random.

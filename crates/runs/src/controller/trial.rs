@@ -81,7 +81,7 @@ impl<'a> Trial<'a> {
             max_episode_steps: Some(usize::MAX),
             ..VecEnvOptions::default()
         };
-        let play = Play::of(setting, policy, &vec_options)?;
+        let play = Play::of(setting, &[policy], &vec_options)?;
         let number = |of: &str| play.spec().info.iter().position(|name| name == of);
         let (error, rising) = (number(ERROR), number(RISING));
         let model = registry::agent(&setting.agent)?.model()?;
