@@ -147,8 +147,8 @@ impl Face {
     }
 
     /// Appends an encoded [`AgentInfoList`](crate::wire::AgentInfoList): infos of the agents for which the role decides, and of
-    /// those whose episode, or the role's part of it, ended one more. With `fresh_ids`, the number for the next new episode, agents change their numbers
-    /// between episodes.
+    /// those whose episode, or the role's part of it, ended one more. With `fresh_ids`, the number for the next new episode,
+    /// agents change their numbers between episodes.
     pub fn report(
         &mut self,
         spec: &Spec,

@@ -258,7 +258,7 @@ impl RunFolder {
     }
     /// The policy of a role but the first.
     pub fn policy_of(&self, role: &str) -> PathBuf {
-        self.path.join(format!("policy-{role}.safetensors"))
+        policy_of_role(&self.policy(), role)
     }
     /// The folder of the checkpoint.
     pub fn checkpoint(&self) -> PathBuf {
@@ -451,6 +451,12 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
     let near = did_you_mean(text::nearest_path(given, &[Path::new(RUNS)], fits));
     let expected = format!("a policy file or the folder of a run{near}");
     Err(RunError::file(given, "policy", found, expected))
+}
+
+/// Where the policy of a role but the first lies, beside that of the first.
+pub fn policy_of_role(first: &Path, role: &str) -> PathBuf {
+    let part = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    first.with_file_name(format!("{}-{role}.{}", part(first.file_stem()), part(first.extension())))
 }
 
 /// Writes a JSON document.

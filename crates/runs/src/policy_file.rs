@@ -1,7 +1,7 @@
 //! Policies on disk: Marathon's own files, and ONNX.
 
 use crate::error::RunError;
-use crate::folder::policy_path;
+use crate::folder::{policy_of_role, policy_path};
 use crate::setting::{Setting, TaskOptions};
 use crate::text;
 use marathon_envs::{ShardFactory, Spec};
@@ -42,11 +42,7 @@ pub fn load_all(
     let (path, spec) = (policy_path(given)?, factory.spec());
     let mut policies = Vec::new();
     for role in spec.deciders() {
-        let mut own = path.clone();
-        if !policies.is_empty() {
-            let name = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
-            own.set_file_name(format!("{}-{}.{}", name(path.file_stem()), role.name, name(path.extension())));
-        }
+        let own = if policies.is_empty() { path.clone() } else { policy_of_role(&path, &role.name) };
         if !own.exists() {
             let expected = format!("that of the role '{}' beside {}", role.name, text::path_word(&path));
             return Err(RunError::file(&own, "policy", "no such file", expected));

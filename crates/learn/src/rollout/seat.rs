@@ -192,15 +192,15 @@ impl Seat {
             rollout.cut.push((item, [cut, whole]));
             rollout.cut_obs.extend_from_slice(obs);
         }
-        for i in (0..BLOCK).filter(|i| (done & !left) >> i & 1 == 1) {
-            sums.episodes += 1.0;
-            sums.returns += returns[i] as f64;
-            sums.lengths += lengths[i] as f64;
-            sums.speeds += distances[i] as f64 / lengths[i] as f64;
-            sums.falls += ((out.terminated | fallen) >> i & 1) as f64;
-            sums.diverged += (out.diverged >> i & 1) as f64;
-        }
         for i in (0..BLOCK).filter(|i| done >> i & 1 == 1) {
+            if left >> i & 1 == 0 {
+                sums.episodes += 1.0;
+                sums.returns += returns[i] as f64;
+                sums.lengths += lengths[i] as f64;
+                sums.speeds += distances[i] as f64 / lengths[i] as f64;
+                sums.falls += ((out.terminated | fallen) >> i & 1) as f64;
+                sums.diverged += (out.diverged >> i & 1) as f64;
+            }
             (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
         }
         // all decide at the start of an episode

@@ -4,11 +4,18 @@
 //! keeps the rest. So the weight of the policy after `s` steps falls as `(s / t)^(1/f - 1)` (polynomial-decay averaging,
 //! Shamir and Zhang, 2013): at every moment the mean is that of about the latest part `f` of the run.
 
-use crate::policy::Policy;
+use super::{Replica, Shared};
 
-/// Takes the policy of the last `taken` of `steps` steps into the mean of the latest part of the run.
-pub fn absorb(mean: &mut Option<Vec<f64>>, policy: &Policy, part: f64, taken: u64, steps: u64) {
-    let mean = mean.get_or_insert_with(|| policy.numbers().collect());
-    let weight = (taken as f64 / (part * steps as f64)).min(1.0);
-    mean.iter_mut().zip(policy.numbers()).for_each(|(mean, x)| *mean += weight * (x - *mean));
+/// Takes the policy of each role into its mean, if the run averages them, after `taken` more steps.
+pub fn absorb(shared: &Shared, replica: &mut Replica, taken: f64) {
+    let part = shared.config.run.policy_average;
+    if part == 0.0 {
+        return;
+    }
+    let weight = (taken / (part * replica.progress.steps as f64)).min(1.0);
+    for (parts, role) in shared.roles.iter().zip(&mut replica.roles) {
+        let policy = parts.last_policy(role);
+        let mean = role.average.get_or_insert_with(|| policy.numbers().collect());
+        mean.iter_mut().zip(policy.numbers()).for_each(|(mean, x)| *mean += weight * (x - *mean));
+    }
 }

@@ -291,7 +291,7 @@ impl Checkpoint {
             role.learner.load(&saved)?;
             // a run that no longer averages hands out its last policy
             if averages && saved.get::<f64>(AVERAGE).is_ok() {
-                let policy = part.last_policy(role, &replica.progress, new);
+                let policy = part.last_policy(role);
                 let mut average = vec![0.0; policy.numbers().count()];
                 saved.copy(AVERAGE, &mut average)?;
                 role.average = Some(average);

@@ -363,17 +363,6 @@ impl Trainer {
         Checkpoint::of(self)
     }
 
-    /// Takes every role's policy after so many more steps into the mean that the run hands out.
-    fn average(&mut self, taken: u64) {
-        let (Shared { config, roles: parts, .. }, Replica { roles, progress }) = (&*self.shared, &mut self.replica);
-        if config.run.policy_average > 0.0 {
-            for (part, role) in parts.iter().zip(roles) {
-                let policy = part.last_policy(role, progress, config);
-                average::absorb(&mut role.average, &policy, config.run.policy_average, taken, progress.steps);
-            }
-        }
-    }
-
     /// The numbers of an iteration.
     fn report(&mut self, sums: &[Sums], wall: f64) -> Result<IterationStats, Error> {
         let (shared, Replica { roles, progress }) = (&self.shared, &self.replica);
@@ -395,9 +384,9 @@ impl Trainer {
                 return Err(Error::Diverged { count, parameters, steps: progress.steps, rates });
             }
         }
-        self.average(sums[0].totals.samples as u64);
+        average::absorb(shared, &mut self.replica, sums[0].totals.samples);
 
-        let (shared, Replica { roles, progress }) = (&self.shared, &self.replica);
+        let Replica { roles, progress } = &self.replica;
         let learned = |i: usize| {
             let Sums { totals, updates } = &sums[i];
             shared.roles[i].learned(&*roles[i].learner, totals, updates)

@@ -70,17 +70,9 @@ impl RoleParts {
         self.config.setup(&self.spec, isa, self.demonstrations.as_ref())
     }
 
-    /// The policy that the run hands out for it.
+    /// The policy that a run of this configuration hands out for it.
     pub fn policy(&self, replica: &RoleReplica, progress: &Progress, config: &TrainConfig) -> Policy {
-        let last = self.last_policy(replica, progress, config);
-        replica.average.as_ref().map_or_else(|| last.clone(), |average| last.with_numbers(average))
-    }
-
-    /// Its last policy in a run that has this configuration.
-    pub fn last_policy(&self, replica: &RoleReplica, progress: &Progress, config: &TrainConfig) -> Policy {
-        let network = &self.config.network;
-        let mut meta = PolicyMeta::of(&self.spec, network.actor_hidden.clone(), network.activation);
-        meta.observation_clip = self.config.statistics.observation_clip as f32;
+        let mut meta = self.meta();
         let run = RunConfig { threads: 0, ..config.run.clone() };
         let config = TrainConfig { run, ..config.clone() };
         meta.training = Some(Training {
@@ -88,7 +80,23 @@ impl RoleParts {
             steps: progress.steps,
             iterations: progress.iteration,
         });
-        replica.learner.policy(meta, replica.statistics.normalizer())
+        let last = replica.learner.policy(meta, replica.statistics.normalizer());
+        match &replica.average {
+            Some(average) => last.with_numbers(average),
+            None => last,
+        }
+    }
+
+    /// Its last policy, which does not tell of the run.
+    pub fn last_policy(&self, replica: &RoleReplica) -> Policy {
+        replica.learner.policy(self.meta(), replica.statistics.normalizer())
+    }
+
+    fn meta(&self) -> PolicyMeta {
+        let network = &self.config.network;
+        let mut meta = PolicyMeta::of(&self.spec, network.actor_hidden.clone(), network.activation);
+        meta.observation_clip = self.config.statistics.observation_clip as f32;
+        meta
     }
 
     /// What reports say of its learning in an iteration.

@@ -113,13 +113,7 @@ impl<F: Runner> Terrain<F> {
     /// Rows of its height field.
     const ROWS: usize = if F::IN_SPACE { (2.0 * F::HALF_WIDTH / ROW) as usize + 1 } else { 2 };
 
-    /// A variable of the course, behind those of the figure.
-    #[inline(always)]
-    fn own<T: Real>(s: &Senses<T>, slot: usize) -> T {
-        s.memory(F::MEMORY + slot)
-    }
-
-    /// The variables of the course.
+    /// The variables of the course, behind those of the figure.
     #[inline(always)]
     fn course<'s, T: Real>(s: &Senses<'s, T>) -> &'s [T] {
         &s.memory[F::MEMORY..]
@@ -163,7 +157,7 @@ impl<F: Runner> Terrain<F> {
     #[inline(always)]
     fn hard<T: Real>(&self, s: &Senses<T>) -> [T; 2] {
         let of = |ignored| [s.effort(ignored), s.joints_at_limit_penalty(ignored)];
-        let own = of(Motors::except(0, F::MOTORS));
+        let own = of(Motors::from(F::MOTORS));
         if !self.regrets() {
             return own;
         }
@@ -361,9 +355,8 @@ impl<F: Runner> Agent for Terrain<F> {
         memory[LIES] = lies;
         memory[HURT] = memory[HURT].max(lies);
         if self.regrets() {
-            regret::go_on(memory);
-            let over = regret::is_over(memory, Self::stopped(s, memory), s.dt());
-            let begins = regret::remember(memory, T::or(self.failed(memory), over));
+            let ended = [self.failed(memory), Self::stopped(s, memory)];
+            let begins = regret::remember(memory, ended, s.dt());
             self.begin_again(s, own, begins);
         }
     }
@@ -385,23 +378,24 @@ impl<F: Runner> Agent for Terrain<F> {
     }
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
+        let memory = Self::course(s);
         match self.arguments.reward {
             Reward::Full => {
-                F::add_terms(s, T::lit(1.0) - Self::own(s, HURT), self.hard(s), terms);
-                terms.add("pain", PAIN, Self::own(s, HIT));
+                F::add_terms(s, T::lit(1.0) - memory[HURT], self.hard(s), terms);
+                terms.add("pain", PAIN, memory[HIT]);
                 if self.built() {
-                    terms.add("fall", F::FALL, T::masked(self.failed(Self::course(s)), T::lit(1.0)));
+                    terms.add("fall", F::FALL, T::masked(self.failed(memory), T::lit(1.0)));
                 }
             }
             Reward::Velocity => terms.add("velocity", 1.0, s.normalized_velocity(F::TORSO, FASTEST)),
             Reward::Sparse => {
                 let over = T::or(self.terminated(s), T::or(self.truncated(s), s.time_is_up()));
                 let over = T::or(over, self.handed_over(s));
-                terms.add("distance", 1.0, T::masked(over, Self::own(s, FARTHEST) * T::lit(1.0 / WAY)));
+                terms.add("distance", 1.0, T::masked(over, memory[FARTHEST] * T::lit(1.0 / WAY)));
             }
         }
         if self.regrets() {
-            let theirs = terms.keep(T::not(regret::runs(Self::course(s))));
+            let theirs = terms.keep(T::not(regret::runs(memory)));
             let earned = terms.sum();
             terms.add(regret::REGRET, 1.0, theirs - earned);
             terms.add(regret::REFERENCE, 1.0, theirs);
@@ -451,8 +445,9 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
-        let failed = self.failed(Self::course(s));
-        if self.regrets() { T::and(failed, regret::runs(Self::course(s))) } else { failed }
+        let memory = Self::course(s);
+        let failed = self.failed(memory);
+        if self.regrets() { T::and(failed, regret::runs(memory)) } else { failed }
     }
 
     #[inline(always)]
@@ -467,7 +462,8 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        out.scalar(if self.regrets() { regret::way(Self::course(s)) } else { Self::own(s, FARTHEST) });
-        out.scalar(Self::own(s, DIFFICULTY));
+        let memory = Self::course(s);
+        out.scalar(if self.regrets() { regret::way(memory) } else { memory[FARTHEST] });
+        out.scalar(memory[DIFFICULTY]);
     }
 }

@@ -58,16 +58,13 @@ pub(super) fn is_over<T: Real>(memory: &[T], stopped: T::Mask, dt: f64) -> T::Ma
     T::or(stopped, T::or(late, T::and(runs(memory), beyond)))
 }
 
-/// Counts a decision of the present run.
+/// Takes note of a decision of the present run, with which the figure has failed or the run has stopped in some lanes. Returns those in
+/// which it was the reference's first.
 #[inline(always)]
-pub(super) fn go_on<T: Real>(memory: &mut [T]) {
-    memory[RUN] += T::lit(1.0);
-}
-
-/// Takes note of a decision with which the present run is `over` in some lanes. Returns those in which it was the reference's first.
-#[inline(always)]
-pub(super) fn remember<T: Real>(memory: &mut [T], over: T::Mask) -> T::Mask {
+pub(super) fn remember<T: Real>(memory: &mut [T], [failed, stopped]: [T::Mask; 2], dt: f64) -> T::Mask {
     let (second, one) = (runs(memory), T::lit(1.0));
+    memory[RUN] += one;
+    let over = T::or(failed, is_over(memory, stopped, dt));
     memory[DUE_TO_BEGIN] = T::masked(T::and(over, T::not(second)), one);
     // the adversary is asked what it makes of the second run
     let begins = T::and(second, memory[RUN].lt(T::lit(1.5)));
