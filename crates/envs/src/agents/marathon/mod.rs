@@ -12,6 +12,7 @@ mod idle;
 mod imitation;
 pub mod in_style;
 pub mod marathon_man;
+mod relive;
 pub mod terrain;
 pub mod walker2d;
 

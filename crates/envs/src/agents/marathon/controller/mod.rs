@@ -27,11 +27,13 @@ use marathon_physics::lanes::Real;
 
 use super::hopper::HopperV0;
 use super::idle;
+use super::relive::Relive;
 use super::walker2d::Walker2dV1;
 use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, Senses, Terms, names,
+    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses, Start,
+    Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
@@ -60,8 +62,6 @@ const SHARPNESS: f64 = 4.0;
 /// is told to run.
 const PRICE: f64 = 0.5;
 const WORTHLESS: f64 = FASTEST;
-/// Worth of a fall.
-const FALL: f64 = -40.0;
 /// Worth of each decision until a figure that stands has jumped as told.
 const LATE: f64 = -2.0;
 /// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
@@ -111,6 +111,10 @@ crate::options! {
         schedule: Schedule = Schedule::Repeats,
         /// Who commands where no caller does: the `schedule`, or an `adversary` that learns, too.
         commander: Commander = Commander::Schedule,
+        /// What a fall costs, in place of all other terms of that decision.
+        price: Scale = Scale(40.0),
+        /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one.
+        relive: Scale = Scale(0.0),
     }
 }
 
@@ -126,6 +130,13 @@ impl<F: Figure> Controller<F> {
     #[inline(always)]
     fn is_opposed(&self) -> bool {
         self.arguments.commander == Commander::Adversary
+    }
+
+    /// The states before its falls.
+    #[inline(always)]
+    fn relive(&self) -> Relive {
+        let slot = if self.is_opposed() { commander::MEMORY } else { MEMORY };
+        Relive { slot, share: self.arguments.relive.0, joints: [3 + F::MOTORS; 2], places: 1, also: None }
     }
 
     /// Number `i` of the command: to an observation, the one to obey from now on; otherwise the one that the decision was made
@@ -177,8 +188,8 @@ impl<F: Figure> Agent for Controller<F> {
             metrics: names(["forward", "velocity_error"]),
             parts: names(F::PARTS),
             command,
-            memory: MEMORY,
-            termination_reward: Some(FALL),
+            memory: MEMORY + self.relive().slots(),
+            termination_reward: Some(-self.arguments.price.0),
             ..own
         };
         if self.is_opposed() {
@@ -191,7 +202,7 @@ impl<F: Figure> Agent for Controller<F> {
             let idle = idle::actuators("rootx", commander::actions(input));
             facts.model = idle::extended(model, &idle).into();
             (facts.observation, facts.termination_reward) = (None, None);
-            (facts.command, facts.memory) = (Vec::new(), commander::MEMORY);
+            (facts.command, facts.memory) = (Vec::new(), commander::MEMORY + self.relive().slots());
         }
         facts
     }
@@ -202,6 +213,13 @@ impl<F: Figure> Agent for Controller<F> {
 
     fn with_options(&self, options: &Options) -> Option<Self> {
         Some(Controller { figure: self.figure.clone(), arguments: self.arguments.with(options) })
+    }
+
+    fn reset(&self, start: &mut Start) {
+        let relive = self.relive();
+        relive.carry(start);
+        relive.start(start);
+        start.add_noise(ResetNoise::MARATHON);
     }
 
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
@@ -236,6 +254,10 @@ impl<F: Figure> Agent for Controller<F> {
         let waits = memory[WAITS].max(one - memory[TOLD]);
         memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
         memory[TOLD] = jump;
+        if self.relive().happens() {
+            let felled = self.figure.terminated(s);
+            self.relive().remember(s, memory, T::not(felled), felled);
+        }
     }
 
     #[inline(always)]
@@ -276,7 +298,7 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));
         if self.is_opposed() {
             let fallen = self.figure.terminated(s);
-            terms.add("fall", FALL, T::masked(fallen, one));
+            terms.add("fall", -self.arguments.price.0, T::masked(fallen, one));
             commander::add_terms((told - velocity).abs(), fallen, terms);
         }
     }

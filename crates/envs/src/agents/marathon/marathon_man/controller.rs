@@ -271,9 +271,11 @@ impl Agent for Controller {
             memory[TARGET + i] = T::select(led, memory[TARGET + i], [x, y][i]);
         }
         memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
-        let felled = T::and(SKILL.rises(memory), T::not(rose));
-        let goes = T::not(T::or(on, SKILL.leaps(memory)));
-        self.steer.relive.remember(s, memory, goes, felled);
+        if self.steer.relive.happens() {
+            let felled = T::and(SKILL.rises(memory), T::not(rose));
+            let goes = T::not(T::or(on, SKILL.leaps(memory)));
+            self.steer.relive.remember(s, memory, goes, felled);
+        }
     }
 
     #[inline(always)]

@@ -21,7 +21,6 @@ pub mod clips;
 mod controller;
 mod courses;
 pub mod gait;
-mod relive;
 pub mod reward;
 mod skills;
 mod sparse;

@@ -33,12 +33,12 @@ use marathon_physics::lanes::Real;
 use super::super::controller::stillness;
 use super::super::heading;
 use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
+use super::super::relive::Relive;
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
 };
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
-use super::relive::Relive;
 use super::{DECISION, FRAME_SKIP, SECONDS, decisions, observe_soles};
 use crate::agent::options::Choice;
 use crate::agent::senses::{clamp, hypot};
@@ -209,7 +209,13 @@ impl Default for Steer {
 impl Steer {
     /// `relived`: the first variable of the falls that are lived again.
     pub(super) fn of(arguments: SteerArguments, relived: usize) -> Self {
-        let relive = Relive { slot: relived, share: arguments.relive.0 };
+        let relive = Relive {
+            slot: relived,
+            share: arguments.relive.0,
+            joints: [FIRST_QPOS, FIRST_QPOS - 1].map(|first| first + JOINTS.len()),
+            places: 2,
+            also: Some(PHASE),
+        };
         Steer { arguments, relive }
     }
 
@@ -491,8 +497,10 @@ impl Agent for Steer {
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), HASTE);
-        let felled = on_the_ground(s);
-        self.relive.remember(s, memory, T::not(felled), felled);
+        if self.relive.happens() {
+            let felled = on_the_ground(s);
+            self.relive.remember(s, memory, T::not(felled), felled);
+        }
     }
 
     #[inline(always)]
