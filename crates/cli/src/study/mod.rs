@@ -79,8 +79,8 @@ pub enum What {
         /// TerrainHopper, TerrainWalker2d, or both with a comma between them [default: both].
         #[arg(long, value_name = "TASKS", value_delimiter = ',')]
         tasks: Vec<String>,
-        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded, rising
-        /// [default: all].
+        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded, rising,
+        /// regret [default: all].
         #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
         grounds: Vec<String>,
         /// Whether runners see the ground: heights, blind, or both with a comma between them [default: both].

@@ -24,14 +24,9 @@ pub(super) struct Relive {
 }
 
 impl Relive {
-    /// Whether there are such episodes.
-    pub fn happens(self) -> bool {
-        self.share > 0.0
-    }
-
-    /// How many variables there are; none without such episodes.
-    pub fn slots(self) -> usize {
-        if self.happens() { 3 + 3 * self.state() } else { 0 }
+    /// Number of all variables of an agent that has these behind its others; those alone without such episodes.
+    pub fn memory(self) -> usize {
+        self.slot + if self.share > 0.0 { 3 + 3 * self.state() } else { 0 }
     }
 
     /// Numbers of a state: angles and velocities of all joints, and the other variable.
@@ -52,7 +47,7 @@ impl Relive {
 
     /// The next episode may start in the state from before the last fall.
     pub fn carry(self, start: &mut Start) {
-        if self.happens() {
+        if self.share > 0.0 {
             let ([.., has], [lived, ..]) = (self.counts(), self.states());
             start.memory[has] = start.previous[has];
             start.memory[lived..lived + self.state()].copy_from_slice(&start.previous[lived..lived + self.state()]);
@@ -62,7 +57,7 @@ impl Relive {
     /// Starts there, some of the time.
     pub fn start(self, start: &mut Start) {
         let [.., has] = self.counts();
-        if !self.happens() || start.memory[has] == 0.0 || start.random.uniform(0.0, 1.0) >= self.share {
+        if self.share == 0.0 || start.memory[has] == 0.0 || start.random.uniform(0.0, 1.0) >= self.share {
             return;
         }
         let [lived, ..] = self.states();
@@ -77,9 +72,14 @@ impl Relive {
         }
     }
 
-    /// Where there are such episodes, a decision has been made, after which the agent `goes`, or which has `felled` it: then it does not go.
+    /// A decision has been made. `fate`, given the agent's variables, tells where it goes on, and where the decision has felled it: there
+    /// it does not go on. Nobody asks without such episodes.
     #[inline(always)]
-    pub fn remember<T: Real>(self, s: &Senses<T>, memory: &mut [T], goes: T::Mask, felled: T::Mask) {
+    pub fn remember<T: Real>(self, s: &Senses<T>, memory: &mut [T], fate: impl FnOnce(&[T]) -> [T::Mask; 2]) {
+        if self.share == 0.0 {
+            return;
+        }
+        let [goes, felled] = fate(memory);
         let ([since, kept, has], [lived, newest, older]) = (self.counts(), self.states());
         let one = T::lit(1.0);
         let felled = T::and(felled, T::lit(1.5).lt(memory[kept]));

@@ -32,8 +32,7 @@ use super::walker2d::Walker2dV1;
 use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, ResetNoise, Scale, Senses, Start,
-    Terms, names,
+    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, Scale, Senses, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
@@ -188,7 +187,7 @@ impl<F: Figure> Agent for Controller<F> {
             metrics: names(["forward", "velocity_error"]),
             parts: names(F::PARTS),
             command,
-            memory: MEMORY + self.relive().slots(),
+            memory: self.relive().memory(),
             termination_reward: Some(-self.arguments.price.0),
             ..own
         };
@@ -202,7 +201,7 @@ impl<F: Figure> Agent for Controller<F> {
             let idle = idle::actuators("rootx", commander::actions(input));
             facts.model = idle::extended(model, &idle).into();
             (facts.observation, facts.termination_reward) = (None, None);
-            (facts.command, facts.memory) = (Vec::new(), commander::MEMORY + self.relive().slots());
+            facts.command = Vec::new();
         }
         facts
     }
@@ -219,7 +218,7 @@ impl<F: Figure> Agent for Controller<F> {
         let relive = self.relive();
         relive.carry(start);
         relive.start(start);
-        start.add_noise(ResetNoise::MARATHON);
+        self.figure.reset(start);
     }
 
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
@@ -254,10 +253,10 @@ impl<F: Figure> Agent for Controller<F> {
         let waits = memory[WAITS].max(one - memory[TOLD]);
         memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
         memory[TOLD] = jump;
-        if self.relive().happens() {
+        self.relive().remember(s, memory, |_| {
             let felled = self.figure.terminated(s);
-            self.relive().remember(s, memory, T::not(felled), felled);
-        }
+            [T::not(felled), felled]
+        });
     }
 
     #[inline(always)]

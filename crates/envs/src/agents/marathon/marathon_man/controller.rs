@@ -161,7 +161,7 @@ impl Agent for Controller {
             ],
             clips: known_clips().into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: MEMORY + self.steer.relive.slots(),
+            memory: self.steer.relive.memory(),
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
@@ -271,11 +271,10 @@ impl Agent for Controller {
             memory[TARGET + i] = T::select(led, memory[TARGET + i], [x, y][i]);
         }
         memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
-        if self.steer.relive.happens() {
+        self.steer.relive.remember(s, memory, |memory| {
             let felled = T::and(SKILL.rises(memory), T::not(rose));
-            let goes = T::not(T::or(on, SKILL.leaps(memory)));
-            self.steer.relive.remember(s, memory, goes, felled);
-        }
+            [T::not(T::or(on, SKILL.leaps(memory))), felled]
+        });
     }
 
     #[inline(always)]

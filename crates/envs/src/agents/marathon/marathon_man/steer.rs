@@ -412,7 +412,7 @@ impl Agent for Steer {
             ],
             clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: self.relive.slot + self.relive.slots(),
+            memory: self.relive.memory(),
             termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
             ..Facts::default()
         }
@@ -497,10 +497,10 @@ impl Agent for Steer {
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), HASTE);
-        if self.relive.happens() {
+        self.relive.remember(s, memory, |_| {
             let felled = on_the_ground(s);
-            self.relive.remember(s, memory, T::not(felled), felled);
-        }
+            [T::not(felled), felled]
+        });
     }
 
     #[inline(always)]
