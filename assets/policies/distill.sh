@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the policies of this folder that are learned from others: MarathonMan (one for sixteen clips) and
-# MarathonManController. What they are learned from is trained before, but for the policies that are here; more than seven hours
+# MarathonManController. What they are learned from is trained before, but for the policies that are here; more than eight hours
 # of processor time in all.
 #
 #     assets/policies/distill.sh [MarathonMan] [MarathonManController]
@@ -107,10 +107,29 @@ for policy in "${wanted[@]}"; do
       # to fall less; the best of its policies is not the last
       "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
         --seed 5 --threads 1 --out "$runs/steady"
+      # noise that stays leaves him something to spare; what he loses by it, others of the mean have
+      noisy() { # deviation at the beginning as a logarithm, and floors of it
+        sed "s/init_log_std: .*/init_log_std: $1/; s/ min_std: .*/ min_std: $2/; s/final_min_std: .*/final_min_std: $3/" \
+          assets/configs/marathon_man_controller-steady.yaml > "$runs/noisy.yaml"
+        "$marathon" train MarathonManController --config "$runs/noisy.yaml" --threads 1 "${@:4}"
+      }
       # who plays starts from a stand, and is not asked for extremes half of the time
-      "$marathon" import "$runs"/steady/policies/policy-50*.safetensors --option start=first --option commands=even \
-        --option price=20 --out "$runs/shipped.safetensors"
-      cp "$runs/shipped.safetensors" "$shipped/MarathonManController.safetensors"
+      mean() {
+        "$marathon" average "${@:2}" --option start=first --option commands=even --option mortal=0 --option knocked=0 \
+          --option price=20 --option relive=0 --out "$1"
+      }
+      first=("$runs"/steady/policies/policy-50*.safetensors)
+      noisy -2.3 0.1 0.1 --initialize-from "${first[0]}" --seed 1 --out "$runs/n1"
+      noisy -2.3 0.1 0.1 --option commands=even --initialize-from "$runs/n1" --seed 2 --out "$runs/n2"
+      several=("${first[0]}" "$runs/n1/policy.safetensors" "$runs/n2/policy.safetensors")
+      mean "$runs/three.safetensors" "${several[@]}"
+      noisy -2.3 0.1 0.1 --option relive=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
+      several+=("$runs/n3/policy.safetensors")
+      mean "$runs/four.safetensors" "${several[@]}"
+      noisy -3.0 0.05 0.02 --steps 40M --initialize-from "$runs/four.safetensors" --seed 4 --out "$runs/n4"
+      last=("$runs"/n4/policies/policy-40*.safetensors)
+      mean "$shipped/MarathonManController.safetensors" "${several[@]}" "${first[0]}" "${last[0]}" "${last[0]}" \
+        "$runs"/n4/policies/policy-30*.safetensors
       ;;
     *)
       echo "no policy $policy is learned from others here: MarathonMan, MarathonManController" >&2

@@ -290,7 +290,7 @@ def test_a_commander_decides_every_hundred_decisions(launch):
     env.reset()
     walker, commander = env.behavior_specs
     assert (walker, commander) == ("WalkerController-v0?team=0", "WalkerController-v0.commander?team=0")
-    assert sizes(env, walker) == (47, 6) and env.behavior_specs[commander].action_spec.continuous_size == 2
+    assert sizes(env, walker) == (48, 6) and env.behavior_specs[commander].action_spec.continuous_size == 2
     age, at_hundreds = np.zeros(16, int), 0
     for _ in range(250):
         asked = env.get_steps(commander)[0]

@@ -9,9 +9,10 @@
 //! | what the figure's own task observes | |
 //! | `command` | commanded velocity, m/s; with `discrete` also the jump, 0 or 1 |
 //! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
-//! | `target_velocity` | what the velocity should be by now: it follows the command by 6 m/s^2, m/s |
+//! | `target_velocity` | what the velocity should be by now: it follows the command by 5 m/s^2, m/s |
+//! | `awaited` | with `discrete`: whether it has been told to jump and has yet to do it, 0 or 1 |
 //!
-//! r = exp(-4 e^2) + 2 - 0.5 e + forward bonus + jump - late - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
+//! r = exp(-4 e^2) + 4 - e + forward bonus + jump - late - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
 //! and effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not stand still. The
 //! Walker also pays for a low torso. Standing is worth something whatever is told, so that a fall is never a way out.
 
@@ -48,24 +49,31 @@ const TARGET: usize = VELOCITIES;
 const ALOFT: usize = TARGET + 1;
 const TOLD: usize = ALOFT + 1;
 const WAITS: usize = TOLD + 1;
-const MEMORY: usize = WAITS + 1;
+/// Fastest that the center of mass has risen since it was told to jump, m/s.
+const ROSE: usize = WAITS + 1;
+const MEMORY: usize = ROSE + 1;
 /// Time off the ground that makes a jump, s: whoever steps from foot to foot has none on the ground now and then.
 const JUMPED: f64 = 0.1;
 /// How fast the target velocity follows the command, m/s^2. Friction allows 9.8.
-const RAMP: f64 = 6.0;
+const RAMP: f64 = 5.0;
+/// What it observes besides its own task's numbers, the last with `discrete`.
+const OBSERVED: [&str; 4] = ["command", "mean_velocity", "target_velocity", "awaited"];
 /// Terms of the reward.
 const TERMS: [&str; 8] = ["velocity", "pace", "uprightness", "jump", "late", "still", "height", "effort"];
 /// Sharpness of the worth of the right velocity, s^2/m^2.
 const SHARPNESS: f64 = 4.0;
 /// Price of a difference of 1 m/s, and the difference at which a decision is worth nothing, m/s: that of a figure that stands while it
 /// is told to run.
-const PRICE: f64 = 0.5;
+const PRICE: f64 = 1.0;
 const WORTHLESS: f64 = FASTEST;
-/// Worth of each decision until a figure that stands has jumped as told.
-const LATE: f64 = -2.0;
-/// Worth of standing still as told, and the mean square of the parts' velocities at which it is worth 1/e of that, m^2/s^2.
+/// Worth of each decision until a figure that stands has jumped as told, and the part of it that one is spared that has risen by 1 m/s: a
+/// figure that has never jumped finds out by pushing off harder.
+const LATE: f64 = -6.0;
+const RISEN: f64 = 0.6;
+/// Worth of each half of standing still as told, and the mean squares of the parts' velocities at which each is down to 1/e, m^2/s^2: who
+/// fidgets is to come to rest, and who rests to keep quite still.
 const STILL: f64 = 1.5;
-const RESTLESS: f64 = 0.04;
+const RESTLESS: [f64; 2] = [0.4, 0.04];
 
 /// The Hopper told how fast to go.
 pub type HopperController = Controller<HopperV0>;
@@ -181,7 +189,8 @@ impl<F: Figure> Agent for Controller<F> {
         let mut facts = Facts {
             id: F::ID.into(),
             summary: F::SUMMARY.into(),
-            observation: own.observation.map(|n| n + command.len() + 2),
+            // the command, whether its jump is awaited, and two velocities
+            observation: own.observation.map(|n| n + 2 * command.len() + 1),
             reward_terms: names(TERMS),
             info: names(["velocity_error"]),
             metrics: names(["forward", "velocity_error"]),
@@ -193,7 +202,8 @@ impl<F: Figure> Agent for Controller<F> {
         };
         if self.is_opposed() {
             let own = [&TERMS[..], &["fall"]].concat();
-            let seen = [F::OBSERVED, &["command", "mean_velocity", "target_velocity"]].concat();
+            let seen = OBSERVED.len() - usize::from(input == Input::Continuous);
+            let seen = [F::OBSERVED, &OBSERVED[..seen]].concat();
             facts.roles = commander::roles(input, facts.actions.clone(), &seen, &own);
             facts.actions.extend(names(commander::actions(input)));
             facts.reward_terms = names(own.iter().chain(&commander::TERMS));
@@ -252,6 +262,8 @@ impl<F: Figure> Agent for Controller<F> {
         // a jump that is told anew is waited for anew
         let waits = memory[WAITS].max(one - memory[TOLD]);
         memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
+        let rose = memory[ROSE] * memory[TOLD];
+        memory[ROSE] = jump * rose.max(s.center_of_mass_velocity()[2]);
         memory[TOLD] = jump;
         self.relive().remember(s, memory, |_| {
             let felled = self.figure.terminated(s);
@@ -271,6 +283,10 @@ impl<F: Figure> Agent for Controller<F> {
         out.scalar(mean_velocity(s));
         out.group("target_velocity");
         out.scalar(s.memory(TARGET));
+        if self.arguments.input == Input::Discrete {
+            out.group("awaited");
+            out.scalar(s.memory(WAITS));
+        }
         if self.is_opposed() {
             commander::observe::<F, T>(s, out);
         }
@@ -287,11 +303,12 @@ impl<F: Figure> Agent for Controller<F> {
         let jump = self.jump(s);
         terms.add("jump", 1.0, jump * F::leap(s));
         let stands = (one - told.abs() * T::lit(10.0)).max(zero);
-        terms.add("late", LATE, s.memory(WAITS) * stands);
+        let rose = clamp(s.memory(ROSE), 0.0, 1.0);
+        terms.add("late", LATE, s.memory(WAITS) * stands * (one - rose * T::lit(RISEN)));
         // told to go nowhere and not to jump
         let rest = stands * (one - jump);
-        let [still] = stillness(s, F::PARTS.len(), [RESTLESS]);
-        terms.add("still", STILL, rest * still);
+        let [fidgets, stirs] = stillness(s, F::PARTS.len(), RESTLESS);
+        terms.add("still", STILL, rest * (fidgets + stirs));
         terms.add("height", -1.0, F::low(s));
         // what an adversary does is no effort of the figure's
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));

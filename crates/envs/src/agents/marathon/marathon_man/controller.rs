@@ -220,6 +220,10 @@ impl Agent for Controller {
             (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
         } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
             (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
+            // a player rather steps straight aside
+            if self.arguments.commands == Commands::Sharp && random.whole(0, 1) == 0 {
+                going[0] = 0.0;
+            }
         }
         out.copy_from_slice(&[going[0], left, going[1], jump, backflip]);
         hold
