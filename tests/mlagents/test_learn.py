@@ -156,7 +156,7 @@ MOON = {"environment_parameters": {"gravity": 1.6}}
     ("task", "behaviors", "changes", "again", "term", "alone"),
     [
         (COURSES, {WALKER: (69, 6), BUILDER: (19, 1)}, {}, 0, "inverse", "course=bumps"),
-        (COMMANDED, {OBEDIENT: (47, 6), COMMANDER: (9, 2)}, MOON, 2, "disobedience", "commander=schedule"),
+        (COMMANDED, {OBEDIENT: (48, 6), COMMANDER: (9, 2)}, MOON, 2, "disobedience", "commander=schedule"),
     ],
     ids=["builder", "commander"],
 )
