@@ -32,6 +32,11 @@ for agent in "${wanted[@]}"; do
   learn() { "$marathon" train "$agent" --threads 1 "$@"; }
   steadily=(--config "assets/configs/$steady-steady.yaml" --initialize-from)
   last="$runs/$agent"
+  # of the policies that the last run has kept, as what is shipped
+  mean() {
+    policy="$last-shipped.safetensors"
+    "$marathon" average "$last" "$@" --out "$policy"
+  }
   learn "${from[@]}" --seed 1 --out "$last-goes"
   case "$agent" in
     AntController)
@@ -44,14 +49,11 @@ for agent in "${wanted[@]}"; do
       learn "${steadily[@]}" "$last-goes" --option relive=0 --option seconds=20 --seed 1 --out "$last-stands"
       learn "${steadily[@]}" "$last-stands"/policies/policy-80*.safetensors --seed 2 --out "$last"
       # who plays starts from a stand, and is not asked for extremes half of the time
-      policy="$last-shipped.safetensors"
-      "$marathon" average "$last" --option start=first --option commands=even --option price=20 --option seconds=20 \
-        --out "$policy"
+      mean --option start=first --option commands=even --option price=20 --option seconds=20
       ;;
     *)
       learn "${steadily[@]}" "$last-goes" --seed 1 --out "$last"
-      policy="$last-shipped.safetensors"
-      "$marathon" average "$last" --option price=40 --option relive=0 --out "$policy"
+      mean --option price=40 --option relive=0
       ;;
   esac
   cp "$policy" "$shipped/$agent.safetensors"
