@@ -7,6 +7,7 @@ mod common;
 use common::{begun, options};
 use marathon_envs::{Step, VecEnv, factory, registry};
 use marathon_physics::lanes::Isa;
+use std::f64::consts::FRAC_PI_2;
 
 const ID: &str = "MarathonManController-v0";
 const AGENTS: usize = 16;
@@ -49,6 +50,24 @@ fn he_observes_what_the_steered_figure_does_first() {
     let names: Vec<&str> = own.command.iter().map(|range| range.name.as_str()).collect();
     assert_eq!(names, ["speed", "left", "turn", "jump", "backflip"]);
     assert_eq!(own.command.iter().filter(|range| range.is_button()).count(), 2);
+}
+
+/// However slowly he is told to go, his gait is one that lifts the feet; at rest it is none.
+#[test]
+fn who_creeps_lifts_his_feet() {
+    let cases = [([0.3, 0.0, 0.0], 0.8), ([0.0, -0.5, 0.0], 0.8), ([0.1, 0.0, 0.0], 0.4), ([0.0; 3], 0.0)];
+    for ([speed, left, turn], expected) in cases.into_iter().chain([([0.0, 0.0, FRAC_PI_2], 0.6 * FRAC_PI_2)]) {
+        let (mut env, mut step) = made(&[("start", "first")]);
+        tell(&mut env, [speed, left, turn, 0.0, 0.0]);
+        (0..12).for_each(|_| go(&mut env, &mut step));
+        let (pace, obs) = (part(&env, "gait").start, env.spec().obs);
+        let up: Vec<usize> = (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect();
+        assert!(up.len() > AGENTS / 2, "{up:?}");
+        for agent in up {
+            let pace = f64::from(step.obs[agent * obs + pace]);
+            assert!((pace - expected).abs() < 1e-3, "told {speed} {left} {turn}: {pace}, expected {expected}");
+        }
+    }
 }
 
 /// What a button begins has the length of its piece of the clip, and he is paid for being like it.

@@ -207,6 +207,9 @@ fn an_adversary_commands() {
             assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id} {input}");
             assert_eq!(commander.act, plain.act..plain.act + 1 + buttons);
             assert!(commander.intermittent && spec.command.is_empty());
+            // who plays sees what the adversary says
+            let infos = 2 + buttons;
+            assert_eq!(spec.info, ["velocity_error", "told_velocity", "told_jump"][..infos]);
             assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..8], &["fall".into()]].concat());
             assert_eq!(spec.reward_terms[commander.terms.clone()], ["disobedience", "felled"]);
 
@@ -246,7 +249,9 @@ fn an_adversary_commands() {
                             (f64::from(terms[0]) - velocity).abs() < 1e-3 && near(terms[1], pace),
                             "{id} {input}, agent {i}"
                         );
-                        assert!(near(terms[9], off / 4.0) && near(out.info[i], off));
+                        let info = &out.info[infos * i..infos * (i + 1)];
+                        assert!(near(terms[9], off / 4.0) && near(info[0], off));
+                        assert!(info[1..].iter().zip(told[i]).all(|(got, expected)| near(*got, expected)));
                         let down = out.terminated[i];
                         let expected = if down { [-40.0, 10.0] } else { [0.0; 2] };
                         assert_eq!([terms[8], terms[10]], expected, "{id} {input}, agent {i}");

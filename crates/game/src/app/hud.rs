@@ -17,7 +17,7 @@ use bevy_egui::egui::{
     self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Painter, Pos2, Rect, RichText,
     Sense, Stroke, Ui,
 };
-use marathon_envs::options::Value;
+use marathon_envs::{Spec, options::Value};
 use std::collections::VecDeque;
 
 /// Decisions that the reward's curve shows.
@@ -200,6 +200,7 @@ pub fn draw(
                             format!("{}: {} {}{by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
                         line(ui, text(13.0, if command.is_some() { ACCENT } else { FAINT }, told));
                     }
+                    told_by_another(ui, spec, episode);
                 }
                 imitation(ui, anatomy, episode);
                 let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
@@ -240,6 +241,15 @@ pub fn draw(
         keys(&ctx, &bindings, hud.help, &show, *steering);
     }
     Ok(())
+}
+
+/// What another role of the task has told the character, as far as the task tells it: `told_velocity` and the like.
+fn told_by_another(ui: &mut Ui, spec: &Spec, episode: &Episode) {
+    for (name, x) in spec.info.iter().zip(&episode.info) {
+        if let Some(name) = name.strip_prefix("told_") {
+            line(ui, text(13.0, BAD, format!("{}: {}   by its adversary", name.replace('_', " "), spaced(*x))));
+        }
+    }
 }
 
 /// How far the clip is and how near the character is to it, if it follows one.

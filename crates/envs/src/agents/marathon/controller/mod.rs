@@ -212,6 +212,7 @@ impl<F: Figure> Agent for Controller<F> {
             facts.model = idle::extended(model, &idle).into();
             (facts.observation, facts.termination_reward) = (None, None);
             facts.command = Vec::new();
+            facts.info.extend(names(commander::actions(input)));
         }
         facts
     }
@@ -332,6 +333,12 @@ impl<F: Figure> Agent for Controller<F> {
     #[inline(always)]
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         out.scalar((self.told(s, 0, false) - mean_velocity(s)).abs());
+        if self.is_opposed() {
+            out.scalar(self.told(s, 0, false));
+            if self.arguments.input == Input::Discrete {
+                out.scalar(self.jump(s));
+            }
+        }
     }
 }
 

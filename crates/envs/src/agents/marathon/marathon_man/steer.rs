@@ -102,7 +102,7 @@ pub(super) const PACE: usize = PHASE + 1;
 const MADE: usize = PACE + 1;
 pub(super) const BEGUN: usize = MADE + 1;
 /// What leads the steered figure.
-const HASTE: Haste = Haste { speeding: 4.0, slowing: 4.0, lead: 0.8, quick: false };
+const HASTE: Haste = Haste { speeding: 4.0, slowing: 4.0, lead: 0.8, quick: false, turning: 0.4, least: 0.0 };
 /// He slows down where he is told to be slower than his target by more than this, m/s: a turn bends the target, too.
 const SLOWER: f64 = 0.3;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
@@ -112,8 +112,8 @@ const LEANING: f64 = 3.0;
 /// Mean squares of the parts' velocities at which each half of what standing still is worth is down to 1/e, m^2/s^2: who shuffles is
 /// to come to rest, and who rests to keep quite still.
 const RESTLESS: [f64; 2] = [0.1, 0.01];
-/// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
-const TURNING_RADIUS: f64 = 0.4;
+/// The least pace is at most this many times the velocity that he is told, so that it fades where he is told hardly anything.
+const LEAST_OF_TOLD: f64 = 4.0;
 
 /// How fast what leads him changes.
 #[derive(Clone, Copy, Debug)]
@@ -126,6 +126,10 @@ pub(super) struct Haste {
     pub lead: f64,
     /// The gait goes round as fast as for the target velocity, if that is faster than the pace: he starts with short, quick steps.
     pub quick: bool,
+    /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
+    pub turning: f64,
+    /// Least pace where he is told to go or turn, m/s: the feet of a slower gait hardly leave the ground, and he stumbles over them.
+    pub least: f64,
 }
 
 impl Haste {
@@ -291,7 +295,9 @@ impl Steer {
         for i in 0..2 {
             memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
         }
-        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(turn.abs() * T::lit(TURNING_RADIUS));
+        let turning = turn.abs() * T::lit(haste.turning);
+        let least = (hypot(told, left).max(turning) * T::lit(LEAST_OF_TOLD)).min(T::lit(haste.least));
+        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(turning).max(least);
         let asked = speed + clamp(asked - speed, -haste.lead, haste.lead);
         memory[PACE] += (asked - memory[PACE]).max(-slowing).min(speeding);
     }
