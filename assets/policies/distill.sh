@@ -107,7 +107,7 @@ for policy in "${wanted[@]}"; do
       # to fall less; the best of its policies is not the last
       "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
         --seed 5 --threads 1 --out "$runs/steady"
-      # noise that stays leaves him something to spare; what he loses by it, others of the mean have
+      # noise that stays leaves him something to spare; what he loses by it, the other of the mean has
       noisy() { # deviation at the beginning as a logarithm, and floors of it
         sed "s/init_log_std: .*/init_log_std: $1/; s/ min_std: .*/ min_std: $2/; s/final_min_std: .*/final_min_std: $3/" \
           assets/configs/marathon_man_controller-steady.yaml > "$runs/noisy.yaml"
@@ -125,11 +125,7 @@ for policy in "${wanted[@]}"; do
       mean "$runs/three.safetensors" "${several[@]}"
       noisy -2.3 0.1 0.1 --option relive=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
       several+=("$runs/n3/policy.safetensors")
-      mean "$runs/four.safetensors" "${several[@]}"
-      noisy -3.0 0.05 0.02 --steps 40M --initialize-from "$runs/four.safetensors" --seed 4 --out "$runs/n4"
-      last=("$runs"/n4/policies/policy-40*.safetensors)
-      mean "$shipped/MarathonManController.safetensors" "${several[@]}" "${first[0]}" "${last[0]}" "${last[0]}" \
-        "$runs"/n4/policies/policy-30*.safetensors
+      mean "$shipped/MarathonManController.safetensors" "${several[@]}"
       ;;
     *)
       echo "no policy $policy is learned from others here: MarathonMan, MarathonManController" >&2

@@ -144,7 +144,6 @@ fn a_role_may_play_as_it_is() {
     let (session, _) = Session::open(Some(task), &options, None, false).unwrap();
     let outcome = session.carry_out(false, &mut |_| Control::Continue).unwrap();
     let (old, new) = (policy_file::read(&path, None).unwrap(), outcome.policy);
-    assert_eq!(new.params(), old.params());
     // and from that of such a run
     let again = RunOptions { initialize_from: Some(folder.path().join("run")), out: None, ..options };
     drop(outcome.folder);
@@ -152,8 +151,9 @@ fn a_role_may_play_as_it_is() {
     assert_eq!(session.run.initialize_from, again.initialize_from);
     let [(name, builder)] = &outcome.others[..] else { panic!("one other role") };
     assert!(name == "builder" && builder.meta().act == 1);
-    // its episodes are shorter than those of one that runs where nobody builds
+    // the statistics have moved, and the first layer with them
+    assert_ne!(new.params(), old.params());
     let obs: Vec<f32> = (0..old.meta().obs).map(|k| 0.1 * (k as f32).sin()).collect();
     let (a, b) = (old.act(&obs), new.act(&obs));
-    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.2), "{a:?} {b:?}");
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-3), "{a:?} {b:?}");
 }
