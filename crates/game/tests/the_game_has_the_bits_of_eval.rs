@@ -98,15 +98,46 @@ fn in_the_task_that_the_policy_notes() {
     assert_ne!(measure(&other, &policy).length_mean, eval.length_mean);
 }
 
+/// A role that does not decide goes on with its last action: a commander's word holds for a hundred decisions.
+#[test]
+fn a_role_that_does_not_decide_goes_on() {
+    let given = [("commander", "adversary"), ("input", "continuous")];
+    let given = given.map(|(name, value)| (name.to_string(), Value::Text(value.into())));
+    let plain = Setting::named("WalkerController").expect("the agent exists");
+    let setting = plain.with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
+    let (runner, others) = roles_hardly_trained(&setting);
+    let (name, commander) = others.into_iter().next().expect("two roles");
+    assert_eq!(name, "commander");
+    let mut app = app(Duration::from_millis(8));
+    let [runner, commander] =
+        [runner, commander].map(|policy| app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
+    let parts = (Ragdoll::agent("WalkerController"), Policy(runner), Opponent(commander));
+    let walker = app.world_mut().spawn(parts).id();
+    let mut told = Vec::new();
+    run_until(&mut app, 2_000, "the end of the episode", |world| {
+        let episode = world.get::<Episode>(walker).filter(|episode| episode.decisions > 1);
+        told.extend(episode.filter(|e| e.number == 1).map(|episode| episode.info[1]));
+        !world.resource::<Log>().ended.is_empty()
+    });
+    assert!(told.len() > 20 && told[0] != 0.0, "{told:?}");
+    let of_one = told.len().min(98);
+    assert!(told[..of_one].iter().all(|x| *x == told[0]), "{told:?}");
+}
+
 /// A policy of some steps of training.
 fn hardly_trained(setting: &Setting) -> Net {
+    roles_hardly_trained(setting).0
+}
+
+/// The first role's, and the others' with their names.
+fn roles_hardly_trained(setting: &Setting) -> (Net, Vec<(String, Net)>) {
     let factory = setting.factory().expect("the task exists");
     let config = TrainConfig::default().with(|config| {
         (config.run.agents, config.run.horizon, config.run.total_steps) = (16, 8, 256);
         config.network.actor_hidden = vec![8];
     });
     let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
-    let mut policy = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains").policy;
-    policy.set_task(factory.spec().options.clone(), setting.clips.clone());
-    policy
+    let mut trained = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains");
+    trained.policy.set_task(factory.spec().options.clone(), setting.clips.clone());
+    (trained.policy, trained.others)
 }

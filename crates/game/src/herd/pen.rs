@@ -29,6 +29,8 @@ pub(crate) struct Pen {
     roles: Vec<Role>,
     obs: Vec<f32>,
     action: Vec<f32>,
+    /// Their last actions, with which roles go on that do not decide now.
+    last: Vec<f32>,
     /// What a role sees, and what it chooses.
     seen: Vec<f32>,
     scratch: Vec<f32>,
@@ -65,6 +67,7 @@ impl Pen {
             dt: herd.dt,
             obs: vec![0.0; n_obs * BLOCK],
             action: vec![0.0; herd.model.nu * BLOCK],
+            last: vec![0.0; herd.model.nu * BLOCK],
             roles: herd.spec.as_ref().map(|spec| spec.deciders()).unwrap_or_default(),
             seen: Vec::new(),
             scratch: vec![0.0; herd.model.nu * BLOCK],
@@ -224,9 +227,10 @@ impl Pen {
 
     /// Fills in the actions.
     fn choose(&mut self) {
+        std::mem::swap(&mut self.action, &mut self.last);
         self.action.fill(0.0);
         let n = self.n_act;
-        let Pen { lanes, roles, pilots, obs, seen, action, scratch, .. } = self;
+        let Pen { engine, lanes, roles, pilots, obs, seen, action, last, scratch, .. } = self;
         let n_obs = obs.len() / BLOCK;
         let has = |lane: &Option<Resident>, role: usize, policy: &Arc<Policy>| {
             lane.as_ref().and_then(|r| r.policies[role].as_ref()).is_some_and(|own| Arc::ptr_eq(own, policy))
@@ -246,10 +250,18 @@ impl Pen {
             }
             // all of a pen at once: most often they share one policy
             let own = role.act.len();
+            let mut decides = [true; BLOCK];
+            if let Engine::Env(env) = engine.get() {
+                // one of its roles, and a place for each of its agents
+                let _ = env.decides(*number, &mut decides);
+            }
             pilot.act_rows(seen, None, &mut scratch[..own * BLOCK]);
             for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], *number, pilot.policy())) {
-                let row = &mut action[lane * n..(lane + 1) * n];
-                row[role.act.clone()].copy_from_slice(&scratch[lane * own..(lane + 1) * own]);
+                let of_role = lane * n + role.act.start..lane * n + role.act.end;
+                action[of_role.clone()].copy_from_slice(match decides[lane] {
+                    true => &scratch[lane * own..(lane + 1) * own],
+                    false => &last[of_role],
+                });
             }
         }
         for (row, resident) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
