@@ -108,10 +108,10 @@ for policy in "${wanted[@]}"; do
       "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
         --seed 5 --threads 1 --out "$runs/steady"
       # noise that stays leaves him something to spare; what he loses by it, the other of the mean has
-      noisy() { # deviation at the beginning as a logarithm, and floors of it
-        sed "s/init_log_std: .*/init_log_std: $1/; s/ min_std: .*/ min_std: $2/; s/final_min_std: .*/final_min_std: $3/" \
-          assets/configs/marathon_man_controller-steady.yaml > "$runs/noisy.yaml"
-        "$marathon" train MarathonManController --config "$runs/noisy.yaml" --threads 1 "${@:4}"
+      sed "s/init_log_std: .*/init_log_std: -2.3/; s/min_std: .*/min_std: 0.1/" \
+        assets/configs/marathon_man_controller-steady.yaml > "$runs/noisy.yaml"
+      noisy() {
+        "$marathon" train MarathonManController --config "$runs/noisy.yaml" --threads 1 "$@"
       }
       # who plays starts from a stand, and is not asked for extremes half of the time
       mean() {
@@ -119,11 +119,11 @@ for policy in "${wanted[@]}"; do
           --option price=20 --option relive=0 --out "$1"
       }
       first=("$runs"/steady/policies/policy-50*.safetensors)
-      noisy -2.3 0.1 0.1 --initialize-from "${first[0]}" --seed 1 --out "$runs/n1"
-      noisy -2.3 0.1 0.1 --option commands=even --initialize-from "$runs/n1" --seed 2 --out "$runs/n2"
+      noisy --initialize-from "${first[0]}" --seed 1 --out "$runs/n1"
+      noisy --option commands=even --initialize-from "$runs/n1" --seed 2 --out "$runs/n2"
       several=("${first[0]}" "$runs/n1/policy.safetensors" "$runs/n2/policy.safetensors")
       mean "$runs/three.safetensors" "${several[@]}"
-      noisy -2.3 0.1 0.1 --option relive=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
+      noisy --option relive=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
       several+=("$runs/n3/policy.safetensors")
       mean "$shipped/MarathonManController.safetensors" "${several[@]}"
       ;;

@@ -153,6 +153,8 @@ fn a_role_may_play_as_it_is() {
     assert!(name == "builder" && builder.meta().act == 1);
     // the statistics have moved, and the first layer with them, but not with those of the first rollout
     assert_ne!(new.params(), old.params());
+    let (second, _) = old.net().layers().nth(1).expect("it has hidden layers");
+    assert_eq!(new.params()[second.start..], old.params()[second.start..]);
     let obs: Vec<f32> = (0..old.meta().obs).map(|k| 0.1 * (k as f32).sin()).collect();
     let (a, b) = (old.act(&obs), new.act(&obs));
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.25), "{a:?} {b:?}");
