@@ -1,5 +1,7 @@
 //! Agents under the names of other systems.
 
+use marathon_envs::shard::role_id;
+
 /// Names of the paper's scenes and of the repository's later versions, without the agent's own. `(agent, names)`
 const BRAINS: [(&str, &[&str]); 4] = [
     ("Hopper", &["DeepMindHopperBrain", "OpenAIHopperBrain", "HopperBrain"]),
@@ -36,4 +38,10 @@ pub fn accepted(id: &str) -> Vec<&str> {
 /// The key among `keys` that speaks of an agent, ignoring case.
 pub fn find<'a>(id: &str, keys: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
     accepted(id).into_iter().find_map(|name| keys.clone().find(|key| key.eq_ignore_ascii_case(name)))
+}
+
+/// The key among `keys` that speaks of a role of an agent, ignoring case.
+pub fn find_role<'a>(id: &str, role: &str, keys: &[&'a str]) -> Option<&'a str> {
+    let mut ids = accepted(id).into_iter().map(|name| role_id(name, role));
+    ids.find_map(|id| keys.iter().copied().find(|key| key.eq_ignore_ascii_case(&id)))
 }

@@ -1,5 +1,5 @@
 //! What a file says about an agent, and about the roles of a task: the behavior `Tag-v0` speaks of the run and of the first
-//! role, `Tag-v0/opponent` of another.
+//! role, `Tag-v0/opponent` of another. Before the slash stands any name of the task.
 
 use super::Loaded;
 use super::error::ConfigError;
@@ -39,14 +39,21 @@ pub fn parse_roles(
     let map = document::parse(path, bytes)?;
     let root = Section::root(path, &map);
     let behaviors = if map.keys().any(|key| current::TOP.contains(&key)) { root.section("behaviors")? } else { root };
-    let ids: Vec<String> = roles.iter().map(|role| role_id(task, role)).collect();
+    let keys: Vec<&str> = behaviors.entries().map(|entry| entry.key).collect();
     let mut found = BTreeMap::new();
-    for entry in behaviors.entries().filter(|entry| entry.key.starts_with(&role_id(task, ""))) {
-        let Some(i) = ids.iter().position(|id| id == entry.key) else {
+    for role in roles {
+        if let Some(key) = names::find_role(task, role, &keys) {
+            found.insert(role.to_string(), parse(path, bytes, key)?.config.into());
+        }
+    }
+    for entry in behaviors.entries() {
+        let Some((name, role)) = entry.key.split_once('/') else { continue };
+        let of_the_task = names::find(task, [name].into_iter()).is_some();
+        if of_the_task && !roles.iter().any(|known| known.eq_ignore_ascii_case(role)) {
+            let ids: Vec<String> = roles.iter().map(|role| role_id(name, role)).collect();
             let known: Vec<&str> = ids.iter().map(String::as_str).collect();
             return Err(ConfigError::unknown(entry.place, entry.key, &known));
-        };
-        found.insert(roles[i].to_string(), parse(path, bytes, &ids[i])?.config.into());
+        }
     }
     Ok(found)
 }

@@ -1,5 +1,5 @@
 //! A task with several roles: the behavior with the task's name speaks of the run and of the first role, `task/role` of
-//! another. A role that the file does not speak of has the settings of the first; one that the task lacks is refused.
+//! another, under any of the task's names. A role that the file does not speak of has the settings of the first; one that the task lacks is refused.
 
 use marathon_config::{parse, parse_roles};
 use std::path::Path;
@@ -41,4 +41,21 @@ fn a_role_has_the_settings_of_its_behavior() {
 fn a_role_that_there_is_not_is_refused_by_name() {
     let error = parse_roles(path(), FILE.as_bytes(), "Tag-v0", &["oponent"]).unwrap_err().to_string();
     assert_eq!(error, "tag.yaml:8: behaviors.Tag-v0/opponent: unknown key; did you mean 'Tag-v0/oponent'?");
+}
+
+#[test]
+fn a_role_goes_by_any_name_of_its_task() {
+    let agents = ["TerrainWalker2d/builder", "terrainwalker2d-v0/builder", "TERRAINWALKER2D/Builder"];
+    for name in agents {
+        let file = FILE.replace("Tag-v0/opponent", name).replace("Tag-v0", "TerrainWalker2d");
+        let roles = parse_roles(path(), file.as_bytes(), "TerrainWalker2d-v0", &["builder"]).unwrap();
+        assert_eq!(roles["builder"].network.actor_hidden, [24], "{name}");
+        // and is refused by it
+        let error = parse_roles(path(), file.as_bytes(), "TerrainWalker2d-v0", &["bilder"]).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("tag.yaml:8: behaviors.{name}: unknown key; did you mean '")), "{error}");
+    }
+    // the most particular name is taken, and what is said of other tasks is theirs
+    let file = format!("{FILE}  Tag/opponent: {{network_settings: {{hidden_units: 8}}}}\n  Chase-v0/hunter: {{}}\n");
+    let roles = parse_roles(path(), file.as_bytes(), "Tag-v0", &["opponent"]).unwrap();
+    assert_eq!(roles["opponent"].network.actor_hidden, [24]);
 }

@@ -151,11 +151,14 @@ fn a_role_may_play_as_it_is() {
     assert_eq!(session.run.initialize_from, again.initialize_from);
     let [(name, builder)] = &outcome.others[..] else { panic!("one other role") };
     assert!(name == "builder" && builder.meta().act == 1);
-    // the statistics have moved, and the first layer with them, but not with those of the first rollout
+    // the statistics have moved, and the first layer with them
     assert_ne!(new.params(), old.params());
     let (second, _) = old.net().layers().nth(1).expect("it has hidden layers");
     assert_eq!(new.params()[second.start..], old.params()[second.start..]);
-    let obs: Vec<f32> = (0..old.meta().obs).map(|k| 0.1 * (k as f32).sin()).collect();
+    // what it observes now and then: farther away, observations are clipped, and what never varied does not now
+    let usual = old.normalizer().mean().iter().zip(old.normalizer().std());
+    let varied = |k: usize, std: f32| if std < 2e-4 { 0.0 } else { std * (k as f32).sin() };
+    let obs: Vec<f32> = usual.enumerate().map(|(k, (mean, std))| mean + varied(k, *std)).collect();
     let (a, b) = (old.act(&obs), new.act(&obs));
-    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.25), "{a:?} {b:?}");
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-3), "{a:?} {b:?}");
 }

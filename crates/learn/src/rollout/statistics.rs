@@ -83,13 +83,13 @@ impl Statistics {
     }
 
     /// Takes in a rollout. Returns the maps of observations before and after, if networks are to follow them; they do not
-    /// follow the first rollout's, which the weights at the start are meant for.
-    pub fn absorb(&mut self, totals: &Totals, is_first: bool) -> Option<[Normalizer; 2]> {
+    /// follow the very first samples, whose statistics are what new weights are meant for.
+    pub fn absorb(&mut self, totals: &Totals) -> Option<[Normalizer; 2]> {
         let StatisticsConfig { normalize_observations, follow_statistics, statistics_cap: cap, .. } = self.config;
         let mut moved = None;
         // without normalization the deviations are from zero, not from the mean
         if normalize_observations {
-            let before = (follow_statistics && !is_first).then(|| self.normalizer());
+            let before = (follow_statistics && self.observations.count > 0.0).then(|| self.normalizer());
             self.observations.merge(totals.samples, &totals.sums.observations, cap);
             moved = before.map(|before| [before, self.normalizer()]);
         }

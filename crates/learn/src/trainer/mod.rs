@@ -468,7 +468,7 @@ impl Shared {
             let experience = Experience::new(rollouts.iter().map(|r| &**r).collect(), &totals, id);
             let now = Now { progress, statistics: &role.statistics };
             role.learner.update(&mut Worker::new(crew, id), &experience, now, updates);
-            role.absorb(&totals, progress);
+            role.absorb(&totals);
             samples = totals.samples as u64;
             all.add(&totals);
         }

@@ -156,8 +156,8 @@ impl RoleReplica {
     }
 
     /// Takes in the statistics of a rollout.
-    pub fn absorb(&mut self, totals: &Totals, progress: &Progress) {
-        if let Some([before, after]) = self.statistics.absorb(totals, progress.iteration == 0) {
+    pub fn absorb(&mut self, totals: &Totals) {
+        if let Some([before, after]) = self.statistics.absorb(totals) {
             self.learner.follow(&before, &after);
         }
     }

@@ -44,6 +44,8 @@ const UP: f64 = 4.0;
 const PRESSED: f64 = 1.0;
 const ALOFT: f64 = 0.1;
 const PROMPT: f64 = 0.35;
+/// Acceleration of whatever falls, m/s^2.
+const GRAVITY: f64 = 9.81;
 /// Pushes: what they would add to the velocity of a rigid body of the figure's mass, m/s, and how long they last, s.
 const PUSHES: [f64; 3] = [0.25, 0.5, 1.0];
 const PUSH: f64 = 0.1;
@@ -134,6 +136,9 @@ pub struct Jump {
     pub agents: u64,
     /// Those of them that were off the ground within 0.35 s.
     pub prompt: u64,
+    /// Those of them whose center of mass then rose as fast as a body must to be in the air for so long, within 0.35 s: whoever draws up the
+    /// legs is off the ground, too, but falls.
+    pub thrown: u64,
     /// Those of them that fell within 4 s.
     pub falls: u64,
     /// Median time until no foot is on the ground for a tenth of a second, s; none if fewer than half of them jumped.
@@ -382,21 +387,27 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) ->
     trial.command(|_| goes.clone())?;
     join(&mut tracks, trial.play(AFTER - PRESSED)?);
     let start = |agent| before.iter().find(|track| track.agent == agent).and_then(|track| track.moments.last());
-    let time = |track: &Track| {
-        // who steps from foot to foot has none on the ground now and then
-        let window = (ALOFT / dt).round().max(1.0) as usize;
-        let off = track.moments.windows(window).position(|some| some.iter().all(|moment| !moment.grounded));
+    // who steps from foot to foot has none on the ground now and then
+    let window = (ALOFT / dt).round().max(2.0) as usize;
+    let least = 0.5 * GRAVITY * (ALOFT - dt) * dt;
+    let time = |track: &Track, rise: f64| {
+        let aloft =
+            |some: &[Moment]| some.iter().all(|moment| !moment.grounded) && rise < some[1].height - some[0].height;
+        let off = track.moments.windows(window).position(aloft);
         off.map_or(f64::INFINITY, |i| (i + 1) as f64 * dt)
     };
+    let prompt = |times: &[f64]| times.iter().filter(|time| **time <= PROMPT + 1e-9).count() as u64;
     let rise = |track: &Track| {
         let start = start(track.agent)?.height;
         Some(track.moments.iter().map(|moment| moment.height - start).fold(0.0, f64::max))
     };
-    let times: Vec<f64> = tracks.iter().map(time).collect();
+    let [times, thrown] =
+        [f64::NEG_INFINITY, least].map(|rise| tracks.iter().map(|t| time(t, rise)).collect::<Vec<f64>>());
     Ok(Jump {
         speed,
         agents: tracks.len() as u64,
-        prompt: times.iter().filter(|time| **time <= PROMPT + 1e-9).count() as u64,
+        prompt: prompt(&times),
+        thrown: prompt(&thrown),
         falls: falls(&tracks),
         latency: response::median_time(times),
         height: response::median(tracks.iter().filter_map(rise).collect()),

@@ -327,7 +327,10 @@ impl Agent for Controller {
         let told = s.command(1).abs() + s.command(2).abs() + s.command(0);
         let (jumps, gait) = (SKILL.is(&all, JUMP), T::not(SKILL.on(&all)));
         // a jump need not stand where the clip's does
-        Steer::add_terms(s, [T::or(gait, jumps), gait], told, terms);
+        // whoever turns on one point falls
+        let moves = T::or(gait, jumps);
+        let straight = s.command(2).abs().lt(T::lit(0.01));
+        Steer::add_terms(s, [moves, T::and(moves, straight), gait], told, terms);
         let [similar, posture] = imitation::similarity(s, &ANATOMY);
         terms.add("skill", 1.0, SKILL.worth(&all) * T::select(jumps, posture, similar));
         // a hop looks much like a jump

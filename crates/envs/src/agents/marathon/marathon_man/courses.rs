@@ -61,6 +61,6 @@ impl Runner for Steer {
 
     #[inline(always)]
     fn add_terms<T: Real>(s: &Senses<T>, whole: T, _: [T; 2], terms: &mut Terms<T>) {
-        Steer::add_terms(s, [T::lit(0.5).lt(whole); 2], Steer::told(s), terms);
+        Steer::add_terms(s, [T::lit(0.5).lt(whole); 3], Steer::told(s), terms);
     }
 }

@@ -44,7 +44,11 @@ const FACE_UP: usize = 3;
 pub const SLOTS: usize = 2;
 /// Shortest and longest that he takes to be as the clip is at its beginning, decisions; he comes to a stop for longer than he lies.
 const SETTLING: [f64; 2] = [12.0, 80.0];
-const LYING: f64 = 30.0;
+const LYING: f64 = 20.0;
+/// If his butt faces elsewhere than the clip's in the clip's first second, he lies on another side and begins again: cosine between
+/// the forward axes, and decisions of the clip.
+const ON_THAT_SIDE: f64 = 0.2;
+const BEGINNING: f64 = 40.0;
 /// Mean distance of the parts from the clip's at which an attempt to get up has failed and he begins again, m.
 const LOST: f64 = 0.5;
 /// Who is faster than this leaps when told to jump, m/s, and for how long, decisions.
@@ -182,7 +186,9 @@ impl Skills {
         // what begins
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));
         let failed = T::or(T::and(past, height.lt(T::lit(LOW))), T::and(lost, T::not(waits)));
-        let fails = T::and(rises, T::and(failed, T::not(risen)));
+        let early = memory[Following::ROW].lt(beginning + T::lit(BEGINNING));
+        let rolled = T::and(early, facing_alike(s, &s.reference_of(memory, 0)).lt(T::lit(ON_THAT_SIDE)));
+        let fails = T::and(rises, T::and(T::or(failed, rolled), T::not(risen)));
         let fallen = T::or(T::and(grounded, T::not(rises)), fails);
         let free = T::and(T::and(T::not(T::or(on, leaps)), T::lit(PAUSE).lt(lasted)), stands);
         let wants_flip = T::and(half.lt(backflip), Steer::speed(s).lt(T::lit(SLOW)));
@@ -234,11 +240,9 @@ impl Skills {
     /// Whether he is as a clip is.
     #[inline(always)]
     fn is_as<T: Real>(&self, s: &Senses<T>, following: &[T]) -> T::Mask {
-        let (clip, own) = (s.reference_of(following, 0), s.forward(BUTT));
-        let [forward, ..] = clip.axes(BUTT);
-        let cos = own[0].mul_add(forward[0], own[1].mul_add(forward[1], own[2] * forward[2]));
+        let clip = s.reference_of(following, 0);
         let apart = (s.position(BUTT)[2] - clip.position(BUTT)[2]).abs();
-        T::and(T::lit(AS_THE_CLIP[0]).lt(cos), apart.lt(T::lit(AS_THE_CLIP[1])))
+        T::and(T::lit(AS_THE_CLIP[0]).lt(facing_alike(s, &clip)), apart.lt(T::lit(AS_THE_CLIP[1])))
     }
 
     /// The direction along the ground that vectors of a skill are seen from: cosine and sine.
@@ -248,6 +252,13 @@ impl Skills {
         let (on, [c, d]) = (self.on(memory), s.heading(BUTT));
         [T::select(on, cos, c), T::select(on, sin, d)]
     }
+}
+
+/// Cosine between the forward axis of his butt and a clip's.
+#[inline(always)]
+fn facing_alike<T: Real>(s: &Senses<T>, clip: &Frame<'_, T>) -> T {
+    let (own, [forward, ..]) = (s.forward(BUTT), clip.axes(BUTT));
+    own[0].mul_add(forward[0], own[1].mul_add(forward[1], own[2] * forward[2]))
 }
 
 /// How a clip holds the butt: its height, forward axis and up axis.

@@ -302,17 +302,17 @@ impl Steer {
         memory[PACE] += (asked - memory[PACE]).max(-slowing).min(speeding);
     }
 
-    /// Adds the terms of the reward for the velocity where `moves`, and for the direction, the gait and stillness where `goes`.
-    /// `told`: how much he is told to go or turn, 0 if he is to stand.
+    /// Adds the terms of the reward for the velocity where `moves`, for none beside it where `holds`, and for the direction, the gait and
+    /// stillness where `goes`. `told`: how much he is told to go or turn, 0 if he is to stand.
     #[inline(always)]
-    pub(super) fn add_terms<T: Real>(s: &Senses<T>, [moves, goes]: [T::Mask; 2], told: T, terms: &mut Terms<T>) {
+    pub(super) fn add_terms<T: Real>(s: &Senses<T>, [moves, holds, goes]: [T::Mask; 3], told: T, terms: &mut Terms<T>) {
         let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
         let angle = Self::off(s, Self::direction(s));
         let [pose, tempo] = Self::out_of_step(s);
         let mut add = |name, weight, counts, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
         add("velocity", 0.3, moves, slip * slip * T::lit(-5.0));
         add("pace", 0.2, moves, slip * slip * T::lit(-0.5));
-        add("drift", 0.05, moves, slip * slip * T::lit(-100.0));
+        add("drift", 0.05, holds, slip * slip * T::lit(-100.0));
         add("heading", 0.2, goes, angle * angle * T::lit(-4.0));
         add("gait", 0.2, goes, pose * T::lit(-5.0));
         add("tempo", 0.05, goes, tempo * T::lit(-1.0));
@@ -516,7 +516,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        Self::add_terms(s, [T::not(T::none()); 2], Self::told(s), terms);
+        Self::add_terms(s, [T::not(T::none()); 3], Self::told(s), terms);
     }
 
     #[inline(always)]
