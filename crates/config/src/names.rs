@@ -37,11 +37,18 @@ pub fn accepted(id: &str) -> Vec<&str> {
 
 /// The key among `keys` that speaks of an agent, ignoring case.
 pub fn find<'a>(id: &str, keys: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
-    accepted(id).into_iter().find_map(|name| keys.clone().find(|key| key.eq_ignore_ascii_case(name)))
+    first(accepted(id).into_iter(), keys)
 }
 
 /// The key among `keys` that speaks of a role of an agent, ignoring case.
-pub fn find_role<'a>(id: &str, role: &str, keys: &[&'a str]) -> Option<&'a str> {
-    let mut ids = accepted(id).into_iter().map(|name| role_id(name, role));
-    ids.find_map(|id| keys.iter().copied().find(|key| key.eq_ignore_ascii_case(&id)))
+pub fn find_role<'a>(id: &str, role: &str, keys: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    first(accepted(id).into_iter().map(|name| role_id(name, role)), keys)
+}
+
+/// The key that is the first of these names that is there.
+fn first<'a>(
+    mut names: impl Iterator<Item = impl AsRef<str>>,
+    keys: impl Iterator<Item = &'a str> + Clone,
+) -> Option<&'a str> {
+    names.find_map(|name| keys.clone().find(|key| key.eq_ignore_ascii_case(name.as_ref())))
 }

@@ -42,7 +42,7 @@ pub fn parse_roles(
     let keys: Vec<&str> = behaviors.entries().map(|entry| entry.key).collect();
     let mut found = BTreeMap::new();
     for role in roles {
-        if let Some(key) = names::find_role(task, role, &keys) {
+        if let Some(key) = names::find_role(task, role, keys.iter().copied()) {
             found.insert(role.to_string(), parse(path, bytes, key)?.config.into());
         }
     }

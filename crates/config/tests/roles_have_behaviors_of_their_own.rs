@@ -1,5 +1,6 @@
 //! A task with several roles: the behavior with the task's name speaks of the run and of the first role, `task/role` of
-//! another, under any of the task's names. A role that the file does not speak of has the settings of the first; one that the task lacks is refused.
+//! another, under any of the task's names. A role that the file does not speak of has the settings of the first; one that the
+//! task lacks is refused.
 
 use marathon_config::{parse, parse_roles};
 use std::path::Path;

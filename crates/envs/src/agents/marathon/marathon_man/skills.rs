@@ -184,10 +184,11 @@ impl Skills {
         let ended = T::or(landed, T::and(on, T::or(risen, T::and(over, upright))));
 
         // what begins
-        let lost = T::lit(LOST).lt(imitation::distance_from(s, &s.reference_of(memory, 0), &ANATOMY, true));
+        let clip = s.reference_of(memory, 0);
+        let lost = T::lit(LOST).lt(imitation::distance_from(s, &clip, &ANATOMY, true));
         let failed = T::or(T::and(past, height.lt(T::lit(LOW))), T::and(lost, T::not(waits)));
         let early = memory[Following::ROW].lt(beginning + T::lit(BEGINNING));
-        let rolled = T::and(early, facing_alike(s, &s.reference_of(memory, 0)).lt(T::lit(ON_THAT_SIDE)));
+        let rolled = T::and(early, facing_alike(s, &clip).lt(T::lit(ON_THAT_SIDE)));
         let fails = T::and(rises, T::and(T::or(failed, rolled), T::not(risen)));
         let fallen = T::or(T::and(grounded, T::not(rises)), fails);
         let free = T::and(T::and(T::not(T::or(on, leaps)), T::lit(PAUSE).lt(lasted)), stands);
