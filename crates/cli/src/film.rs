@@ -10,7 +10,7 @@ use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line};
 use marathon_runs::text::unsigned_zero;
-use marathon_runs::{Play, text};
+use marathon_runs::{Play, Setting, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -212,7 +212,8 @@ impl<'a> Stage<'a> {
             ..Default::default()
         };
         let model = registry::agent(&spec.id)?.model()?;
-        let play = Play::with_roles(&policies.iter().collect::<Vec<_>>(), &options)?;
+        let setting = policies.first().map(|policy| Setting::asked(policy.meta())).unwrap_or_default();
+        let play = Play::of(&setting, &policies.iter().collect::<Vec<_>>(), &options)?;
         if cast.ghost.is_some() && play.reference(0)?.is_none() {
             let text =
                 format!("--ghost: {} follows no clip, expected an agent that does, such as MarathonMan", spec.id);

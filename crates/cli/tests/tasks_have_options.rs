@@ -55,6 +55,22 @@ fn options_are_recorded_and_obeyed() {
 }
 
 #[test]
+fn what_only_helps_to_learn_plays_along_if_it_is_asked_for() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/policies");
+    let policy = folder.join("MarathonManController.safetensors");
+    let told = |words: &[&str], option: &str, number: &str| {
+        let words = [&["--json", words[0], policy.to_str().unwrap()], &words[1..], &["--option", option]].concat();
+        json(&succeed(temp.path(), &words))[number].as_f64().unwrap()
+    };
+    let film = ["render", "--out", "a.png", "--frames", "2", "--seconds", "0.5", "--width", "40"];
+    let demo = ["record-demo", "--out", "a.demo", "--episodes", "1"];
+    for (words, number) in [(&film[..], "distance_mean"), (&demo, "return_mean")] {
+        assert_ne!(told(words, "knocked=1", number), told(words, "knocked=0", number), "{words:?}");
+    }
+}
+
+#[test]
 fn a_configuration_has_options_and_the_command_line_wins() {
     let temp = tempfile::tempdir().unwrap();
     let path = temp.path();

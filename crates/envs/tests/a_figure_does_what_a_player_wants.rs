@@ -70,6 +70,25 @@ fn who_creeps_lifts_his_feet() {
     }
 }
 
+/// Where he is told to go, the velocity that he is to have by now aims beyond the command by half of what he lacks, and by 0.5 m/s at
+/// most; at rest it is none.
+#[test]
+fn who_lags_behind_is_urged() {
+    for (speed, expected) in [(2.0, 2.2..2.501), (0.2, 0.2..0.301), (0.0, 0.0..0.001)] {
+        let (mut env, mut step) = made(&[("start", "first")]);
+        tell(&mut env, [speed, 0.0, 0.0, 0.0, 0.0]);
+        (0..22).for_each(|_| go(&mut env, &mut step));
+        // behind the command, and the sine and cosine of its direction
+        let (command, obs) = (part(&env, "command").start, env.spec().obs);
+        let up: Vec<usize> = (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect();
+        assert!(up.len() > AGENTS / 2, "{up:?}");
+        for agent in up {
+            let [x, y] = [4, 5].map(|i| f64::from(step.obs[agent * obs + command + i]));
+            assert!(expected.contains(&x.hypot(y)), "told {speed}: {x} {y}");
+        }
+    }
+}
+
 /// What a button begins has the length of its piece of the clip, and he is paid for being like it.
 #[test]
 fn a_button_begins_a_skill_that_ends_by_itself() {

@@ -109,11 +109,12 @@ fn the_reward_is_its_formula() {
                 let still =
                     if rests { 1.5 * [0.4, 0.04].map(|most| (-speed2 / most).exp()).iter().sum::<f64>() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
-                // a tenth of a second off the ground makes a jump
-                aloft[agent] = if leap > 0.0 { aloft[agent] + 1 } else { 0 };
-                jumped[agent] |= aloft[agent] >= 10;
+                // a tenth of a second off the ground makes a jump, from a moment on at which the center of mass rises by 0.7 m/s
                 let up: f64 = masses.iter().zip(&moving).map(|(mass, v)| mass * v[2]).sum();
-                rose[agent] = rose[agent].max(up / masses.iter().sum::<f64>());
+                let rises = up / masses.iter().sum::<f64>();
+                aloft[agent] = if leap > 0.0 && (aloft[agent] > 0 || rises > 0.7) { aloft[agent] + 1 } else { 0 };
+                jumped[agent] |= aloft[agent] >= 10;
+                rose[agent] = rose[agent].max(rises);
                 let awaited = if jumped[agent] { 0.0 } else { jump };
                 assert!(commands == 1 || obs[n - 1] == awaited);
                 let late = if command == 0.0 { 6.0 * awaited * (1.0 - 0.6 * rose[agent].min(1.0)) } else { 0.0 };
@@ -132,45 +133,68 @@ fn the_reward_is_its_formula() {
     }
 }
 
-/// A figure that stands pays for each decision until it has been off the ground for a tenth of a second, less if it has risen, and
-/// again when it is told anew.
+/// A figure that stands pays for each decision until it has been off the ground for a tenth of a second after it rose, less the faster it
+/// has risen, and again when it is told anew. Whoever falls meanwhile, as a figure does that draws up its legs, has not jumped; the
+/// Hopper, which would draw up its leg, is not paid for that either.
 #[test]
 fn a_jump_that_is_late_costs() {
-    let id = "WalkerController-v0";
-    let mut env = env(id, "discrete");
-    let (act, k) = (env.spec().act, env.spec().reward_terms.len());
-    let mut out: Step = env.buffers();
-    env.reset(Some(2), &mut out.obs).unwrap();
-    // so high that a fall takes 0.17 s; who is put somewhere is told anew
-    let lift = |env: &mut VecEnv, command: [f64; 2]| {
-        for agent in 0..AGENTS {
-            env.set_command(agent, Some(&command)).unwrap();
-            let mut state = env.state(agent).unwrap();
-            state.qvel.fill(0.0);
-            state.qpos[1] += 0.15;
-            env.set_state(agent, &state).unwrap();
+    for (id, jumped, dt, drawn) in [("WalkerController-v0", 10, 0.01, 1.0), ("HopperController-v0", 5, 0.02, 0.0)] {
+        let mut env = env(id, "discrete");
+        assert_eq!(env.spec().dt, dt);
+        let (act, k) = (env.spec().act, env.spec().reward_terms.len());
+        let mut out: Step = env.buffers();
+        env.reset(Some(2), &mut out.obs).unwrap();
+        // so high that a fall takes 0.17 s; who is put somewhere is told anew
+        let lift = |env: &mut VecEnv, command: [f64; 2], upward: f64| {
+            for agent in 0..AGENTS {
+                env.set_command(agent, Some(&command)).unwrap();
+                let mut state = env.state(agent).unwrap();
+                state.qvel.fill(0.0);
+                state.qvel[1] = upward;
+                state.qpos[1] += 0.15;
+                env.set_state(agent, &state).unwrap();
+            }
+        };
+        // what a jump and its delay are worth
+        let mut paid = |env: &mut VecEnv, command: [f64; 2]| {
+            (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
+            env.step(&vec![0.0; AGENTS * act], &mut out.as_mut()).unwrap();
+            [3, 4].map(|term| {
+                let terms = (0..AGENTS).map(|agent| out.terms[agent * k + term]);
+                terms.fold([f32::MAX, f32::MIN], |[low, high], x| [low.min(x), high.max(x)])
+            })
+        };
+        let (jump, stand) = ([0.0, 1.0], [0.0, 0.0]);
+        lift(&mut env, jump, 0.0);
+        for decision in 1..=3 * jumped / 2 {
+            let [jumps, late] = paid(&mut env, jump);
+            assert_eq!(late, [-6.0; 2], "{id}, decision {decision}");
+            assert!(
+                (drawn..1.5).contains(&f64::from(jumps[0])) && (drawn == 1.0 || jumps[1] == 0.0),
+                "{id}: {jumps:?}"
+            );
         }
-    };
-    let mut late = |env: &mut VecEnv, command: [f64; 2]| {
-        (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
-        env.step(&vec![0.0; AGENTS * act], &mut out.as_mut()).unwrap();
-        let terms: Vec<f32> = (0..AGENTS).map(|agent| out.terms[agent * k + 4]).collect();
-        terms.iter().fold([f32::MAX, f32::MIN], |[low, high], x| [low.min(*x), high.max(*x)])
-    };
-    let (jump, stand) = ([0.0, 1.0], [0.0, 0.0]);
-    lift(&mut env, jump);
-    for decision in 1..=30 {
-        let expected = if decision < 10 { -6.0 } else { 0.0 };
-        assert_eq!(late(&mut env, jump), [expected; 2], "decision {decision}");
-    }
-    // on the ground again, and told anew: a command is obeyed from the decision after the one in which it is given
-    let told = [stand, stand, jump, jump].map(|command| late(&mut env, command));
-    assert_eq!(told[..3], [[0.0; 2]; 3]);
-    assert!(told[3][0] >= -6.0 && told[3][1] < -4.0, "{told:?}");
-    // who is to run need not hurry
-    lift(&mut env, [4.0, 1.0]);
-    for _ in 0..9 {
-        assert_eq!(late(&mut env, [4.0, 1.0]), [0.0; 2]);
+        lift(&mut env, jump, 1.0);
+        for decision in 1..=5 * jumped / 2 {
+            let [jumps, late] = paid(&mut env, jump);
+            assert!(jumps[0] > 1.0, "{id}, decision {decision}: {jumps:?}");
+            if decision < jumped {
+                // spared 0.6 of it by 1 m/s, of which gravity has taken a tenth or two
+                assert!(late[0] > -3.2 && late[1] < -2.4, "{id}, decision {decision}: {late:?}");
+            } else {
+                assert_eq!(late, [0.0; 2], "{id}, decision {decision}");
+            }
+        }
+        (0..jumped).for_each(|_| _ = paid(&mut env, jump));
+        // on the ground again, and told anew: a command is obeyed from the decision after the one in which it is given
+        let told = [stand, stand, jump, jump].map(|command| paid(&mut env, command)[1]);
+        assert_eq!(told[..3], [[0.0; 2]; 3], "{id}");
+        assert!(told[3][0] >= -6.0 && told[3][1] < -4.0, "{id}: {told:?}");
+        // who is to run need not hurry
+        lift(&mut env, [4.0, 1.0], 0.0);
+        for _ in 1..jumped {
+            assert_eq!(paid(&mut env, [4.0, 1.0])[1], [0.0; 2], "{id}");
+        }
     }
 }
 

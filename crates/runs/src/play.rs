@@ -35,21 +35,10 @@ impl<'a> Play<'a> {
         Self::of(&Setting::of(policy.meta()), &[policy], options)
     }
 
-    /// The same with a policy for each role of the task, in their order.
+    /// The same in a task with other arguments, with a policy for each role of the task, in their order.
     ///
     /// # Errors
     /// The same, and if there is not one policy for each role.
-    pub fn with_roles(policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
-        let Some(first) = policies.first() else {
-            return Err(RunError::option("policies", "is none, expected one or more"));
-        };
-        Self::of(&Setting::of(first.meta()), policies, options)
-    }
-
-    /// The same in a task with other arguments.
-    ///
-    /// # Errors
-    /// The same.
     pub fn of(setting: &Setting, policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
         let mut env = setting.vec_env(options)?;
         let mut step = env.buffers();

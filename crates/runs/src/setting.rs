@@ -61,9 +61,16 @@ impl Setting {
 
     /// The task that a policy is for, without what only helped to learn; of a role's policy, that in which it has the role.
     pub fn of(policy: &PolicyMeta) -> Self {
+        let whole = Self::asked(policy);
+        Setting { options: whole.options.without(&OF_LEARNING), ..whole }
+    }
+
+    /// The same with all arguments of a policy that has been [loaded](crate::policy_file::load_all): those that only help to learn are
+    /// among them if the caller has asked for them.
+    pub fn asked(policy: &PolicyMeta) -> Self {
         Setting {
             agent: task_of_role(&policy.agent).into(),
-            options: policy.options.clone().without(&OF_LEARNING),
+            options: policy.options.clone(),
             clips: policy.clips.clone(),
         }
     }

@@ -6,7 +6,7 @@ use crate::error::CliError;
 use marathon_envs::VecEnvOptions;
 use marathon_learn::{Policy, write_atomic};
 use marathon_mlagents::{Demonstration, Episode};
-use marathon_runs::{Play, text};
+use marathon_runs::{Play, Setting, text};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -70,7 +70,8 @@ pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
 /// would favor short episodes.
 fn play(policy: &Policy, episodes: usize, seed: u64) -> Result<Vec<Episode>, CliError> {
     let (n, meta) = (episodes.min(MAX_AGENTS), policy.meta());
-    let mut play = Play::new(policy, &VecEnvOptions { agents: n, seed, ..Default::default() })?;
+    let options = VecEnvOptions { agents: n, seed, ..Default::default() };
+    let mut play = Play::of(&Setting::asked(meta), &[policy], &options)?;
     let quota = |agent: usize| (episodes - agent).div_ceil(n);
     let mut done: Vec<Vec<Episode>> = vec![Vec::new(); n];
     let mut now = vec![Episode::default(); n];

@@ -143,6 +143,8 @@ pub struct Jump {
     pub falls: u64,
     /// Median time until no foot is on the ground for a tenth of a second, s; none if fewer than half of them jumped.
     pub latency: Option<f64>,
+    /// The same until they are thrown.
+    pub thrown_latency: Option<f64>,
     /// Median of how far the center of mass rises above where it was, m; none if nobody was left.
     pub height: Option<f64>,
 }
@@ -237,7 +239,7 @@ fn obedient() -> Vec<String> {
 /// # Errors
 /// If the policy's task does not exist, or cannot be told a speed.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
-    let setting = Setting::of(policy.meta()).from_the_first()?;
+    let setting = Setting::asked(policy.meta()).from_the_first()?;
     let commands = Commands::of(policy, &setting)?;
     let trial = || Trial::new(&setting, policy, options, commands.speed);
     let (levels, half) = (commands.levels(), 0.5 * commands.range[1]);
@@ -410,6 +412,7 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) ->
         thrown: prompt(&thrown),
         falls: falls(&tracks),
         latency: response::median_time(times),
+        thrown_latency: response::median_time(thrown),
         height: response::median(tracks.iter().filter_map(rise).collect()),
     })
 }

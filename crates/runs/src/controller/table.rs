@@ -57,12 +57,13 @@ impl Obedience {
         for j in &self.jumps {
             let _ = write!(
                 out,
-                "\ntold to jump at {:.2} m/s: {} of {} are off the ground within {PROMPT} s, {} on the way up; half of them within {}; {} high, {} fall",
+                "\ntold to jump at {:.2} m/s: {} of {} are off the ground within {PROMPT} s, {} on the way up; half of them within {}, on the way up {}; {} high, {} fall",
                 j.speed,
                 j.prompt,
                 j.agents,
                 j.thrown,
                 seconds(&j.latency),
+                seconds(&j.thrown_latency),
                 number(&j.height, "m"),
                 j.falls
             );

@@ -45,7 +45,8 @@ pub const FASTEST: f64 = 4.0;
 const VELOCITIES: usize = 3;
 /// The target velocity, m/s.
 const TARGET: usize = VELOCITIES;
-/// For how many decisions no foot has been on the ground; whether the figure was told to jump, and has yet to do it, 0 or 1.
+/// For how many decisions it has been in the air since it rose by [`Figure::THROWN`]; whether it was told to jump, and has yet to do it,
+/// 0 or 1.
 const ALOFT: usize = TARGET + 1;
 const TOLD: usize = ALOFT + 1;
 const WAITS: usize = TOLD + 1;
@@ -258,13 +259,15 @@ impl<F: Figure> Agent for Controller<F> {
         let most = RAMP * s.dt();
         memory[TARGET] += clamp(told - memory[TARGET], -most, most);
         let one = T::lit(1.0);
-        memory[ALOFT] = T::masked(T::zero().lt(F::leap(s)), memory[ALOFT] + one);
+        let rises = s.center_of_mass_velocity()[2];
+        let thrown = T::or(T::zero().lt(memory[ALOFT]), T::lit(F::THROWN).lt(rises));
+        memory[ALOFT] = T::masked(T::and(T::zero().lt(F::leap(s)), thrown), memory[ALOFT] + one);
         let jumped = T::lit(JUMPED / s.dt() - 0.5).lt(memory[ALOFT]);
         // a jump that is told anew is waited for anew
         let waits = memory[WAITS].max(one - memory[TOLD]);
         memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
         let rose = memory[ROSE] * memory[TOLD];
-        memory[ROSE] = jump * rose.max(s.center_of_mass_velocity()[2]);
+        memory[ROSE] = jump * rose.max(rises);
         memory[TOLD] = jump;
         self.relive().remember(s, memory, |_| {
             let felled = self.figure.terminated(s);
@@ -302,8 +305,13 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("pace", PRICE, T::lit(WORTHLESS) - off);
         terms.add("uprightness", 1.0, s.forward_bonus(F::TORSO));
         let jump = self.jump(s);
-        terms.add("jump", 1.0, jump * F::leap(s));
         let stands = (one - told.abs() * T::lit(10.0)).max(zero);
+        let mut flies = jump * F::leap(s);
+        if F::DRAWS_UP {
+            let thrown = T::masked(zero.lt(s.memory(ALOFT)), one);
+            flies *= thrown.max(one - stands);
+        }
+        terms.add("jump", 1.0, flies);
         let rose = clamp(s.memory(ROSE), 0.0, 1.0);
         terms.add("late", LATE, s.memory(WAITS) * stands * (one - rose * T::lit(RISEN)));
         // told to go nowhere and not to jump

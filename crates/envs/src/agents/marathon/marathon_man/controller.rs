@@ -40,7 +40,8 @@ use crate::episode_rng::EpisodeRng;
 /// Fastest that he is told to step aside, m/s.
 const ASIDE: f64 = 0.8;
 /// What leads him: faster than what leads the steered figure, but a run that ends at once fells him.
-const HASTE: Haste = Haste { speeding: 5.0, slowing: 3.0, lead: 1.2, quick: true, turning: 0.6, least: 0.8 };
+const HASTE: Haste =
+    Haste { speeding: 5.0, slowing: 3.0, urging: 0.5, lead: 1.2, quick: true, turning: 0.6, least: 0.8 };
 /// Decisions of the clip ahead that he sees.
 const AHEAD: usize = 4;
 /// His skills, behind the variables of the steered figure.

@@ -102,7 +102,8 @@ pub(super) const PACE: usize = PHASE + 1;
 const MADE: usize = PACE + 1;
 pub(super) const BEGUN: usize = MADE + 1;
 /// What leads the steered figure.
-const HASTE: Haste = Haste { speeding: 4.0, slowing: 4.0, lead: 0.8, quick: false, turning: 0.4, least: 0.0 };
+const HASTE: Haste =
+    Haste { speeding: 4.0, slowing: 4.0, urging: 0.0, lead: 0.8, quick: false, turning: 0.4, least: 0.0 };
 /// He slows down where he is told to be slower than his target by more than this, m/s: a turn bends the target, too.
 const SLOWER: f64 = 0.3;
 /// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
@@ -112,6 +113,9 @@ const LEANING: f64 = 3.0;
 /// Mean squares of the parts' velocities at which each half of what standing still is worth is down to 1/e, m^2/s^2: who shuffles is
 /// to come to rest, and who rests to keep quite still.
 const RESTLESS: [f64; 2] = [0.1, 0.01];
+/// Most that the target aims beyond the command, m/s, and the least command for which it does.
+const URGED: f64 = 0.5;
+const URGES: f64 = 0.05;
 /// The least pace is at most this many times the velocity that he is told, so that it fades where he is told hardly anything.
 const LEAST_OF_TOLD: f64 = 4.0;
 
@@ -122,6 +126,9 @@ pub(super) struct Haste {
     pub speeding: f64,
     /// The same while he slows down.
     pub slowing: f64,
+    /// Where he is told to go, the target aims beyond the command by this share of what his velocity lacks, but by [`URGED`] at most, and
+    /// never beyond [`FASTEST`]: he comes near a command at once, and takes as long again for the rest.
+    pub urging: f64,
     /// Most that the pace is off his speed, m/s: a run does not lead who stands.
     pub lead: f64,
     /// The gait goes round as fast as for the target velocity, if that is faster than the pace: he starts with short, quick steps.
@@ -290,16 +297,28 @@ impl Steer {
         let slows = told.lt(hypot(memory[TARGET], memory[TARGET + 1]) - T::lit(SLOWER));
         let most = T::select(slows, slowing, speeding);
         let beside = [-(left * direction[1]), left * direction[0]];
-        let missing = [0, 1].map(|i| told.mul_add(direction[i], -memory[TARGET + i]) + beside[i]);
+        let lacks = {
+            let [x, y, _] = s.center_of_mass_velocity();
+            [told.mul_add(direction[0], -x) + beside[0], told.mul_add(direction[1], -y) + beside[1]]
+        };
+        // nobody is urged to go faster than he knows, and whoever stands is left in peace
+        let asked = hypot(told, left);
+        let most_urged = clamp(T::lit(FASTEST) - asked, 1e-6, URGED);
+        let urging = T::masked(T::lit(URGES).lt(asked), T::lit(haste.urging));
+        let urging = urging * most_urged.div((hypot(lacks[0], lacks[1]) * urging).max(most_urged));
+        let missing = [0, 1].map(|i| {
+            let missing = told.mul_add(direction[i], -memory[TARGET + i]) + beside[i];
+            lacks[i].mul_add(urging, missing)
+        });
         let share = most.div(hypot(missing[0], missing[1]).max(most));
         for i in 0..2 {
             memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
         }
         let turning = turn.abs() * T::lit(haste.turning);
-        let least = (hypot(told, left).max(turning) * T::lit(LEAST_OF_TOLD)).min(T::lit(haste.least));
-        let asked = hypot(memory[TARGET], memory[TARGET + 1]).max(turning).max(least);
-        let asked = speed + clamp(asked - speed, -haste.lead, haste.lead);
-        memory[PACE] += (asked - memory[PACE]).max(-slowing).min(speeding);
+        let least = (asked.max(turning) * T::lit(LEAST_OF_TOLD)).min(T::lit(haste.least));
+        let pace = hypot(memory[TARGET], memory[TARGET + 1]).max(turning).max(least);
+        let pace = speed + clamp(pace - speed, -haste.lead, haste.lead);
+        memory[PACE] += (pace - memory[PACE]).max(-slowing).min(speeding);
     }
 
     /// Adds the terms of the reward for the velocity where `moves`, for none beside it where `holds`, and for the direction, the gait and
