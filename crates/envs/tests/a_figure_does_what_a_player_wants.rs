@@ -65,19 +65,26 @@ fn who_creeps_lifts_his_feet() {
         assert!(up.len() > AGENTS / 2, "{up:?}");
         for agent in up {
             let pace = f64::from(step.obs[agent * obs + pace]);
-            assert!((pace - expected).abs() < 1e-3, "told {speed} {left} {turn}: {pace}, expected {expected}");
+            // whoever lags behind is told to go faster than that
+            let more = if [speed, left] == [0.0; 2] { 1e-3 } else { 0.1 };
+            assert!(
+                (expected - 1e-3..expected + more).contains(&pace),
+                "told {speed} {left} {turn}: {pace}, expected {expected}"
+            );
         }
     }
 }
 
 /// Where he is told to go, the velocity that he is to have by now aims beyond the command by half of what he lacks, and by 0.5 m/s at
-/// most; at rest it is none.
+/// most, but never beyond 3 m/s, and below the command if he is faster; at rest it is none.
 #[test]
 fn who_lags_behind_is_urged() {
-    for (speed, expected) in [(2.0, 2.2..2.501), (0.2, 0.2..0.301), (0.0, 0.0..0.001)] {
+    for (speed, expected) in
+        [(2.0, 2.2..2.501), (2.8, 2.6..3.001), (3.0, 2.8..3.001), (0.2, 0.0..0.301), (0.0, 0.0..0.001)]
+    {
         let (mut env, mut step) = made(&[("start", "first")]);
         tell(&mut env, [speed, 0.0, 0.0, 0.0, 0.0]);
-        (0..22).for_each(|_| go(&mut env, &mut step));
+        (0..25).for_each(|_| go(&mut env, &mut step));
         // behind the command, and the sine and cosine of its direction
         let (command, obs) = (part(&env, "command").start, env.spec().obs);
         let up: Vec<usize> = (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect();

@@ -140,7 +140,9 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
         assert_eq!((jump.agents, jump.prompt, jump.thrown, jump.falls), (20, 20, 20, 0));
         let (latency, height) = (jump.latency.unwrap(), jump.height.unwrap());
         assert!((0.2..0.3).contains(&latency), "{latency}");
-        assert_eq!(jump.thrown_latency, jump.latency);
+        // it has to rise fast enough first
+        let thrown = jump.thrown_latency.unwrap();
+        assert!((latency..latency + 0.1).contains(&thrown), "{thrown}");
         let (way, speed) = (0.5 * THRUST * 0.8 * 0.8, THRUST * 0.8);
         assert!((height - (way + speed * speed / 20.0)).abs() < 0.05, "{height}");
     }
