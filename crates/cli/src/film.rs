@@ -212,8 +212,7 @@ impl<'a> Stage<'a> {
             ..Default::default()
         };
         let model = registry::agent(&spec.id)?.model()?;
-        let setting = policies.first().map(|policy| Setting::asked(policy.meta())).unwrap_or_default();
-        let play = Play::of(&setting, &policies.iter().collect::<Vec<_>>(), &options)?;
+        let play = Play::of(&Setting::asked(policies[0].meta()), &policies.iter().collect::<Vec<_>>(), &options)?;
         if cast.ghost.is_some() && play.reference(0)?.is_none() {
             let text =
                 format!("--ghost: {} follows no clip, expected an agent that does, such as MarathonMan", spec.id);

@@ -43,6 +43,11 @@ fn part(env: &VecEnv, name: &str) -> std::ops::Range<usize> {
     env.spec().observations.iter().find(|group| group.name == name).expect("it observes that").range.clone()
 }
 
+/// Where the velocity is that he is to have by now: behind the command, and the sine and cosine of its direction.
+fn target_of(env: &VecEnv) -> usize {
+    part(env, "command").start + 4
+}
+
 #[test]
 fn he_observes_what_the_steered_figure_does_first() {
     let [own, steered] = [ID, "MarathonManSteer-v0"].map(|id| factory(id, Isa::best()).unwrap().spec().clone());
@@ -60,17 +65,14 @@ fn who_creeps_lifts_his_feet() {
         let (mut env, mut step) = made(&[("start", "first")]);
         tell(&mut env, [speed, left, turn, 0.0, 0.0]);
         (0..12).for_each(|_| go(&mut env, &mut step));
-        let (pace, obs) = (part(&env, "gait").start, env.spec().obs);
+        let (pace, target, obs) = (part(&env, "gait").start, target_of(&env), env.spec().obs);
         let up: Vec<usize> = (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect();
         assert!(up.len() > AGENTS / 2, "{up:?}");
         for agent in up {
-            let pace = f64::from(step.obs[agent * obs + pace]);
-            // whoever lags behind is told to go faster than that
-            let more = if [speed, left] == [0.0; 2] { 1e-3 } else { 0.1 };
-            assert!(
-                (expected - 1e-3..expected + more).contains(&pace),
-                "told {speed} {left} {turn}: {pace}, expected {expected}"
-            );
+            let [pace, x, y] = [pace, target, target + 1].map(|i| f64::from(step.obs[agent * obs + i]));
+            // whoever lags behind is to go faster than he is told
+            let expected = expected.max(x.hypot(y));
+            assert!((pace - expected).abs() < 1e-3, "told {speed} {left} {turn}: {pace}, expected {expected}");
         }
     }
 }
@@ -85,12 +87,11 @@ fn who_lags_behind_is_urged() {
         let (mut env, mut step) = made(&[("start", "first")]);
         tell(&mut env, [speed, 0.0, 0.0, 0.0, 0.0]);
         (0..25).for_each(|_| go(&mut env, &mut step));
-        // behind the command, and the sine and cosine of its direction
-        let (command, obs) = (part(&env, "command").start, env.spec().obs);
+        let (target, obs) = (target_of(&env), env.spec().obs);
         let up: Vec<usize> = (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect();
         assert!(up.len() > AGENTS / 2, "{up:?}");
         for agent in up {
-            let [x, y] = [4, 5].map(|i| f64::from(step.obs[agent * obs + command + i]));
+            let [x, y] = [target, target + 1].map(|i| f64::from(step.obs[agent * obs + i]));
             assert!(expected.contains(&x.hypot(y)), "told {speed}: {x} {y}");
         }
     }

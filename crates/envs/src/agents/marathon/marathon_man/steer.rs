@@ -297,19 +297,15 @@ impl Steer {
         let slows = told.lt(hypot(memory[TARGET], memory[TARGET + 1]) - T::lit(SLOWER));
         let most = T::select(slows, slowing, speeding);
         let beside = [-(left * direction[1]), left * direction[0]];
-        let lacks = {
-            let [x, y, _] = s.center_of_mass_velocity();
-            [told.mul_add(direction[0], -x) + beside[0], told.mul_add(direction[1], -y) + beside[1]]
-        };
+        let short_of_told = |i: usize, velocity: T| told.mul_add(direction[i], -velocity) + beside[i];
+        let [x, y, _] = s.center_of_mass_velocity();
+        let lacks = [short_of_told(0, x), short_of_told(1, y)];
         // nobody is urged to go faster than he knows, and whoever stands is left in peace
         let asked = hypot(told, left);
         let most_urged = clamp(T::lit(FASTEST) - asked, 1e-6, URGED);
         let urging = T::masked(T::lit(URGES).lt(asked), T::lit(haste.urging));
         let urging = urging * most_urged.div((hypot(lacks[0], lacks[1]) * urging).max(most_urged));
-        let missing = [0, 1].map(|i| {
-            let missing = told.mul_add(direction[i], -memory[TARGET + i]) + beside[i];
-            lacks[i].mul_add(urging, missing)
-        });
+        let missing = [0, 1].map(|i| lacks[i].mul_add(urging, short_of_told(i, memory[TARGET + i])));
         let share = most.div(hypot(missing[0], missing[1]).max(most));
         for i in 0..2 {
             memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
