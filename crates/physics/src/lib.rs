@@ -6,6 +6,7 @@
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
 //! * [`hint`] finds the name that an error about an unknown one may suggest.
+//! * [`budget`] has the limits of what a file or a message may ask for.
 //!
 //! Each folder imports only from folders above it in this list:
 //!
@@ -29,6 +30,9 @@
 //! | `batch` | any number of agents on any number of threads |
 
 pub mod hint;
+
+pub mod budget;
+
 pub mod lanes;
 
 mod algebra;
