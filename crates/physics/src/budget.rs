@@ -113,6 +113,11 @@ impl From<OverBudget> for io::Error {
 }
 
 impl Limit {
+    /// The default with its unit, such as "2 GB".
+    pub fn default_text(&self) -> String {
+        self.unit.text(self.default as f64)
+    }
+
     /// The most that is allowed: the default, or what [`VARIABLE`] says.
     ///
     /// # Errors
