@@ -2,6 +2,7 @@
 //! stdout does not take for another reason, such as a full disk, is an error.
 
 use crate::error::CliError;
+use marathon_runs::text::{printable, printable_json};
 use serde::Serialize;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::path::Path;
@@ -10,21 +11,26 @@ use std::sync::Mutex;
 /// Why something is missing on stdout, the first time.
 static LOST: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// Prints text for the user, or a command's result, on stdout.
+/// Prints text for the user, or a command's result, on stdout. Texts of files may be among it: they do not reach the terminal
+/// as commands.
 pub fn say(text: impl AsRef<str>) {
+    put(&printable(text.as_ref()));
+}
+
+fn put(text: &str) {
     let mut out = stdout().lock();
-    written(writeln!(out, "{}", text.as_ref()).and_then(|()| out.flush()));
+    written(writeln!(out, "{text}").and_then(|()| out.flush()));
 }
 
 /// Prints what is not a result on stderr: progress, notes, errors.
 pub fn note(text: impl AsRef<str>) {
-    let _ = writeln!(stderr(), "{}", text.as_ref());
+    let _ = writeln!(stderr(), "{}", printable(text.as_ref()));
 }
 
 /// Prints the one JSON object of `--json`.
 pub fn print_json(document: &impl Serialize) {
     match serde_json::to_string_pretty(document) {
-        Ok(json) => say(json),
+        Ok(json) => put(&printable_json(&json)),
         Err(error) => written(Err(error.into())),
     }
 }

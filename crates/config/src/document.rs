@@ -4,15 +4,16 @@
 //! aliases are bounded, so that no file exhausts the stack or the memory.
 
 use super::error::{ConfigError, shown};
+use marathon_physics::budget::CONFIG_FILE;
 use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Most bytes of a file.
-const MOST_BYTES: usize = 1 << 20;
 /// Most values of a file, repetitions by aliases included.
 const MOST_NODES: usize = 100_000;
+/// Most bytes of all texts of a file, repetitions by aliases included.
+const MOST_TEXT: usize = 1 << 24;
 /// Most levels of nesting.
 const MOST_LEVELS: usize = 32;
 
@@ -81,6 +82,14 @@ impl Node {
             Value::Map(map) => map.entries.iter().map(|field| field.node.size()).sum(),
         }
     }
+    /// Bytes of all texts in it.
+    fn text(&self) -> usize {
+        match &self.value {
+            Value::Scalar { text, .. } => text.len(),
+            Value::List(items) => items.iter().map(Node::text).sum(),
+            Value::Map(map) => map.entries.iter().map(|field| field.key.len() + field.node.text()).sum(),
+        }
+    }
     /// Levels below it.
     fn depth(&self) -> usize {
         match &self.value {
@@ -96,16 +105,14 @@ impl Node {
 /// # Errors
 /// If it is not, with line and column.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Map, ConfigError> {
-    if bytes.len() > MOST_BYTES {
-        let problem = format!("found {} bytes, expected a configuration of at most {MOST_BYTES}", bytes.len());
-        return Err(ConfigError::syntax(path, 1, 1, problem));
-    }
+    let asked = CONFIG_FILE.check(bytes.len() as f64);
+    asked.map_err(|error| ConfigError::syntax(path, 1, 1, format!("the file {error}")))?;
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
         ConfigError::syntax(path, line, 1, "found bytes that are no text, expected UTF-8")
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut builder = Builder { path, open: Vec::new(), anchors: BTreeMap::new(), nodes: 0, root: None };
+    let mut builder = Builder { path, open: Vec::new(), anchors: BTreeMap::new(), nodes: 0, repeated: 0, root: None };
     let mut parser = Parser::new_from_str(text);
     while let Some(event) = parser.next_event() {
         let (event, span) = event.map_err(|e| {
@@ -141,6 +148,8 @@ struct Builder<'a> {
     open: Vec<Open>,
     anchors: BTreeMap<usize, Node>,
     nodes: usize,
+    /// Bytes of texts that aliases have repeated.
+    repeated: usize,
     root: Option<Node>,
 }
 
@@ -157,7 +166,13 @@ impl Builder<'_> {
                 (Node { line, value: Value::Scalar { text: text.into_owned(), plain } }, anchor)
             }
             Event::Alias(id) => match self.anchors.get(&id) {
-                Some(node) => (node.clone(), 0),
+                Some(node) => {
+                    self.repeated += node.text();
+                    if self.repeated > MOST_TEXT {
+                        return fail(format!("found aliases that repeat more than {MOST_TEXT} bytes of text, expected a configuration"));
+                    }
+                    (node.clone(), 0)
+                }
                 None => return fail("found a value that contains itself, expected an alias of an earlier one".into()),
             },
             Event::SequenceStart(anchor, _) => return self.begin(line, anchor, Content::List(Vec::new())),

@@ -1,6 +1,10 @@
 //! What can go wrong.
 
+use marathon_physics::budget::OverBudget;
 use std::path::{Path, PathBuf};
+
+/// Most characters of a file's contents in a message.
+const MOST_SHOWN: usize = 300;
 
 /// An error of the trainer; the text says where, what was found and what was expected.
 #[derive(Debug, thiserror::Error)]
@@ -71,6 +75,16 @@ pub enum Error {
         /// What should be there.
         expected: String,
     },
+    /// What a file contains asks for more than a limit allows.
+    #[error("{}: {place} {error}", path.display())]
+    Budget {
+        /// The file.
+        path: PathBuf,
+        /// What asks, in the file.
+        place: String,
+        /// How much, and the limit.
+        error: OverBudget,
+    },
     /// A policy or checkpoint belongs to something else.
     #[error("{what} is for {found}, expected {expected}")]
     Mismatch {
@@ -105,7 +119,19 @@ impl Error {
         move |source| Error::Io { path: path.into(), action, source }
     }
     pub(crate) fn file(path: &Path, place: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
-        let (place, found, expected) = (place.to_string(), found.to_string(), expected.to_string());
-        Error::File { path: path.into(), place, found, expected }
+        let expected = expected.to_string();
+        Error::File { path: path.into(), place: short(place.to_string()), found: short(found.to_string()), expected }
+    }
+    /// A file whose contents ask for too much.
+    pub(crate) fn budget(path: &Path, place: &str, error: OverBudget) -> Self {
+        Error::Budget { path: path.into(), place: place.into(), error }
+    }
+}
+
+/// A text as a message shows it: a file may hold any amount.
+fn short(text: String) -> String {
+    match text.char_indices().nth(MOST_SHOWN) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
     }
 }

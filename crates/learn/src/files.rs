@@ -2,37 +2,104 @@
 //! own checksum.
 
 use crate::error::Error;
+use marathon_physics::budget;
 pub use safetensors::tensor::Dtype;
 use safetensors::tensor::{SafeTensors, TensorView};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::collections::HashMap;
-use std::io::Write;
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Key of the JSON document in a safetensors header.
 const KEY: &str = "marathon";
-/// Key of a description's checksum.
+/// Key of a document's checksum.
 const CHECKSUM: &str = "checksum";
+/// What stands for the checksum of a sealed file while it is computed.
+const BLANK: &str = "0000000000000000";
+/// Memory that a JSON document takes, in its own lengths: `0,` becomes 32 bytes, beside the text and what is made of it.
+const JSON_MEMORY: f64 = 64.0;
+
+/// A file being written: under a temporary name until [`AtomicFile::commit`], so that a reader never sees half of it. Without
+/// that, nothing of it is left and the old file is whole.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    /// None once the file is in its place.
+    temporary: Option<PathBuf>,
+    file: File,
+}
+
+/// Number of the next temporary file of this process.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+impl AtomicFile {
+    /// Starts a file that is to be at `path`.
+    ///
+    /// # Errors
+    /// If a file cannot be made in that folder.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        // a name of its own length: that of the file may be as long as names can be
+        let name = checksum(path.file_name().unwrap_or_default().as_encoded_bytes());
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let temporary = path.with_file_name(format!(".{name}-{number}.{}.tmp", std::process::id()));
+        // never through a link that somebody has put there
+        let new = || File::options().write(true).create_new(true).open(&temporary);
+        let file = new().or_else(|error| match error.kind() {
+            // left by a process with the same number that was killed
+            ErrorKind::AlreadyExists => std::fs::remove_file(&temporary).and_then(|()| new()),
+            _ => Err(error),
+        });
+        let file = file.map_err(Error::io(path, "write"))?;
+        Ok(Self { path: path.into(), temporary: Some(temporary), file })
+    }
+
+    /// Puts the file into its place.
+    ///
+    /// # Errors
+    /// If the disk does not take it.
+    pub fn commit(mut self) -> Result<(), Error> {
+        let Some(temporary) = &self.temporary else { return Ok(()) };
+        let moved = self.file.sync_all().and_then(|()| std::fs::rename(temporary, &self.path));
+        moved.map_err(Error::io(&self.path, "write"))?;
+        self.temporary = None;
+        Ok(())
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if let Some(temporary) = &self.temporary {
+            let _ = std::fs::remove_file(temporary);
+        }
+    }
+}
 
 /// Writes a file under a temporary name and renames it, so that a reader never sees half of it.
 ///
 /// # Errors
 /// If the file cannot be written; the old one is whole then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    // a name of its own length: that of the file may be as long as names can be
-    let name = checksum(path.file_name().unwrap_or_default().as_encoded_bytes());
-    let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-    let write = || {
-        let mut file = std::fs::File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&temporary, path)
-    };
-    write().map_err(|source| {
-        let _ = std::fs::remove_file(&temporary);
-        Error::io(path, "write")(source)
-    })
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes).map_err(Error::io(path, "write"))?;
+    file.commit()
 }
 
 /// Numbers that safetensors can hold.
@@ -82,7 +149,19 @@ impl TensorWriter {
     }
     /// The file's bytes, the document in its header.
     pub fn bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
+        self.with_document(serde_json::to_string(document).expect("documents are plain data"))
+    }
+    /// The same with a checksum of all these bytes at the end of the document.
+    pub fn sealed_bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
         let json = serde_json::to_string(document).expect("documents are plain data");
+        let open = json.strip_suffix('}').expect("a document has keys");
+        let mut bytes = self.with_document(format!("{open},\"{CHECKSUM}\":\"{BLANK}\"}}"));
+        let place = seal_place(&bytes).expect("the document ends with it");
+        let sum = checksum(&bytes);
+        bytes[place..place + sum.len()].copy_from_slice(sum.as_bytes());
+        bytes
+    }
+    fn with_document(&self, json: String) -> Vec<u8> {
         let views = self.tensors.iter().map(|(name, dtype, shape, bytes)| {
             (
                 name.as_str(),
@@ -108,12 +187,31 @@ impl<'a> TensorReader<'a> {
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(bad)?;
         let document = metadata.metadata().as_ref().and_then(|m| m.get(KEY)).cloned();
         let expected = format!("metadata '{KEY}', which Marathon writes");
-        let document = document.ok_or_else(|| Error::file(path, "header", "none", expected))?;
+        let document: String = document.ok_or_else(|| Error::file(path, "header", "none", expected))?;
+        budget::MEMORY.check(JSON_MEMORY * document.len() as f64).map_err(|e| Error::budget(path, "header", e))?;
         Ok(Self { path, tensors: SafeTensors::deserialize(bytes).map_err(bad)?, document })
     }
     /// The JSON document.
     pub fn document<D: DeserializeOwned>(&self, format: &str, version: u32) -> Result<D, Error> {
-        parse(self.path, &self.document, format, version, None)
+        let mut value = json(self.path, &self.document, format)?;
+        // of all bytes: see `seal`
+        value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM));
+        known(self.path, value, format, version, None)
+    }
+    /// The checksum of all `bytes`, those that this was made of; none if the document has none.
+    ///
+    /// # Errors
+    /// If the bytes have changed since it was computed.
+    pub fn seal(&self, bytes: &[u8]) -> Result<Option<String>, Error> {
+        let document: Value = serde_json::from_str(&self.document).unwrap_or_default();
+        let Some(found) = document.get(CHECKSUM) else { return Ok(None) };
+        let place = seal_place(bytes).unwrap_or(bytes.len() - BLANK.len());
+        let (before, rest) = bytes.split_at(place);
+        let sum = checksum_of_parts(&[before, BLANK.as_bytes(), &rest[BLANK.len()..]]);
+        match found == sum.as_str() && rest.starts_with(sum.as_bytes()) {
+            true => Ok(Some(sum)),
+            false => Err(changed(self.path, found, &sum)),
+        }
     }
     /// A tensor of a known shape.
     pub fn get<N: Number>(&self, name: &str, shape: &[usize]) -> Result<Vec<N>, Error> {
@@ -160,17 +258,34 @@ impl<'a> TensorReader<'a> {
 /// Makes a document of an earlier version into one of this version; or says where it is none, and what is found there.
 pub type Upgrade = fn(u64, Value) -> Result<Value, (String, String)>;
 
-/// Parses a JSON document that names its format and version; one of an earlier version, if there is a way to upgrade it.
-fn parse<D: DeserializeOwned>(
+/// Where the digits of a sealed file's checksum are: in the header, behind the last such key of the document, which is a
+/// JSON text in JSON.
+fn seal_place(bytes: &[u8]) -> Option<usize> {
+    let key = format!("\\\"{CHECKSUM}\\\":\\\"");
+    let length = u64::from_le_bytes(*bytes.first_chunk()?);
+    let header = bytes.get(8..usize::try_from(length).ok()?.checked_add(8)?)?;
+    let place = 8 + header.windows(key.len()).rposition(|window| window == key.as_bytes())? + key.len();
+    (place + BLANK.len() <= bytes.len()).then_some(place)
+}
+
+fn changed(path: &Path, found: &Value, sum: &str) -> Error {
+    Error::file(path, CHECKSUM, found, format!("\"{sum}\"; the file has changed since it was written"))
+}
+
+/// Parses a JSON document.
+fn json(path: &Path, text: &str, format: &str) -> Result<Value, Error> {
+    serde_json::from_str(text).map_err(|e| Error::file(path, "JSON", format!("'{e}'"), format!("a {format} document")))
+}
+
+/// What a JSON document says that names its format and version; one of an earlier version, if there is a way to upgrade it.
+fn known<D: DeserializeOwned>(
     path: &Path,
-    json: &str,
+    mut value: Value,
     format: &str,
     version: u32,
     upgrade: Option<Upgrade>,
 ) -> Result<D, Error> {
     let expected = || format!("a {format} document");
-    let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), expected());
-    let mut value: Value = serde_json::from_str(json).map_err(bad)?;
     let (found, number) = (&value["format"], &value["version"]);
     if found != format {
         return Err(Error::file(path, "format", found, format!("\"{format}\"")));
@@ -183,12 +298,7 @@ fn parse<D: DeserializeOwned>(
     if let Some(found) = value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM)) {
         let sum = checksum_of(&value);
         if found != sum.as_str() {
-            return Err(Error::file(
-                path,
-                CHECKSUM,
-                found,
-                format!("\"{sum}\"; the file has changed since it was written"),
-            ));
+            return Err(changed(path, &found, &sum));
         }
     }
     if let (Some(number), Some(upgrade)) = (earlier, upgrade) {
@@ -231,9 +341,8 @@ pub fn read_versions<D: DeserializeOwned>(
     version: u32,
     upgrade: Option<Upgrade>,
 ) -> Result<D, Error> {
-    let json = std::fs::read(path).map_err(Error::io(path, "read"))?;
-    let json = String::from_utf8(json).map_err(|e| Error::file(path, "text", e, "UTF-8"))?;
-    parse(path, &json, format, version, upgrade)
+    let text = budget::read_to_string(path, &budget::CONFIG_FILE).map_err(Error::io(path, "read"))?;
+    known(path, json(path, &text, format)?, format, version, upgrade)
 }
 
 /// Checksum of a document's values, whatever the order of its keys and the spelling of its numbers.
@@ -268,8 +377,14 @@ fn checksum_of(document: &Value) -> String {
     checksum(&bytes)
 }
 
-/// Checksum (FNV-1a) that tells damaged files.
+/// Checksum (FNV-1a) that tells damaged files: another byte at one place is always another checksum.
 pub fn checksum(bytes: &[u8]) -> String {
-    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ *b as u64).wrapping_mul(0x100_0000_01b3));
+    checksum_of_parts(&[bytes])
+}
+
+/// The checksum of bytes in several parts.
+fn checksum_of_parts(parts: &[&[u8]]) -> String {
+    let bytes = parts.iter().copied().flatten();
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ *b as u64).wrapping_mul(0x100_0000_01b3));
     format!("{hash:016x}")
 }

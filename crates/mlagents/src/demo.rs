@@ -95,8 +95,21 @@ impl Demonstration {
         self.total / self.episodes.max(1) as f64
     }
 
-    /// The file.
+    /// The file, if nothing has been [taken](Self::take) yet.
     pub fn bytes(&self) -> Vec<u8> {
+        let mut bytes = self.front();
+        bytes.extend(&self.pairs);
+        bytes
+    }
+
+    /// Takes the bytes of the episodes that were added since the last time. A file that is written as it is played has them
+    /// after [`Demonstration::front`], which is known at the end.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.pairs)
+    }
+
+    /// What a file begins with. It says how many episodes there are, but its length stays the same.
+    pub fn front(&self) -> Vec<u8> {
         let mut meta = DemonstrationMeta {
             api_version: API_VERSION,
             // a word, as Unity's editor makes of it
@@ -113,7 +126,6 @@ impl Demonstration {
         let mut bytes = meta.encode_length_delimited_to_vec();
         bytes.resize(HEAD, 0);
         bytes.extend(behavior.encode_length_delimited_to_vec());
-        bytes.extend(&self.pairs);
         bytes
     }
 }

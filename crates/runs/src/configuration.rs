@@ -4,6 +4,7 @@ use crate::error::RunError;
 use marathon_config::{Loaded, parse, parse_roles};
 use marathon_envs::registry;
 use marathon_learn::RoleConfig;
+use marathon_physics::budget;
 use marathon_physics::hint::{did_you_mean, nearest};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,5 +36,5 @@ pub fn load_roles(path: &Path, task: &str, roles: &[&str]) -> Result<BTreeMap<St
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, RunError> {
-    std::fs::read(path).map_err(RunError::io(path, "read"))
+    budget::read(path, &budget::CONFIG_FILE).map_err(RunError::io(path, "read"))
 }

@@ -1,9 +1,11 @@
 //! Demonstrations that a configuration names.
 
 use crate::error::RunError;
+use crate::inputs;
 use marathon_envs::{Demonstrations, Shard, ShardFactory, Spec};
-use marathon_learn::{RewardConfig, TrainConfig};
+use marathon_learn::TrainConfig;
 use marathon_mlagents::{DemoError, read_demonstrations};
+use marathon_physics::budget;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -36,9 +38,7 @@ pub fn with_demonstrations(
     task: Arc<dyn ShardFactory>,
     config: &TrainConfig,
 ) -> Result<Arc<dyn ShardFactory>, RunError> {
-    let rewards = config.rewards.iter().chain(config.roles.values().flat_map(|role| &role.rewards));
-    let of = |reward: &RewardConfig| reward.kind.imitation().and_then(|imitation| imitation.demonstrations.clone());
-    let mut files: Vec<String> = rewards.filter_map(of).collect();
+    let mut files: Vec<&str> = inputs::demonstrations(config).collect();
     files.dedup();
     let file = match &files[..] {
         [] => return Ok(task),
@@ -50,7 +50,7 @@ pub fn with_demonstrations(
         }
     };
     let path = Path::new(file);
-    let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
+    let bytes = budget::read(path, &budget::DEMONSTRATION_FILE).map_err(RunError::io(path, "read"))?;
     let demonstrations = read_demonstrations(path, &bytes, task.spec())
         .map_err(|DemoError { path, place, found, expected }| RunError::file(&path, place, found, expected))?;
     Ok(Arc::new(Shown { task, demonstrations }))

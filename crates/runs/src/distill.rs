@@ -3,6 +3,8 @@
 //! Each teacher has agents of its own in the student's task. If the task takes a `clip` and a teacher follows one, the
 //! teacher's agents follow that. Teachers may observe less than the student, never more: the named parts of a teacher's
 //! observation are looked up in the student's.
+//!
+//! [`resumable`] notes on its way all that it needs to go on with the same bits.
 
 use crate::error::RunError;
 #[cfg(feature = "clap")]
@@ -11,9 +13,14 @@ use crate::policy_file;
 use crate::setting::{CLIP, Setting, TaskOptions};
 use marathon_envs::options::Value;
 use marathon_envs::{Step, VecEnv, VecEnvOptions, registry};
-use marathon_learn::{Activation, BlockPolicy, Control, Distiller, Lessons, Policy, PolicyMeta};
+use marathon_learn::{
+    Activation, BlockPolicy, Control, Distiller, Halfway, Lessons, Policy, PolicyMeta, can_be_had, checksum,
+};
+use marathon_physics::budget::AGENTS_MEMORY;
 use marathon_physics::lanes::Isa;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Decisions of each agent between two rounds of learning.
 const HORIZON: usize = 32;
@@ -27,6 +34,10 @@ const KEPT: usize = 16;
 const ROWS: usize = 2048;
 /// How often a row is learned from, on average.
 const PASSES: usize = 4;
+/// Time between two notes of how far it is.
+const NOTED: Duration = Duration::from_secs(60);
+/// What environments and the rest take for every byte of the lessons, at the most seen.
+const REST: f64 = 1.0;
 
 /// How to learn from others.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +91,54 @@ pub struct Distilled {
     pub failures: f64,
 }
 
+impl DistillOptions {
+    /// Refuses options with which nothing can be learned.
+    ///
+    /// # Errors
+    /// Names the option, its value and what was expected.
+    pub fn validate(&self) -> Result<(), RunError> {
+        let wrong = |name, found: String, expected: &str| {
+            Err(RunError::option(name, format!("is {found}, expected {expected}")))
+        };
+        let lr = self.lr as f32;
+        if !(lr.is_finite() && lr > 0.0) {
+            return wrong("lr", self.lr.to_string(), "a positive number, such as 0.001");
+        }
+        if self.agents == 0 {
+            return wrong("agents", "0".into(), "at least 1");
+        }
+        if self.steps == 0 {
+            return wrong("steps", "0".into(), "at least 1");
+        }
+        if self.hidden.is_empty() || self.hidden.contains(&0) {
+            return wrong("hidden", format!("{:?}", self.hidden), "positive widths, such as 256,256");
+        }
+        Ok(())
+    }
+
+    /// Refuses what does not fit into memory.
+    fn check_memory(&self, teachers: usize, meta: &PolicyMeta) -> Result<(), RunError> {
+        let refused = |name, problem: String| Err(RunError::option(name, problem));
+        let student = Distiller::memory(meta);
+        let rows = (KEPT * HORIZON) as f64 * teachers as f64 * self.agents as f64;
+        let lessons = (1.0 + REST) * Lessons::memory(rows, meta.obs, meta.act);
+        for (name, bytes) in [("hidden", student), ("agents", lessons)] {
+            if let Err(error) = AGENTS_MEMORY.check(bytes) {
+                return refused(name, error.to_string());
+            }
+        }
+        match can_be_had((student + lessons) as u64) {
+            true => Ok(()),
+            false => {
+                let (gigabytes, less) = ((student + lessons) / 1e9, "narrower layers or fewer teachers need less");
+                let (n, hidden) = (self.agents, &self.hidden);
+                let what = format!("is {n} and the hidden layers {hidden:?}: that needs about {gigabytes:.1} GB of");
+                refused("agents", format!("{what} memory, more than can be had; fewer agents, {less}"))
+            }
+        }
+    }
+}
+
 /// A teacher with its agents.
 struct Class {
     env: VecEnv,
@@ -92,59 +151,49 @@ struct Class {
 /// Learns from the policies in files; returns the student's. `watch` is told of each round and may end it all.
 ///
 /// # Errors
-/// If there is no teacher, a file is no policy, a teacher observes what the student does not, decides otherwise, or the task
-/// cannot be made.
+/// If there is no teacher, an option makes no sense, a file is no policy, a teacher observes what the student does not, decides
+/// otherwise, or the task cannot be made; or if the learning rate is so large that numbers do not stay finite.
 pub fn distill(
     task: Setting,
     teachers: &[PathBuf],
     options: &DistillOptions,
     watch: &mut dyn FnMut(&Distilled) -> Control,
 ) -> Result<Policy, RunError> {
-    let teachers: Vec<(PathBuf, Policy)> = teachers
-        .iter()
-        .map(|path| Ok((path.clone(), policy_file::read(path, None)?)))
-        .collect::<Result<_, RunError>>()?;
-    if teachers.is_empty() {
-        return Err(RunError::option("teacher", "is not given, expected at least one policy"));
-    }
-    let mut lessons_of = Vec::new();
-    for (_, teacher) in &teachers {
-        lessons_of.push(clips_of(&task, teacher)?);
-    }
-    // what the student is for: all that its teachers do
-    let mut all: Vec<&str> = Vec::new();
-    for clip in lessons_of.iter().flatten().flat_map(|clips| clips.split(',')) {
-        // a teacher may be named twice, so that it counts for more
-        if !all.contains(&clip) {
-            all.push(clip);
+    resumable(task, teachers, options, None, watch)
+}
+
+/// The same with a file, `notes`, that tells how far it is: written every minute and when `watch` ends it. If the file is there,
+/// it goes on from there, with the bits of one that was never interrupted. Whoever has saved the policy removes the file.
+///
+/// # Errors
+/// The same, and if the file cannot be written, is damaged, or is of another distillation.
+pub fn resumable(
+    task: Setting,
+    teachers: &[PathBuf],
+    options: &DistillOptions,
+    notes: Option<&Path>,
+    watch: &mut dyn FnMut(&Distilled) -> Control,
+) -> Result<Policy, RunError> {
+    options.validate()?;
+    let mut school = School::open(task, teachers, options)?;
+    let School { classes, student, lessons, about } = &mut school;
+    let round = (classes.len() * options.agents * HORIZON) as u64;
+    let total = options.steps.max(round);
+    let mut first = 0;
+    if let Some(path) = notes.filter(|path| path.exists()) {
+        let halfway = student.resume(path, about, lessons)?;
+        first = halfway.rounds;
+        for (i, class) in classes.iter_mut().enumerate() {
+            let saved = halfway.classes.get(i).filter(|(_, obs)| obs.len() == class.step.obs.len());
+            let Some((snapshot, obs)) = saved else {
+                return Err(RunError::file(path, "classes", halfway.classes.len(), "one for each teacher"));
+            };
+            class.env.load(snapshot)?;
+            class.step.obs.copy_from_slice(obs);
         }
     }
-    let whole = if all.is_empty() { task.clone() } else { follow(&task, &all.join(","))? };
-    let spec = whole.factory()?.spec().clone();
-    let mut classes = Vec::new();
-    for (i, ((path, teacher), clips)) in teachers.into_iter().zip(&lessons_of).enumerate() {
-        let own = clips.as_ref().map_or(Ok(task.clone()), |clips| follow(&task, clips))?;
-        let seed = options.seed.wrapping_add(1_000_003 * (1 + i as u64));
-        let make = VecEnvOptions { agents: options.agents, threads: options.threads, seed, ..Default::default() };
-        let mut env = own.vec_env(&make)?;
-        let sees = policy_file::seen_by(&teacher, &path, &spec)?;
-        let mut step = env.buffers();
-        env.reset(None, &mut step.obs)?;
-        classes.push(Class { env, step, teacher, sees });
-    }
-
-    let mut meta = PolicyMeta::of(&spec, options.hidden.clone(), Activation::Tanh);
-    (meta.options, meta.clips) = (spec.options.clone(), whole.clips.clone());
-    let log_std = (0..spec.act).map(|i| mean(classes.iter().map(|class| class.teacher.log_std()[i]))).collect();
-    let mut student = Distiller::new(meta, log_std, options.seed, Isa::best())?;
-    if let Some(path) = &options.initialize_from {
-        let known = policy_file::read(path, None)?;
-        student.start_from(&known, &policy_file::seen_by(&known, path, &spec)?)?;
-    }
-    let round = (classes.len() * options.agents * HORIZON) as u64;
-    let mut lessons = Lessons::new(KEPT * round as usize, spec.obs, spec.act);
-    let total = options.steps.max(round);
-    for number in 0.. {
+    let mut noted = Instant::now();
+    for number in first.. {
         let done = number * round;
         if done >= total {
             break;
@@ -153,9 +202,9 @@ pub fn distill(
         let led = if number < SHOWN { 1.0 } else { (1.0 - progress / ALONE).max(0.0) };
         let policy = student.policy();
         let (mut failed, mut decided) = (0, 0);
-        for class in &mut classes {
+        for class in classes.iter_mut() {
             let leads = (led * options.agents as f64).ceil() as usize;
-            let [bad, all] = class.play(&policy, leads, &mut student, &mut lessons)?;
+            let [bad, all] = class.play(&policy, leads, student, lessons)?;
             (failed, decided) = (failed + bad, decided + all);
         }
         let mut loss = 0.0;
@@ -165,15 +214,109 @@ pub fn distill(
             let updates = (PASSES * round as usize).div_ceil(ROWS);
             let lr = options.lr * (1.0 - progress);
             for _ in 0..updates {
-                loss += student.learn(&lessons, ROWS, lr) / updates as f64;
+                loss += student.learn(lessons, ROWS, lr) / updates as f64;
+            }
+            if !loss.is_finite() || student.lost() > 0 {
+                let found = format!("is {}, with which numbers do not stay finite", options.lr);
+                return Err(RunError::option("lr", format!("{found}; expected a smaller one, such as 0.001")));
             }
         }
         let failures = failed as f64 / (decided as f64).max(1.0);
-        if watch(&Distilled { steps: done + round, loss, failures }) == Control::Stop {
+        let stop = watch(&Distilled { steps: done + round, loss, failures }) == Control::Stop;
+        if let Some(path) = notes.filter(|_| stop || noted.elapsed() >= NOTED) {
+            let of_class = |class: &Class| (class.env.save(), class.step.obs.clone());
+            let classes = classes.iter().map(of_class).collect();
+            student.save(path, &Halfway { rounds: number + 1, about: about.clone(), classes }, lessons)?;
+            noted = Instant::now();
+        }
+        if stop {
             break;
         }
     }
     Ok(student.policy())
+}
+
+/// Teachers and student at the start.
+struct School {
+    classes: Vec<Class>,
+    student: Distiller,
+    lessons: Lessons,
+    /// All that the result depends on, by names.
+    about: BTreeMap<String, String>,
+}
+
+impl School {
+    fn open(task: Setting, paths: &[PathBuf], options: &DistillOptions) -> Result<Self, RunError> {
+        let teachers: Vec<(&PathBuf, Policy)> =
+            paths.iter().map(|path| Ok((path, policy_file::read(path, None)?))).collect::<Result<_, RunError>>()?;
+        if teachers.is_empty() {
+            return Err(RunError::option("teacher", "is not given, expected at least one policy"));
+        }
+        let mut lessons_of = Vec::new();
+        for (_, teacher) in &teachers {
+            lessons_of.push(clips_of(&task, teacher)?);
+        }
+        // what the student is for: all that its teachers do
+        let mut all: Vec<&str> = Vec::new();
+        for clip in lessons_of.iter().flatten().flat_map(|clips| clips.split(',')) {
+            // a teacher may be named twice, so that it counts for more
+            if !all.contains(&clip) {
+                all.push(clip);
+            }
+        }
+        let whole = if all.is_empty() { task.clone() } else { follow(&task, &all.join(","))? };
+        let spec = whole.factory()?.spec().clone();
+        let mut meta = PolicyMeta::of(&spec, options.hidden.clone(), Activation::Tanh);
+        (meta.options, meta.clips) = (spec.options.clone(), whole.clips.clone());
+        options.check_memory(teachers.len(), &meta)?;
+        let known = options.initialize_from.as_ref().map(|path| policy_file::read(path, None)).transpose()?;
+        let about = about(&whole, &teachers, known.as_ref(), options);
+
+        let mut classes = Vec::new();
+        for (i, ((path, teacher), clips)) in teachers.into_iter().zip(&lessons_of).enumerate() {
+            let own = clips.as_ref().map_or(Ok(task.clone()), |clips| follow(&task, clips))?;
+            let seed = options.seed.wrapping_add(1_000_003 * (1 + i as u64));
+            let make = VecEnvOptions { agents: options.agents, threads: options.threads, seed, ..Default::default() };
+            let mut env = own.vec_env(&make)?;
+            let sees = policy_file::seen_by(&teacher, path, &spec)?;
+            let mut step = env.buffers();
+            env.reset(None, &mut step.obs)?;
+            classes.push(Class { env, step, teacher, sees });
+        }
+        let log_std = (0..spec.act).map(|i| mean(classes.iter().map(|class| class.teacher.log_std()[i]))).collect();
+        let hidden = |error: marathon_learn::Error| RunError::option("hidden", format!("asks for a {error}"));
+        let mut student = Distiller::new(meta, log_std, options.seed, Isa::best()).map_err(hidden)?;
+        if let Some((known, path)) = known.zip(options.initialize_from.as_ref()) {
+            student.start_from(&known, &policy_file::seen_by(&known, path, &spec)?)?;
+        }
+        let rows = KEPT * classes.len() * options.agents * HORIZON;
+        Ok(School { classes, student, lessons: Lessons::new(rows, spec.obs, spec.act), about })
+    }
+}
+
+/// All that the result of a distillation depends on, by names.
+fn about(
+    task: &Setting,
+    teachers: &[(&PathBuf, Policy)],
+    known: Option<&Policy>,
+    options: &DistillOptions,
+) -> BTreeMap<String, String> {
+    let sum = |policy: &Policy| checksum(&policy.to_bytes());
+    let DistillOptions { hidden, steps, agents, lr, seed, .. } = options;
+    let mut about: BTreeMap<String, String> = [
+        ("task", checksum(serde_json::to_string(task).unwrap_or_default().as_bytes())),
+        ("initialize_from", known.map(sum).unwrap_or_default()),
+        ("hidden", format!("{hidden:?}")),
+        ("steps", steps.to_string()),
+        ("agents", agents.to_string()),
+        ("lr", lr.to_string()),
+        ("seed", seed.to_string()),
+        ("teachers", teachers.len().to_string()),
+    ]
+    .map(|(name, value)| (name.to_string(), value))
+    .into();
+    about.extend(teachers.iter().enumerate().map(|(i, (_, teacher))| (format!("teacher {}", i + 1), sum(teacher))));
+    about
 }
 
 impl Class {

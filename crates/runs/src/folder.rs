@@ -2,19 +2,21 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
+use crate::inputs::Inputs;
 use crate::setting::Setting;
 use crate::text;
 use marathon_config::Loaded;
 use marathon_envs::Options;
 use marathon_learn::policy::options;
 use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_versions, write_atomic, write_description};
+use marathon_physics::budget;
 use marathon_physics::hint::did_you_mean;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
@@ -23,6 +25,8 @@ const VERSION: u32 = 2;
 const RUN: &str = "run.json";
 const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";
+/// Folder of the checkpoint.
+const CHECKPOINT: &str = "checkpoint";
 /// Folder of the policies on the way.
 pub const POLICIES: &str = "policies";
 /// Where runs go unless the user says otherwise.
@@ -46,9 +50,15 @@ pub struct RunFile {
     /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clips: BTreeMap<String, String>,
+    /// Files elsewhere that the run depends on, with their checksums.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub files: Inputs,
     /// Policy that the run starts from, if not from random weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initialize_from: Option<PathBuf>,
+    /// Its checksum. Nothing depends on it any more once there is a checkpoint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initialize_from_checksum: Option<String>,
     /// Steps between progress lines where there is no terminal.
     pub summary_freq: u64,
     /// Steps between checkpoints.
@@ -68,7 +78,9 @@ impl RunFile {
             agent: task.agent.clone(),
             options: task.options.clone(),
             clips: task.clips.iter().map(|(name, text)| (name.clone(), checksum(text.as_bytes()))).collect(),
+            files: Inputs::new(),
             initialize_from: None,
+            initialize_from_checksum: None,
             summary_freq: loaded.summary_freq,
             checkpoint_interval: loaded.checkpoint_interval,
             keep_checkpoints: loaded.keep_checkpoints,
@@ -108,11 +120,15 @@ impl RunFile {
     }
 }
 
-/// The first place where two runs differ, and what is there in each; but for threads, which change no result.
+/// The first place where two runs differ, and what is there in each; but for threads and the places of files elsewhere, which
+/// change no result.
 pub fn difference_of_runs(found: &RunFile, expected: &RunFile) -> Option<(String, Value, Value)> {
     let keys = |run: &RunFile| {
         let mut run = run.clone();
         run.config.run.threads = 1;
+        let name = |path: &PathBuf| path.file_name().map(PathBuf::from);
+        run.initialize_from = run.initialize_from.as_ref().and_then(name);
+        run.files = run.files.into_iter().filter_map(|(path, sum)| Some((name(&path)?, sum))).collect();
         serde_json::to_value(run).unwrap_or_default()
     };
     let (found, expected) = (keys(found), keys(expected));
@@ -169,6 +185,7 @@ impl RunFolder {
         let folder = Self { made: Some(made), ..Self::lock(path)? };
         // another process may have been here in between
         refuse(&folder.path)?;
+        refuse_links(&folder.path)?;
         folder.clear();
         Ok(folder)
     }
@@ -176,22 +193,33 @@ impl RunFolder {
     /// Opens the folder of a run to go on with it.
     ///
     /// # Errors
-    /// If it holds no run, or another process is writing to it.
+    /// If it holds no run or links to other places, or another process is writing to it.
     pub fn open(path: &Path) -> Result<(Self, RunFile), RunError> {
         let file = path.join(RUN);
         if !file.is_file() {
             let found = if path.is_dir() { "no run.json" } else { "no such folder" };
             return Err(RunError::NoRun { folder: path.into(), found, nearest: nearest_run(path) });
         }
+        refuse_links(path)?;
         let folder = Self::lock(path.into())?;
         let run = RunFile::read(&file)?;
+        folder.place_clips(&run)?;
         folder.remove_leftovers();
         Ok((folder, run))
     }
 
     fn lock(path: PathBuf) -> Result<Self, RunError> {
         let name = path.join(LOCK);
-        let lock = File::create(&name).map_err(RunError::io(&path, "write to folder"))?;
+        refuse_link(&name)?;
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::OpenOptionsExt;
+            // a link put there a moment ago, or a pipe that nobody reads
+            options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
+        }
+        let lock = options.open(&name).map_err(RunError::io(&path, "write to folder"))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 Err(RunError::file(&path, "run", "another process that is writing to it", "no other"))
@@ -262,7 +290,7 @@ impl RunFolder {
     }
     /// The folder of the checkpoint.
     pub fn checkpoint(&self) -> PathBuf {
-        self.path.join("checkpoint")
+        self.path.join(CHECKPOINT)
     }
     /// Numbers of all iterations.
     pub fn progress(&self) -> PathBuf {
@@ -298,6 +326,27 @@ impl RunFolder {
         Ok(files)
     }
 
+    /// Writes what a new run is: `run.json`, and the clips that do not come with Marathon. Killed on the way, it has left a run
+    /// that goes on, or nothing that stands in the way of the same command.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn begin(&self, run: &RunFile, clips: &Clips) -> Result<(), RunError> {
+        for (i, (name, text)) in clips.iter().enumerate() {
+            // under temporary names until `run.json` says what they are
+            let path = self.path.join(format!(".clip-{i}.{}.tmp", std::process::id()));
+            let _ = fs::remove_file(&path);
+            let write = || {
+                let mut file = File::options().write(true).create_new(true).open(&path)?;
+                file.write_all(text.as_bytes())?;
+                file.sync_all()
+            };
+            write().map_err(RunError::io(&self.path.join(name), "write"))?;
+        }
+        self.write_run(run)?;
+        self.place_clips(run)
+    }
+
     /// Writes `run.json`.
     ///
     /// # Errors
@@ -306,13 +355,19 @@ impl RunFolder {
         Ok(write_description(&self.path.join(RUN), run)?)
     }
 
-    /// Writes the clips that do not come with Marathon.
-    ///
-    /// # Errors
-    /// If that fails.
-    pub fn write_clips(&self, clips: &Clips) -> Result<(), RunError> {
-        for (name, text) in clips {
-            write_atomic(&self.path.join(name), text.as_bytes())?;
+    /// Gives the clips of a run that lie under temporary names their own.
+    fn place_clips(&self, run: &RunFile) -> Result<(), RunError> {
+        let missing = run.clips.iter().filter(|(name, _)| !self.path.join(name).exists());
+        for (name, sum) in missing {
+            let staged = fs::read_dir(&self.path).into_iter().flatten().flatten();
+            let staged = staged.filter(|entry| is_leftover(&entry.file_name())).map(|entry| entry.path());
+            let is_it = |path: &PathBuf| {
+                budget::read(path, &budget::CLIP_FILE).is_ok_and(|bytes| checksum(&bytes) == *sum)
+            };
+            if let Some(path) = staged.into_iter().find(is_it) {
+                let place = self.path.join(name);
+                fs::rename(path, &place).map_err(RunError::io(&place, "write"))?;
+            }
         }
         Ok(())
     }
@@ -325,7 +380,7 @@ impl RunFolder {
         let mut setting = Setting { agent: run.agent.clone(), options: run.options.clone(), clips: Clips::new() };
         for (name, sum) in &run.clips {
             let path = self.path.join(name);
-            let text = fs::read_to_string(&path).map_err(RunError::io(&path, "read"))?;
+            let text = budget::read_to_string(&path, &budget::CLIP_FILE).map_err(RunError::io(&path, "read"))?;
             let found = checksum(text.as_bytes());
             if found != *sum {
                 return Err(RunError::file(
@@ -374,7 +429,49 @@ fn refuse(out: &Path) -> Result<(), RunError> {
     Err(RunError::option("out", problem))
 }
 
-/// Whether a folder has nothing to lose: it is not there, or empty, or holds a run that has not made an iteration.
+/// Whether the program writes an entry of this name into a run's folder, and whether that is a folder.
+fn kind_of_entry(name: &OsStr) -> Option<bool> {
+    let name = name.to_str()?;
+    let files = [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png"];
+    let numbered = name.starts_with("policy-") || name.starts_with(EVENTS) || name.ends_with(".motion");
+    match name {
+        CHECKPOINT | POLICIES => Some(true),
+        _ if files.contains(&name) || numbered || is_leftover(name.as_ref()) => Some(false),
+        _ => None,
+    }
+}
+
+/// Refuses links among the entries of a run's folder that the program writes: somebody else may have made the folder, and what
+/// is written would end up elsewhere.
+fn refuse_links(folder: &Path) -> Result<(), RunError> {
+    for entry in fs::read_dir(folder).map_err(RunError::io(folder, "read folder"))? {
+        let entry = entry.map_err(RunError::io(folder, "read folder"))?;
+        refuse_link(&entry.path())?;
+    }
+    Ok(())
+}
+
+/// Refuses an entry of a run's folder that is not the file or folder that it should be.
+fn refuse_link(path: &Path) -> Result<(), RunError> {
+    let Some(is_folder) = path.file_name().and_then(kind_of_entry) else { return Ok(()) };
+    let kind = match fs::symlink_metadata(path) {
+        Ok(facts) => facts.file_type(),
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(RunError::io(path, "read")(e)),
+    };
+    let found = match (kind.is_symlink(), kind.is_dir(), kind.is_file()) {
+        (_, folder, file) if folder == is_folder && file != is_folder => return Ok(()),
+        (true, ..) => "a link",
+        (_, true, _) => "a folder",
+        (_, _, true) => "a file",
+        _ => "a device, pipe or socket",
+    };
+    let expected = if is_folder { "a folder of the run's own" } else { "a file of the run's own" };
+    Err(RunError::file(path, "kind", found, expected))
+}
+
+/// Whether a folder has nothing to lose: it is not there, or empty, or holds a run that has not made an iteration, or what a
+/// start has left that was killed.
 fn is_blank(folder: &Path) -> bool {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
@@ -386,11 +483,11 @@ fn is_blank(folder: &Path) -> bool {
         names.push(entry.file_name());
     }
     names.retain(|name| name != LOCK);
-    if names.is_empty() {
+    if names.iter().all(|name| is_leftover(name)) {
         return true;
     }
     let rows = || {
-        let text = fs::read_to_string(folder.join(PROGRESS));
+        let text = budget::read_to_string(&folder.join(PROGRESS), &budget::TABLE_FILE);
         text.map_or_else(|e| usize::from(e.kind() != ErrorKind::NotFound), |text| text.lines().skip(1).count())
     };
     let run = RunFile::read(&folder.join(RUN));
@@ -402,10 +499,12 @@ fn is_blank(folder: &Path) -> bool {
     names.iter().all(ours) && run.is_ok() && rows() == 0
 }
 
-/// Whether a file has a temporary name.
+/// Whether a file has a temporary name: `.<name>.<number of a process>.tmp`.
 fn is_leftover(name: &OsStr) -> bool {
     let name = name.as_encoded_bytes();
-    name.starts_with(b".") && name.ends_with(b".tmp")
+    let inner = name.strip_prefix(b".").and_then(|name| name.strip_suffix(b".tmp"));
+    let number = inner.and_then(|inner| inner.rsplit(|byte| *byte == b'.').next().filter(|n| n.len() < inner.len()));
+    number.is_some_and(|number| !number.is_empty() && number.iter().all(u8::is_ascii_digit))
 }
 
 /// Claims the first free `runs/<agent>-<n>`; also the folders that were made for it.

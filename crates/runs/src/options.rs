@@ -6,6 +6,7 @@ use crate::policy_file;
 use crate::setting::TaskOptions;
 use marathon_envs::ShardFactory;
 use marathon_learn::{Algorithm, Policy};
+use marathon_physics::budget::FILM_SECONDS;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -151,8 +152,6 @@ pub struct FilmOptions {
 }
 
 impl FilmOptions {
-    /// Longest film, and most that may pass before it, seconds.
-    pub const MOST_SECONDS: f64 = 3600.0;
     /// Most frames per second.
     pub const MOST_FPS: f64 = 1000.0;
 
@@ -161,21 +160,19 @@ impl FilmOptions {
     /// # Errors
     /// Names the option, its value and what was expected.
     pub fn validate(&self) -> Result<(), RunError> {
-        let above_zero = |name, value: Option<f64>, most: f64| match value {
-            Some(x) if !(x > 0.0 && x <= most) => {
-                Err(RunError::option(name, format!("is {x}, expected a number above 0 and up to {most}")))
+        let wrong = |name, x: f64, expected: &str| Err(RunError::option(name, format!("is {x}, expected {expected}")));
+        match (self.seconds, self.fps) {
+            (Some(x), _) if x.is_nan() || x <= 0.0 => return wrong("seconds", x, "a number above 0"),
+            (_, Some(x)) if !(x > 0.0 && x <= Self::MOST_FPS) => {
+                return wrong("fps", x, &format!("a number above 0 and up to {}", Self::MOST_FPS));
             }
-            _ => Ok(()),
-        };
-        above_zero("seconds", self.seconds, Self::MOST_SECONDS)?;
-        above_zero("fps", self.fps, Self::MOST_FPS)?;
-        match (0.0..=Self::MOST_SECONDS).contains(&self.start) {
-            true => Ok(()),
-            false => {
-                let problem = format!("is {}, expected a number from 0 to {}", self.start, Self::MOST_SECONDS);
-                Err(RunError::option("start", problem))
-            }
+            _ if self.start.is_nan() || self.start < 0.0 => return wrong("start", self.start, "0 or more"),
+            _ => {}
         }
+        for (name, seconds) in [("seconds", self.seconds.unwrap_or(0.0)), ("start", self.start)] {
+            FILM_SECONDS.check(seconds).map_err(|error| RunError::option(name, error.to_string()))?;
+        }
+        Ok(())
     }
 }
 

@@ -5,7 +5,8 @@ use crate::folder::{policy_of_role, policy_path};
 use crate::setting::{Setting, TaskOptions};
 use crate::text;
 use marathon_envs::{ShardFactory, Spec};
-use marathon_learn::{Policy, PolicyMeta, write_atomic};
+use marathon_learn::{Error, Policy, PolicyMeta, write_atomic};
+use marathon_physics::budget;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,9 +21,29 @@ pub fn load(
     agent: Option<&str>,
     options: &TaskOptions,
 ) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
-    let setting = setting(given, agent, options)?;
+    load_with(given, agent, options, Policy::load)
+}
+
+/// The same for a file that may lack a checksum.
+///
+/// # Errors
+/// The same.
+pub fn load_unsealed(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<Policy, RunError> {
+    Ok(load_with(given, agent, options, Policy::load_unsealed)?.0)
+}
+
+/// How a file of Marathon's own is read.
+type Load = fn(&Path) -> Result<Policy, Error>;
+
+fn load_with(
+    given: &Path,
+    agent: Option<&str>,
+    options: &TaskOptions,
+    load: Load,
+) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
+    let setting = setting(given, agent, options, load)?;
     let factory = setting.factory()?;
-    let mut policy = read(given, Some(factory.spec()))?;
+    let mut policy = read_with(given, Some(factory.spec()), load)?;
     policy.set_task(factory.spec().options.clone(), setting.clips);
     Ok((policy, factory))
 }
@@ -37,7 +58,7 @@ pub fn load_all(
     agent: Option<&str>,
     options: &TaskOptions,
 ) -> Result<(Vec<Policy>, Arc<dyn ShardFactory>), RunError> {
-    let setting = setting(given, agent, options)?;
+    let setting = setting(given, agent, options, Policy::load)?;
     let factory = setting.factory()?;
     let (path, spec) = (policy_path(given)?, factory.spec());
     let mut policies = Vec::new();
@@ -55,14 +76,14 @@ pub fn load_all(
 }
 
 /// The task that a policy is to play in.
-fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<Setting, RunError> {
-    let noted = task_of(given)?;
+fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load) -> Result<Setting, RunError> {
+    let noted = task_with(given, load)?;
     let setting = match (agent.map(Setting::named).transpose()?, noted) {
         (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
         (Some(asked), _) => asked,
         (None, Some(noted)) => noted,
         // the message says what is missing
-        (None, None) => Setting::named(&read(given, None)?.meta().agent)?,
+        (None, None) => Setting::named(&read_with(given, None, load)?.meta().agent)?,
     };
     setting.with(options)
 }
@@ -72,13 +93,13 @@ fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<S
 /// # Errors
 /// If there is no such file, or it is no policy.
 pub fn task_of(given: &Path) -> Result<Option<Setting>, RunError> {
+    task_with(given, Policy::load)
+}
+
+fn task_with(given: &Path, load: Load) -> Result<Option<Setting>, RunError> {
     let path = policy_path(given)?;
-    let noted: Option<PolicyMeta> = if is_onnx(&path) {
-        let bytes = std::fs::read(&path).map_err(RunError::io(&path, "read"))?;
-        Policy::meta_of_onnx(&bytes)
-    } else {
-        Some(Policy::load(&path)?.meta().clone())
-    };
+    let noted: Option<PolicyMeta> =
+        if is_onnx(&path) { Policy::meta_of_onnx(&bytes(&path)?) } else { Some(load(&path)?.meta().clone()) };
     Ok(noted.map(|meta| Setting::of(&meta)))
 }
 
@@ -87,15 +108,23 @@ pub fn task_of(given: &Path) -> Result<Option<Setting>, RunError> {
 /// # Errors
 /// If there is no such file, it is no policy, or it is for another agent.
 pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, RunError> {
+    read_with(given, spec, Policy::load)
+}
+
+fn read_with(given: &Path, spec: Option<&Spec>, load: Load) -> Result<Policy, RunError> {
     let path = policy_path(given)?;
     if is_onnx(&path) {
-        let bytes = std::fs::read(&path).map_err(RunError::io(&path, "read"))?;
-        return Ok(Policy::from_onnx(&path, &bytes, spec)?);
+        return Ok(Policy::from_onnx(&path, &bytes(&path)?, spec)?);
     }
-    Ok(match spec {
-        Some(spec) => Policy::load_for(&path, spec)?,
-        None => Policy::load(&path)?,
-    })
+    let policy = load(&path)?;
+    if let Some(spec) = spec {
+        policy.check(spec).map_err(|error| error.of_file(&path))?;
+    }
+    Ok(policy)
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, RunError> {
+    budget::read(path, &budget::POLICY_FILE).map_err(RunError::io(path, "read"))
 }
 
 /// Where the numbers that a policy observes are in the observation of another task, which may have more; parts are looked up
@@ -136,6 +165,9 @@ pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, 
     }
     Ok(sees)
 }
+
+/// Endings of the files that [`save`] writes.
+pub const ENDINGS: [&str; 2] = ["safetensors", "onnx"];
 
 /// Writes a policy in the format that the file's name ends with.
 ///

@@ -5,6 +5,7 @@ use crate::demonstrations::with_demonstrations;
 use crate::error::RunError;
 use crate::folder::{RunFile, RunFolder, write_json};
 use crate::imitation;
+use crate::inputs;
 use crate::options::RunOptions;
 use crate::policy_file;
 use crate::processes::Processes;
@@ -20,6 +21,7 @@ use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput,
     evaluate_roles, initialized, train_with,
 };
+use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use std::path::Path;
 use std::sync::Arc;
@@ -68,7 +70,7 @@ fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkp
 impl Session {
     /// A new run, or the run in the folder that `resume` names, from its last checkpoint. A new run has the configuration
     /// `loaded`, or the one of the options' file, or the agent's own fast one, and a folder of its own unless `dry`. A run that
-    /// goes on knows its task; only one that a front end has made is to be given again. Returns what the user should know of
+    /// goes on knows its task and its arguments; only one that a front end has made is to be given again. Returns what the user should know of
     /// the configuration, too.
     ///
     /// # Errors
@@ -122,16 +124,19 @@ impl Session {
             let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
             loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
         }
+        inputs::name_wholly(&mut loaded.config);
         let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let mut run = RunFile::new(&setting, &loaded);
-        run.initialize_from.clone_from(&options.initialize_from);
+        run.files = inputs::of(&setting, &run.config)?;
+        run.initialize_from = options.initialize_from.as_deref().map(inputs::whole);
+        run.initialize_from_checksum = run.initialize_from.as_deref().map(inputs::of_start).transpose()?;
         let checkpoint = start_from(&run, &*factory)?;
         let mut folder = None;
         if !dry {
             let made = RunFolder::create(options.out.as_deref(), &agent)?;
-            if let Err(error) = made.write_run(&run).and_then(|()| made.write_clips(&setting.clips)) {
+            if let Err(error) = made.begin(&run, &setting.clips) {
                 made.discard();
                 return Err(error);
             }
@@ -147,12 +152,16 @@ impl Session {
             Some(task) if task.id() != run.agent => {
                 return Err(RunError::file(path, "agent", &run.agent, task.id()));
             }
-            Some(task) => task,
-            None => Task::set(folder.setting(&run)?),
+            Some(task) if task.is_made() => task,
+            _ => Task::set(folder.setting(&run)?),
         };
+        inputs::check(&run.files)?;
         Processes::check(&run.config, options.processes)?;
         // a run that ended before its first checkpoint begins again, which gives the same bits
         let checkpoint = folder.last_checkpoint(&run)?;
+        if let (None, Some(policy), Some(sum)) = (&checkpoint, &run.initialize_from, &run.initialize_from_checksum) {
+            inputs::check_start(policy, sum)?;
+        }
         let done = checkpoint.as_ref().map_or(0, Checkpoint::steps);
 
         if let Some(steps) = learn.steps {
@@ -296,7 +305,7 @@ fn is_finished(folder: &RunFolder, steps: u64) -> Result<bool, RunError> {
     if !path.exists() || !folder.curve().exists() {
         return Ok(false);
     }
-    let text = std::fs::read_to_string(&path).map_err(RunError::io(&path, "read"))?;
+    let text = budget::read_to_string(&path, &budget::CONFIG_FILE).map_err(RunError::io(&path, "read"))?;
     Ok(serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.eval.is_some() && s.steps == steps))
 }
 

@@ -2,9 +2,10 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
+use crate::inputs::whole;
 use marathon_envs::options::{OF_LEARNING, Value};
 use marathon_envs::shard::task_of_role;
-use marathon_envs::{Options, ShardFactory, VecEnv, VecEnvOptions, registry};
+use marathon_envs::{ModelSource, Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
 use marathon_learn::policy::options;
 use marathon_physics::lanes::Isa;
@@ -17,6 +18,12 @@ pub(crate) const CLIP: &str = "clip";
 /// The argument that says where episodes start, and its value for a start as every use of a policy has it.
 pub(crate) const START: &str = "start";
 pub(crate) const FIRST: &str = "first";
+
+/// The argument that names the file of a model, in place of the one that comes with Marathon.
+const XML: &str = "xml_file";
+
+/// Most clips that one task has: looking for a name looks at all of them.
+const MOST_CLIPS: usize = 1000;
 
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
 static NAMING: Mutex<()> = Mutex::new(());
@@ -102,7 +109,18 @@ impl Setting {
             self.options.set(name, value);
         }
         self.forget_unused_clips();
+        // a policy or run may be used from another folder
+        if let Some(ModelSource::File(path)) = self.model()
+            && self.options.get(XML) == Some(&Value::Text(path.to_string_lossy().into_owned()))
+        {
+            self.options.set(XML, Value::Text(whole(&path).to_string_lossy().into_owned()));
+        }
         Ok(self)
+    }
+
+    /// Where its model comes from; none if it does not take its arguments, which is told when its environments are made.
+    pub fn model(&self) -> Option<ModelSource> {
+        Some(registry::global().agent_with(&self.agent, &self.options).ok()?.facts().model)
     }
 
     fn forget_unused_clips(&mut self) {
@@ -152,6 +170,10 @@ impl Setting {
     /// # Errors
     /// If a clip is damaged, or those of `make`.
     pub fn with_clips<T, E: From<RunError>>(&self, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+        if self.clips.len() > MOST_CLIPS {
+            let problem = format!("has {} clips, expected at most {MOST_CLIPS}", self.clips.len());
+            return Err(RunError::option("option", problem).into());
+        }
         let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
         clips::name(&self.clips)?;
         make()

@@ -33,6 +33,11 @@ impl<'a> Task<'a> {
         Task { setting: Setting { agent: id, ..Setting::default() }, make: Some(Box::new(make)) }
     }
 
+    /// Whether a front end makes it.
+    pub fn is_made(&self) -> bool {
+        self.make.is_some()
+    }
+
     /// Its name, such as `Hopper-v0`.
     pub fn id(&self) -> &str {
         &self.setting.agent

@@ -1,6 +1,7 @@
 //! Numbers and paths as people read them.
 
 use serde::Serializer;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// `12345678` as `12,345,678`.
@@ -68,6 +69,31 @@ pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
 }
 
+/// Whether a character may tell a terminal to do something: control characters but for tabs and ends of lines, and marks that
+/// turn the direction of the text around.
+fn commands_terminals(c: char) -> bool {
+    let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    turns || (c.is_control() && !matches!(c, '\n' | '\t'))
+}
+
+/// A text as a terminal may have it, whatever file it is from: what would command the terminal is shown in place of that, as
+/// `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    replaced(text, |c| c.escape_unicode().to_string())
+}
+
+/// JSON as a terminal may have it: what would command the terminal is escaped, and means the same.
+pub fn printable_json(json: &str) -> Cow<'_, str> {
+    replaced(json, |c| format!("\\u{:04x}", u32::from(c)))
+}
+
+fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
+    if !text.contains(commands_terminals) {
+        return text.into();
+    }
+    text.chars().map(|c| if commands_terminals(c) { escape(c) } else { c.to_string() }).collect::<String>().into()
+}
+
 /// A path in JSON, which has no other text: bytes that are not UTF-8 become replacement characters.
 pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
@@ -124,6 +150,16 @@ mod tests {
         assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
         assert_eq!([12.0, 1500.0, 512_345.0, 1.25e6].map(short), ["12", "1.5 k", "512 k", "1.25 M"]);
         assert_eq!([8.31, 59.96, 125.0, 3725.0].map(duration), ["8.3 s", "1 min 00 s", "2 min 05 s", "1 h 02 min"]);
+    }
+
+    #[test]
+    fn what_commands_a_terminal_is_shown() {
+        assert_eq!(printable("a\tb\n\u{b1}\u{1f600}"), "a\tb\n\u{b1}\u{1f600}");
+        assert_eq!(printable("\u{1b}[2J\r\u{9b}1m\u{202e}"), r"\u{1b}[2J\u{d}\u{9b}1m\u{202e}");
+        let json = serde_json::to_string("\u{9b}\u{7f}\u{1b}").unwrap();
+        let shown = printable_json(&json);
+        assert_eq!(shown, r#""\u009b\u007f\u001b""#);
+        assert_eq!(serde_json::from_str::<String>(&shown).unwrap(), "\u{9b}\u{7f}\u{1b}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::options::Head;
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::EvalOptions;
-use marathon_runs::{Obedience, PolicySource, controller};
+use marathon_runs::{Obedience, PolicySource, controller, output};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -41,6 +41,9 @@ struct Document<'a> {
 /// # Errors
 /// If there is no such policy, its task cannot be told a speed, or the picture cannot be written.
 pub fn run(args: &ControllerArgs, json: bool) -> Result<(), CliError> {
+    if let Some(out) = &args.out {
+        output::check(out, &["png"], &[&args.source.policy])?;
+    }
     let (policy, _) = args.source.load()?;
     let options = EvalOptions { episodes: args.episodes as usize, seed: args.seed, threads: args.threads };
     let obedience = controller::measure(&policy, &options)?;

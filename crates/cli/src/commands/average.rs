@@ -4,6 +4,7 @@ use crate::args::AverageArgs;
 use crate::commands::convert::{save, tell};
 use crate::error::CliError;
 use marathon_runs::average::average;
+use marathon_runs::{output, policy_file};
 use std::path::{Path, PathBuf};
 
 /// Averages policies and writes the mean.
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// If a file is no policy, the policies do not fit each other, or the mean cannot be written.
 pub fn run(args: &AverageArgs, json: bool) -> Result<(), CliError> {
+    output::check(&args.out, &policy_file::ENDINGS, &args.policies)?;
     let (policy, paths) = average(&args.policies, &args.task)?;
     let inputs: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
     save(&policy, &inputs, &args.out)?;

@@ -4,9 +4,8 @@ use crate::args::{ExportArgs, ImportArgs};
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::Policy;
-use marathon_runs::folder::policy_path;
 use marathon_runs::text::path_word;
-use marathon_runs::{TaskOptions, policy_file};
+use marathon_runs::{TaskOptions, output, policy_file};
 use std::path::Path;
 
 /// Writes a policy as ONNX.
@@ -14,26 +13,23 @@ use std::path::Path;
 /// # Errors
 /// If there is no such policy, or the file cannot be written.
 pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
-    let (policy, _) = policy_file::load(&args.policy, None, &TaskOptions::default())?;
     let out = match &args.out {
         Some(out) => out.clone(),
         None if args.policy.is_dir() => args.policy.join("policy.onnx"),
         None => args.policy.with_extension("onnx"),
     };
-    if !policy_file::is_onnx(&out) {
-        return Err(CliError::Usage(format!("--out is {}, expected a name that ends with .onnx", path_word(&out))));
-    }
+    output::check(&out, &["onnx"], &[&args.policy])?;
+    let (policy, _) = policy_file::load(&args.policy, None, &TaskOptions::default())?;
     save(&policy, &[&args.policy], &out)?;
     tell(&policy, &out, json);
     Ok(())
 }
 
-/// Turns an ONNX file into a policy, or a policy into one that is for other options.
+/// Turns an ONNX file into a policy, or a policy into one that is for other options or has a checksum.
 ///
 /// # Errors
 /// If the file is not of a network that a policy of the agent can be, or the policy cannot be written.
 pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
-    let (policy, _) = policy_file::load(&args.network, args.agent.as_deref(), &args.task)?;
     let out = match &args.out {
         Some(out) => out.clone(),
         None if policy_file::is_onnx(&args.network) => args.network.with_extension("safetensors"),
@@ -44,6 +40,8 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
             )));
         }
     };
+    output::check(&out, &policy_file::ENDINGS, &[&args.network])?;
+    let policy = policy_file::load_unsealed(&args.network, args.agent.as_deref(), &args.task)?;
     save(&policy, &[&args.network], &out)?;
     tell(&policy, &out, json);
     Ok(())
@@ -51,13 +49,7 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
 
 /// Writes what was made of `inputs`, files or folders of runs, whose policies are kept.
 pub fn save(policy: &Policy, inputs: &[&Path], out: &Path) -> Result<(), CliError> {
-    let file = |input: &Path| policy_path(input).ok()?.canonicalize().ok();
-    if let Ok(old) = out.canonicalize()
-        && inputs.iter().any(|input| file(input).as_ref() == Some(&old))
-    {
-        let found = path_word(out);
-        return Err(CliError::Usage(format!("--out is {found}, a file that is read; expected another")));
-    }
+    output::check(out, &policy_file::ENDINGS, inputs)?;
     Ok(policy_file::save(policy, out)?)
 }
 

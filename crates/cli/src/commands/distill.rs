@@ -7,11 +7,11 @@ use crate::interrupt;
 use crate::program;
 use cpu_time::ProcessTime;
 use marathon_learn::Control;
-use marathon_runs::distill::{Distilled, distill};
+use marathon_runs::distill::{Distilled, resumable};
 use marathon_runs::report::progress::bar;
-use marathon_runs::{Setting, policy_file, text};
+use marathon_runs::{Setting, output, policy_file, text};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Decisions between two lines where there is no terminal.
 const EVERY: u64 = 1_000_000;
@@ -29,17 +29,23 @@ struct Report {
     failures: f64,
 }
 
-/// Learns from teachers and writes the policy.
+/// Learns from teachers and writes the policy. What it needs to go on after an interruption is in a file beside the policy,
+/// which goes when the policy is whole.
 ///
 /// # Errors
 /// If a file is no policy, a teacher does not fit the task, or the policy cannot be written; [`CliError::Interrupted`] after
 /// Ctrl-C, with the policy as it was then.
 pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
+    let read: Vec<&PathBuf> = args.teachers.iter().chain(&args.options.initialize_from).collect();
+    output::check(&args.out, &policy_file::ENDINGS, &read)?;
+    args.options.validate()?;
+    let notes = notes(&args.out);
     let task = Setting::named(&args.agent)?.with(&args.task)?;
     let options = &args.options;
     interrupt::install("finishing this round and writing the policy")?;
+    let verb = if notes.exists() { "going on with" } else { "learning" };
     note(format!(
-        "learning {} from {} teachers: {} decisions, seed {}",
+        "{verb} {} from {} teachers: {} decisions, seed {}",
         task.agent,
         args.teachers.len(),
         text::thousands(options.steps),
@@ -47,7 +53,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     ));
     let (progress, mut due, mut last) = (bar(options.steps), EVERY, None);
     let start = ProcessTime::try_now().ok();
-    let policy = distill(task, &args.teachers, options, &mut |now: &Distilled| {
+    let policy = resumable(task, &args.teachers, options, Some(&notes), &mut |now: &Distilled| {
         last = Some(*now);
         let line = format!("loss {:.5}  failures {:.3} % of decisions", now.loss, 100.0 * now.failures);
         if let Some(bar) = &progress {
@@ -73,12 +79,22 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     }
     if interrupt::requested() {
         let (done, out) = (text::thousands(steps), text::path_word(&args.out));
-        return Err(CliError::Interrupted(format!("{done} decisions are done; {out} holds the policy as it is")));
+        let advice = format!("{out} holds the policy as it is, and the same command goes on");
+        return Err(CliError::Interrupted(format!("{done} decisions are done; {advice}")));
     }
+    // the policy is whole
+    let _ = std::fs::remove_file(&notes);
     if !json {
         let out = text::path_word(&args.out);
         say(format!("wrote {out}: {} decisions, loss {loss:.5}", text::thousands(steps)));
         say(format!("measure it by    {} eval {out}", program::name()));
     }
     Ok(())
+}
+
+/// The file that tells how far it is, beside the policy.
+fn notes(out: &Path) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_os_string();
+    name.push(".unfinished");
+    out.with_file_name(name)
 }

@@ -4,10 +4,11 @@ use crate::args::RecordDemoArgs;
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_envs::VecEnvOptions;
-use marathon_learn::{Policy, write_atomic};
+use marathon_learn::{AtomicFile, Policy};
 use marathon_mlagents::{Demonstration, Episode};
-use marathon_runs::{Play, Setting, text};
+use marathon_runs::{Play, Setting, output, text};
 use serde::Serialize;
+use std::io::{BufWriter, Seek, Write};
 use std::path::PathBuf;
 
 /// Most agents that play side by side.
@@ -24,31 +25,33 @@ struct Report {
     return_mean: f64,
 }
 
-/// Plays whole episodes with the policy's best actions and writes them down.
+/// Plays whole episodes with the policy's best actions and writes them down as they end.
 ///
 /// # Errors
 /// If there is no such policy, or the file has another ending or cannot be written.
 pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
-    let ending = args.out.extension().unwrap_or_default();
-    if !ending.eq_ignore_ascii_case("demo") {
-        let out = text::path_word(&args.out);
-        return Err(CliError::Usage(format!(
-            "--out is {out}, expected a name that ends in .demo: ML-Agents looks for it"
-        )));
-    }
+    // ML-Agents looks for this ending
+    output::check(&args.out, &["demo"], &[&args.source.policy])?;
     let (policy, factory) = args.source.load()?;
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy();
     let mut demo = Demonstration::new(&name, factory.spec());
-    let episodes = play(&policy, args.episodes as usize, args.seed)?;
-    for episode in &episodes {
+    let mut file = BufWriter::new(AtomicFile::create(&args.out)?);
+    let failed = || CliError::io(&args.out, "write");
+    file.write_all(&demo.front()).map_err(failed())?;
+    let mut decisions = 0;
+    play(&policy, args.episodes as usize, args.seed, &mut |episode| {
+        decisions += episode.rewards.len();
         demo.push(episode);
-    }
-    write_atomic(&args.out, &demo.bytes())?;
+        file.write_all(&demo.take()).map_err(failed())
+    })?;
+    file.rewind().map_err(failed())?;
+    file.write_all(&demo.front()).map_err(failed())?;
+    file.into_inner().map_err(|e| failed()(e.into_error()))?.commit()?;
     let report = Report {
         out: args.out.clone(),
         agent: factory.spec().id.clone(),
-        episodes: episodes.len(),
-        decisions: episodes.iter().map(|episode| episode.rewards.len()).sum(),
+        episodes: demo.episodes(),
+        decisions,
         return_mean: demo.mean_return(),
     };
     if json {
@@ -67,15 +70,19 @@ pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
 }
 
 /// Agents play side by side, and each plays a number of episodes that is fixed before the start: taking whatever ends first
-/// would favor short episodes.
-fn play(policy: &Policy, episodes: usize, seed: u64) -> Result<Vec<Episode>, CliError> {
+/// would favor short episodes. `record` takes each episode when it ends.
+fn play(
+    policy: &Policy,
+    episodes: usize,
+    seed: u64,
+    record: &mut dyn FnMut(&Episode) -> Result<(), CliError>,
+) -> Result<(), CliError> {
     let (n, meta) = (episodes.min(MAX_AGENTS), policy.meta());
     let options = VecEnvOptions { agents: n, seed, ..Default::default() };
     let mut play = Play::of(&Setting::asked(meta), &[policy], &options)?;
-    let quota = |agent: usize| (episodes - agent).div_ceil(n);
-    let mut done: Vec<Vec<Episode>> = vec![Vec::new(); n];
+    let mut left: Vec<usize> = (0..n).map(|agent| (episodes - agent).div_ceil(n)).collect();
     let mut now = vec![Episode::default(); n];
-    while (0..n).any(|agent| done[agent].len() < quota(agent)) {
+    while left.iter().any(|left| *left > 0) {
         for (episode, obs) in now.iter_mut().zip(play.last().obs.chunks_exact(meta.obs)) {
             episode.obs.extend(obs);
         }
@@ -89,11 +96,12 @@ fn play(policy: &Policy, episodes: usize, seed: u64) -> Result<Vec<Episode>, Cli
                 episode.obs.extend(&step.final_obs[agent * meta.obs..(agent + 1) * meta.obs]);
                 episode.truncated = step.truncated[agent];
                 let whole = std::mem::take(episode);
-                if done[agent].len() < quota(agent) {
-                    done[agent].push(whole);
+                if left[agent] > 0 {
+                    left[agent] -= 1;
+                    record(&whole)?;
                 }
             }
         }
     }
-    Ok(done.into_iter().flatten().collect())
+    Ok(())
 }

@@ -4,8 +4,12 @@ use crate::args::RenderArgs;
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::film::{Cast, Shot, shoot};
+use marathon_physics::budget::MEMORY;
 use marathon_render::Format;
+use marathon_runs::output;
 
+/// Bytes of a pixel while it is drawn.
+const PIXEL: f64 = 4.0;
 /// Most agents side by side.
 const MAX_AGENTS: usize = 64;
 
@@ -15,6 +19,7 @@ const MAX_AGENTS: usize = 64;
 /// If there is no such policy, an option makes no sense, or the picture cannot be written.
 pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = shot(args)?;
+    output::check(&args.out, &["png", "gif", "mp4"], &[&args.source.policy])?;
     let (policies, factory) = args.source.load_all()?;
     let cast = Cast { agents: args.agents, seed: args.seed, start: args.film.start, ghost: args.ghost };
     let report = shoot(&policies, factory.spec(), &shot, &cast, &args.out)?;
@@ -54,6 +59,12 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
         Format::Gif | Format::Mp4 if args.frames.is_some() => {
             usage("--frames is for .png; a film has --seconds and --fps".into())
         }
-        _ => Ok(Shot { format, width, height, length, frames, fps }),
+        _ => {
+            // pixels of all frames that are held at once, and of the picture that they make
+            let pixels = width as f64 * height as f64 * if format == Format::Png { 2.0 * frames as f64 } else { 2.0 };
+            let asked = MEMORY.check(PIXEL * pixels);
+            asked.map_err(|error| CliError::Usage(format!("--width and --height: the picture {error}")))?;
+            Ok(Shot { format, width, height, length, frames, fps })
+        }
     }
 }

@@ -6,6 +6,7 @@ use crate::error::CliError;
 use crate::interrupt;
 use marathon_config::Loaded;
 use marathon_learn::{Control, IterationStats};
+use marathon_physics::budget;
 use marathon_runs::folder::{difference_of_runs, write_json};
 use marathon_runs::{LearnOptions, RunError, RunFile, RunFolder, RunOptions, Session, Summary, Task, TaskOptions};
 use serde::Serialize;
@@ -86,7 +87,7 @@ pub fn file(folder: &Path) -> PathBuf {
 /// If the file cannot be read.
 pub fn summary(folder: &RunFolder) -> Result<Summary, CliError> {
     let file = folder.summary();
-    let text = std::fs::read_to_string(&file).map_err(CliError::io(&file, "read"))?;
+    let text = budget::read_to_string(&file, &budget::TABLE_FILE).map_err(CliError::io(&file, "read"))?;
     serde_json::from_str(&text).map_err(|error| CliError::file(&file, "summary", error, "that of a run"))
 }
 
@@ -95,7 +96,7 @@ pub fn summary(folder: &RunFolder) -> Result<Summary, CliError> {
 /// # Errors
 /// If the file cannot be read.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, CliError> {
-    let text = match std::fs::read_to_string(path) {
+    let text = match budget::read_to_string(path, &budget::TABLE_FILE) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         text => text.map_err(CliError::io(path, "read"))?,
     };

@@ -18,7 +18,9 @@ mod table3;
 use crate::console::{print_json, say};
 use crate::error::CliError;
 use clap::Subcommand;
-use std::path::PathBuf;
+use marathon_learn::AtomicFile;
+use marathon_runs::text::path_word;
+use std::path::{Path, PathBuf};
 
 /// Options of `study`.
 #[derive(Debug, clap::Args)]
@@ -142,11 +144,37 @@ impl Peers {
     }
 }
 
+impl What {
+    /// What all studies have.
+    fn options(&self) -> &Options {
+        match self {
+            What::Table1 { options, .. } | What::Table3 { options, .. } => options,
+            What::StyleTransfer { options, .. } | What::AssaultCourse { options, .. } => options,
+            What::Table2(options) | What::MlagentsAgreement(options) | What::Concurrency(options) => options,
+            What::DecisionPeriod(options) | What::Headless(options) | What::MultiEnv(options) => options,
+        }
+    }
+}
+
+/// Refuses a folder that cannot be made or takes no files, before hours of work for them.
+fn check_out(options: &Options) -> Result<(), CliError> {
+    // what is made is made at the end: a study that fails leaves nothing
+    let mut there = options.out.ancestors().filter(|folder| folder.exists());
+    let there = there.next().unwrap_or(Path::new("."));
+    if !there.is_dir() {
+        let (out, found) = (path_word(&options.out), path_word(there));
+        return Err(CliError::Usage(format!("--out is {out}, but {found} is a file; expected a folder")));
+    }
+    AtomicFile::create(&there.join("study"))?;
+    Ok(())
+}
+
 /// Measures and writes the files.
 ///
 /// # Errors
 /// If an agent cannot be trained, other people's trainers are missing, or a file cannot be written.
 pub fn run(args: &StudyArgs, json: bool) -> Result<(), CliError> {
+    check_out(args.what.options())?;
     let (record, options) = match &args.what {
         What::Table1 { options, peers } => (table1::run(options, peers)?, options),
         What::Table2(options) => (table2::run(options)?, options),

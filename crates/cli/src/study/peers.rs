@@ -5,6 +5,7 @@ use crate::error::CliError;
 use crate::python::{self, VARIABLE};
 use marathon_envs::registry;
 use marathon_learn::{Algorithm, EvalOptions, Evaluation, Schedule, TrainConfig, evaluate, write_atomic};
+use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use marathon_runs::{policy_file, text};
 use serde::{Deserialize, Serialize};
@@ -87,7 +88,8 @@ fn once(
     let Some(folder) = keep else { return make() };
     let agent = job["agent"].as_str().unwrap_or_default();
     let path = folder.join(format!("{name}-{agent}-{seed}.json"));
-    if let Ok(bytes) = std::fs::read(&path) {
+    if path.exists() {
+        let bytes = budget::read(&path, &budget::TABLE_FILE).map_err(CliError::io(&path, "read"))?;
         let kept: Kept = serde_json::from_slice(&bytes)
             .map_err(|e| CliError::file(&path, "kept run", e, "a run that a study has put there"))?;
         if kept.job == *job {

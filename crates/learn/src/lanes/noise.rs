@@ -47,6 +47,14 @@ impl SplitMix {
         let mut mix = SplitMix(seed ^ 0x6c65_6172_6e65_7221);
         SplitMix(mix.word() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
     }
+    /// Where the stream is, as saved.
+    pub fn state(&self) -> u64 {
+        self.0
+    }
+    /// The inverse of [`SplitMix::state`].
+    pub fn from_state(state: u64) -> Self {
+        SplitMix(state)
+    }
     /// The next word.
     pub fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -4,6 +4,7 @@ use super::{FORMAT, Policy, PolicyMeta, VERSION};
 use crate::error::Error;
 use crate::files::{TensorReader, TensorWriter, write_atomic};
 use marathon_envs::Spec;
+use marathon_physics::budget;
 use std::path::Path;
 
 impl Policy {
@@ -26,23 +27,44 @@ impl Policy {
             file.add(format!("layer.{l}.weight"), &shape, self.params[weights].iter().copied());
             file.list(&format!("layer.{l}.bias"), &self.params[biases]);
         }
-        file.bytes(&self.meta)
+        file.sealed_bytes(&self.meta)
     }
 
     /// Reads a policy.
     ///
     /// # Errors
-    /// If the file cannot be read or is not a whole and finite policy.
+    /// If the file cannot be read, has changed since it was written, or is not a whole and finite policy.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::from_bytes(path, &std::fs::read(path).map_err(Error::io(path, "read"))?)
+        Self::from_bytes(path, &read(path)?)
     }
 
     /// Reads a policy from the bytes of a file. `path` stands for it in messages.
     ///
     /// # Errors
-    /// If the bytes are not a whole and finite policy.
+    /// If the bytes have no checksum, have changed since it was computed, or are not a whole and finite policy.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
         let file = TensorReader::new(path, bytes)?;
+        if file.seal(bytes)?.is_none() {
+            // a file of another kind is told as one
+            Self::of_file(path, &file)?;
+            let expected = format!("one; `marathon import {} --out NEW.safetensors` writes it", path.display());
+            return Err(Error::file(path, "checksum", "none", expected));
+        }
+        Self::of_file(path, &file)
+    }
+
+    /// Reads a policy that another program may have written, without a checksum. One that is there is checked.
+    ///
+    /// # Errors
+    /// As [`Policy::load`], but for a missing checksum.
+    pub fn load_unsealed(path: &Path) -> Result<Self, Error> {
+        let bytes = read(path)?;
+        let file = TensorReader::new(path, &bytes)?;
+        file.seal(&bytes)?;
+        Self::of_file(path, &file)
+    }
+
+    fn of_file(path: &Path, file: &TensorReader<'_>) -> Result<Self, Error> {
         let meta: PolicyMeta = file.document(FORMAT, VERSION)?;
         let positive = |x: f32| x.is_finite() && x > 0.0;
         if !positive(meta.observation_clip) || !positive(meta.action_clip) {
@@ -81,4 +103,8 @@ impl Policy {
         policy.check(spec).map_err(|e| e.of_file(path))?;
         Ok(policy)
     }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    budget::read(path, &budget::POLICY_FILE).map_err(Error::io(path, "read"))
 }

@@ -1,6 +1,6 @@
 //! Deployable policies: one safetensors file with everything that is needed to act.
 //!
-//! The header's metadata hold one JSON document, [`PolicyMeta`]; the tensors are `obs_mean`, `obs_std`, `log_std`, and
+//! The header's metadata hold one JSON document, [`PolicyMeta`] and a checksum; the tensors are `obs_mean`, `obs_std`, `log_std`, and
 //! `layer.<i>.weight` (`[output, input]`) and `layer.<i>.bias` for each layer. The action for an observation is
 //!
 //! ```text
@@ -11,6 +11,8 @@
 //!
 //! with `[low, high]` from `action_range`. The action is in the units of the environment ([`Spec::action_low`]), so that
 //! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
+//!
+//! The last key of the document, `checksum`, is the FNV-1a hash of all bytes of the file, with sixteen zeros in its own place.
 
 mod block;
 mod cast;
@@ -37,6 +39,11 @@ use std::collections::BTreeMap;
 
 const FORMAT: &str = "marathon-policy";
 const VERSION: u32 = 1;
+
+/// Largest width of a layer, most hidden layers, and most parameters.
+const MOST_WIDTH: usize = 1 << 16;
+const MOST_HIDDEN: usize = 64;
+const MOST_PARAMETERS: u64 = 1 << 28;
 
 /// What a policy is for, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -155,13 +162,10 @@ impl Policy {
         (obs_mean, obs_std): (Vec<f32>, Vec<f32>),
         log_std: Vec<f32>,
     ) -> Result<Self, Error> {
+        let count = check_widths(&meta)?;
         let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
-        let count: u64 = sizes.windows(2).map(|p| (p[0] as u64 + 1).saturating_mul(p[1] as u64)).sum();
         let mismatch =
             |what: &str, found: String, expected: String| Error::Mismatch { what: what.into(), found, expected };
-        if sizes.iter().any(|s| !(1..=1 << 16).contains(s)) || sizes.len() > 66 || count > 1 << 28 {
-            return Err(mismatch("network", format!("widths {sizes:?}"), "positive widths of a practical size".into()));
-        }
         let lengths = [
             ("parameters", params.len(), count as usize),
             ("obs_mean", obs_mean.len(), meta.obs),
@@ -242,6 +246,22 @@ impl Policy {
         ];
         agree(pairs)
     }
+}
+
+/// Number of parameters of a policy's network.
+///
+/// # Errors
+/// If no policy has such widths.
+pub(crate) fn check_widths(meta: &PolicyMeta) -> Result<u64, Error> {
+    let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+    let pairs = sizes.windows(2).map(|p| (p[0] as u64).saturating_add(1).saturating_mul(p[1] as u64));
+    let count = pairs.fold(0, u64::saturating_add);
+    if sizes.iter().any(|s| !(1..=MOST_WIDTH).contains(s)) || meta.hidden.len() > MOST_HIDDEN || count > MOST_PARAMETERS {
+        let (found, most) = (format!("widths {sizes:?}"), format!("{MOST_HIDDEN} hidden layers"));
+        let expected = format!("1 to {MOST_WIDTH}, at most {most} and {MOST_PARAMETERS} parameters");
+        return Err(Error::Mismatch { what: "network".into(), found, expected });
+    }
+    Ok(count)
 }
 
 /// Whether what is found is what is expected, each under its name.

@@ -67,6 +67,13 @@ impl RewardKind {
             _ => None,
         }
     }
+    /// The same, to be changed.
+    pub fn imitation_mut(&mut self) -> Option<&mut Imitation> {
+        match self {
+            RewardKind::Imitation(settings) => Some(settings),
+            _ => None,
+        }
+    }
 }
 
 /// Networks of a reward for novelty; the defaults are ML-Agents'.

@@ -13,6 +13,7 @@ use crate::files::{self, Dtype, TensorReader, TensorWriter, read_versions, write
 use crate::nets::normalize::Moments;
 use crate::rewards::RewardConfig;
 use crate::rollout::states::{AgentStates, StatesShape};
+use marathon_physics::budget;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -361,7 +362,7 @@ impl Checkpoint {
         about.check(&path)?;
 
         let path = folder.join(&about.state.name);
-        let bytes = std::fs::read(&path).map_err(Error::io(&path, "read"))?;
+        let bytes = budget::read(&path, &budget::POLICY_FILE).map_err(Error::io(&path, "read"))?;
         if bytes.len() as u64 != about.state.bytes {
             return Err(Error::file(&path, "length", bytes.len(), format!("{} bytes", about.state.bytes)));
         }

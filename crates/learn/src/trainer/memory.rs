@@ -17,14 +17,19 @@ const REST: f64 = 0.3;
 /// Names what the run needs, and what would need less.
 pub fn check(roles: &[RoleParts], isa: Isa, config: &TrainConfig) -> Result<(), Error> {
     let bytes = roles.iter().map(|role| bytes(&role.setup(isa), &role.config)).fold(0, u64::saturating_add);
+    match can_be_had(bytes) {
+        true => Ok(()),
+        false => Err(Error::Memory { gigabytes: bytes as f64 / 1e9, less: less(config) }),
+    }
+}
+
+/// Whether so many bytes of memory can be had at once.
+pub fn can_be_had(bytes: u64) -> bool {
     let mut probe: Vec<u8> = Vec::new();
     let fits = usize::try_from(bytes).is_ok_and(|bytes| probe.try_reserve_exact(bytes).is_ok());
     // without this the compiler sees that nobody needs it, and takes it as given
     black_box(&probe);
-    match fits {
-        true => Ok(()),
-        false => Err(Error::Memory { gigabytes: bytes as f64 / 1e9, less: less(config) }),
-    }
+    fits
 }
 
 /// What a run with less memory has smaller.

@@ -21,7 +21,7 @@ pub mod config;
 pub mod evaluate;
 mod flat;
 pub mod initialize;
-mod memory;
+pub mod memory;
 pub mod observer;
 pub mod remote;
 mod roles;

@@ -2,11 +2,14 @@
 
 use crate::error::RunError;
 use marathon_learn::{IterationStats, Learned, write_atomic};
+use marathon_physics::budget;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 
 /// First column, which orders the rows.
 const ITERATION: &str = "iteration";
+/// Memory of a table's cells per byte of its file: an empty cell is a comma.
+const CELL_MEMORY: f64 = 16.0;
 
 /// Appends rows, each of which reaches the file at once.
 pub struct CsvLog {
@@ -120,7 +123,10 @@ impl History {
     /// # Errors
     /// If the file cannot be read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
-        let mut reader = csv::Reader::from_path(path).map_err(|e| failed(path, "read", e))?;
+        let bytes = budget::read(path, &budget::TABLE_FILE).map_err(RunError::io(path, "read"))?;
+        let need = budget::MEMORY.check(CELL_MEMORY * bytes.len() as f64);
+        need.map_err(|e| RunError::io(path, "read")(e.into()))?;
+        let mut reader = csv::Reader::from_reader(&bytes[..]);
         let names = reader.headers().map_err(|e| failed(path, "read", e))?.iter().map(String::from).collect();
         let cell = |x: &str| if x.is_empty() { Some(None) } else { x.parse().ok().map(Some) };
         let whole = reader.records().map_while(|row| row.ok()?.iter().map(cell).collect());
@@ -136,7 +142,7 @@ impl History {
 /// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too. Returns
 /// the head and the last row.
 fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError> {
-    let text = std::fs::read_to_string(path).map_err(RunError::io(path, "read"))?;
+    let text = budget::read_to_string(path, &budget::TABLE_FILE).map_err(RunError::io(path, "read"))?;
     let mut kept = String::with_capacity(text.len());
     for (i, line) in text.split_inclusive('\n').enumerate() {
         let number = line.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
@@ -146,12 +152,27 @@ fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError
         }
         kept.push_str(line);
     }
-    if kept.len() < text.len() {
+    // rows are appended in place, which would change every other name of the file, too
+    if kept.len() < text.len() || has_other_names(path) {
         write_atomic(path, kept.as_bytes())?
     }
     let mut lines = kept.lines();
     let head = lines.next();
     Ok(head.zip(lines.next_back()).map(|(head, last)| (head.into(), last.into())))
+}
+
+/// Whether a file has other names, as copies by hard links have.
+fn has_other_names(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        std::fs::metadata(path).is_ok_and(|facts| facts.nlink() > 1)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
+    }
 }
 
 fn failed(path: &Path, action: &'static str, error: csv::Error) -> RunError {

@@ -37,7 +37,7 @@ pub struct Reporter<'a> {
     last: (u64, f64),
     /// Why the run was ended, if by an error.
     pub error: Option<RunError>,
-    /// Whether all iterations have their rows and events.
+    /// Whether all iterations have their rows and events, and a policy in `policies/` where one was due.
     pub told: bool,
 }
 
@@ -95,13 +95,15 @@ impl<'a> Reporter<'a> {
         self.told = false;
         self.csv.push(&csv::columns(stats, rate, &self.terms))?;
         self.events.push(stats.steps, &tensorboard::scalars(stats, rate, &self.terms))?;
-        self.told = true;
-        if stats.steps >= self.due {
-            self.plan(stats.steps);
+        if stats.steps < self.due {
+            self.told = true;
+        } else {
             let mut output = snapshot.output();
             note_clips(&mut output, &self.clips);
-            // a run that is killed in between comes by here again
+            // a run that is killed or stopped in between comes by here again
             self.keep(&output.policy)?;
+            self.told = true;
+            self.plan(stats.steps);
             save(self.folder, &output)?;
             self.prune(stats.steps);
         }

@@ -14,6 +14,7 @@ use crate::error::RunError;
 use crate::folder::{EVENTS, RunFolder};
 use crc::{CRC_32_ISCSI, Crc, Table};
 use marathon_learn::{IterationStats, Learned, write_atomic};
+use marathon_physics::budget;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -87,8 +88,11 @@ impl EventLog {
         }
         // TensorBoard reads files in the order of their names
         let seconds = now() as u64;
-        let path = folder.path().join(format!("{EVENTS}.{seconds:010}.marathon.{:04}", older.len()));
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(RunError::io(&path, "create"))?;
+        let path = |n: usize| folder.path().join(format!("{EVENTS}.{seconds:010}.marathon.{n:04}"));
+        let path = (older.len()..).map(path).find(|path| !older.contains(path)).unwrap_or_default();
+        // never through a link that somebody has put there
+        let file = OpenOptions::new().create_new(true).append(true).open(&path);
+        let file = file.map_err(RunError::io(&path, "create"))?;
         let mut log = Self { path, file };
         let version = message(0, |event| event.text(3, "brain.Event:2"));
         let mut start = record(&version);
@@ -121,7 +125,7 @@ impl EventLog {
 
 /// Drops records after a step, and a last one that a killed process left half-written.
 fn cut(path: &Path, steps: u64) -> Result<(), RunError> {
-    let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
+    let bytes = budget::read(path, &budget::TABLE_FILE).map_err(RunError::io(path, "read"))?;
     let mut kept = Vec::with_capacity(bytes.len());
     for (whole, data) in records(&bytes) {
         if step_of(data) <= steps {

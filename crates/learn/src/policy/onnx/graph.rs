@@ -20,6 +20,21 @@ pub enum Value {
     Shape(usize),
 }
 
+impl Value {
+    /// How many numbers it holds itself.
+    pub fn numbers(&self) -> usize {
+        match self {
+            Value::Constant(array) => array.data.len(),
+            Value::Network(net) => match &net.stage {
+                Some((Stage::Scale { factor, shift }, _)) => factor.len() + shift.len(),
+                Some((Stage::Dense { weights, bias }, _)) => weights.len() + bias.len(),
+                _ => 0,
+            },
+            Value::Opaque { .. } | Value::Shape(_) => 0,
+        }
+    }
+}
+
 /// Functions of single numbers that no policy has; what is computed with them may be beside the point.
 const ELEMENTWISE: [&str; 9] = ["Exp", "Log", "Softplus", "Abs", "Neg", "Sqrt", "Pow", "Reciprocal", "Erf"];
 /// What keeps the number of features.

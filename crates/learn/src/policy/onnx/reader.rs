@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::policy::Policy;
 use crate::policy::PolicyMeta;
 use marathon_envs::Spec;
+use marathon_physics::budget;
 use prost::Message;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,6 +16,8 @@ use std::rc::Rc;
 
 /// Most operations of a graph: a policy has dozens.
 const MOST_NODES: usize = 4096;
+/// Memory that a file takes, in its own lengths: two bytes are an operation without inputs.
+const DECODED: f64 = 64.0;
 /// Most numbers of an observation or an action.
 const LARGEST: usize = 1 << 16;
 /// Outputs that hold actions, by preference, in lower case; then whatever has their length.
@@ -32,7 +35,13 @@ type Values = BTreeMap<String, Result<Value, String>>;
 
 /// What Marathon has noted in a file's metadata.
 pub fn meta(bytes: &[u8]) -> Option<PolicyMeta> {
-    noted(&Model::decode(bytes).ok()?)
+    noted(&model(Path::new(""), bytes).ok()?)
+}
+
+/// Decodes the bytes of a file.
+fn model(path: &Path, bytes: &[u8]) -> Result<Model, Error> {
+    budget::MEMORY.check(DECODED * bytes.len() as f64).map_err(|e| Error::budget(path, "file", e))?;
+    Model::decode(bytes).map_err(|e| Error::file(path, "file", format!("'{e}'"), "an ONNX model"))
 }
 
 fn noted(model: &Model) -> Option<PolicyMeta> {
@@ -68,7 +77,7 @@ fn task(meta: &PolicyMeta) -> Spec {
 /// The policy of a file, for a task or the one that the file names.
 pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, Error> {
     let wrong = |place: &str, found: String, expected: &str| Error::file(path, place, found, expected);
-    let model = Model::decode(bytes).map_err(|e| wrong("file", format!("'{e}'"), "an ONNX model"))?;
+    let model = model(path, bytes)?;
     let noted = noted(&model);
     let spec = &match (spec, &noted) {
         (Some(spec), _) => spec.clone(),
@@ -99,6 +108,8 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     values.insert(input, Ok(Value::Network(Rc::new(Net { stage: None, width: spec.obs }))));
     for node in &graph.node {
         let value = inputs(&values, &node.input).and_then(|inputs| evaluate(node, &inputs, &neighbors));
+        let numbers = value.as_ref().map_or(0, Value::numbers);
+        neighbors.count(numbers).map_err(|e| Error::budget(path, &format!("operation {}", node.op_type), e))?;
         let Some(output) = node.output.first() else { continue };
         values.insert(output.clone(), value);
         // further outputs, such as a dropout's mask, are for training

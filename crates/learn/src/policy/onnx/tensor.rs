@@ -1,22 +1,38 @@
-//! Constants of a graph.
+//! Constants of a graph, and the memory that they take.
 
 use super::proto::{DOUBLE, FLOAT, INT64, Tensor};
+use marathon_physics::budget::{self, OverBudget};
 use std::borrow::Cow;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
-/// Files beside the model's that hold the numbers of large tensors (PyTorch writes `model.onnx.data`).
+/// Copies of a number that a network takes on its way to a policy.
+const COPIES: f64 = 6.0;
+
+/// Files beside the model's that hold the numbers of large tensors (PyTorch writes `model.onnx.data`), and how many numbers
+/// have been read and computed: a small file can name the same large one many times.
 pub struct Neighbors {
     folder: PathBuf,
     read: RefCell<BTreeMap<String, Rc<Vec<u8>>>>,
+    numbers: Cell<f64>,
 }
 
 impl Neighbors {
     /// Of a model's file.
     pub fn of(model: &Path) -> Self {
-        Neighbors { folder: model.parent().unwrap_or(Path::new("")).into(), read: RefCell::default() }
+        let folder = model.parent().unwrap_or(Path::new("")).into();
+        Neighbors { folder, read: RefCell::default(), numbers: Cell::new(0.0) }
+    }
+
+    /// Counts numbers that are about to be made, or have been.
+    ///
+    /// # Errors
+    /// If all of them need too much memory.
+    pub fn count(&self, numbers: usize) -> Result<(), OverBudget> {
+        self.numbers.set(self.numbers.get() + numbers as f64);
+        budget::MEMORY.check(COPIES * size_of::<f64>() as f64 * self.numbers.get())
     }
 
     /// The numbers of a tensor.
@@ -30,7 +46,7 @@ impl Neighbors {
             return Err(format!("tensor '{}' in file '{name}', expected one in the model's folder", tensor.name));
         }
         if !self.read.borrow().contains_key(name) {
-            let bytes = std::fs::read(self.folder.join(name))
+            let bytes = budget::read(&self.folder.join(name), &budget::POLICY_FILE)
                 .map_err(|e| format!("tensor '{}' in file '{name}' beside the model's: {e}", tensor.name))?;
             self.read.borrow_mut().insert(name.into(), Rc::new(bytes));
         }
@@ -40,7 +56,9 @@ impl Neighbors {
         };
         let rest = bytes.get(offset.unwrap_or(0)..);
         let part = rest.and_then(|rest| rest.get(..length.unwrap_or(rest.len())));
-        part.map(<[u8]>::to_vec).ok_or_else(|| format!("tensor '{}' beyond the end of file '{name}'", tensor.name))
+        let part = part.ok_or_else(|| format!("tensor '{}' beyond the end of file '{name}'", tensor.name))?;
+        self.count(part.len() / size_of::<f32>()).map_err(|e| format!("tensor '{}' {e}", tensor.name))?;
+        Ok(part.to_vec())
     }
 }
 
@@ -63,6 +81,8 @@ impl Array {
             0 => Cow::Borrowed(&tensor.raw_data),
             _ => Cow::Owned(neighbors.bytes(tensor)?),
         };
+        let listed = tensor.float_data.len().max(tensor.double_data.len()).max(tensor.int64_data.len());
+        neighbors.count(listed.max(raw.len() / 4)).map_err(|e| format!("tensor '{}' {e}", tensor.name))?;
         let data: Vec<f64> = match tensor.data_type {
             FLOAT if raw.is_empty() => tensor.float_data.iter().map(|x| f64::from(*x)).collect(),
             FLOAT => raw.as_chunks().0.iter().map(|x| f64::from(f32::from_le_bytes(*x))).collect(),

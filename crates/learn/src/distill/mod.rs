@@ -7,6 +7,10 @@
 //!
 //! The loss is half the squared distance from the teacher's best action, in the units of the network's output.
 
+mod saved;
+
+pub use saved::Halfway;
+
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -16,7 +20,7 @@ use crate::nets::init::{Init, normal};
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
 use crate::nets::normalize::{Moments, Normalizer};
 use crate::optim::adam::Adam;
-use crate::policy::{Policy, PolicyMeta};
+use crate::policy::{Policy, PolicyMeta, check_widths};
 use marathon_physics::lanes::Isa;
 
 /// Added to the root of Adam's second moment.
@@ -39,6 +43,10 @@ impl Lessons {
     /// Room for so many rows of such lengths.
     pub fn new(room: usize, obs_len: usize, act_len: usize) -> Self {
         Self { obs_len, act_len, room: room.max(1), obs: Vec::new(), actions: Vec::new(), next: 0 }
+    }
+    /// Memory that so many rows take, bytes.
+    pub fn memory(rows: f64, obs_len: usize, act_len: usize) -> f64 {
+        rows * (obs_len + act_len) as f64 * size_of::<f32>() as f64
     }
     /// Number of rows.
     pub fn len(&self) -> usize {
@@ -102,12 +110,10 @@ impl Distiller {
     /// A policy that knows nothing yet. `log_std`: logarithms of the standard deviations of its actions, which it keeps.
     ///
     /// # Errors
-    /// If a width is zero.
+    /// If no policy has such widths.
     pub fn new(mut meta: PolicyMeta, log_std: Vec<f32>, seed: u64, isa: Isa) -> Result<Self, Error> {
         meta.observation_clip = OBSERVATION_CLIP;
-        if meta.hidden.contains(&0) {
-            return Err(Error::config("hidden", format!("{:?}", meta.hidden), "positive widths"));
-        }
+        check_widths(&meta)?;
         let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
         let net = Mlp::new(&sizes, meta.activation);
         let mut params = vec![0.0; net.len().next_multiple_of(BLOCK)];
@@ -229,6 +235,20 @@ impl Distiller {
     /// Fills a list with standard normal numbers, for actions as in training.
     pub fn draw(&mut self, noise: &mut [f32]) {
         noise.iter_mut().for_each(|x| *x = normal(&mut self.noise) as f32);
+    }
+
+    /// Numbers of the network that are not finite.
+    pub fn lost(&self) -> usize {
+        self.params.iter().filter(|x| !x.is_finite()).count()
+    }
+
+    /// Memory that a student with such a policy takes while it learns, bytes.
+    pub fn memory(meta: &PolicyMeta) -> f64 {
+        let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
+        let params: f64 = sizes.windows(2).map(|pair| (pair[0] as f64 + 1.0) * pair[1] as f64).sum();
+        let activations: f64 = sizes.iter().map(|size| (2 * CHUNK * BLOCK) as f64 * *size as f64).sum();
+        // parameters, two moments, two gradients, and the policy that plays
+        (6.0 * params + activations) * size_of::<f32>() as f64
     }
 
     /// The policy as it is now.

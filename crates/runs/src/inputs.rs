@@ -1,0 +1,107 @@
+//! Files outside a run's folder that the run depends on: the model of its task, demonstrations, the policy that it starts from.
+//! `run.json` names them by their whole paths, so that a run goes on from any folder, with their checksums, so that it goes on
+//! with the same bits.
+
+use crate::error::RunError;
+use crate::folder::policy_path;
+use crate::setting::Setting;
+use marathon_envs::ModelSource;
+use marathon_learn::{TrainConfig, checksum};
+use marathon_physics::Model;
+use marathon_physics::budget::{self, Limit};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Files with their checksums.
+pub type Inputs = BTreeMap<PathBuf, String>;
+
+/// The whole path of a file that a user may have named from the present folder. One that is not UTF-8 stays as it is: no
+/// description could hold it.
+pub fn whole(path: &Path) -> PathBuf {
+    std::path::absolute(path).ok().filter(|whole| whole.to_str().is_some()).unwrap_or_else(|| path.into())
+}
+
+/// Names the demonstrations of a configuration by their whole paths.
+pub fn name_wholly(config: &mut TrainConfig) {
+    let roles = config.roles.values_mut().flat_map(|role| &mut role.rewards);
+    for reward in config.rewards.iter_mut().chain(roles) {
+        let imitation = reward.kind.imitation_mut();
+        if let Some(file) = imitation.and_then(|imitation| imitation.demonstrations.as_mut()) {
+            *file = whole(Path::new(file)).to_string_lossy().into_owned();
+        }
+    }
+}
+
+/// The files that a task and its configuration name, as they are now.
+///
+/// # Errors
+/// If one cannot be read.
+pub fn of(setting: &Setting, config: &TrainConfig) -> Result<Inputs, RunError> {
+    let mut inputs = Inputs::new();
+    if let Some(ModelSource::File(path)) = setting.model() {
+        inputs.extend(of_model(&path)?);
+    }
+    for file in demonstrations(config) {
+        inputs.insert(file.into(), sum(Path::new(file), &budget::DEMONSTRATION_FILE)?);
+    }
+    Ok(inputs)
+}
+
+/// The demonstrations that a configuration names.
+pub fn demonstrations(config: &TrainConfig) -> impl Iterator<Item = &str> {
+    let rewards = config.rewards.iter().chain(config.roles.values().flat_map(|role| &role.rewards));
+    rewards.filter_map(|reward| reward.kind.imitation()?.demonstrations.as_deref())
+}
+
+/// A model's file, and all that it names.
+fn of_model(path: &Path) -> Result<Inputs, RunError> {
+    let bytes = budget::read(path, &budget::MODEL_FILE).map_err(RunError::io(path, "read"))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let inputs = RefCell::new(Inputs::from([(path.to_path_buf(), checksum(&bytes))]));
+    let read = |name: &str| {
+        let file = folder.join(name);
+        let bytes = budget::read(&file, &budget::MODEL_FILE).map_err(|error| error.to_string())?;
+        inputs.borrow_mut().insert(file, checksum(&bytes));
+        Ok(bytes)
+    };
+    // what is wrong with it is told when the task is made
+    let _ = Model::from_xml_str_with(&String::from_utf8_lossy(&bytes), &path.display().to_string(), &read);
+    Ok(inputs.into_inner())
+}
+
+/// The checksum of the policy that a run starts from: a file or the folder of a run.
+///
+/// # Errors
+/// If there is none.
+pub fn of_start(policy: &Path) -> Result<String, RunError> {
+    sum(&policy_path(policy)?, &budget::POLICY_FILE)
+}
+
+/// Refuses files that have changed since the run began.
+///
+/// # Errors
+/// If one has, or cannot be read.
+pub fn check(inputs: &Inputs) -> Result<(), RunError> {
+    inputs.iter().try_for_each(|(path, expected)| agree(path, &sum(path, &budget::DEMONSTRATION_FILE)?, expected))
+}
+
+/// Refuses a policy to start from that has changed since the run began.
+///
+/// # Errors
+/// If it has, or is gone.
+pub fn check_start(policy: &Path, expected: &str) -> Result<(), RunError> {
+    agree(policy, &of_start(policy)?, expected)
+}
+
+fn agree(path: &Path, found: &str, expected: &str) -> Result<(), RunError> {
+    if found == expected {
+        return Ok(());
+    }
+    let expected = format!("{expected}, as in run.json; the file has changed since the run began");
+    Err(RunError::file(path, "checksum", found, expected))
+}
+
+fn sum(path: &Path, limit: &Limit) -> Result<String, RunError> {
+    Ok(checksum(&budget::read(path, limit).map_err(RunError::io(path, "read"))?))
+}
