@@ -169,7 +169,9 @@ impl Builder<'_> {
                 Some(node) => {
                     self.repeated += node.text();
                     if self.repeated > MOST_TEXT {
-                        return fail(format!("found aliases that repeat more than {MOST_TEXT} bytes of text, expected a configuration"));
+                        return fail(format!(
+                            "found aliases that repeat more than {MOST_TEXT} bytes of text, expected a configuration"
+                        ));
                     }
                     (node.clone(), 0)
                 }

@@ -361,9 +361,8 @@ impl RunFolder {
         for (name, sum) in missing {
             let staged = fs::read_dir(&self.path).into_iter().flatten().flatten();
             let staged = staged.filter(|entry| is_leftover(&entry.file_name())).map(|entry| entry.path());
-            let is_it = |path: &PathBuf| {
-                budget::read(path, &budget::CLIP_FILE).is_ok_and(|bytes| checksum(&bytes) == *sum)
-            };
+            let is_it =
+                |path: &PathBuf| budget::read(path, &budget::CLIP_FILE).is_ok_and(|bytes| checksum(&bytes) == *sum);
             if let Some(path) = staged.into_iter().find(is_it) {
                 let place = self.path.join(name);
                 fs::rename(path, &place).map_err(RunError::io(&place, "write"))?;

@@ -58,6 +58,9 @@ pub(crate) struct Motor<C> {
     pub velocity_scale: C,
 }
 
+/// Most physics steps of a decision.
+const MOST_FRAME_SKIP: usize = 1000;
+
 /// The indices that [`Senses`](crate::Senses) work with.
 pub(crate) struct Bindings<T: Real> {
     pub parts: Vec<PartFrame<T::Scalar>>,
@@ -103,6 +106,9 @@ impl Blueprint {
             if n == 0 {
                 return Err(wrong(format!("{what} is 0, expected at least 1")));
             }
+        }
+        if facts.frame_skip > MOST_FRAME_SKIP {
+            return Err(wrong(format!("frame_skip is {}, expected at most {MOST_FRAME_SKIP}", facts.frame_skip)));
         }
         let found: Vec<_> = model.actuators.iter().map(|a| a.name.as_str()).collect();
         if !facts.actions.is_empty() && found != facts.actions {

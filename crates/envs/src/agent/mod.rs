@@ -26,7 +26,7 @@ use crate::episode_rng::EpisodeRng;
 pub use command::{CommandRange, Ctrl};
 pub(crate) use facts::FORWARD;
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
-pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Value};
+pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Seconds, Share, Value};
 pub use outputs::{Obs, Terms};
 pub use reference::{Following, Frame};
 pub use role::RoleFacts;

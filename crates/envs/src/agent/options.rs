@@ -7,6 +7,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use marathon_physics::budget::FILM_SECONDS;
+
 /// Value of an argument.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
@@ -232,6 +234,40 @@ impl OptionValue for Scale {
     }
 }
 
+/// A share of something, or what grows from nothing to all there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share(pub f64);
+
+impl OptionValue for Share {
+    const EXPECTED: &'static str = "a number from 0 to 1";
+    fn value(&self) -> Value {
+        Value::Number(self.0)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(x) if (0.0..=1.0).contains(x) => Some(Share(*x)),
+            _ => None,
+        }
+    }
+}
+
+/// A time that somebody waits for, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seconds(pub f64);
+
+impl OptionValue for Seconds {
+    const EXPECTED: &'static str = "seconds, from 0 to the limit 'film_seconds' (3600)";
+    fn value(&self) -> Value {
+        Value::Number(self.0)
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(x) if *x >= 0.0 && FILM_SECONDS.check(*x).is_ok() => Some(Seconds(*x)),
+            _ => None,
+        }
+    }
+}
+
 impl OptionValue for usize {
     const EXPECTED: &'static str = "a whole number, 0 or more";
     fn value(&self) -> Value {
@@ -385,6 +421,10 @@ mod tests {
             on: bool = true,
             /// A width.
             width: Scale = Scale(1.0),
+            /// A part.
+            part: Share = Share(0.5),
+            /// A time.
+            time: Seconds = Seconds(20.0),
         }
     }
 
@@ -392,7 +432,14 @@ mod tests {
     fn types_are_checked() {
         let mut x = Sample::default();
         assert!(x.put("count", &5.0.into()) && x.put("on", &0.0.into()) && x.put("range", &[1.0, 2.0].into()));
+        assert!(x.put("part", &1.0.into()) && x.put("time", &3600.0.into()));
         for (name, value) in [
+            ("part", Value::from(1.5)),
+            ("part", (-0.1).into()),
+            ("part", 1e18.into()),
+            ("time", 1e300.into()),
+            ("time", f64::INFINITY.into()),
+            ("time", (-1.0).into()),
             ("count", Value::from(-1.0)),
             ("count", 0.5.into()),
             ("count", f64::INFINITY.into()),

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use marathon_motion::{Clip, Cycle, Layout};
+use marathon_physics::budget;
 use marathon_physics::lanes::{MAX_LANES, Real};
 use marathon_physics::{Group, Model, Readings, Sim, Work};
 
@@ -72,14 +73,10 @@ impl Timeline {
     /// A looping clip is cut into whole laps of as many cycles as it takes for their length to be a whole number of
     /// decisions; what remains is less than a hundredth of a decision for clips of 30 or 60 frames a second, and is spread.
     fn add(&mut self, clip: &Clip, dt: f64) {
-        let decisions = clip.duration() / dt;
-        let (rows, step, cycle) = match clip.cycle() {
-            None => ((decisions + 1e-9).floor() as usize + 1, dt, None),
-            Some(cycle) => {
-                let cycles = fitting_cycles(decisions);
-                let rows = (cycles as f64 * decisions).round();
-                (rows as usize, cycles as f64 * clip.duration() / rows, Some(repeated(cycle, cycles)))
-            }
+        let (rows, cycles) = rows_of(clip, dt);
+        let (step, cycle) = match clip.cycle() {
+            None => (dt, None),
+            Some(cycle) => (cycles as f64 * clip.duration() / rows as f64, Some(repeated(cycle, cycles))),
         };
         let (nq, nv) = (clip.layout().nq(), clip.layout().nv());
         let first = self.phase.len();
@@ -99,6 +96,18 @@ impl Timeline {
     pub fn clip_of(&self, row: usize) -> &Lap {
         let after = self.clips.partition_point(|lap| lap.rows.end <= row);
         &self.clips[after.min(self.clips.len() - 1)]
+    }
+}
+
+/// How many rows a clip has, and of how many cycles if it loops.
+fn rows_of(clip: &Clip, dt: f64) -> (usize, usize) {
+    let decisions = clip.duration() / dt;
+    match clip.cycle() {
+        None => ((decisions + 1e-9).floor() as usize + 1, 1),
+        Some(_) => {
+            let cycles = fitting_cycles(decisions);
+            ((cycles as f64 * decisions).round() as usize, cycles)
+        }
     }
 }
 
@@ -172,8 +181,13 @@ impl<T: Real> Reference<T> {
         for clip in clips {
             clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
         }
-        let timeline = Timeline::new(clips, dt);
         let columns = Columns::new(model, bindings);
+        // each row is in the timeline and in the table, and once more while it is made
+        let rows: f64 = clips.iter().map(|clip| rows_of(clip, dt).0 as f64).sum();
+        let numbers = model.nq + model.nv + 2 * columns.width;
+        let asked = budget::MEMORY.check(size_of::<f64>() as f64 * rows * numbers as f64);
+        asked.map_err(|error| format!("what it follows, {} clips, {error}", clips.len()))?;
+        let timeline = Timeline::new(clips, dt);
         let sim = Sim::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
         let mut table = Vec::new();
         for lap in &timeline.clips {

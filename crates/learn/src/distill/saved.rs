@@ -110,9 +110,8 @@ impl Distiller {
         if !whole || rows > lessons.room || lessons.next >= lessons.room {
             return Err(Error::file(path, "lessons", rows, format!("whole rows, at most {}", lessons.room)));
         }
-        let of_class = |i: usize| {
-            Ok((file.list(&format!("class.{i}.snapshot"))?, file.list(&format!("class.{i}.obs"))?))
-        };
+        let of_class =
+            |i: usize| Ok((file.list(&format!("class.{i}.snapshot"))?, file.list(&format!("class.{i}.obs"))?));
         let classes = (0..document.classes).map(of_class).collect::<Result<_, Error>>()?;
         Ok(Halfway { rounds: words[0], about: document.about, classes })
     }

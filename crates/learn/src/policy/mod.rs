@@ -256,7 +256,8 @@ pub(crate) fn check_widths(meta: &PolicyMeta) -> Result<u64, Error> {
     let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
     let pairs = sizes.windows(2).map(|p| (p[0] as u64).saturating_add(1).saturating_mul(p[1] as u64));
     let count = pairs.fold(0, u64::saturating_add);
-    if sizes.iter().any(|s| !(1..=MOST_WIDTH).contains(s)) || meta.hidden.len() > MOST_HIDDEN || count > MOST_PARAMETERS {
+    if sizes.iter().any(|s| !(1..=MOST_WIDTH).contains(s)) || meta.hidden.len() > MOST_HIDDEN || count > MOST_PARAMETERS
+    {
         let (found, most) = (format!("widths {sizes:?}"), format!("{MOST_HIDDEN} hidden layers"));
         let expected = format!("1 to {MOST_WIDTH}, at most {most} and {MOST_PARAMETERS} parameters");
         return Err(Error::Mismatch { what: "network".into(), found, expected });

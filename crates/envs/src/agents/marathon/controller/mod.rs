@@ -33,7 +33,8 @@ use super::walker2d::Walker2dV1;
 use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
 use crate::agent::{
-    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, Scale, Senses, Start, Terms, names,
+    Agent, CommandRange, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Part, Scale, Senses, Share, Start, Terms,
+    names,
 };
 use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
@@ -122,7 +123,7 @@ crate::options! {
         /// What a fall costs, in place of all other terms of that decision.
         price: Scale = Scale(40.0),
         /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one.
-        relive: Scale = Scale(0.0),
+        relive: Share = Share(0.0),
     }
 }
 

@@ -32,8 +32,8 @@ use super::steer::{
 use super::{FRAME_SKIP, SECONDS, decisions};
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms,
-    names,
+    Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses, Share,
+    Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
@@ -80,13 +80,13 @@ crate::options! {
         /// those of getting up, a fall ends the episode; without those of the gait, the end of a skill.
         clip: ClipNames = ClipNames(ALL.into()),
         /// Share of the episodes that a fall ends: learners need not lie so long. Those that start lying are not among them.
-        mortal: Scale = Scale(0.0),
+        mortal: Share = Share(0.0),
         /// Share of the episodes of the gait that begin with a push over, which no fall ends: learners come to lie as they fall.
-        knocked: Scale = Scale(0.0),
+        knocked: Share = Share(0.0),
         /// What an episode's end costs that is a failure.
         price: Scale = Scale(0.0),
         /// Share of the episodes of the gait that start 0.75 to 1.5 s before the last fall from it, once there is one.
-        relive: Scale = Scale(0.0),
+        relive: Share = Share(0.0),
     }
 }
 
@@ -144,7 +144,7 @@ impl Agent for Controller {
                 .into(),
             model: model(Control::Pd).into(),
             frame_skip: FRAME_SKIP,
-            max_episode_steps: decisions(Scale(SECONDS)),
+            max_episode_steps: decisions(Seconds(SECONDS)),
             observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),
             actions: names(ACTIONS.map(|i| JOINTS[i].name)),
             reward_terms: names(TERMS.iter().chain(&["skill", "leap", "rise"])),

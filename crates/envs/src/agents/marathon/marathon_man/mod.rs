@@ -32,7 +32,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use crate::agent::{
-    Agent, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start, Terms, names,
+    Agent, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses, Start, Terms, names,
 };
 use crate::any_agent::AnyAgent;
 
@@ -80,7 +80,7 @@ crate::options! {
         future: usize = 0,
         /// How long an episode is at most, s. Of several clips, those that are mastered take the less of the training, the
         /// shorter it is.
-        seconds: Scale = Scale(SECONDS),
+        seconds: Seconds = Seconds(SECONDS),
     }
 }
 
@@ -139,7 +139,7 @@ fn has_joints(model: &Model) -> Result<(), String> {
 }
 
 /// Decisions in so many seconds, one at least.
-fn decisions(seconds: Scale) -> usize {
+fn decisions(seconds: Seconds) -> usize {
     (seconds.0 / DECISION).round().max(1.0) as usize
 }
 

@@ -43,8 +43,8 @@ use super::{DECISION, FRAME_SKIP, SECONDS, decisions, observe_soles};
 use crate::agent::options::Choice;
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Senses, Start,
-    Terms, names,
+    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds,
+    Senses, Share, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
@@ -179,9 +179,9 @@ crate::options! {
         price: Scale = Scale(0.0),
         /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one: learners come to do better what
         /// felled them.
-        relive: Scale = Scale(0.0),
+        relive: Share = Share(0.0),
         /// How long an episode is at most, s: the shorter, the more of them follow a fall.
-        seconds: Scale = Scale(SECONDS),
+        seconds: Seconds = Seconds(SECONDS),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Arguments of figures that run over uneven ground.
 
 use super::course::Kind;
-use crate::agent::Scale;
+use crate::agent::Share;
 use crate::agent::options::Choice;
 
 /// What a figure is rewarded for.
@@ -73,7 +73,7 @@ crate::options! {
         /// original's `meters`, made by hand: `bumps`, `blocks`, or built by an `adversary` that learns, too.
         course: Kind = Kind::Mixed,
         /// How difficult the most difficult courses are, from 0 to 1.
-        difficulty: Scale = Scale(0.5),
+        difficulty: Share = Share(0.5),
         /// How difficult each course is: `fixed`, `random` up to the difficulty, or `curriculum`: 5 % harder after 16 m, 5 %
         /// easier after less than 8 m.
         levels: Levels = Levels::Fixed,

@@ -34,7 +34,7 @@ use super::hopper::HopperV0;
 use super::idle;
 use super::walker2d::Walker2dV0;
 use crate::agent::{
-    Agent, Ctrl, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Site, Start, Terms, names,
+    Agent, Ctrl, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Senses, Share, Site, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 use arguments::{Earns, Falls, Levels, Reward};
@@ -291,13 +291,13 @@ impl<F: Runner> Agent for Terrain<F> {
     }
 
     fn reset(&self, start: &mut Start) {
-        let TerrainArguments { course, difficulty: Scale(most), levels, .. } = self.arguments;
+        let TerrainArguments { course, difficulty: Share(most), levels, .. } = self.arguments;
         let level = match levels {
             Levels::Fixed => 1.0,
             Levels::Random => start.random.uniform(0.0, 1.0),
             Levels::Curriculum => Self::next_level(start.previous),
         };
-        let difficulty = level * most.min(1.0);
+        let difficulty = level * most;
         let field = course.field(difficulty, Self::ROWS, start.random);
         start.set_ground(0, field);
         self.figure.place(start);
