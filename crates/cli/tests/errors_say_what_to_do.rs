@@ -143,7 +143,7 @@ fn pictures_need_a_name_that_says_what_they_are() {
     says(&fail(temp.path(), 1, &["render", "a", "--out", "x.gfi"]), &["x.gfi", "did you mean 'gif'?"]);
     says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--frames", "3"]), &["--frames is for .png"]);
     says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--seconds", "-1"]), &["--seconds"]);
-    says(&fail(temp.path(), 1, &["render", "a", "--out", "none/x.gif"]), &["none/x.gif", "No such file"]);
+    says(&fail(temp.path(), 2, &["render", "a", "--out", "none/x.gif"]), &["none/x.gif", "there is no folder none"]);
 }
 
 #[test]

@@ -80,6 +80,29 @@ fn a_failed_start_leaves_nothing() {
     succeed(path, &train("mine"));
 }
 
+/// A start that was killed before it could say what it is leaves files under temporary names; they block nobody.
+#[test]
+fn a_start_that_was_killed_early_does_not_block_the_same_command() {
+    let temp = tempfile::tempdir().unwrap();
+    let run = temp.path().join("a");
+    std::fs::create_dir(&run).unwrap();
+    for (name, content) in [(".lock", ""), (".x.1.tmp", ""), (".0123456789abcdef-0.4711.tmp", "{\"format\"")] {
+        std::fs::write(run.join(name), content).unwrap();
+    }
+    succeed(temp.path(), &train("a"));
+    assert_no_leftovers(&run);
+    // names that are almost like that are somebody's
+    for name in [".precious.tmp", ".1.tmp", ".x.1a.tmp", "x.1.tmp", ".x..tmp"] {
+        let folder = temp.path().join("b");
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join(name), "precious").unwrap();
+        let text = fail(temp.path(), 2, &train("b"));
+        assert!(text.contains(&format!("--out b holds '{name}'")), "{text}");
+        assert_eq!(std::fs::read(folder.join(name)).unwrap(), b"precious");
+        std::fs::remove_file(folder.join(name)).unwrap();
+    }
+}
+
 /// More memory than there is, by a limit or by numbers that no computer has.
 #[cfg(target_os = "linux")]
 #[test]

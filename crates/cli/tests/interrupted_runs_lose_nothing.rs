@@ -337,6 +337,36 @@ fn a_kill_loses_no_policy_on_the_way() {
     assert_eq!(kept(&run).len(), 3);
 }
 
+/// A policy on the way that could not be written comes with the iteration that is done again.
+#[test]
+fn a_policy_on_the_way_that_failed_is_written_again() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("tiny.yaml"), TINY).unwrap();
+    let policies = |run: &str| {
+        let mut all: Vec<_> = files(&temp.path().join(run).join("policies"))
+            .iter()
+            .map(|path| (path.file_name().unwrap().to_owned(), tensors(path)))
+            .collect();
+        all.sort();
+        all
+    };
+    for run in ["whole", "a"] {
+        succeed(temp.path(), &["train", "hopper", "--config", "tiny.yaml", "--steps", "2560", "--out", run]);
+    }
+    succeed(temp.path(), &["train", "--resume", "whole", "--steps", "9000"]);
+    // a folder stands in the way
+    let in_the_way = temp.path().join("a/policies/policy-5120.safetensors");
+    std::fs::create_dir(&in_the_way).unwrap();
+    let text = fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "9000"]);
+    assert!(text.contains("policy-5120.safetensors: write") && text.contains("checkpoint has 2,560 of"), "{text}");
+    std::fs::remove_dir(&in_the_way).unwrap();
+    succeed(temp.path(), &["train", "--resume", "a", "--steps", "9000"]);
+    assert_eq!(policies("a"), policies("whole"));
+    assert_eq!(policies("a").len(), 3);
+    let table = |run: &str| timeless_rows(&temp.path().join(run).join("progress.csv"));
+    assert_eq!(table("a"), table("whole"));
+}
+
 /// A full disk, by a limit on the size of files.
 #[test]
 fn a_full_disk_stops_the_run_and_keeps_the_last_checkpoint() {

@@ -99,3 +99,14 @@ proptest! {
         check(format!("behaviors: {{Hopper: {{{key}: {value}, hyperparameters: {{{key}: {value}}}, network_settings: {{{key}: {value}}}}}}}").as_bytes());
     }
 }
+
+/// A long text that aliases repeat would be a file of fifty gigabytes.
+#[test]
+fn aliases_do_not_multiply_text() {
+    let file = format!("a: &a '{}'\nb: [{}]\n", "x".repeat(400_000), "*a,".repeat(90_000));
+    let error = parse(Path::new("f.yaml"), file.as_bytes(), "hopper").unwrap_err().to_string();
+    assert!(error.contains("found aliases that repeat more than 16777216 bytes of text"), "{error}");
+    let file = format!("a: '{}'", "x".repeat(2_000_000));
+    let error = parse(Path::new("f.yaml"), file.as_bytes(), "hopper").unwrap_err().to_string();
+    assert!(error.contains("f.yaml:1:1: the file asks for 2 MB; the limit 'config_file' is 1 MB"), "{error}");
+}

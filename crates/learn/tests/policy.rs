@@ -109,7 +109,7 @@ fn damaged_policies_never_panic() {
     let mut damaged = bytes.clone();
     let last = damaged.len() - 4;
     damaged[last..].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert!(load(&damaged).err().unwrap().to_string().contains("found NaN, expected a finite number"));
+    assert!(load(&damaged).err().unwrap().to_string().contains("the file has changed since it was written"));
     // a file of another kind
     assert!(load(b"<mujoco/>").err().unwrap().to_string().contains("expected a safetensors file"));
     std::fs::remove_file(&path).unwrap();

@@ -260,3 +260,63 @@ fn log_std(values: &Values, act: usize) -> Vec<f32> {
     });
     lists.next().unwrap_or_else(|| vec![SMALL; act])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::proto::{Dimension, FLOAT, Node, Shape, Tensor, TensorType, Type};
+    use super::*;
+
+    fn error(graph: Graph) -> String {
+        let model = Model { graph: Some(graph), ..Model::default() };
+        let spec = Spec { id: "Any-v0".into(), obs: 2, act: 1, ..Spec::default() };
+        decode(Path::new("a.onnx"), &model.encode_to_vec(), Some(&spec)).unwrap_err().to_string()
+    }
+
+    fn input() -> Vec<ValueInfo> {
+        let dim = [1, 2].map(|n| Dimension { value: Some(Size::Value(n)) }).into();
+        let tensor_type = Some(TensorType { elem_type: FLOAT, shape: Some(Shape { dim }) });
+        vec![ValueInfo { name: "obs_0".into(), kind: Some(Type { tensor_type }) }]
+    }
+
+    /// A file of a few megabytes that asks for a hundred gigabytes: the same matrix turned around again and again.
+    #[test]
+    fn operations_may_not_multiply_memory() {
+        let numbers = 1 << 18;
+        let matrix = Tensor {
+            dims: vec![1, numbers],
+            data_type: FLOAT,
+            name: "w".into(),
+            raw_data: vec![0; 4 * numbers as usize],
+            ..Tensor::default()
+        };
+        let turn = |i: usize| Node {
+            input: vec!["w".into()],
+            output: vec![format!("w{i}")],
+            op_type: "Transpose".into(),
+            ..Node::default()
+        };
+        let node = (0..4096).map(turn).collect();
+        let text = error(Graph { node, initializer: vec![matrix], input: input(), ..Graph::default() });
+        assert!(text.starts_with("a.onnx: operation Transpose asks for "), "{text}");
+        assert!(text.contains("the limit 'memory' is 2 GB"), "{text}");
+    }
+
+    /// The same numbers of a file beside the model's, named again and again.
+    #[test]
+    fn neighbors_may_not_multiply_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("w.data"), vec![0; 1 << 20]).unwrap();
+        let neighbors = Neighbors::of(&folder.path().join("a.onnx"));
+        let entry = |key: &str, value: &str| super::super::proto::Property { key: key.into(), value: value.into() };
+        let tensor = Tensor {
+            dims: vec![1 << 18],
+            data_type: FLOAT,
+            name: "w".into(),
+            external_data: vec![entry("location", "w.data")],
+            data_location: 1,
+            ..Tensor::default()
+        };
+        let refused = (0..1000).find_map(|_| Array::read(&tensor, &neighbors).err()).expect("a refusal");
+        assert!(refused.starts_with("tensor 'w' asks for") && refused.contains("'memory'"), "{refused}");
+    }
+}
