@@ -103,6 +103,9 @@ Each teacher has agents of its own. The student plays, the teachers say what the
 learns that. If the agent takes a clip, a teacher's agents follow the clip that the teacher follows. A teacher may observe
 less than the student: the parts of its observation are looked up by their names.
 
+Ctrl-C finishes the round and writes the policy as it is. The same command goes on from FILE.unfinished, which is also
+written every minute, with the bits of a distillation that was never interrupted.
+
   marathon distill MarathonMan --option future=3 --out all.safetensors \\
       --teacher runs/marathon_man_walk-1 --teacher runs/marathon_man_jump-1";
 
@@ -211,9 +214,10 @@ Reads multi-layer perceptrons with one observation as input and actions as outpu
 Stable-Baselines3 write them: normalization, layers with swish, tanh, elu or relu, a final tanh, bounds.
 `eval` and `render` take such files as they are.
 
-A policy of Marathon is written again for the options that are given:
+A policy of Marathon is written again for the options that are given, and with a checksum if it has none:
 
-  marathon import runs/marathon_man_steer-1 --option start=first --out steer.safetensors";
+  marathon import runs/marathon_man_steer-1 --option start=first --out steer.safetensors
+  marathon import old.safetensors --out new.safetensors";
 
 /// Options of `import`.
 #[derive(Debug, clap::Args)]

@@ -76,13 +76,15 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
         let size = ["--steps", "3M", "--agents", "16", "--hidden", "16,16"];
         own.iter().chain(&size).map(|word| word.to_string()).collect::<Vec<_>>()
     };
-    let as_words = |words: &[String]| words.to_vec();
     let finish = |words: Vec<String>| {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         run(path, &words)
     };
     let mut child = marathon(path, &[]);
-    child.args(words("parts.safetensors", "3")).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+    child
+        .args(words("parts.safetensors", "3"))
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped());
     let mut child = child.spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     // a third of the way
@@ -108,7 +110,7 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
     assert!(error.contains("the file has changed since it was written"), "{error}");
     std::fs::write(&notes, whole_notes).unwrap();
 
-    let resumed = finish([as_words(&words("parts.safetensors", "3")), vec!["--threads".into(), "2".into()]].concat());
+    let resumed = finish([words("parts.safetensors", "3"), vec!["--threads".into(), "2".into()]].concat());
     assert!(resumed.status.success(), "{}", stderr(&resumed));
     assert!(stderr(&resumed).contains("going on with Hopper-v0"), "{}", stderr(&resumed));
     assert!(!notes.exists());

@@ -11,7 +11,7 @@ fn every_command_looks_at_its_output_first() {
     let path = temp.path();
     std::fs::copy(shipped("hopper"), path.join("p.safetensors")).unwrap();
     std::fs::copy(shipped("WalkerController"), path.join("w.safetensors")).unwrap();
-    let before = [("p.safetensors"), ("w.safetensors")].map(|name| std::fs::read(path.join(name)).unwrap());
+    let before = ["p.safetensors", "w.safetensors"].map(|name| std::fs::read(path.join(name)).unwrap());
     for folder in ["d.png", "d.demo", "d.onnx", "d.safetensors"] {
         std::fs::create_dir(path.join(folder)).unwrap();
     }
@@ -48,7 +48,7 @@ fn every_command_looks_at_its_output_first() {
     let error = fail(path, 2, &["study", "table3", "--steps", "1000000000", "--out", "file/pages"]);
     assert!(error.contains("--out is file/pages, but file is a file; expected a folder"), "{error}");
     assert!(begun.elapsed() < Duration::from_secs(60), "no work is done");
-    assert_eq!(before, [("p.safetensors"), ("w.safetensors")].map(|name| std::fs::read(path.join(name)).unwrap()));
+    assert_eq!(before, ["p.safetensors", "w.safetensors"].map(|name| std::fs::read(path.join(name)).unwrap()));
     assert_no_leftovers(path);
     assert_eq!(files(path).len(), 3, "{:?}", files(path));
 }
@@ -62,7 +62,8 @@ fn a_policy_without_a_checksum_is_imported() {
     let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
     let text = std::str::from_utf8(&bytes[8..header]).unwrap();
     let start = text.rfind(r#",\"checksum\":\""#).unwrap();
-    let text = format!("{}{}", &text[..start], text[start + r#",\"checksum\":\"0123456789abcdef\""#.len()..].trim_end());
+    let text =
+        format!("{}{}", &text[..start], text[start + r#",\"checksum\":\"0123456789abcdef\""#.len()..].trim_end());
     let old = [&(text.len() as u64).to_le_bytes(), text.as_bytes(), &bytes[header..]].concat();
     std::fs::write(path.join("old.safetensors"), old).unwrap();
     for command in ["eval", "export"] {
@@ -84,8 +85,10 @@ fn a_long_demonstration_takes_little_memory() {
     let temp = tempfile::tempdir().unwrap();
     let limited = |episodes: &str| {
         let mut shell = std::process::Command::new("bash");
-        let script = format!("ulimit -v 400000; exec \"$0\" record-demo \"$1\" --episodes {episodes} --out a.demo --json");
-        let output = shell.args(["-c", &script, program(), &shipped("hopper")]).current_dir(temp.path()).output().unwrap();
+        let script =
+            format!("ulimit -v 400000; exec \"$0\" record-demo \"$1\" --episodes {episodes} --out a.demo --json");
+        let output =
+            shell.args(["-c", &script, program(), &shipped("hopper")]).current_dir(temp.path()).output().unwrap();
         assert!(output.status.success(), "{}", stderr(&output));
         json(&String::from_utf8(output.stdout).unwrap())
     };

@@ -39,8 +39,17 @@ fn links_in_a_folder_are_refused_by_name() {
     let before = outside(path);
     let clip = "clip.motion";
     let event = "events.out.tfevents.0000000001.marathon.0000";
-    let files_of_a_run =
-        [".lock", "run.json", "progress.csv", "policy.safetensors", "summary.json", "curve.png", event, clip, ".x.2.tmp"];
+    let files_of_a_run = [
+        ".lock",
+        "run.json",
+        "progress.csv",
+        "policy.safetensors",
+        "summary.json",
+        "curve.png",
+        event,
+        clip,
+        ".x.2.tmp",
+    ];
     let run = path.join("run");
     for (name, target) in files_of_a_run.into_iter().map(|name| (name, "victim.txt")).chain([
         ("policies", "victims"),
@@ -59,7 +68,8 @@ fn links_in_a_folder_are_refused_by_name() {
         }
         symlink(path.join(target), &link).unwrap();
         let error = fail(path, 1, &["train", "--resume", "run", "--steps", "20k"]);
-        let expected = if name == "run.json" && target == "nowhere" { "no run.json" } else { "found a link, expected a " };
+        let expected =
+            if name == "run.json" && target == "nowhere" { "no run.json" } else { "found a link, expected a " };
         assert!(error.contains(name) && error.contains(expected), "{name}: {error}");
         assert!(error.contains("of the run's own"), "{name}: {error}");
         assert_eq!(outside(path), before, "{name}");

@@ -141,7 +141,8 @@ fn a_table_of_any_numbers_is_drawn_or_refused() {
         let changed: Vec<String> = rows
             .lines()
             .map(|row| {
-                let cells = row.split(',').zip(&names).map(|(cell, name)| if *name == "iteration" { cell } else { value });
+                let cells =
+                    row.split(',').zip(&names).map(|(cell, name)| if *name == "iteration" { cell } else { value });
                 cells.collect::<Vec<_>>().join(",")
             })
             .collect();

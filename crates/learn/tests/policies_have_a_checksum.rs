@@ -62,7 +62,8 @@ fn unsealed(policy: &Policy) -> Vec<u8> {
 fn a_file_without_a_checksum_is_refused_with_the_command_that_writes_one() {
     let policy = small();
     let bytes = unsealed(&policy);
-    let advice = "checksum: found none, expected one; `marathon import puck.safetensors --out NEW.safetensors` writes it";
+    let advice =
+        "checksum: found none, expected one; `marathon import puck.safetensors --out NEW.safetensors` writes it";
     assert_eq!(refusal(&bytes), format!("puck.safetensors: {advice}"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("puck.safetensors");

@@ -2,7 +2,6 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
-use crate::inputs::Inputs;
 use crate::setting::Setting;
 use crate::text;
 use marathon_config::Loaded;
@@ -33,6 +32,9 @@ pub const POLICIES: &str = "policies";
 const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
 pub const EVENTS: &str = "events.out.tfevents";
+
+/// Files elsewhere with their checksums.
+pub type Inputs = BTreeMap<PathBuf, String>;
 
 /// What a run is: everything that a resumed run must agree on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

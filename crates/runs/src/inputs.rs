@@ -3,24 +3,15 @@
 //! with the same bits.
 
 use crate::error::RunError;
-use crate::folder::policy_path;
+use crate::folder::{Inputs, policy_path};
 use crate::setting::Setting;
+use crate::text::whole;
 use marathon_envs::ModelSource;
 use marathon_learn::{TrainConfig, checksum};
 use marathon_physics::Model;
 use marathon_physics::budget::{self, Limit};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// Files with their checksums.
-pub type Inputs = BTreeMap<PathBuf, String>;
-
-/// The whole path of a file that a user may have named from the present folder. One that is not UTF-8 stays as it is: no
-/// description could hold it.
-pub fn whole(path: &Path) -> PathBuf {
-    std::path::absolute(path).ok().filter(|whole| whole.to_str().is_some()).unwrap_or_else(|| path.into())
-}
+use std::path::Path;
 
 /// Names the demonstrations of a configuration by their whole paths.
 pub fn name_wholly(config: &mut TrainConfig) {

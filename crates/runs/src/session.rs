@@ -14,7 +14,7 @@ use crate::report::summary::{EPISODES, Summary};
 use crate::report::{Reporter, Watch, curve, note_clips, save, save_policies};
 use crate::setting::{Setting, TaskOptions};
 use crate::task::Task;
-use crate::text::thousands;
+use crate::text::{thousands, whole};
 use marathon_config::{Loaded, default_for, default_of};
 use marathon_envs::ShardFactory;
 use marathon_learn::{
@@ -130,7 +130,7 @@ impl Session {
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let mut run = RunFile::new(&setting, &loaded);
         run.files = inputs::of(&setting, &run.config)?;
-        run.initialize_from = options.initialize_from.as_deref().map(inputs::whole);
+        run.initialize_from = options.initialize_from.as_deref().map(whole);
         run.initialize_from_checksum = run.initialize_from.as_deref().map(inputs::of_start).transpose()?;
         let checkpoint = start_from(&run, &*factory)?;
         let mut folder = None;

@@ -2,7 +2,7 @@
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
-use crate::inputs::whole;
+use crate::text::whole;
 use marathon_envs::options::{OF_LEARNING, Value};
 use marathon_envs::shard::task_of_role;
 use marathon_envs::{ModelSource, Options, ShardFactory, VecEnv, VecEnvOptions, registry};

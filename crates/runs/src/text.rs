@@ -2,7 +2,7 @@
 
 use serde::Serializer;
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// `12345678` as `12,345,678`.
 pub fn thousands(n: u64) -> String {
@@ -97,6 +97,12 @@ fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
 /// A path in JSON, which has no other text: bytes that are not UTF-8 become replacement characters.
 pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
+}
+
+/// The whole path of a file that a user may have named from the present folder. One that is not UTF-8 stays as it is: no
+/// description could hold it.
+pub fn whole(path: &Path) -> PathBuf {
+    std::path::absolute(path).ok().filter(|whole| whole.to_str().is_some()).unwrap_or_else(|| path.into())
 }
 
 /// A path as a word of a shell command.

@@ -40,9 +40,9 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
     };
     let width = args.width.unwrap_or(width);
     let height = args.height.unwrap_or(match format {
-        Format::Png => width * 4 / 3,
+        Format::Png => width.saturating_mul(4) / 3,
         // video encoders want even sides
-        _ => width * 9 / 16 / 2 * 2,
+        _ => width.saturating_mul(9) / 16 / 2 * 2,
     });
     let (length, fps) = (args.film.seconds.unwrap_or(seconds), args.film.fps.unwrap_or(fps));
     let frames = args.frames.unwrap_or(8);
