@@ -1,16 +1,24 @@
 #!/usr/bin/env python3
-"""Writes seeds for the target `motion`: small files of each format, with a byte before them, in corpus/motion-0 to -4.
+"""Writes seeds for the targets `motion` and `files`: small files of each format, with a byte before them, in corpus/motion-0 to -4
+and corpus/files-0 to -7.
 
-Few bytes make a file of a format out of nothing; what is whole can be changed. Needs no packages.
+Few bytes make a file of a format out of nothing; what is whole can be changed. Needs no packages. Networks and demonstrations need the
+program in target/release.
 """
 
 import json
 import math
+import re
 import struct
+import subprocess
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
 MOTIONS = HERE.parent / "assets/motions"
+POLICIES = HERE.parent / "assets/policies"
+RUNS = HERE.parent / "crates/learn/tests/files"
+PROGRAM = HERE.parent / "target/release/marathon"
 
 
 def clips():
@@ -115,10 +123,78 @@ def mappings():
     yield (MOTIONS / "mappings/walker2d.json").read_text()
 
 
+def policies():
+    """Small policies without their checksums, which would refuse every change."""
+    for path in [*RUNS.glob("*/policy.safetensors"), POLICIES / "hopper.safetensors", POLICIES / "TerrainWalker2d.safetensors"]:
+        data = path.read_bytes()
+        (length,) = struct.unpack("<Q", data[:8])
+        header = re.sub(rb',\\"checksum\\":\\"[0-9a-f]{16}\\"', b"", data[8 : 8 + length])
+        yield struct.pack("<Q", len(header)) + header + data[8 + length :]
+
+
+def program(ending, *words):
+    """What the program makes of a small policy."""
+    if PROGRAM.exists():
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / f"seed.{ending}"
+            policy = RUNS / "ppo/policy.safetensors"
+            subprocess.run([PROGRAM, words[0], policy, *words[1:], "--out", out], check=True, stdout=subprocess.DEVNULL)
+            yield out.read_bytes()
+
+
+def configurations():
+    """Those that ship."""
+    for path in (HERE.parent / "assets/configs").glob("*.yaml"):
+        yield path.read_bytes()
+
+
+def tables():
+    """Rows of small runs."""
+    yield from (path.read_bytes() for path in RUNS.glob("*/progress.csv"))
+    yield b"iteration,a\n1,\n2,1\n3,1.5\n"
+
+
+def castagnoli(data):
+    """CRC-32C, masked as TFRecord does."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x82F63B78 if crc & 1 else 0)
+    crc ^= 0xFFFFFFFF
+    return ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF
+
+
+def events():
+    """Records with steps."""
+    record = b""
+    for step in [1, 4, 9]:
+        data = b"\x09" + bytes(8) + bytes([0x10, step]) + b"*\x05\n\x03\n\x01a"
+        length = struct.pack("<Q", len(data))
+        record += length + struct.pack("<I", castagnoli(length)) + data + struct.pack("<I", castagnoli(data))
+    yield record
+
+
+def descriptions(name):
+    """Of runs or checkpoints, without their checksums."""
+    for path in RUNS.glob(f"*/{name}"):
+        document = json.loads(path.read_text())
+        document.pop("checksum", None)
+        yield json.dumps(document, indent=1)
+
+
 def main():
     """Writes all seeds."""
-    for number, seeds in enumerate([clips(), bvh(), deep_mimic(), glb(), mappings()]):
-        folder = HERE / f"corpus/motion-{number}"
+    write("motion", [clips(), bvh(), deep_mimic(), glb(), mappings()])
+    demonstration = program("demo", "record-demo", "--episodes", "1")
+    files = [policies(), program("onnx", "export"), configurations(), demonstration, tables(), events()]
+    write("files", [*files, descriptions("run.json"), descriptions("checkpoint/checkpoint.json")])
+
+
+def write(target, kinds):
+    """A folder for each kind."""
+    for number, seeds in enumerate(kinds):
+        folder = HERE / f"corpus/{target}-{number}"
         folder.mkdir(parents=True, exist_ok=True)
         for i, seed in enumerate(seeds):
             (folder / f"seed-{i}").write_bytes(bytes([number]) + (seed if isinstance(seed, bytes) else seed.encode()))
