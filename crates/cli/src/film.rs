@@ -6,9 +6,11 @@ use crate::interrupt;
 use clap::ValueEnum;
 use marathon_envs::{Autoreset, Spec, VecEnvOptions, registry};
 use marathon_learn::Policy;
-use marathon_physics::Model;
 use marathon_physics::model::JointType;
-use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line};
+use marathon_physics::{Model, budget};
+use marathon_render::{
+    Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size,
+};
 use marathon_runs::text::unsigned_zero;
 use marathon_runs::{Play, Setting, text};
 use serde::Serialize;
@@ -81,6 +83,19 @@ impl Shot {
         self.frames.div_ceil(self.frames.div_ceil(8))
     }
 
+    /// Checks before anything is played that the picture is not too large or long.
+    ///
+    /// # Errors
+    /// If it is.
+    pub fn check(&self) -> Result<(), CliError> {
+        let long = |over| CliError::Usage(format!("--seconds: the film {over}"));
+        budget::FILM_SECONDS.check(self.length).map_err(long)?;
+        if self.format == Format::Png {
+            strip_size([self.width, self.height], self.frames, self.columns())?;
+        }
+        Ok(())
+    }
+
     /// Seconds from the beginning to each frame, in ascending order.
     pub fn times(&self) -> Vec<f64> {
         match self.format {
@@ -101,6 +116,7 @@ impl Shot {
 /// # Errors
 /// If a ghost is asked for and the agents follow no clip, or the picture cannot be written.
 pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &Path) -> Result<Report, CliError> {
+    shot.check()?;
     interrupt::install("leaving without a picture")?;
     let mut stage = Stage::new(policies, spec, cast)?;
     let lanes = if cast.ghost == Some(Ghost::Beside) { 2 * cast.agents } else { cast.agents };

@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use color_quant::NeuQuant;
+use marathon_physics::budget;
 
 use crate::atomic::Pending;
 use crate::error::RenderError;
@@ -65,10 +66,16 @@ impl GifWriter {
     /// Appends a frame.
     ///
     /// # Errors
-    /// [`RenderError::FrameSize`], [`RenderError::Io`], [`RenderError::Encode`].
+    /// [`RenderError::FrameSize`], [`RenderError::Budget`], [`RenderError::Io`], [`RenderError::Encode`].
     pub fn push(&mut self, frame: &Image) -> Result<(), RenderError> {
         if self.count + self.waiting.len() == 0 {
             self.size = [frame.width(), frame.height()];
+            let bytes = (STUDY * frame.rgb().len()) as f64;
+            budget::MEMORY.check(bytes).map_err(|source| RenderError::Budget {
+                path: self.pending.path().to_path_buf(),
+                what: "a GIF of this size",
+                source,
+            })?;
         }
         same_size(self.count + self.waiting.len(), frame, self.size)?;
         if let Stage::Studying(_) = self.stage {

@@ -1,6 +1,6 @@
 //! Files appear whole or not at all: they are written beside their final name, then renamed.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -41,8 +41,10 @@ impl Pending {
         &self.temporary
     }
 
-    /// Gives the finished file its final name, replacing an older one.
+    /// Gives the finished file its final name, replacing an older one. Writes that the system has put off must succeed first.
     pub fn commit(&mut self) -> Result<(), RenderError> {
+        let synced = OpenOptions::new().write(true).open(&self.temporary).and_then(|file| file.sync_all());
+        synced.map_err(RenderError::io(&self.path, "cannot write"))?;
         fs::rename(&self.temporary, &self.path).map_err(RenderError::io(&self.path, "cannot rename into place"))?;
         self.committed = true;
         Ok(())

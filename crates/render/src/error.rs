@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use marathon_physics::budget::OverBudget;
+
 /// Any failure of this crate. Those that concern a file name its path.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
@@ -74,6 +76,16 @@ pub enum RenderError {
         min: f64,
         /// Highest rate.
         max: f64,
+    },
+    /// A film that needs more memory or time than the budget allows.
+    #[error("{}: {what} {source}", path.display())]
+    Budget {
+        /// File to be written.
+        path: PathBuf,
+        /// What needs it.
+        what: &'static str,
+        /// The limit.
+        source: OverBudget,
     },
     /// A file could not be created, written or renamed.
     #[error("{}: {action}: {source}", path.display())]

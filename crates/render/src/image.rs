@@ -176,8 +176,10 @@ impl Image {
         let (mut pending, file) = Pending::create(path)?;
         let mut sink = BufWriter::new(file);
 
-        let refused =
-            |error: png::EncodingError| RenderError::Encode { path: path.to_path_buf(), reason: error.to_string() };
+        let refused = |error: png::EncodingError| match error {
+            png::EncodingError::IoError(source) => RenderError::io(path, "cannot write")(source),
+            other => RenderError::Encode { path: path.to_path_buf(), reason: other.to_string() },
+        };
         let mut encoder = png::Encoder::new(&mut sink, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
@@ -203,15 +205,31 @@ pub fn strip(frames: &[Image], columns: usize) -> Result<Image, RenderError> {
         same_size(index, frame, [first.width, first.height])?;
     }
     let columns = columns.clamp(1, frames.len());
-    let rows = frames.len().div_ceil(columns);
-    let gap = (first.height / 180).max(1);
-    let side = |count: usize, size: usize| count.saturating_mul(size + gap) - gap;
-
-    let mut out = Image::new(side(columns, first.width), side(rows, first.height), [246, 248, 250])?;
+    let gap = gap(first.height);
+    let [width, height] = strip_size([first.width, first.height], frames.len(), columns)?;
+    let mut out = Image::new(width, height, [246, 248, 250])?;
     for (i, frame) in frames.iter().enumerate() {
         out.paste(frame, (i % columns) * (first.width + gap), (i / columns) * (first.height + gap));
     }
     Ok(out)
+}
+
+/// Width and height of a [`strip`] of so many frames, pixels.
+///
+/// # Errors
+/// [`RenderError::Size`] when it would be too large.
+pub fn strip_size([width, height]: [usize; 2], frames: usize, columns: usize) -> Result<[usize; 2], RenderError> {
+    check_size(width, height)?;
+    let (columns, gap) = (columns.clamp(1, frames.max(1)), gap(height));
+    let side = |count: usize, size: usize| count.max(1).saturating_mul(size + gap) - gap;
+    let size = [side(columns, width), side(frames.div_ceil(columns), height)];
+    check_size(size[0], size[1])?;
+    Ok(size)
+}
+
+/// Pixels between the frames of a strip.
+fn gap(height: usize) -> usize {
+    (height / 180).max(1)
 }
 
 /// Checks that a picture can have this size.

@@ -23,6 +23,7 @@
 mod animation;
 mod atomic;
 mod bins;
+mod boxes;
 mod camera;
 mod error;
 mod font;
@@ -43,7 +44,7 @@ mod view;
 pub use animation::GifWriter;
 pub use camera::{Camera, Follow};
 pub use error::RenderError;
-pub use image::{Corner, Image, MAX_SIDE, status_line, strip};
+pub use image::{Corner, Image, MAX_SIDE, status_line, strip, strip_size};
 pub use kinematics::{BodyPose, GeomPose, Pose};
 pub use mp4::Mp4Writer;
 pub use recorder::{Format, Recorder};

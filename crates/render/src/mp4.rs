@@ -1,11 +1,13 @@
 //! MP4 through an `ffmpeg` process that is fed raw pixels.
 
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread::JoinHandle;
 
 use crate::atomic::Pending;
+use crate::boxes;
 use crate::error::RenderError;
 use crate::image::{Image, same_size};
 
@@ -75,13 +77,16 @@ impl Mp4Writer {
         match sink.map(|sink| sink.write_all(frame.rgb())) {
             Some(Ok(())) => Ok(()),
             // a closed pipe means that ffmpeg gave up: its own words say why
-            Some(Err(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => self.wait(),
+            Some(Err(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => {
+                let words = self.wait()?;
+                Err(self.failed("it stopped reading frames".into(), words))
+            }
             Some(Err(error)) => Err(RenderError::io(self.pending.path(), "cannot send frames to ffmpeg")(error)),
-            None => self.wait(),
+            None => self.wait().map(|_| ()),
         }
     }
 
-    /// Waits for the encoder and gives the file its name.
+    /// Waits for the encoder, checks that the film is whole and gives the file its name.
     ///
     /// # Errors
     /// [`RenderError::NoFrames`], [`RenderError::Ffmpeg`], [`RenderError::Io`].
@@ -89,8 +94,13 @@ impl Mp4Writer {
         if self.count == 0 {
             return Err(RenderError::NoFrames { what: self.pending.path().display().to_string() });
         }
-        self.wait()?;
-        self.pending.commit()
+        let words = self.wait()?;
+        let whole = File::open(self.pending.temporary()).and_then(|mut file| boxes::check(&mut file, self.count));
+        match whole {
+            Ok(()) => self.pending.commit(),
+            // on a full disk ffmpeg may end with success, and only its words tell
+            Err(problem) => Err(self.failed(format!("the film is not whole: {problem}"), words)),
+        }
     }
 
     fn start(&self) -> Result<Running, RenderError> {
@@ -101,7 +111,8 @@ impl Mp4Writer {
 
         let [width, height] = self.size;
         let mut child = Command::new(&self.program)
-            .args(["-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"])
+            // the first error ends it: it would go on after a failed write
+            .args(["-hide_banner", "-loglevel", "error", "-xerror", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"])
             .arg(format!("{width}x{height}"))
             .args(["-r", &self.fps.to_string(), "-i", "-", "-c:v"])
             .args(*encoder)
@@ -119,15 +130,15 @@ impl Mp4Writer {
         Ok(Running { child, words: std::thread::spawn(move || last_words(stderr)) })
     }
 
-    /// Closes the pipe and waits for the process to end well.
-    fn wait(&mut self) -> Result<(), RenderError> {
+    /// Closes the pipe and waits for the process to end well. Returns what it wrote to stderr.
+    fn wait(&mut self) -> Result<String, RenderError> {
         let Some(mut running) = self.running.take() else {
             return Err(self.failed("it had already ended".into(), String::new()));
         };
         drop(running.child.stdin.take());
         let status = running.child.wait().map_err(RenderError::io(self.pending.path(), "cannot wait for ffmpeg"))?;
         let words = running.words.join().unwrap_or_default();
-        if status.success() { Ok(()) } else { Err(self.failed(status.to_string(), words)) }
+        if status.success() { Ok(words) } else { Err(self.failed(status.to_string(), words)) }
     }
 
     fn failed(&self, status: String, stderr: String) -> RenderError {

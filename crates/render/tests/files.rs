@@ -158,18 +158,27 @@ fn stand_in(folder: &Folder, body: &str) -> String {
 #[test]
 fn mp4_feeds_the_encoder_every_byte() {
     let folder = Folder::new("mp4");
-    let program = stand_in(&folder, "echo \"$*\" > \"$0.args\"; for last; do :; done; cat > \"$last\"");
-    let frames = film(3);
-    let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &program).unwrap();
+    // boxes of a film around the frames, with a table that counts them
+    let count = 3_u8;
+    let frames = film(count.into());
+    let mut table = vec![0, 0, 0, 20, b's', b't', b's', b'z', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, count];
+    for kind in [b"stbl", b"minf", b"mdia", b"trak", b"moov"] {
+        table = [&(8 + table.len() as u32).to_be_bytes()[..], kind, &table].concat();
+    }
+    let sent: Vec<u8> = frames.iter().flat_map(|frame| frame.rgb().iter().copied()).collect();
+    let head = [b"\0\0\0\x0cftypisom", &table[..], &(8 + sent.len() as u32).to_be_bytes(), b"mdat"].concat();
+    std::fs::write(folder.path("encoder.sh.head"), &head).unwrap();
+
+    let body = "echo \"$*\" > \"$0.args\"; for last; do :; done; cat \"$0.head\" - > \"$last\"";
+    let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &stand_in(&folder, body)).unwrap();
     for frame in &frames {
         writer.push(frame).unwrap();
     }
     writer.finish().unwrap();
-    let sent: Vec<u8> = frames.iter().flat_map(|frame| frame.rgb().iter().copied()).collect();
-    assert_eq!(std::fs::read(folder.path("run.mp4")).unwrap(), sent);
+    assert_eq!(std::fs::read(folder.path("run.mp4")).unwrap(), [head, sent].concat());
     let arguments = std::fs::read_to_string(folder.path("encoder.sh.args")).unwrap();
     assert!(arguments.contains("-pix_fmt rgb24 -s 96x60 -r 25 -i - -c:v libx264"), "{arguments}");
-    assert_eq!(folder.names(), ["encoder.sh", "encoder.sh.args", "run.mp4"]);
+    assert_eq!(folder.names(), ["encoder.sh", "encoder.sh.args", "encoder.sh.head", "run.mp4"]);
 }
 
 #[cfg(unix)]

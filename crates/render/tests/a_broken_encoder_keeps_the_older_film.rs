@@ -1,0 +1,118 @@
+//! A film that could not be written whole is an error, and the film of that name from before stays. The cause may be an
+//! encoder that reports success, or a full disk.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::Folder;
+use marathon_render::{Image, Mp4Writer, Recorder, RenderError};
+
+/// A frame that no encoder makes small.
+fn noise(seed: usize) -> Image {
+    let mut state = 0x9e37_79b9_u32 ^ seed as u32;
+    let rgb = (0..3 * 160 * 120).map(|_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    });
+    Image::from_rgb(160, 120, rgb.collect()).unwrap()
+}
+
+fn record(path: &Path, frames: usize) -> Result<(), RenderError> {
+    let mut recorder = Recorder::create(path, 25.0, 8)?;
+    for i in 0..frames {
+        recorder.push(&noise(i))?;
+    }
+    recorder.finish()
+}
+
+/// Stands in for ffmpeg: it reads all frames, runs `body` with the output file as `$last`, and reports success.
+#[cfg(unix)]
+fn stand_in(folder: &Folder, body: &str) -> String {
+    use std::os::unix::fs::PermissionsExt;
+    let path = folder.path("encoder.sh");
+    let listing = "case \"$*\" in *-encoders*) echo ' V....D libx264 H.264'; exit 0;; esac";
+    let text = format!("#!/bin/sh\n{listing}\nfor last; do :; done\ncat > /dev/null\n{body}\nexit 0\n");
+    std::fs::write(&path, text).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    // the file may still count as open for writing in a process that another test forks just now
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    path.display().to_string()
+}
+
+#[cfg(unix)]
+#[test]
+fn an_encoder_that_reports_success_is_not_believed() {
+    for (body, problem) in [
+        (":", "its part 'ftyp' is missing"),
+        ("printf '\\0\\0\\0\\014ftypisom\\0\\0\\0\\100mdatdata' > \"$last\"", "it is cut short"),
+        ("printf '\\0\\0\\0\\014ftypisom\\0\\0\\0\\014mdatdata' > \"$last\"", "its part 'moov' is missing"),
+        ("rm \"$last\"; echo 'No space left on device' >&2", "No space left on device"),
+    ] {
+        let folder = Folder::new("success");
+        std::fs::write(folder.path("run.mp4"), "older film").unwrap();
+        let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &stand_in(&folder, body)).unwrap();
+        writer.push(&noise(0)).unwrap();
+        let error = writer.finish().unwrap_err().to_string();
+        assert!(error.contains("run.mp4") && error.contains(problem), "{body}: {error}");
+        assert_eq!(std::fs::read(folder.path("run.mp4")).unwrap(), b"older film");
+        assert_eq!(folder.names(), ["encoder.sh", "run.mp4"]);
+    }
+}
+
+/// A file system of its own in memory.
+struct Disk(PathBuf);
+
+impl Disk {
+    /// One of so many kilobytes, or why there is none.
+    fn new(folder: &Folder, kilobytes: usize) -> Result<Disk, String> {
+        let path = folder.path("disk");
+        std::fs::create_dir(&path).unwrap();
+        let size = format!("size={kilobytes}k");
+        let mount = Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(&path).output();
+        match mount {
+            Ok(output) if output.status.success() => Ok(Disk(path)),
+            Ok(output) => Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// Needs the right to mount a file system, which CI has.
+#[test]
+fn a_full_disk_is_an_error_and_keeps_the_older_file() {
+    let folder = Folder::new("full-disk");
+    // films smaller than the encoder's buffers fail at their end only
+    let disk = match Disk::new(&folder, 64) {
+        Ok(disk) => disk,
+        Err(reason) => return println!("skipped: no file system can be mounted here: {reason}"),
+    };
+    let encoder = Command::new("ffmpeg").arg("-version").output().is_ok();
+    for (name, frames) in [("run.png", 6), ("run.gif", 2), ("run.gif", 40), ("run.mp4", 2), ("run.mp4", 60)] {
+        if name == "run.mp4" && !encoder {
+            println!("skipped: {name}: there is no ffmpeg");
+            continue;
+        }
+        let path = disk.0.join(name);
+        // all but 8 kB are taken
+        std::fs::write(&path, "older film").unwrap();
+        std::fs::write(disk.0.join("others"), vec![1; 52 * 1024]).unwrap();
+        let error = record(&path, frames).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains("o space left on device"), "{name}, {frames} frames: {error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"older film", "{name}, {frames} frames");
+        let names: Vec<_> = std::fs::read_dir(&disk.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(names.len(), 2, "{name}, {frames} frames: {names:?}");
+
+        // with room, the same film is written
+        std::fs::remove_file(disk.0.join("others")).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        record(&folder.path(name), frames).unwrap();
+    }
+}
