@@ -349,7 +349,7 @@ def test_a_trainer_that_waits_on_a_port_is_found():
     assert player.returncode == 0 and "the trainer has closed" in errors
 
 
-def test_a_trainer_that_dies_ends_the_player():
+def test_a_trainer_that_dies_ends_the_player_with_an_error():
     port = free_port()
     code = f"""
 import os
@@ -362,7 +362,7 @@ os._exit(9)
     words = [PLAYER, "--mlagents-port", str(port), *HOPPERS]
     player = subprocess.run(words, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     assert trainer.wait(timeout=10) == 9
-    assert player.returncode == 0 and "the trainer is gone" in player.stderr
+    assert player.returncode == 1 and "the trainer is gone" in player.stderr
 
 
 def test_messages_over_the_limit_are_refused(launch, log):

@@ -8,9 +8,7 @@ use marathon_envs::{Autoreset, Spec, VecEnvOptions, registry};
 use marathon_learn::Policy;
 use marathon_physics::model::JointType;
 use marathon_physics::{Model, budget};
-use marathon_render::{
-    Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size,
-};
+use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size};
 use marathon_runs::text::unsigned_zero;
 use marathon_runs::{Play, Setting, text};
 use serde::Serialize;

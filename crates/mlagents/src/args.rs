@@ -30,15 +30,20 @@ or it connects to an mlagents-learn that was started without --env and waits:
   --max-episode-steps N    decisions after which an episode is truncated [the task's]
   --threads N              threads that simulate; 0: one per processor [1]
   --fresh-agent-ids        a new agent id with every episode, which UnityParallelEnv and UnityAECEnv need
-  --connect-timeout S      seconds to wait for a trainer [60]
+  --connect-timeout S      seconds to wait for a trainer and its first answer [60]
+  --answer-timeout S       seconds of silence, without even an answer to a ping, after which the trainer counts as gone;
+                           0: never [300]
   -logFile FILE            write the log there instead of to the standard error
   --help, --version
 
 Flags with one dash are Unity's and have no effect here.
 ";
 
+/// Shortest silence after which a trainer may count as gone, s. A busy one may take seconds to answer a ping.
+const SHORTEST_SILENCE: u64 = 10;
+
 /// Flags of ours that take a value.
-const VALUED: [&str; 8] = [
+const VALUED: [&str; 9] = [
     "--mlagents-port",
     "--spawn-env",
     "--num-spawn-envs",
@@ -47,6 +52,7 @@ const VALUED: [&str; 8] = [
     "--max-episode-steps",
     "--threads",
     "--connect-timeout",
+    "--answer-timeout",
 ];
 /// Those that do not.
 const BARE: [&str; 3] = ["--fresh-agent-ids", "--help", "--version"];
@@ -122,6 +128,15 @@ pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerE
             "--spawn-env" => options.behaviors.push(BehaviorOptions { env: value, ..Default::default() }),
             "--threads" => options.threads = number(flag, &value, 0..=4096)? as usize,
             "--connect-timeout" => options.patience = Duration::from_secs(number(flag, &value, 0..=86400)?),
+            "--answer-timeout" => {
+                let seconds = number(flag, &value, 0..=86400)?;
+                if (1..SHORTEST_SILENCE).contains(&seconds) {
+                    return Err(usage(format!(
+                        "--answer-timeout is '{value}', expected 0 or from {SHORTEST_SILENCE} to 86400"
+                    )));
+                }
+                options.silence = (seconds > 0).then(|| Duration::from_secs(seconds));
+            }
             _ => {
                 if options.behaviors.is_empty() {
                     options.behaviors.push(BehaviorOptions::default());
@@ -229,6 +244,7 @@ mod tests {
             ("--mlagents-port 1 --option mass", "expected NAME=VALUE"),
             ("--mlagents-port 1 --behavior-name a?team=1", "expected a name without '?'"),
             ("--mlagents-port 1 hopper", "'hopper' belongs to no flag"),
+            ("--mlagents-port 1 --answer-timeout 3", "expected 0 or from 10 to 86400"),
             ("-logFile", "-logFile needs"),
         ] {
             let error = read(line).unwrap_err();

@@ -7,6 +7,7 @@ use crate::parameters::{Names, Parameters};
 use crate::wire::{AgentActionList, BrainParameters};
 use marathon_envs::{Autoreset, Options, Spec, Step, VecEnv, VecEnvOptions, registry};
 use marathon_physics::Model;
+use marathon_physics::lanes::Isa;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -36,6 +37,44 @@ impl Default for BehaviorOptions {
             options: Options::new(),
             max_episode_steps: None,
         }
+    }
+}
+
+/// How much room the agents of a behavior take in a message.
+pub(crate) struct Sizes {
+    /// The behavior's name for the trainer.
+    pub name: String,
+    /// Bytes without agents, and of each agent.
+    frame: usize,
+    each: usize,
+}
+
+impl Sizes {
+    /// Those of a behavior that is yet to be made.
+    ///
+    /// # Errors
+    /// If there is no such agent, or it does not take its arguments.
+    pub fn of(options: &BehaviorOptions) -> Result<Self, PlayerError> {
+        let agent = registry::global().agent_with(&options.env, &options.options)?;
+        let shards = agent.shards(Isa::best())?;
+        let spec = shards.spec();
+        Ok(Self::of_faces(&Face::all(options.name.as_ref().unwrap_or(&spec.id), spec, 1, 0)))
+    }
+
+    fn of_faces(faces: &[Face]) -> Self {
+        let sum = |bytes: fn(&Face) -> usize| faces.iter().map(bytes).sum();
+        let name = faces.first().map_or("", Face::name).to_owned();
+        Sizes { name, frame: sum(Face::frame_bytes), each: sum(Face::bytes_per_agent) }
+    }
+
+    /// Bytes of the longest message part that so many agents can need.
+    pub fn largest(&self, agents: usize) -> usize {
+        agents.saturating_mul(self.each).saturating_add(self.frame)
+    }
+
+    /// How many agents there may be if a message may have so many bytes.
+    pub fn most_agents(&self, bytes: usize) -> usize {
+        bytes.saturating_sub(self.frame) / self.each.max(1)
     }
 }
 
@@ -157,20 +196,12 @@ impl Behavior {
     /// Bytes of the longest message part that the agents can need: when all their episodes end at once, there are two infos
     /// for each and each of its roles.
     pub fn largest(&self) -> usize {
-        let [frame, each] = self.bytes();
-        frame + self.env.agents().saturating_mul(each)
+        Sizes::of_faces(&self.faces).largest(self.env.agents())
     }
 
     /// How many agents there may be if a message may have so many bytes.
     pub fn most_agents(&self, bytes: usize) -> usize {
-        let [frame, each] = self.bytes();
-        bytes.saturating_sub(frame) / each.max(1)
-    }
-
-    /// Bytes of a message without agents, and those of an agent.
-    fn bytes(&self) -> [usize; 2] {
-        let sum = |bytes: fn(&Face) -> usize| self.faces.iter().map(bytes).sum();
-        [sum(Face::frame_bytes), sum(Face::bytes_per_agent)]
+        Sizes::of_faces(&self.faces).most_agents(bytes)
     }
 
     /// Begins all episodes anew; the first time under a seed.

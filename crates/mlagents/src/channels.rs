@@ -23,6 +23,9 @@ const fn id(a: u32, b: u16, c: u16, d: u64) -> ChannelId {
     [a[0], a[1], a[2], a[3], b[0], b[1], c[0], c[1], d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]]
 }
 
+/// Most intervals of a sampler. All of them are looked at for every draw.
+const INTERVALS: usize = 1024;
+
 /// What a trainer says beside its actions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
@@ -199,6 +202,9 @@ impl<'a> Reader<'a> {
                 self.at -= 4 * count;
                 let numbers = (0..count).map(|_| self.float()).collect::<Result<Vec<_>, _>>()?;
                 let (ranges, rest) = numbers.as_chunks::<2>();
+                if ranges.len() > INTERVALS {
+                    return self.fail("a sampler has more than 1024 intervals");
+                }
                 if ranges.is_empty() || !rest.is_empty() {
                     return self.fail("a sampler of intervals does not have two numbers for each");
                 }
@@ -287,6 +293,18 @@ mod tests {
             all(&bytes[..10]).unwrap_err().to_string(),
             "side channels, byte 0: they end in the middle of a message"
         );
+    }
+
+    #[test]
+    fn a_sampler_has_a_bounded_number_of_intervals() {
+        let int = i32::to_le_bytes;
+        let of = |n: usize| {
+            let numbers = vec![0; 8 * n];
+            let head = [int(4), *b"mass", int(1), int(7), int(2), int(2 * n as i32)].concat();
+            all(&message(PARAMETERS, &[&head, &numbers]))
+        };
+        assert!(of(INTERVALS).is_ok());
+        assert!(of(INTERVALS + 1).unwrap_err().to_string().contains("more than 1024 intervals"));
     }
 
     #[test]

@@ -15,6 +15,10 @@ use std::path::{Path, PathBuf};
 const HEAD: usize = 33;
 /// Version of the format.
 const API_VERSION: i32 = 1;
+/// Longest entry, bytes: those of its numbers, and room for names and for fields that are not read. The messages of a longer
+/// one, empty ones say, could take much memory.
+const ENTRY: usize = 1 << 16;
+const ENTRY_NUMBER: usize = 16;
 
 /// An episode as it was played, from its first observation to its last.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -171,6 +175,12 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
     let mut entry = 0;
     while rest.has_remaining() {
         let place = format!("entry {entry}");
+        let most = ENTRY + ENTRY_NUMBER * (spec.obs + spec.act);
+        let length =
+            prost::decode_length_delimiter(rest).map_err(|error| wrong(&place, error.to_string(), "a length"))?;
+        if length > most {
+            return Err(wrong(&place, format!("{length} bytes"), &format!("at most {most}, as {} needs", spec.id)));
+        }
         let pair = AgentInfoActionPair::decode_length_delimited(&mut rest)
             .map_err(|error| wrong(&place, error.to_string(), "an observation with an action"))?;
         let (info, action) = (pair.agent_info.unwrap_or_default(), pair.action_info.unwrap_or_default());
@@ -213,6 +223,7 @@ fn nominal([low, high]: [f32; 2], action: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::Observation;
 
     #[test]
     fn a_file_is_head_behavior_and_pairs() {
@@ -274,6 +285,12 @@ mod tests {
         }
         let error = read_demonstrations(path, b"behaviors:", &spec).unwrap_err().to_string();
         assert!(error.starts_with("hop.demo: head: found") && error.ends_with("expected a demonstration file (.demo)"));
+        // an entry of nothing but empty messages
+        let info = AgentInfo { observations: vec![Observation::default(); 1 << 18], ..AgentInfo::default() };
+        let pair = AgentInfoActionPair { agent_info: Some(info), action_info: None };
+        let long = [&bytes[..HEAD], &[0], &pair.encode_length_delimited_to_vec()[..]].concat();
+        let error = read_demonstrations(path, &long, &spec).unwrap_err().to_string();
+        assert!(error.contains("entry 0: found") && error.contains("as Hopper-v5 needs"), "{error}");
         let other = Spec { obs: 7, ..spec.clone() };
         let error = read_demonstrations(path, &bytes, &other).unwrap_err().to_string();
         assert_eq!(error, "hop.demo: entry 0: found 11 observed numbers, expected 7, as Hopper-v5 has");

@@ -33,6 +33,28 @@ pub enum PlayerError {
         /// Why.
         source: std::io::Error,
     },
+    /// A program listens, but says nothing.
+    #[error(
+        "the program that listens on port {port} of this computer has not answered within {seconds} s (--connect-timeout); \
+         is it mlagents-learn?"
+    )]
+    NoAnswer {
+        /// The port.
+        port: u16,
+        /// How long it was waited for, s.
+        seconds: u64,
+    },
+    /// A program listens, but closes the connection.
+    #[error(
+        "the program that listens on port {port} of this computer closed the connection before it answered ({source}); is it \
+         mlagents-learn?"
+    )]
+    Closed {
+        /// The port.
+        port: u16,
+        /// How.
+        source: RpcError,
+    },
     /// The trainer is gone or refuses.
     #[error(transparent)]
     Rpc(#[from] RpcError),

@@ -7,6 +7,18 @@ use std::io::{Write, stderr};
 use std::path::Path;
 use std::sync::Arc;
 
+/// Longest part of a foreign text that is shown, characters.
+const SHOWN: usize = 100;
+
+/// A text that came from elsewhere, fit for a terminal: without control characters, and not too long.
+pub(crate) fn shown(text: &str) -> String {
+    let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
+    if text.chars().nth(SHOWN).is_some() {
+        shown.push_str("...");
+    }
+    shown
+}
+
 /// A log file, or the standard error. Copies write to the same.
 #[derive(Clone, Debug)]
 pub struct Log(Option<Arc<File>>);

@@ -71,6 +71,11 @@ impl Names {
         self.known.iter().map(|(name, _)| name.as_str())
     }
 
+    /// Whether there is such a parameter.
+    pub fn contains(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
     fn find(&self, name: &str) -> Option<&Target> {
         self.known.iter().find(|(known, _)| known == name).map(|(_, target)| target)
     }

@@ -1,10 +1,10 @@
 //! A Unity player to Python: [`Player::connect`], then [`Player::advance`] until the trainer closes.
 
-use crate::behavior::{Behavior, BehaviorOptions};
+use crate::behavior::{Behavior, BehaviorOptions, Sizes};
 use crate::channels::{self, Engine};
 use crate::error::PlayerError;
 use crate::face::TEAM;
-use crate::log::Log;
+use crate::log::{Log, shown};
 use crate::parameters::Parameters;
 use crate::trainer::{MESSAGE_LIMIT, Setup, Trainer, message};
 use crate::wire::{RlInitializationOutput, RlInput, RlOutput, UnityMessage, UnityOutput, command};
@@ -16,13 +16,18 @@ use std::time::Duration;
 /// Bytes of a message that are neither infos nor statistics: headers, names, behaviors.
 const ALLOWANCE: usize = 4096;
 
+/// Most remarks that are made once each. A trainer may name any number of things that do not exist.
+const REMARKS: usize = 1000;
+
 /// What a player is made of.
 #[derive(Clone, Debug)]
 pub struct PlayerOptions {
     /// Port on which the trainer listens.
     pub port: u16,
-    /// How long to wait for a trainer that is not there yet.
+    /// How long to wait for a trainer that is not there yet, and for its first answer.
     pub patience: Duration,
+    /// Silence, without even an answer to a ping, after which a trainer counts as gone; `None`: never.
+    pub silence: Option<Duration>,
     /// Its behaviors.
     pub behaviors: Vec<BehaviorOptions>,
     /// Threads that simulate; 0: one per processor.
@@ -38,6 +43,7 @@ impl Default for PlayerOptions {
         PlayerOptions {
             port: 5004,
             patience: Duration::from_secs(60),
+            silence: Some(Duration::from_secs(300)),
             behaviors: vec![BehaviorOptions::default()],
             threads: 1,
             fresh_ids: false,
@@ -96,12 +102,12 @@ impl Player {
     /// If there is no trainer, an agent does not exist, or there are more agents than fit into a message.
     pub fn connect(options: &PlayerOptions, log: Log) -> Result<Self, PlayerError> {
         // what cannot work with one area is told before anybody is waited for
+        check(options, 1)?;
         let one_area = make(options, 1)?;
-        check(&one_area.0)?;
         log.line(format_args!("connecting to a trainer on port {}", options.port));
-        let (mut trainer, setup) = Trainer::connect(options.port, options.patience)?;
+        let (mut trainer, setup) = Trainer::connect(options.port, options.patience, options.silence)?;
+        check(options, setup.areas)?;
         let (behaviors, next_id) = if setup.areas == 1 { one_area } else { make(options, setup.areas)? };
-        check(&behaviors)?;
         let Setup { seed, areas, package_version } = &setup;
         log.line(format_args!("mlagents-envs {package_version}; seed {seed}; areas: {areas}"));
         for behavior in &behaviors {
@@ -183,7 +189,7 @@ impl Player {
                 // a parameter that is out of range: training can go on, its author must know
                 Err(e @ (PlayerError::Env(_) | PlayerError::Sizes { .. } | PlayerError::Roles { .. })) => {
                     let text = e.to_string();
-                    if self.told.insert(text.clone()) {
+                    if first(&mut self.told, &text) {
                         self.log.line(format_args!("warning: {}: {text}", behavior.name()));
                     }
                 }
@@ -232,7 +238,7 @@ impl Player {
             if let Some(UnityOutput { rl: Some(rl), .. }) = &mut self.message.output {
                 rl.side_channel.clear();
             }
-            if self.told.insert("statistics".into()) {
+            if first(&mut self.told, "statistics") {
                 self.log
                     .line(format_args!("{statistics} bytes of statistics left out: the message would be over 4 MiB"));
             }
@@ -250,15 +256,16 @@ impl Player {
         for message in messages {
             match message {
                 channels::Message::Engine(engine) => self.set_engine(engine),
+                // one that no behavior knows does nothing, and is not kept
+                channels::Message::Parameter(name, _) if !self.is_known(&name) => self.warn_of_unknown(&name),
                 channels::Message::Parameter(name, sampler) => {
                     self.log.line(format_args!("environment parameter {name}: {sampler:?}"));
-                    self.warn_if_unknown(&name);
                     self.parameters.set(name, sampler);
                     changed = true;
                 }
                 channels::Message::Analytics => {}
                 channels::Message::Unknown(id) => {
-                    if self.told.insert(format!("{id:?}")) {
+                    if first(&mut self.told, &format!("{id:?}")) {
                         self.log
                             .line(format_args!("a side channel that this player does not know is ignored: {id:02x?}"));
                     }
@@ -272,7 +279,7 @@ impl Player {
     }
 
     fn set_engine(&mut self, engine: Engine) {
-        self.log.line(format_args!("engine: {engine:?}"));
+        let before = self.engine;
         let settings = &mut self.engine;
         match engine {
             Engine::Resolution(width, height) => settings.resolution = Some((width, height)),
@@ -281,17 +288,30 @@ impl Player {
             Engine::TargetFrameRate(rate) => settings.target_frame_rate = Some(rate),
             Engine::CaptureFrameRate(rate) => settings.capture_frame_rate = Some(rate),
         }
+        if self.engine != before {
+            self.log.line(format_args!("engine: {engine:?}"));
+        }
     }
 
-    /// A parameter that no behavior knows does nothing, which its author would like to know.
-    fn warn_if_unknown(&mut self, name: &str) {
-        let known: BTreeSet<&str> = self.behaviors.iter().flat_map(|b| b.parameter_names().iter()).collect();
-        if known.contains(name) {
-            return;
-        }
-        let known = among(name, &Vec::from_iter(known));
-        self.log.line(format_args!("warning: environment parameter '{name}' has no effect{known}"));
+    /// Whether a parameter means anything to a behavior.
+    fn is_known(&self, name: &str) -> bool {
+        self.behaviors.iter().any(|b| b.parameter_names().contains(name))
     }
+
+    /// The author of a parameter that does nothing would like to know.
+    fn warn_of_unknown(&mut self, name: &str) {
+        let name = shown(name);
+        if first(&mut self.told, &format!("parameter {name}")) {
+            let known: BTreeSet<&str> = self.behaviors.iter().flat_map(|b| b.parameter_names().iter()).collect();
+            let known = among(&name, &Vec::from_iter(known));
+            self.log.line(format_args!("warning: environment parameter '{name}' has no effect{known}"));
+        }
+    }
+}
+
+/// Whether a remark has not been made before and there is room for it.
+fn first(told: &mut BTreeSet<String>, remark: &str) -> bool {
+    told.len() < REMARKS && told.insert(remark.to_owned())
 }
 
 /// All behaviors, and the first number that no agent has.
@@ -314,20 +334,21 @@ fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), P
     Ok((behaviors, next_id))
 }
 
-/// Refuses more agents than fit into a message.
-fn check(behaviors: &[Behavior]) -> Result<(), PlayerError> {
-    let bytes: usize = ALLOWANCE + behaviors.iter().map(Behavior::largest).sum::<usize>();
-    match behaviors.iter().max_by_key(|behavior| behavior.largest()) {
-        Some(largest) if bytes > MESSAGE_LIMIT => {
-            let others = bytes - largest.largest();
-            Err(PlayerError::TooManyAgents {
-                agents: largest.env().agents(),
-                name: largest.name().into(),
-                bytes,
-                limit: MESSAGE_LIMIT,
-                most: largest.most_agents(MESSAGE_LIMIT.saturating_sub(others)),
-            })
-        }
+/// Refuses more agents than fit into a message, before any are made.
+fn check(options: &PlayerOptions, areas: usize) -> Result<(), PlayerError> {
+    let sizes = options.behaviors.iter().map(Sizes::of).collect::<Result<Vec<_>, _>>()?;
+    let agents = |i: usize| options.behaviors[i].agents.saturating_mul(areas);
+    let largest = |i: &usize| sizes[*i].largest(agents(*i));
+    let all = 0..sizes.len();
+    let bytes = all.clone().fold(ALLOWANCE, |sum, i| sum.saturating_add(largest(&i)));
+    match all.max_by_key(largest) {
+        Some(i) if bytes > MESSAGE_LIMIT => Err(PlayerError::TooManyAgents {
+            agents: agents(i),
+            name: sizes[i].name.clone(),
+            bytes,
+            limit: MESSAGE_LIMIT,
+            most: sizes[i].most_agents(MESSAGE_LIMIT.saturating_sub(bytes - largest(&i))),
+        }),
         _ => Ok(()),
     }
 }

@@ -40,8 +40,8 @@ pub fn main(words: impl IntoIterator<Item = String>) -> ExitCode {
         }
         // a trainer that was killed says nothing more
         Err(PlayerError::Rpc(e @ (RpcError::Io(_) | RpcError::GoAway(_)))) => {
-            log.line(format_args!("the trainer is gone: {e}"));
-            ExitCode::SUCCESS
+            log.line(format_args!("error: the trainer is gone: {e}"));
+            ExitCode::FAILURE
         }
         Err(e) => {
             log.line(format_args!("error: {e}"));

@@ -5,7 +5,9 @@
 //! [gRPC over HTTP/2](https://github.com/grpc/grpc/blob/master/doc/PROTOCOL-HTTP2.md). The header of a request is written
 //! with indices of HPACK's static table only, and headers of replies are skipped, so that no table has to be kept.
 
+use marathon_physics::budget::{self, OverBudget};
 use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// The one method of ML-Agents' service.
@@ -22,8 +24,10 @@ const WINDOW: u32 = 0x7fff_ffff;
 const FIRST_WINDOW: u32 = 65535;
 /// Bytes after which the connection's window is filled up again.
 const REFILL: u32 = 1 << 30;
-/// Longest reply that is accepted.
-const MAX_REPLY: usize = 256 << 20;
+/// Memory that a byte of a reply may take once it is read: a list of empty messages has two bytes for each.
+const MEMORY_PER_BYTE: f64 = 128.0;
+/// Least time between two pings in one wait. gRPC's server ends the connection of a client that asks more often.
+const PING_PAUSE: Duration = Duration::from_secs(300);
 /// In front of a message: one byte that says whether it is compressed, and its length.
 const MESSAGE_HEAD: usize = 5;
 
@@ -84,6 +88,18 @@ pub enum RpcError {
     /// The peer answered without a message.
     #[error("the trainer refused a message of {0} bytes; it takes at most 4 MiB (4194304)")]
     Refused(usize),
+    /// The peer has not answered in time.
+    #[error("the trainer has not answered in time")]
+    Late,
+    /// The peer is there no more, though the connection is.
+    #[error(
+        "the trainer has sent nothing for {} s and does not answer a ping: it has stopped or hangs (--answer-timeout)",
+        .0.as_secs()
+    )]
+    Silent(Duration),
+    /// The peer's message needs too much memory.
+    #[error("the trainer's message {0}")]
+    Budget(#[from] OverBudget),
     /// What the peer sent is not HTTP/2, or not a gRPC reply.
     #[error("the peer does not speak ML-Agents' protocol: {0}")]
     Protocol(&'static str),
@@ -121,6 +137,48 @@ pub struct Channel<S> {
     end: usize,
     /// Bytes to be sent.
     sending: Vec<u8>,
+    wait: Wait,
+}
+
+/// How long a peer is waited for. All of this takes a stream whose reads and writes time out now and then.
+#[derive(Default)]
+struct Wait {
+    /// The present reply must be there by then.
+    deadline: Option<Instant>,
+    /// Longest silence.
+    silence: Option<Duration>,
+    /// Begin of the present silence; `None`: something has come or gone since a read or write last timed out.
+    since: Option<Instant>,
+    /// The ping that is not answered yet.
+    pinged: Option<Instant>,
+    last_ping: Option<Instant>,
+}
+
+impl Wait {
+    /// A read or write has timed out. Returns whether the peer is to be asked whether it is there.
+    fn go_on(&mut self) -> Result<bool, RpcError> {
+        let now = Instant::now();
+        if self.deadline.is_some_and(|deadline| now >= deadline) {
+            return Err(RpcError::Late);
+        }
+        let Some(most) = self.silence else { return Ok(false) };
+        let silent = now - *self.since.get_or_insert(now);
+        if let Some(pinged) = self.pinged {
+            return if silent >= most && now - pinged >= most / 2 { Err(RpcError::Silent(silent)) } else { Ok(false) };
+        }
+        Ok(silent >= most / 2 && self.last_ping.is_none_or(|last| now - last >= PING_PAUSE))
+    }
+
+    /// A write has timed out, in the midst of which no ping can be sent.
+    fn go_on_writing(&mut self) -> Result<(), RpcError> {
+        self.go_on()?;
+        let silent = self.since.map_or(Duration::ZERO, |since| since.elapsed());
+        if self.silence.is_some_and(|most| silent >= most) { Err(RpcError::Silent(silent)) } else { Ok(()) }
+    }
+
+    fn heard(&mut self) {
+        (self.since, self.pinged) = (None, None);
+    }
 }
 
 impl<S: Read + Write> Channel<S> {
@@ -128,7 +186,7 @@ impl<S: Read + Write> Channel<S> {
     ///
     /// # Errors
     /// If the stream cannot be written to.
-    pub fn open(mut stream: S, authority: &str) -> Result<Self, RpcError> {
+    pub fn open(stream: S, authority: &str) -> Result<Self, RpcError> {
         let mut hello = PREFACE.to_vec();
         let mut settings = Vec::new();
         for (id, value) in [(setting::ENABLE_PUSH, 0), (setting::INITIAL_WINDOW_SIZE, WINDOW)] {
@@ -137,8 +195,7 @@ impl<S: Read + Write> Channel<S> {
         }
         put_frame(&mut hello, frame::SETTINGS, 0, 0, &settings);
         put_frame(&mut hello, frame::WINDOW_UPDATE, 0, 0, &(WINDOW - FIRST_WINDOW).to_be_bytes());
-        stream.write_all(&hello)?;
-        Ok(Channel {
+        let mut channel = Channel {
             stream,
             request: request_header(authority),
             call: 0,
@@ -152,7 +209,49 @@ impl<S: Read + Write> Channel<S> {
             at: 0,
             end: 0,
             sending: Vec::new(),
-        })
+            wait: Wait::default(),
+        };
+        channel.send(&hello)?;
+        Ok(channel)
+    }
+
+    /// Sets the time by which a reply must be there, from now on. The stream's reads and writes must time out now and then.
+    pub fn set_deadline(&mut self, deadline: Option<Instant>) {
+        self.wait.deadline = deadline;
+    }
+
+    /// Sets the longest silence of the peer. It may take any time for a reply as long as it answers pings; gRPC's servers do
+    /// while their program is busy. The stream's reads and writes must time out now and then.
+    pub fn set_longest_silence(&mut self, silence: Option<Duration>) {
+        self.wait.silence = silence;
+    }
+
+    /// Sends bytes, however long the peer takes for them.
+    fn send(&mut self, mut bytes: &[u8]) -> Result<(), RpcError> {
+        while !bytes.is_empty() {
+            match self.stream.write(bytes) {
+                Ok(0) => return Err(RpcError::Io(io::ErrorKind::WriteZero.into())),
+                Ok(n) => {
+                    bytes = &bytes[n..];
+                    self.wait.since = None;
+                }
+                Err(e) if timed_out(&e) => self.wait.go_on_writing()?,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e.into()),
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks the peer whether it is there.
+    fn ping(&mut self) -> Result<(), RpcError> {
+        let mut ping = Vec::new();
+        put_frame(&mut ping, frame::PING, 0, 0, b"marathon");
+        let since = self.wait.since;
+        self.send(&ping)?;
+        let now = Instant::now();
+        (self.wait.since, self.wait.pinged, self.wait.last_ping) = (since, Some(now), Some(now));
+        Ok(())
     }
 
     /// Sends a message and waits for the reply, which replaces what is in `reply`.
@@ -166,6 +265,7 @@ impl<S: Read + Write> Channel<S> {
             return Err(RpcError::Protocol("a connection carries no more than 2^30 calls"));
         }
         self.call_window = self.initial_window;
+        self.wait.heard();
         let mut sending = std::mem::take(&mut self.sending);
         sending.clear();
         put_frame(&mut sending, frame::HEADERS, flag::END_HEADERS, self.call, &self.request);
@@ -176,7 +276,7 @@ impl<S: Read + Write> Channel<S> {
             let room = self.window.min(self.call_window).min(self.max_frame as i64);
             if room <= 0 {
                 // the peer has to make room first
-                self.stream.write_all(&sending)?;
+                self.send(&sending)?;
                 sending.clear();
                 if self.pump(reply, message.len())? {
                     return Err(RpcError::Refused(message.len()));
@@ -193,7 +293,7 @@ impl<S: Read + Write> Channel<S> {
             self.window -= n as i64;
             self.call_window -= n as i64;
         }
-        self.stream.write_all(&sending)?;
+        self.send(&sending)?;
         self.sending = sending;
         while !self.pump(reply, message.len())? {}
         unpack(reply, message.len())
@@ -221,10 +321,8 @@ impl<S: Read + Write> Channel<S> {
                 self.taken += length as u32;
                 if ours {
                     let data = if flags & flag::PADDED == 0 { payload } else { unpadded(payload)? };
-                    if reply.len() + data.len() > MAX_REPLY {
-                        return Err(RpcError::Protocol("a reply is longer than 256 MiB"));
-                    }
                     reply.extend(data);
+                    budget::MEMORY.check(MEMORY_PER_BYTE * declared(reply).max(reply.len()) as f64)?;
                     ended = flags & flag::END_STREAM != 0;
                 }
                 if self.taken > REFILL {
@@ -270,7 +368,7 @@ impl<S: Read + Write> Channel<S> {
             _ => {}
         }
         if !answer.is_empty() {
-            self.stream.write_all(&answer)?;
+            self.send(&answer)?;
         }
         Ok(ended)
     }
@@ -283,12 +381,37 @@ impl<S: Read + Write> Channel<S> {
             match self.stream.read(&mut self.received[self.end..]) {
                 Ok(0) if self.leaving => return Err(RpcError::GoAway(0)),
                 Ok(0) => return Err(RpcError::Io(io::ErrorKind::UnexpectedEof.into())),
-                Ok(read) => self.end += read,
+                Ok(read) => {
+                    self.end += read;
+                    self.wait.heard();
+                    // a peer that sends a byte now and then never lets a read time out
+                    if self.wait.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                        return Err(RpcError::Late);
+                    }
+                }
+                Err(e) if timed_out(&e) => {
+                    if self.wait.go_on()? {
+                        self.ping()?;
+                    }
+                }
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(e) => return Err(e.into()),
             }
         }
         Ok(())
+    }
+}
+
+/// Whether a read or write has come to nothing within the stream's own time.
+fn timed_out(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
+}
+
+/// Length of a reply as its head says, once that is there.
+fn declared(reply: &[u8]) -> usize {
+    match reply {
+        [_, a, b, c, d, ..] => MESSAGE_HEAD + u32::from_be_bytes([*a, *b, *c, *d]) as usize,
+        _ => 0,
     }
 }
 
@@ -445,7 +568,7 @@ mod tests {
     #[test]
     fn what_is_no_reply_is_an_error() {
         let refused = (frame::HEADERS, flag::END_STREAM, 1, &b"grpc-status 8"[..]);
-        let cases: [(&[Frame], &str); 8] = [
+        let cases: [(&[Frame], &str); 9] = [
             (&[refused], "refused a message of 3 bytes"),
             (&[], "the connection broke"),
             (&[(frame::GOAWAY, 0, 0, &[0, 0, 0, 1, 0, 0, 0, 2])], "ended the connection (code 2)"),
@@ -454,6 +577,10 @@ mod tests {
             (&[(frame::DATA, flag::END_STREAM, 1, &[1, 0, 0, 0, 0])], "compressed"),
             (&[(frame::DATA, flag::END_STREAM, 1, &[0, 0, 0, 0, 9, 1])], "another length"),
             (&[(frame::WINDOW_UPDATE, 0, 0, &[1])], "cut short"),
+            (
+                &[(frame::DATA, 0, 1, &[0, 64, 0, 0, 0])],
+                "the trainer's message asks for 137.4 GB; the limit 'memory' is 2 GB",
+            ),
         ];
         for (frames, expected) in cases {
             let error = answering(frames).call(b"abc", &mut Vec::new()).unwrap_err().to_string();

@@ -5,7 +5,8 @@
 //! answer says what to do next.
 
 use crate::error::PlayerError;
-use crate::rpc::Channel;
+use crate::log::shown;
+use crate::rpc::{Channel, RpcError};
 use crate::wire::{Capabilities, Header, RlInitializationOutput, RlInput, UnityMessage, UnityOutput};
 use prost::Message;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
@@ -18,8 +19,10 @@ pub const COMMUNICATION_VERSION: &str = "1.5.0";
 const PACKAGE_VERSION: &str = "3.0.0";
 /// Longest message that a trainer takes: gRPC's default, which Python does not change.
 pub const MESSAGE_LIMIT: usize = 4 << 20;
-/// Time between two attempts to reach a trainer.
+/// Time between two attempts to reach a trainer, and between two looks at the clock while one is waited for.
 const PAUSE: Duration = Duration::from_millis(100);
+/// Least time that a trainer has for its first answer.
+const FIRST_ANSWER: Duration = Duration::from_secs(2);
 
 /// What the trainer asked for at the beginning.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,13 +43,17 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// Finds the trainer on a port of this computer and greets it. One that is not there yet is waited for.
+    /// Finds the trainer on a port of this computer and greets it. One that is not there yet is waited for. Once it has
+    /// answered, it counts as gone after `silence` in which it does not even answer a ping; `None`: never.
     ///
     /// # Errors
-    /// If nobody listens until `patience` is over, or who listens is no trainer.
-    pub fn connect(port: u16, patience: Duration) -> Result<(Self, Setup), PlayerError> {
+    /// If no trainer listens and answers until `patience` is over, or another program does.
+    pub fn connect(port: u16, patience: Duration, silence: Option<Duration>) -> Result<(Self, Setup), PlayerError> {
+        let begun = Instant::now();
         let stream = reach(port, patience).map_err(|source| PlayerError::Connect { port, source })?;
-        let channel = Channel::open(stream, &format!("localhost:{port}"))?;
+        let mut channel = Channel::open(stream, &format!("localhost:{port}"))?;
+        let deadline = (begun + patience).max(Instant::now() + FIRST_ANSWER);
+        channel.set_deadline(Some(deadline));
         let mut trainer = Trainer { channel, sending: Vec::new(), reply: Vec::new() };
         let everything = Capabilities {
             base_rl: true,
@@ -65,23 +72,30 @@ impl Trainer {
             capabilities: Some(everything),
         };
         let output = UnityOutput { rl: None, initialization: Some(hello) };
-        let answer = trainer.call(&message(Some(output)))?;
+        let answer = trainer.call(&message(Some(output))).map_err(|error| match error {
+            PlayerError::Rpc(RpcError::Late) => PlayerError::NoAnswer { port, seconds: begun.elapsed().as_secs() },
+            PlayerError::Rpc(source @ (RpcError::Io(_) | RpcError::GoAway(_))) => PlayerError::Closed { port, source },
+            other => other,
+        })?;
+        trainer.channel.set_deadline(None);
+        trainer.channel.set_longest_silence(silence);
         let Some(asked) = answer.input.and_then(|input| input.initialization) else {
             return Err(PlayerError::Message("does not begin with an initialization"));
         };
         let major = |version: &str| version.split('.').next().map(str::to_owned);
         if major(&asked.communication_version) != major(COMMUNICATION_VERSION) {
-            return Err(PlayerError::Version { found: asked.communication_version, expected: COMMUNICATION_VERSION });
+            let found = shown(&asked.communication_version);
+            return Err(PlayerError::Version { found, expected: COMMUNICATION_VERSION });
         }
         let setup = Setup {
             seed: asked.seed,
             areas: usize::try_from(asked.num_areas).unwrap_or(1).max(1),
-            package_version: asked.package_version,
+            package_version: shown(&asked.package_version),
         };
         Ok((trainer, setup))
     }
 
-    /// Waits, as long as it takes, for the first thing to do. `None`: the trainer has closed.
+    /// Waits for the first thing to do, as long as the trainer is there. `None`: the trainer has closed.
     ///
     /// # Errors
     /// If the trainer is gone.
@@ -123,13 +137,23 @@ fn reach(port: u16, patience: Duration) -> std::io::Result<TcpStream> {
     let addresses = [SocketAddr::from((Ipv4Addr::LOCALHOST, port)), SocketAddr::from((Ipv6Addr::LOCALHOST, port))];
     let begun = Instant::now();
     loop {
-        match TcpStream::connect(&addresses[..]) {
-            Ok(stream) => {
-                stream.set_nodelay(true)?;
-                return Ok(stream);
+        let mut failure = std::io::ErrorKind::NotFound.into();
+        for address in &addresses {
+            // a listener with a full queue lets one wait
+            let left = patience.saturating_sub(begun.elapsed()).max(FIRST_ANSWER);
+            match TcpStream::connect_timeout(address, left) {
+                Ok(stream) => {
+                    stream.set_nodelay(true)?;
+                    stream.set_read_timeout(Some(PAUSE))?;
+                    stream.set_write_timeout(Some(PAUSE))?;
+                    return Ok(stream);
+                }
+                Err(e) => failure = e,
             }
-            Err(e) if begun.elapsed() >= patience => return Err(e),
-            Err(_) => sleep(PAUSE),
         }
+        if begun.elapsed() >= patience {
+            return Err(failure);
+        }
+        sleep(PAUSE);
     }
 }

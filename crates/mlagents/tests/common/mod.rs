@@ -8,11 +8,14 @@ use marathon_mlagents::wire::{
 use prost::Message;
 use std::io::{BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 const DATA: u8 = 0;
 const HEADERS: u8 = 1;
 const SETTINGS: u8 = 4;
+const PING: u8 = 6;
 const WINDOW_UPDATE: u8 = 8;
+const ACK: u8 = 1;
 const END_STREAM: u8 = 1;
 const END_HEADERS: u8 = 4;
 const WINDOW: u32 = 0x7fff_ffff;
@@ -92,6 +95,13 @@ impl FakeTrainer {
     /// Receives the greeting and the question what to do; answers the first with a seed.
     pub fn greet(&mut self, seed: i32, areas: i32) -> UnityMessage {
         let hello = self.receive().expect("a greeting");
+        self.answer_greeting(seed, areas);
+        assert_eq!(self.receive().expect("a question").output, None);
+        hello
+    }
+
+    /// Answers the greeting.
+    pub fn answer_greeting(&mut self, seed: i32, areas: i32) {
         let initialization = RlInitializationInput {
             seed,
             communication_version: "1.5.0".into(),
@@ -99,8 +109,30 @@ impl FakeTrainer {
             num_areas: areas,
         };
         self.answer(&input(UnityInput { rl: None, initialization: Some(initialization) }));
-        assert_eq!(self.receive().expect("a question").output, None);
-        hello
+    }
+
+    /// Reads, and says nothing, until the player is gone.
+    pub fn ignore_until_closed(&mut self) {
+        let _ = self.reader.read_to_end(&mut Vec::new());
+    }
+
+    /// Answers nothing but pings for a while. Returns how many came.
+    pub fn answer_pings_for(&mut self, time: Duration) -> usize {
+        let (begun, mut pings) = (Instant::now(), 0);
+        self.reader.get_ref().set_read_timeout(Some(Duration::from_millis(20))).expect("a socket");
+        while begun.elapsed() < time {
+            let mut bytes = [0; 17];
+            match self.reader.read(&mut bytes) {
+                Ok(17) if bytes[3] == PING => {
+                    pings += 1;
+                    self.frame(PING, ACK, 0, &bytes[9..]);
+                }
+                Ok(n) => panic!("{n} bytes that are no ping: {bytes:?}"),
+                Err(_) => {}
+            }
+        }
+        self.reader.get_ref().set_read_timeout(None).expect("a socket");
+        pings
     }
 }
 
