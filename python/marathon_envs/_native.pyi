@@ -142,10 +142,11 @@ class VecEnv:
 
         Args:
             id: name of the task, as in `marathon_envs.ids()`; case does not matter, and without a version it means v0.
-            num_envs: number of agents.
+            num_envs: number of agents. More than fit into 16 GB are a `MemoryError`, whose text says how to allow them.
             seed: seed until `reset` gives another. It is a number, not chance: without one given, every environment
                 begins with the same episodes.
-            threads: number of threads; 0 means one per processor core, but not more than there are blocks of 16 agents.
+            threads: number of threads, at most 1024; 0 means one per processor core. There are never more than blocks
+                of 16 agents.
             isa: instruction set; None means the widest that the processor has.
             autoreset: what happens to an agent whose episode ended. "same_step": `obs` is the first observation of the
                 next episode already, `final_obs` the last one of the old. "next_step": the next step ignores its action
@@ -275,10 +276,17 @@ class VecEnv:
 
         Force, N, and torque, N m, are in world axes at the body's center of mass. `model.body` knows the indices.
         """
-    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
-        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
+    def ground(self, agent: int, field: int = 0) -> npt.NDArray[np.float32]:
+        """An agent's ground: elevations, m above the zero of the model's height field, ``(nrow, ncol)``, a new array.
 
-        The first row has the smallest y. The ground lasts over resets, until changed.
+        The first row has the smallest y. ``model.hfield`` knows the indices.
+        """
+    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
+        """Give an agent ground of its own: elevations, m above the zero of the model's height field.
+
+        They are ``(nrow, ncol)``, or row after row; the first row has the smallest y. ``model.hfield_nrow`` and
+        ``hfield_ncol`` tell the size. The ground lasts over resets, until changed, but not in tasks that draw the
+        ground of every episode, such as ``TerrainWalker2d-v0``: there it lasts until the episode ends.
         """
     def save(self) -> bytes:
         """Everything that the future depends on.
@@ -546,6 +554,20 @@ class Model:
     @property
     def actuator_range(self) -> npt.NDArray[np.float64]:
         """Range of each actuator's control in its own units, infinite where there is none, ``(nu, 2)``."""
+    @property
+    def hfield_names(self) -> list[str]:
+        """Names of the height fields."""
+    def hfield(self, name: str) -> int:
+        """Index of a height field."""
+    @property
+    def hfield_nrow(self) -> npt.NDArray[np.int64]:
+        """Rows of each height field's grid, along y, ``(nhfield,)``."""
+    @property
+    def hfield_ncol(self) -> npt.NDArray[np.int64]:
+        """Columns of each height field's grid, along x, ``(nhfield,)``."""
+    @property
+    def hfield_size(self) -> npt.NDArray[np.float64]:
+        """Half extents along x and y, height of the highest elevation, thickness of the base, m, ``(nhfield, 4)``."""
 
 @final
 class Simulation:
@@ -598,10 +620,11 @@ class Simulation:
 
         Force, N, and torque, N m, are in world axes, at the body's center of mass.
         """
-    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
-        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
+    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
+        """Give an agent ground of its own: elevations, m above the zero of the model's height field.
 
-        The first row has the smallest y. The ground lasts over resets, until changed, and belongs to snapshots.
+        They are ``(nrow, ncol)``, or row after row; the first row has the smallest y. The ground lasts over resets,
+        until changed, and belongs to snapshots.
         """
     def ground_height(self, x: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Heights of the ground at places of the world, m, ``(num_agents, n)``.

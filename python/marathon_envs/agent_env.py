@@ -249,11 +249,8 @@ class AgentVecEnv:
             self.due[due] = steps[due] + np.maximum(np.asarray(holds, np.int64), 1)
         return np.where(self.commanded[:, None], self.given, self.scheduled)
 
-    def set_ground(self, agent: int, field: int, elevations: Sequence[float]) -> None:
-        """Give an agent ground of its own: elevations, m above the zero of the model's height field, row by row.
-
-        The first row has the smallest y. The ground lasts over resets, until changed.
-        """
+    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
+        """Give an agent ground of its own, as `Simulation.set_ground`: it lasts over resets, until changed."""
         self.agent.sim.set_ground(agent, field, elevations)
 
     def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
@@ -264,10 +261,13 @@ class AgentVecEnv:
         if command is None:
             self.commanded[chosen] = False
             return
-        numbers, expected = np.asarray(command, float), self.given.shape
+        # a copy: ends of ranges in single precision become the ends themselves
+        numbers, expected = np.array(command, float), self.given.shape
         if numbers.shape != expected:
             raise ValueError(f"command has the shape {numbers.shape}, expected {expected}")
         for i, number in enumerate(ranges):
+            for end, beyond in ((number.low, np.less), (number.high, np.greater)):
+                numbers[beyond(numbers[:, i], end) & (np.float32(numbers[:, i]) == np.float32(end)), i] = end
             # NaN is in no range
             wrong = chosen & ~((numbers[:, i] >= number.low) & (numbers[:, i] <= number.high))
             if wrong.any():

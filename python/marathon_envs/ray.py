@@ -16,6 +16,7 @@ number of workers, nor on whether some of them were lost on the way.
 Needs Ray: `pip install marathon-envs[ray]`, for RLlib `pip install marathon-envs[rllib]`.
 """
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
 from typing import Any
@@ -48,19 +49,26 @@ class Workers:
     """Ray actors that play the rollouts of a training run, each of them one slice of its agents.
 
     An actor that is lost, with its process or its machine, is replaced, and the new one plays the lost part again: from
-    the same state, with the same policy and random numbers. An exception in an actor is no loss and ends the run.
+    the same state, with the same policy and random numbers. So is one that stops answering. An exception in an actor is
+    no loss and ends the run.
     """
 
-    def __init__(self, count: int, **options: Any) -> None:
+    def __init__(self, count: int, *, answer_timeout: float | None = 600.0, **options: Any) -> None:
         """Prepare `count` actors.
 
         Args:
             count: number of actors; at most one per sixteen agents is used.
+            answer_timeout: longest time that an actor may take for a rollout, s; None means any time. One that takes
+                longer is replaced. If its replacement does too, the run ends with a `TimeoutError`. The time in which
+                an actor waits for free processors counts.
             **options: what `ray.remote` takes for an actor, such as `num_cpus` (default: 1) or `resources`.
         """
         if count < 1:
             raise ValueError(f"count is {count}, expected at least 1")
+        if answer_timeout is not None and not 0 < answer_timeout < float("inf"):
+            raise ValueError(f"answer_timeout is {answer_timeout}, expected a number of seconds above 0, or None")
         self._count = count
+        self._timeout = answer_timeout
         self._actor = ray.remote(**{"num_cpus": 1, **options})(_Actor)
         self._actors: list[Any] = []
         self._run = ("", "")
@@ -81,23 +89,36 @@ class Workers:
         slices = len(states)
         self._actors += [self._make(i, slices) for i in range(len(self._actors), slices)]
         shared = ray.put(orders)
-        pending = {self._actors[i].play.remote(shared, state): i for i, state in enumerate(states)}
+        asked = time.monotonic()
+        # slice and time of each question, the oldest first, and slices whose actor has been late
+        pending = {self._actors[i].play.remote(shared, state): (i, asked) for i, state in enumerate(states)}
+        late: set[int] = set()
         losses = 0
         while pending:
-            (done, *_), _ = ray.wait(list(pending), num_returns=1)
-            i = pending.pop(done)
+            oldest, (i, asked) = next(iter(pending.items()))
+            left = None if self._timeout is None else max(asked + self._timeout - time.monotonic(), 0.0)
+            done, _ = ray.wait(list(pending), num_returns=1, timeout=left)
+            if not done:
+                if i in late:
+                    raise TimeoutError(
+                        f"worker {i} of {slices} has not answered for {self._timeout:g} s, nor had the one before it: "
+                        "they hang, wait for free processors, or need more time for a rollout "
+                        "(Workers(..., answer_timeout=...))"
+                    )
+                late.add(i)
+                del pending[oldest]
+                pending[self._again(i, slices).play.remote(shared, states[i])] = (i, time.monotonic())
+                continue
+            i, _ = pending.pop(done[0])
             try:
-                answer = ray.get(done)
+                answer = ray.get(done[0])
             except RayTaskError:
                 raise
             except RayError as error:
                 losses += 1
                 if losses > _PATIENCE * slices:
                     raise RuntimeError(f"{losses} of {slices} workers were lost one after another") from error
-                self.replaced += 1
-                ray.kill(self._actors[i])
-                self._actors[i] = self._make(i, slices)
-                pending[self._actors[i].play.remote(shared, states[i])] = i
+                pending[self._again(i, slices).play.remote(shared, states[i])] = (i, time.monotonic())
             else:
                 losses = 0
                 yield i, answer
@@ -111,6 +132,13 @@ class Workers:
         for actor in self._actors:
             ray.kill(actor)
         self._actors.clear()
+
+    def _again(self, i: int, slices: int) -> Any:
+        """Replace an actor."""
+        self.replaced += 1
+        ray.kill(self._actors[i])
+        self._actors[i] = self._make(i, slices)
+        return self._actors[i]
 
     def _make(self, i: int, slices: int) -> Any:
         return self._actor.remote(*self._run, i, slices)
@@ -139,6 +167,7 @@ def train(
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
     options: dict[str, Any] | None = None,
+    initialize_from: str | PathLike[str] | None = None,
 ) -> TrainResult:
     """Train as `marathon_envs.train` does, with rollouts played by Ray's workers; the policy has the same bits.
 
@@ -160,6 +189,7 @@ def train(
         resume: the folder of a run to go on with, in place of a task and a configuration. It may have been begun
             without Ray, and may go on without.
         options: arguments of the task.
+        initialize_from: a policy to start from in place of random weights, a file or the folder of a run.
     """
     players = workers if isinstance(workers, Workers) else Workers(workers)
     try:
@@ -174,6 +204,7 @@ def train(
             out=out,
             resume=resume,
             options=options,
+            initialize_from=initialize_from,
             players=players,
         )
     finally:

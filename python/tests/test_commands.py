@@ -188,6 +188,37 @@ def test_what_cannot_be_told_is_refused(command: np.ndarray, message: str) -> No
             hopper.set_command(None)
 
 
+def test_the_ends_of_ranges_may_be_in_single_precision() -> None:
+    """float32, the type of all arrays of the package, has no number for pi/2: the nearest is beyond it."""
+    man = VecEnv("MarathonManController-v0", 1)
+    man.reset(seed=1)
+    turn = [range.name for range in man.spec.command].index("turn")
+    for sign in (1, -1):
+        command = np.zeros((1, len(man.spec.command)), np.float32)
+        command[0, turn] = sign * np.pi / 2
+        assert abs(float(command[0, turn])) > np.pi / 2
+        man.set_command(command)
+        man.step(np.zeros((1, man.spec.act_size)))
+        assert man.command[0, turn] == sign * np.pi / 2
+        command[0, turn] = np.nextafter(command[0, turn], np.float32(sign * np.inf))
+        with pytest.raises(ValueError, match="command turn is"):
+            man.set_command(command)
+
+    class Turner(Cart):
+        commands = (CommandRange("turn", -np.pi / 2, np.pi / 2, "rad/s"), CommandRange("brake", 0.1, 0.7))
+
+    carts = Turner.vec_env(N)
+    carts.reset(seed=1)
+    carts.set_command(np.full((N, 2), [np.pi / 2, 0.7], np.float32))
+    carts.step(np.zeros((N, 1)))
+    assert carts.command.tolist() == [[np.pi / 2, 0.7]] * N
+    carts.set_command(np.full((N, 2), [-np.pi / 2, 0.1], np.float32))
+    carts.step(np.zeros((N, 1)))
+    assert carts.command.tolist() == [[-np.pi / 2, 0.1]] * N
+    with pytest.raises(ValueError, match=r"command brake is 0\.70"):
+        carts.set_command(np.full((N, 2), [0.0, 0.70001]))
+
+
 def test_facts_of_a_class_have_names() -> None:
     spec = Cart.vec_env(2).spec
     assert spec.observations == {"velocity": slice(0, 1, 1), "command": slice(1, 3, 1), "memory": slice(3, 5, 1)}

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from marathon_envs import MarathonAgent, Model, Simulation
+from marathon_envs import MarathonAgent, Model, Simulation, VecEnv
 
 ROWS, COLUMNS = 5, 7
 MODEL = f"""
@@ -120,13 +120,48 @@ def test_ground_lasts_over_resets_and_snapshots_and_is_stood_upon() -> None:
     [
         (2, 0, np.zeros(35), "agent is 2, expected less than 2"),
         (0, 1, np.zeros(35), "field is 1, expected less than 1"),
-        (0, 0, np.zeros(34), r"elevations has length 34, expected 5 \* 7"),
-        (0, 0, np.full(35, np.nan), "elevations has a number that is NaN"),
+        (0, 0, np.zeros(34), r"elevations have the shape \(34,\), expected \(5, 7\) or \(35,\)"),
+        (0, 0, np.zeros((7, 5)), r"elevations have the shape \(7, 5\), expected \(5, 7\) or \(35,\)"),
+        (0, 0, np.full(35, np.nan), "elevations have a number that is NaN"),
     ],
 )
 def test_ground_that_does_not_fit_is_refused(agent: int, field: int, elevations: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Simulation(Model.parse(MODEL), 2).set_ground(agent, field, elevations)
+
+
+def test_a_model_tells_the_size_of_its_height_fields() -> None:
+    model = Model.parse(MODEL)
+    assert (model.hfield_names, model.hfield("hills")) == (["hills"], 0)
+    assert (model.hfield_nrow.tolist(), model.hfield_ncol.tolist()) == ([ROWS], [COLUMNS])
+    assert model.hfield_size.tolist() == [[3, 2, 1, 0.5]]
+    with pytest.raises(ValueError, match="the model has no height field 'hill'; did you mean 'hills'"):
+        model.hfield("hill")
+    assert Model.parse("<mujoco><worldbody/></mujoco>").hfield_size.shape == (0, 4)
+
+
+def test_ground_of_an_environment_lasts_as_long_as_its_task_draws_none() -> None:
+    """In a task that draws the ground of every episode, ground of one's own lasts for an episode."""
+    env = VecEnv("TerrainWalker2d-v0", 2, autoreset="disabled", seed=1)
+    env.reset()
+    rows, columns = env.model.hfield_nrow[0], env.model.hfield_ncol[0]
+    drawn = env.ground(0)
+    assert drawn.shape == (rows, columns)
+    flat = np.zeros((rows, columns), np.float32)
+    for elevations in (flat, flat.ravel(), flat.tolist(), np.asfortranarray(flat.astype(float))):
+        env.set_ground(1, 0, elevations)
+    for _ in range(3):
+        env.step(np.zeros((2, env.spec.act_size)))
+        np.testing.assert_array_equal(env.ground(1, 0), flat)
+        np.testing.assert_array_equal(env.ground(0), drawn)
+    env.reset(mask=[False, True])
+    assert not np.array_equal(env.ground(1), flat)
+    np.testing.assert_array_equal(env.ground(0), drawn)
+    for agent, field, message in ((2, 0, "agent is 2"), (0, 1, "field is 1, expected less than 1")):
+        with pytest.raises(ValueError, match=message):
+            env.set_ground(agent, field, flat)
+        with pytest.raises(ValueError, match=message.split(",")[0]):
+            env.ground(agent, field)
 
 
 def test_places_that_are_no_rows_of_agents_are_refused() -> None:

@@ -3,6 +3,7 @@ the environments. On a cluster of several processes on this machine."""
 
 import gc
 import importlib
+import inspect
 import os
 import runpy
 import signal
@@ -106,6 +107,70 @@ def test_errors_of_a_worker_end_the_run() -> None:
     assert workers.replaced == 0
     with pytest.raises(ValueError, match="count is 0, expected at least 1"):
         Workers(0)
+
+
+def test_workers_start_from_a_policy_as_a_run_on_one_machine_does(
+    tmp_path: Path, want: marathon_envs.TrainResult
+) -> None:
+    want.policy.save(tmp_path / "first.safetensors")
+    short = {**SMALL, "steps": 2 * 4096, "initialize_from": tmp_path / "first.safetensors"}
+    assert same(train("hopper", **short), marathon_envs.train("hopper", **short))
+
+
+def test_it_takes_the_arguments_of_the_native_trainer() -> None:
+    native, own = (set(inspect.signature(f).parameters) for f in (marathon_envs.train, train))
+    assert native - {"players"} == own - {"workers"}
+
+
+def pid(actor: Any) -> int:
+    return ray.get(actor.__ray_call__.remote(lambda _: os.getpid()))
+
+
+def test_a_worker_that_stops_answering_is_replaced(want: marathon_envs.TrainResult) -> None:
+    workers = Workers(2, answer_timeout=10)
+    stopped = []
+
+    def stop(row: dict[str, Any]) -> None:
+        if row["iteration"] == 2:
+            stopped.append(pid(workers._actors[0]))
+            os.kill(stopped[0], signal.SIGSTOP)
+
+    try:
+        got = train("hopper", workers=workers, callback=stop, **SMALL)
+    finally:
+        workers.close()
+    assert workers.replaced == 1
+    assert same(got, want)
+
+
+def test_a_run_whose_workers_do_not_answer_ends_with_an_error(tmp_path: Path) -> None:
+    class Stopped(Workers):
+        """Workers whose replacements stop, too."""
+
+        begun = False
+
+        def _make(self, i: int, slices: int) -> Any:
+            actor = super()._make(i, slices)
+            if self.begun:
+                os.kill(pid(actor), signal.SIGSTOP)
+            return actor
+
+    workers = Stopped(1, answer_timeout=5)
+
+    def stop(row: dict[str, Any]) -> None:
+        workers.begun = True
+        if row["iteration"] == 2:
+            os.kill(pid(workers._actors[0]), signal.SIGSTOP)
+
+    out = tmp_path / "run"
+    with pytest.raises(TimeoutError, match="worker 0 of 1 has not answered for 5 s, nor had the one before it"):
+        train("hopper", workers=workers, callback=stop, out=out, **SMALL)
+    workers.close()
+    # what was learned is there
+    assert marathon_envs.train(resume=out).steps == SMALL["steps"]
+    for wrong in (0, -1, float("inf"), float("nan")):
+        with pytest.raises(ValueError, match="answer_timeout is"):
+            Workers(1, answer_timeout=wrong)
 
 
 def test_without_ray_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,8 +6,8 @@ use crate::interrupt;
 use clap::ValueEnum;
 use marathon_envs::{Autoreset, Spec, VecEnvOptions, registry};
 use marathon_learn::Policy;
+use marathon_physics::Model;
 use marathon_physics::model::JointType;
-use marathon_physics::{Model, budget};
 use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size};
 use marathon_runs::text::unsigned_zero;
 use marathon_runs::{Play, Setting, text};
@@ -81,13 +81,11 @@ impl Shot {
         self.frames.div_ceil(self.frames.div_ceil(8))
     }
 
-    /// Checks before anything is played that the picture is not too large or long.
+    /// Checks before anything is played that the picture is not too large.
     ///
     /// # Errors
     /// If it is.
     pub fn check(&self) -> Result<(), CliError> {
-        let long = |over| CliError::Usage(format!("--seconds: the film {over}"));
-        budget::FILM_SECONDS.check(self.length).map_err(long)?;
         if self.format == Format::Png {
             strip_size([self.width, self.height], self.frames, self.columns())?;
         }

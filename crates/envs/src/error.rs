@@ -1,6 +1,7 @@
 //! What can go wrong before an environment runs.
 
 use marathon_physics::SimError;
+use marathon_physics::budget::OverBudget;
 use marathon_physics::hint::listed;
 use marathon_physics::mjcf::MjcfError;
 use thiserror::Error;
@@ -117,6 +118,14 @@ pub enum EnvError {
         found: String,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// More agents than the budget has memory for.
+    #[error("agents is {agents}, which {source}")]
+    Memory {
+        /// Number of agents.
+        agents: usize,
+        /// The limit.
+        source: OverBudget,
     },
     /// A snapshot does not fit the environment it is loaded into.
     #[error("snapshot: {0}")]

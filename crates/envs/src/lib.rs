@@ -48,6 +48,6 @@ pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
 pub use shard::{
     AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Demonstrations, Metric, MetricSource,
-    ObsGroup, Role, Shard, ShardFactory, Spec,
+    ObsGroup, Role, Shard, ShardFactory, Spec, check_memory,
 };
 pub use vec::{Autoreset, ObsNumber, Step, StepMut, VecEnv, VecEnvOptions};

@@ -140,10 +140,9 @@ impl Parameters {
         for (name, sampler) in &self.samplers {
             let Some(Target::Command(i)) = names.find(name) else { continue };
             let x = draw(sampler, name, agent, episode);
-            let (CommandRange { low, high, .. }, wide) = (&ranges[*i], f64::from(x));
-            // the end of a range may lie between two numbers of single precision
-            let ends = *low as f32..=*high as f32;
-            let x = if ends.contains(&x) { wide.max(*low).min(*high) } else { wide };
+            // what is out of range is refused where it is set
+            let x = f64::from(x);
+            let x = ranges[*i].fit(x).unwrap_or(x);
             told.get_or_insert_with(|| ranges.iter().map(CommandRange::rest).collect())[*i] = x;
         }
         told

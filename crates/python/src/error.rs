@@ -4,27 +4,31 @@ use marathon_envs::EnvError;
 use marathon_learn::Error;
 use marathon_runs::{RunError, Spelling};
 use pyo3::PyErr;
-use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyRuntimeError, PyTypeError, PyValueError};
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// `TypeError` for an argument that there is not, `ValueError` for all else: it comes from an argument's value.
+/// `TypeError` for an argument that there is not, `MemoryError` for too many agents, `ValueError` for all else: it comes from an
+/// argument's value.
 pub fn env(error: EnvError) -> PyErr {
     match &error {
         // Python's own words: there are libraries that look for them
         EnvError::UnknownOption { name, .. } => {
             PyTypeError::new_err(format!("got an unexpected keyword argument '{name}': {error}"))
         }
+        EnvError::Memory { .. } => PyMemoryError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
 
-/// `OSError` for files that cannot be read or written, `ValueError` for all else of the trainer.
+/// `OSError` for files that cannot be read or written, `MemoryError` for a run that does not fit, `ValueError` for all else of
+/// the trainer.
 pub fn learn(error: Error) -> PyErr {
     let text = error.to_string();
     match &error {
         Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
         Error::Io { .. } => PyOSError::new_err(text),
+        Error::Memory { .. } => PyMemoryError::new_err(text),
         _ => PyValueError::new_err(text),
     }
 }

@@ -231,6 +231,36 @@ impl Model {
         table(py, self.inner.actuators.iter().map(|a| if a.ctrl_limited { a.ctrl_range } else { unlimited }))
     }
 
+    /// Names of the height fields.
+    #[getter]
+    fn hfield_names(&self) -> Vec<&str> {
+        self.inner.hfields.iter().map(|x| x.name.as_str()).collect()
+    }
+
+    /// Index of a height field.
+    fn hfield(&self, name: &str) -> PyResult<usize> {
+        find("height field", name, self.hfield_names())
+    }
+
+    /// Rows of each height field's grid, along y, `(nhfield,)`.
+    #[getter]
+    fn hfield_nrow<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.hfields.iter().map(|h| h.nrow))
+    }
+
+    /// Columns of each height field's grid, along x, `(nhfield,)`.
+    #[getter]
+    fn hfield_ncol<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.hfields.iter().map(|h| h.ncol))
+    }
+
+    /// Half extents of each height field along x and y, height of its highest elevation, thickness of its base, m,
+    /// `(nhfield, 4)`.
+    #[getter]
+    fn hfield_size<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
+        table(py, self.inner.hfields.iter().map(|h| h.size))
+    }
+
     fn __repr__(&self) -> String {
         let m = &self.inner;
         format!("Model({:?}, nq={}, nv={}, nu={})", m.name, m.nq, m.nv, m.nu)
@@ -238,6 +268,13 @@ impl Model {
 }
 
 impl Model {
+    /// Rows and columns of a height field's grid.
+    pub(crate) fn grid(&self, field: usize) -> PyResult<[usize; 2]> {
+        let fields = &self.inner.hfields;
+        let beyond = || error::value(format!("field is {field}, expected less than {}", fields.len()));
+        fields.get(field).map(|h| [h.nrow, h.ncol]).ok_or_else(beyond)
+    }
+
     fn of(model: Result<marathon_physics::Model, marathon_physics::mjcf::MjcfError>) -> PyResult<Self> {
         Ok(Model { inner: Arc::new(model.map_err(|e| error::value(e.to_string()))?) })
     }

@@ -47,20 +47,38 @@ macro_rules! arguments {
     };
 }
 
-arguments!(
-    agent,
-    body,
-    field,
-    seed,
-    num_envs,
-    threads,
-    max_episode_steps,
-    steps,
-    agents,
-    episodes,
-    num_agents,
-    substeps
-);
+arguments!(agent, body, field, seed, max_episode_steps, steps, substeps);
+
+/// A number of things of which each takes memory or time.
+pub trait Count: Sized {
+    fn check(self, name: &str) -> PyResult<Self>;
+}
+
+/// Largest number of things; what fits into memory is checked where they are made.
+const MOST: usize = u32::MAX as usize;
+
+impl Count for usize {
+    fn check(self, name: &str) -> PyResult<Self> {
+        if self <= MOST { Ok(self) } else { Err(error::value(format!("{name} is {self}, expected at most {MOST}"))) }
+    }
+}
+
+impl<N: Count> Count for Option<N> {
+    fn check(self, name: &str) -> PyResult<Self> {
+        self.map(|number| number.check(name)).transpose()
+    }
+}
+
+/// The same for numbers of things.
+macro_rules! counts {
+    ($($name:ident),*) => {
+        $(pub fn $name<N: Whole + Count>(value: &Bound<'_, PyAny>) -> PyResult<N> {
+            N::read(stringify!($name), value)?.check(stringify!($name))
+        })*
+    };
+}
+
+counts!(num_envs, threads, agents, episodes, num_agents, width, height);
 
 /// Seeds of a reset.
 pub enum Seeds {

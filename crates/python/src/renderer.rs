@@ -2,7 +2,7 @@
 
 use crate::arrays::of_shape;
 use crate::model::Model;
-use crate::{error, options, task};
+use crate::{error, number, options, task};
 use marathon_envs::registry;
 use marathon_render::{Follow, Scene};
 use marathon_runs::Setting;
@@ -27,9 +27,9 @@ impl Renderer {
     #[pyo3(signature = (id, width = 480, height = 480, *, agents = 1, **options))]
     fn new(
         id: &str,
-        width: usize,
-        height: usize,
-        agents: usize,
+        #[pyo3(from_py_with = number::width)] width: usize,
+        #[pyo3(from_py_with = number::height)] height: usize,
+        #[pyo3(from_py_with = number::agents)] agents: usize,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let id = task::plain(id);
@@ -41,7 +41,12 @@ impl Renderer {
     /// The same for a compiled model.
     #[staticmethod]
     #[pyo3(signature = (model, width = 480, height = 480, *, agents = 1))]
-    fn of(model: &Model, width: usize, height: usize, agents: usize) -> PyResult<Self> {
+    fn of(
+        model: &Model,
+        #[pyo3(from_py_with = number::width)] width: usize,
+        #[pyo3(from_py_with = number::height)] height: usize,
+        #[pyo3(from_py_with = number::agents)] agents: usize,
+    ) -> PyResult<Self> {
         Self::with(&model.inner, width, height, agents)
     }
 

@@ -1,18 +1,26 @@
 //! The bare physics of many agents as a Python object: controls in, readings out, no task.
 
-use crate::arrays::{mask, of_shape, rows};
+use crate::arrays::{elevations, mask, of_shape, rows};
 use crate::model::Model;
 use crate::{error, number};
+use marathon_physics::budget::AGENTS_MEMORY;
 use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity};
 use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::basic::CompareOp;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Mutex;
 
+/// Most threads. Each has working memory of its own.
+const MOST_THREADS: usize = 1024;
+
 /// Agents per thread that are worth a thread.
 const AGENTS_PER_THREAD: usize = 64;
+
+/// Bytes of an agent's allocations.
+const OVERHEAD: usize = 500;
 
 /// What is read together, because it all comes from the frames of the bodies.
 const FRAMES: [Quantity; 6] = [
@@ -60,6 +68,12 @@ impl Simulation {
         }
         let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
         let threads = if threads == 0 { cores().min(num_agents.div_ceil(AGENTS_PER_THREAD)) } else { threads };
+        if threads > MOST_THREADS {
+            return Err(error::value(format!("threads is {threads}, expected at most {MOST_THREADS}")));
+        }
+        AGENTS_MEMORY
+            .check(num_agents as f64 * agent_bytes(&model.get().inner))
+            .map_err(|over| PyMemoryError::new_err(format!("num_agents is {num_agents}, which {over}")))?;
         let options = BatchOptions { agents: num_agents, threads, isa, ..Default::default() };
         let inner = &model.get().inner;
         let batch = py.detach(|| Batch::new(inner, &options)).map_err(|e| error::value(e.to_string()))?;
@@ -138,7 +152,13 @@ impl Simulation {
     /// Pushes a body of an agent until told otherwise or reset: force, N, and torque, N m, in world axes at the body's
     /// center of mass.
     #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]
-    fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]) -> PyResult<()> {
+    fn push(
+        &mut self,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+        #[pyo3(from_py_with = number::body)] body: usize,
+        force: [f64; 3],
+        torque: [f64; 3],
+    ) -> PyResult<()> {
         let bodies = self.model.get().inner.bodies.len();
         for (what, found, n) in [("agent", agent, self.num_agents), ("body", body, bodies)] {
             if found >= n {
@@ -150,28 +170,18 @@ impl Simulation {
         Ok(())
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
-    /// first of which has the smallest y. It lasts over resets, until changed, and belongs to snapshots.
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)` or
+    /// row after row, the first of which has the smallest y. It lasts over resets, until changed, and belongs to snapshots.
     fn set_ground(
         &mut self,
         #[pyo3(from_py_with = number::agent)] agent: usize,
         #[pyo3(from_py_with = number::field)] field: usize,
-        elevations: Vec<f32>,
+        elevations: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let model = &self.model.get().inner;
-        for (what, found, n) in [("agent", agent, self.num_agents), ("field", field, model.hfields.len())] {
-            if found >= n {
-                return Err(error::value(format!("{what} is {found}, expected less than {n}")));
-            }
+        if agent >= self.num_agents {
+            return Err(error::value(format!("agent is {agent}, expected less than {}", self.num_agents)));
         }
-        let (rows, columns) = (model.hfields[field].nrow, model.hfields[field].ncol);
-        if elevations.len() != rows * columns {
-            let found = elevations.len();
-            return Err(error::value(format!("elevations has length {found}, expected {rows} * {columns}")));
-        }
-        if let Some(x) = elevations.iter().find(|x| !x.is_finite()) {
-            return Err(error::value(format!("elevations has a number that is {x}, expected finite ones")));
-        }
+        let elevations = self::elevations(elevations, self.model.get().grid(field)?)?;
         self.read.clear();
         self.batch().set_ground(agent, field, &elevations);
         Ok(())
@@ -311,6 +321,16 @@ impl Simulation {
     fn __repr__(&self) -> String {
         format!("Simulation({:?}, num_agents={})", self.model.get().inner.name, self.num_agents)
     }
+}
+
+/// Memory that an agent takes with all its readings, bytes, at the most.
+fn agent_bytes(model: &marathon_physics::Model) -> f64 {
+    let state = model.nq + 3 * model.nv + 2 * model.nu + model.na + 6 * model.bodies.len();
+    let frames = 18 * model.bodies.len() + 6 * model.geoms.len();
+    let contacts = 6 * model.geoms.len();
+    let sensors: usize = model.sensors.iter().map(|sensor| sensor.dim).sum();
+    let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
+    (8 * (state + frames + contacts + sensors + ground) + OVERHEAD) as f64
 }
 
 impl Simulation {

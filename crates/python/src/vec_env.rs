@@ -1,6 +1,6 @@
 //! Many agents of one kind as a Python object.
 
-use crate::arrays::{Arrays, ObsMut, mask, of_shape, rows};
+use crate::arrays::{Arrays, ObsMut, elevations, mask, of_shape, rows};
 use crate::model::Model;
 use crate::number::{self, Seeds};
 use crate::spec::Spec;
@@ -387,14 +387,30 @@ impl VecEnv {
         self.env().push(agent, body, force, torque).map_err(error::env)
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
-    /// first of which has the smallest y. It lasts over resets, until changed.
-    fn set_ground(
+    /// An agent's ground: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)`, the first row of
+    /// which has the smallest y; a new array.
+    #[pyo3(signature = (agent, field = 0))]
+    fn ground<'py>(
         &mut self,
+        py: Python<'py>,
         #[pyo3(from_py_with = number::agent)] agent: usize,
         #[pyo3(from_py_with = number::field)] field: usize,
-        elevations: Vec<f32>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let ground = self.env().ground(agent, field).map_err(error::env)?;
+        PyArray1::from_vec(py, ground).reshape(self.grid(py, field)?)
+    }
+
+    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)` or
+    /// row after row, the first of which has the smallest y. It lasts over resets, until changed, but not in tasks that draw the
+    /// ground of every episode, such as `TerrainWalker2d-v0`: there it lasts until the episode ends.
+    fn set_ground(
+        &mut self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+        #[pyo3(from_py_with = number::field)] field: usize,
+        elevations: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
+        let elevations = self::elevations(elevations, self.grid(py, field)?)?;
         self.env().set_ground(agent, field, &elevations).map_err(error::env)
     }
 
@@ -461,6 +477,11 @@ impl VecEnv {
 }
 
 impl VecEnv {
+    /// Rows and columns of a height field's grid.
+    fn grid(&mut self, py: Python<'_>, field: usize) -> PyResult<[usize; 2]> {
+        self.model(py)?.get().grid(field)
+    }
+
     fn env(&mut self) -> &mut marathon_envs::VecEnv {
         self.env.get_mut().expect("no thread panics with the lock")
     }

@@ -40,6 +40,19 @@ impl CommandRange {
         self.unit.is_empty() && self.low == 0.0 && self.high == 1.0
     }
 
+    /// `x` if it is in the range. The ends of a range may not be numbers of single precision, in which callers have theirs: one
+    /// that is an end in single precision counts as that end.
+    pub fn fit(&self, x: f64) -> Option<f64> {
+        let is_end = |end: f64| x.is_finite() && x as f32 == end as f32;
+        match x {
+            x if (self.low..=self.high).contains(&x) => Some(x),
+            x if x < self.low && is_end(self.low) => Some(self.low),
+            x if x > self.high && is_end(self.high) => Some(self.high),
+            // not a number is in no range
+            _ => None,
+        }
+    }
+
     /// The value nearest to zero: what an agent is told before anybody tells it anything.
     pub fn rest(&self) -> f64 {
         0.0_f64.max(self.low).min(self.high)
@@ -75,5 +88,28 @@ impl<T: Real> Ctrl<'_, T> {
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
         self.reference.expect("the facts name clips").frame(self.memory, ahead)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn an_end_in_single_precision_is_in_the_range() {
+        let turn = CommandRange::new("turn", -FRAC_PI_2..=FRAC_PI_2, "rad/s");
+        let single = f64::from(std::f32::consts::FRAC_PI_2);
+        assert!(single > FRAC_PI_2);
+        assert_eq!(
+            [single, -single, FRAC_PI_2, 0.1].map(|x| turn.fit(x)),
+            [Some(FRAC_PI_2), Some(-FRAC_PI_2), Some(FRAC_PI_2), Some(0.1)]
+        );
+        let beyond = f64::from(std::f32::consts::FRAC_PI_2.next_up());
+        assert_eq!([beyond, -beyond, f64::NAN, f64::INFINITY].map(|x| turn.fit(x)), [None; 4]);
+        let step = CommandRange::new("left", -0.8..=0.8, "m/s");
+        assert_eq!([f64::from(0.8_f32), -f64::from(0.8_f32)].map(|x| step.fit(x)), [Some(0.8), Some(-0.8)]);
+        let any = CommandRange::new("x", f64::MIN..=f64::MAX, "");
+        assert_eq!([f64::INFINITY, f64::NAN].map(|x| any.fit(x)), [None; 2]);
     }
 }

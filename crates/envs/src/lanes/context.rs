@@ -173,17 +173,20 @@ impl<T: Real> AgentContext for LaneContext<'_, T> {
 
     fn set_command(&mut self, command: Option<&[f64]>) -> Result<(), EnvError> {
         let spec = &self.task.spec;
-        if let Some(command) = command {
-            check_length("command", command.len(), spec.command.len())?;
-            for (x, range) in command.iter().zip(&spec.command) {
-                // NaN is in no range
-                if !(range.low..=range.high).contains(x) {
-                    let CommandRange { name, low, high, unit } = range.clone();
-                    return Err(EnvError::Command { id: spec.id.clone(), name, found: *x, low, high, unit });
-                }
+        let fit = |(x, range): (&f64, &CommandRange)| {
+            range.fit(*x).ok_or_else(|| {
+                let CommandRange { name, low, high, unit } = range.clone();
+                EnvError::Command { id: spec.id.clone(), name, found: *x, low, high, unit }
+            })
+        };
+        let given = match command {
+            Some(command) => {
+                check_length("command", command.len(), spec.command.len())?;
+                Some(command.iter().zip(&spec.command).map(fit).collect::<Result<_, _>>()?)
             }
-        }
-        self.group.commands.told[self.lane].given = command.map(<[f64]>::to_vec);
+            None => None,
+        };
+        self.group.commands.told[self.lane].given = given;
         Ok(())
     }
 

@@ -16,6 +16,7 @@ use super::start_cache::StartCache;
 use super::task::{AgentFactory, EpisodeStart, Task};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
+use crate::shard::spec::NUMBER;
 use crate::shard::{
     AgentContext, AgentShard, AgentShards, AgentState, BLOCK, BlockStep, Demonstrations, Shard, ShardFactory, Spec,
 };
@@ -27,6 +28,16 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
 
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
         Box::new(LaneShard::new(self.task.clone(), first, blocks, seed))
+    }
+
+    fn agent_bytes(&self) -> usize {
+        let Task { spec, facts, blueprint, .. } = &*self.task;
+        let model = &blueprint.model;
+        // pushes are six numbers for each body; a start that took physics is kept with its memory
+        let own = 2 * model.nu + model.na + 6 * model.bodies.len() + 3 * facts.memory + model.nq + model.nv;
+        // ground of its own: in the lanes' precision, and once more where starts draw it
+        let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
+        spec.agent_bytes() + NUMBER * own + 2 * size_of::<f32>() * ground
     }
 
     fn demonstrations(&self) -> Option<Demonstrations> {

@@ -10,7 +10,7 @@ mod agent_shard;
 mod context;
 mod demonstrations;
 mod role;
-mod spec;
+pub(crate) mod spec;
 
 pub use agent_shard::{AgentShard, AgentShards, AgentState};
 pub use context::AgentContext;
@@ -19,6 +19,7 @@ pub use role::{Role, role_id, task_of_role};
 pub use spec::{Metric, MetricSource, ObsGroup, Spec, scale_action};
 
 use crate::error::EnvError;
+use marathon_physics::budget::AGENTS_MEMORY;
 
 /// Agents per block.
 pub const BLOCK: usize = 16;
@@ -85,6 +86,15 @@ pub trait Shard: Send {
     fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError>;
 }
 
+/// Checks before agents are made that they fit the budget: memory that cannot be had ends the process.
+///
+/// # Errors
+/// [`EnvError::Memory`] if they do not.
+pub fn check_memory(factory: &dyn ShardFactory, agents: usize) -> Result<(), EnvError> {
+    let bytes = agents as f64 * factory.agent_bytes() as f64;
+    AGENTS_MEMORY.check(bytes).map_err(|source| EnvError::Memory { agents, source })
+}
+
 /// Makes shards of a task.
 pub trait ShardFactory: Send + Sync {
     /// Facts of the task.
@@ -95,6 +105,10 @@ pub trait ShardFactory: Send + Sync {
     /// must have all of their blocks together. None for a task with as many agents as one likes.
     fn lockstep(&self) -> Option<usize> {
         None
+    }
+    /// Memory that one agent takes, bytes, at the most; see [`check_memory`].
+    fn agent_bytes(&self) -> usize {
+        self.spec().agent_bytes()
     }
     /// How the task is done well, if it knows: of an agent with clips, what it would observe if it moved exactly like them.
     fn demonstrations(&self) -> Option<Demonstrations> {

@@ -5,6 +5,11 @@ use std::ops::Range;
 use super::Role;
 use crate::agent::{CommandRange, Options};
 
+/// Bytes of a number in double precision.
+pub(crate) const NUMBER: usize = 8;
+/// Bytes of an agent's allocations, counters and flags.
+const OVERHEAD: usize = 1200;
+
 /// Constant facts of a task.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spec {
@@ -50,6 +55,17 @@ pub struct Spec {
     pub nq: usize,
     /// Length of a velocity, `qvel`.
     pub nv: usize,
+}
+
+impl Spec {
+    /// Memory that an agent takes for what these facts tell, in the environment and in the arrays that a caller reads, bytes.
+    pub(crate) fn agent_bytes(&self) -> usize {
+        let state = self.nq + 3 * self.nv;
+        // in the environment; in up to three sets of arrays, the observations of each twice and in double precision
+        let told = self.act + self.reward_terms.len() + self.info.len() + 4 * self.command.len();
+        let observed = self.obs * 7;
+        NUMBER * (state + 4 * told + observed) + OVERHEAD
+    }
 }
 
 /// A part of an observation.

@@ -13,7 +13,10 @@ use super::worker::Worker;
 use crate::agent::Options;
 use crate::error::EnvError;
 use crate::registry::{self, Registry};
-use crate::shard::{AgentContext, AgentState, BLOCK, Spec};
+use crate::shard::{AgentContext, AgentState, BLOCK, Spec, check_memory};
+
+/// Most threads. Each has working memory of its own.
+const MOST_THREADS: usize = 1024;
 
 /// What happens to an agent whose episode ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +38,7 @@ pub struct VecEnvOptions {
     pub agents: usize,
     /// Seed until [`VecEnv::reset`] gives another.
     pub seed: u64,
-    /// Number of threads; 0 means one per processor core, but not more than there are blocks.
+    /// Number of threads, at most 1024; 0 means one per processor core. There are never more than blocks.
     pub threads: usize,
     /// Instruction set; `None` means the widest that the processor has.
     pub isa: Option<Isa>,
@@ -80,7 +83,8 @@ impl VecEnv {
     /// first step.
     ///
     /// # Errors
-    /// If there is no such agent, an option makes no sense, or the pool of threads cannot be started.
+    /// If there is no such agent, an option makes no sense, the agents do not fit the budget's memory, or the pool of threads
+    /// cannot be started.
     pub fn new(agent: &str, options: &VecEnvOptions) -> Result<VecEnv, EnvError> {
         Self::from_registry(&registry::global(), agent, options)
     }
@@ -94,11 +98,15 @@ impl VecEnv {
         if options.agents == 0 {
             return wrong("agents", "0".into(), "at least 1");
         }
+        if options.threads > MOST_THREADS {
+            return wrong("threads", options.threads.to_string(), "at most 1024");
+        }
         if options.max_episode_steps == Some(0) {
             return wrong("max_episode_steps", "0".into(), "at least 1");
         }
         let agent = registry.agent_with(agent, &options.options)?;
         let factory = agent.shards(options.isa.unwrap_or_else(Isa::best))?;
+        check_memory(&*factory, options.agents)?;
         let unvaried = factory.unvaried();
         let mut spec = factory.spec().clone();
         spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);

@@ -257,10 +257,7 @@ impl Agent for Controller {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        let [speed, left, turn, jump, backflip] = [0, 1, 2, 3, 4].map(|i| s.command(i));
-        // a backflip waits until he has stopped
-        let flips = T::lit(0.5).lt(backflip);
-        let [speed, left, turn] = [speed, left, turn].map(|x| T::masked(T::not(flips), x));
+        let [speed, left, turn, jump, backflip] = told(s);
         let before = [DIRECTION, DIRECTION + 1].map(|slot| memory[slot]);
         Steer::lead(s, memory, [speed, left], turn, HASTE);
         let rose = SKILL.rises(memory);
@@ -289,7 +286,8 @@ impl Agent for Controller {
         let facing = SKILL.facing(s, &all);
         let (turned, next, r) = (turned_to(facing), s.reference(1), s.readings());
         let pose = |i, of_gait| T::select(on, next.qpos(FIRST_QPOS + i), of_gait);
-        Steer::observe_going(s, facing, [0, 2], pose, HASTE, out);
+        let [speed, left, turn, jump, backflip] = told(s);
+        Steer::observe_going(s, facing, [speed, turn], pose, HASTE, out);
         out.group("phase");
         for x in s.reference(0).phase_angles() {
             out.scalar(T::masked(on, x));
@@ -298,8 +296,8 @@ impl Agent for Controller {
         let gap = turned(sub(s.reference(0).position(BUTT), s.position(BUTT)));
         out.vector(gap.map(|x| T::masked(on, x)));
         out.group("buttons");
-        for i in [1, 3, 4] {
-            out.scalar(s.command(i));
+        for x in [left, jump, backflip] {
+            out.scalar(x);
         }
         out.group("skill");
         for i in 0..SKILLS.len() {
@@ -325,13 +323,14 @@ impl Agent for Controller {
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
         let all = memory(s);
-        let told = s.command(1).abs() + s.command(2).abs() + s.command(0);
+        let [speed, left, turn, ..] = told(s);
+        let moved = left.abs() + turn.abs() + speed;
         let (jumps, gait) = (SKILL.is(&all, JUMP), T::not(SKILL.on(&all)));
         // a jump need not stand where the clip's does
         // whoever turns on one point falls
         let moves = T::or(gait, jumps);
-        let straight = s.command(2).abs().lt(T::lit(0.01));
-        Steer::add_terms(s, [moves, T::and(moves, straight), gait], told, terms);
+        let straight = turn.abs().lt(T::lit(0.01));
+        Steer::add_terms(s, [moves, T::and(moves, straight), gait], moved, terms);
         let [similar, posture] = imitation::similarity(s, &ANATOMY);
         terms.add("skill", 1.0, SKILL.worth(&all) * T::select(jumps, posture, similar));
         // a hop looks much like a jump
@@ -367,13 +366,24 @@ impl Agent for Controller {
     fn info<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let direction = Steer::direction(s);
         let [c, d] = direction;
-        let (speed, left) = (s.command(0), s.command(1));
+        let [speed, left, ..] = told(s);
         out.scalar(Steer::slip(s, [speed * c - left * d, speed.mul_add(d, left * c)]));
         out.scalar(Steer::off(s, direction).abs());
         let all = memory(s);
         out.scalar(SKILL.number(&all));
         out.scalar(T::masked(SKILL.rises(&all), T::lit(1.0)));
     }
+}
+
+/// What he obeys of the command: speed, left, turn, jump, backflip. A backflip waits until he has stopped, so as long as it is
+/// told, he is told to stand and not to jump. That is all he observes of the command then, as in the commands that he learned
+/// from.
+#[inline(always)]
+fn told<T: Real>(s: &Senses<T>) -> [T; 5] {
+    let backflip = s.command(4);
+    let flips = T::lit(0.5).lt(backflip);
+    let [speed, left, turn, jump] = [0, 1, 2, 3].map(|i| T::masked(T::not(flips), s.command(i)));
+    [speed, left, turn, jump, backflip]
 }
 
 /// His variables.

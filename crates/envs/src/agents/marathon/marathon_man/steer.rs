@@ -337,21 +337,21 @@ impl Steer {
     }
 
     /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
-    /// `numbers`: those of the command that are the speed and the turn. `next`: the next angle of a hinge, given the gait's.
+    /// `told`: the commanded speed and turn. `next`: the next angle of a hinge, given the gait's.
     /// `haste`: what leads him.
     #[inline(always)]
     pub(super) fn observe_going<T: Real>(
         s: &Senses<T>,
         facing: [T; 2],
-        numbers: [usize; 2],
+        told: [T; 2],
         next: impl Fn(usize, T) -> T,
         haste: Haste,
         out: &mut Obs<T>,
     ) {
         let turned = turned_to(facing);
         out.group("command");
-        for i in numbers {
-            out.scalar(s.command(i));
+        for x in told {
+            out.scalar(x);
         }
         for x in heading::beside(facing, Self::direction(s)) {
             out.scalar(x);
@@ -387,7 +387,8 @@ impl Steer {
     /// What he observes where nothing but the gait leads him: vectors are in his heading.
     #[inline(always)]
     pub(super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-        Self::observe_going(s, s.heading(BUTT), [0, 1], |_, of_gait| of_gait, HASTE, out);
+        let told = [s.command(0), s.command(1)];
+        Self::observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, HASTE, out);
     }
 
     /// Angles of the gait's next pose, led by some seconds.
