@@ -1,5 +1,6 @@
-"""Numbers of things that cannot be had are errors with the argument's name, before memory is asked for: `MemoryError` if they
-are beyond the budget, `ValueError` if they are beyond all sense. The interpreter goes on."""
+"""Numbers of things that cannot be had are errors with the argument's name, before memory is asked for.
+
+They are a `MemoryError` beyond the budget, a `ValueError` beyond all sense. The interpreter goes on."""
 
 import os
 import re

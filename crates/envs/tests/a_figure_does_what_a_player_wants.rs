@@ -77,6 +77,39 @@ fn who_creeps_lifts_his_feet() {
     }
 }
 
+/// He has learned to turn over from commands to stand alone, so that is what he observes of a command beside the button.
+#[test]
+fn a_backflip_goes_before_all_other_commands() {
+    let story = |command: [f64; COMMAND]| {
+        let (mut env, mut step) = made(&[("start", "first")]);
+        let mut seen = Vec::new();
+        for decision in 0..60 {
+            let held = decision >= 20;
+            tell(&mut env, if held { command } else { [1.0, 0.0, 0.5, 0.0, 0.0] });
+            go(&mut env, &mut step);
+            seen.push((step.obs.clone(), step.reward.clone(), step.info.clone()));
+        }
+        (seen, part(&env, "command"), part(&env, "buttons"), env.spec().obs)
+    };
+    let (alone, command, buttons, obs) = story([0.0, 0.0, 0.0, 0.0, 1.0]);
+    let (beside, ..) = story([2.5, 0.8, -FRAC_PI_2, 1.0, 1.0]);
+    assert_eq!(alone, beside);
+    // without the button, he observes what he is told
+    let (without, ..) = story([2.5, 0.8, -FRAC_PI_2, 1.0, 0.0]);
+    for (seen, expected) in [(&beside, [0.0, 0.0, 0.0, 0.0, 1.0]), (&without, [2.5, 0.8, -FRAC_PI_2, 1.0, 0.0])] {
+        for row in seen.last().unwrap().0.chunks_exact(obs) {
+            let told = [
+                row[command.start],
+                row[buttons.start],
+                row[command.start + 1],
+                row[buttons.start + 1],
+                row[buttons.start + 2],
+            ];
+            assert_eq!(told, expected.map(|x| x as f32));
+        }
+    }
+}
+
 /// Where he is told to go, the velocity that he is to have by now aims beyond the command by half of what he lacks, and by 0.5 m/s at
 /// most, but never beyond 3 m/s. At rest it is none.
 #[test]
