@@ -1,14 +1,18 @@
 //! What a trainer sends is a message or an error: neither the transport, nor the messages, nor the side channels panic on any
-//! bytes, and side channels that are read are finite.
+//! bytes, and side channels that are read are finite. The same holds for demonstration files, whose numbers are those of the
+//! task.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use marathon_envs::Spec;
 use marathon_mlagents::channels::{self, Message, Sampler};
+use marathon_mlagents::read_demonstrations;
 use marathon_mlagents::rpc::Channel;
 use marathon_mlagents::wire::UnityMessage;
 use prost::Message as _;
 use std::io::{Cursor, Read, Result, Write};
+use std::path::Path;
 
 fuzz_target!(|data: &[u8]| {
     // as the bytes of a connection: calls until it breaks
@@ -20,7 +24,21 @@ fuzz_target!(|data: &[u8]| {
     // as a message, and as side channels
     look(data);
     listen(data);
+    // as a demonstration file, also behind the head of one
+    demonstrate(data);
+    demonstrate(&[&HEAD[..], &[0; 30], data].concat());
 });
+
+/// Version 1 of the format.
+const HEAD: [u8; 3] = [2, 8, 1];
+
+fn demonstrate(bytes: &[u8]) {
+    let spec = Spec { id: "Task-v0".into(), obs: 2, act: 1, ..Spec::default() };
+    let Ok(read) = read_demonstrations(Path::new("x.demo"), bytes, &spec) else { return };
+    assert!(!read.decisions.is_empty() && read.actions.len() == read.decisions.len());
+    assert!(read.obs.iter().chain(&read.actions).all(|x| x.is_finite()));
+    assert!(read.decisions.iter().flatten().all(|entry| (entry + 1) * 2 <= read.obs.len()));
+}
 
 /// Says what the fuzzer wants, and does not listen.
 struct Peer<'a>(Cursor<&'a [u8]>);
