@@ -224,7 +224,7 @@ def dynamics(m, i):
     return {
         mujoco.mjtDyn.mjDYN_NONE: "None", mujoco.mjtDyn.mjDYN_INTEGRATOR: "Integrator",
         mujoco.mjtDyn.mjDYN_FILTER: {"Filter": constant}, mujoco.mjtDyn.mjDYN_FILTEREXACT: {"FilterExact": constant},
-    }[mujoco.mjtDyn(m.actuator_dyntype[i])]
+    }.get(mujoco.mjtDyn(m.actuator_dyntype[i]), "Unsupported")
 
 
 def actuator(m, i):
@@ -234,7 +234,7 @@ def actuator(m, i):
     transmission = {
         mujoco.mjtTrn.mjTRN_JOINT: "Joint", mujoco.mjtTrn.mjTRN_JOINTINPARENT: "JointInParent",
         mujoco.mjtTrn.mjTRN_TENDON: "Tendon",
-    }[mujoco.mjtTrn(m.actuator_trntype[i])]
+    }.get(mujoco.mjtTrn(m.actuator_trntype[i]), "Unsupported")
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: m.actuator_trnid[i, 0]},
         "gear": m.actuator_gear[i], "ctrl_limited": bool(m.actuator_ctrllimited[i]),
@@ -305,7 +305,7 @@ def dump(m):
         "equalities": each(equality, m.neq),
         "bodies": each(body, m.nbody), "joints": each(joint, m.njnt), "dofs": each(dof, m.nv),
         "geoms": each(geom, m.ngeom), "sites": each(site, m.nsite), "cameras": each(camera, m.ncam),
-        "lights": each(light, m.nlight), "actuators": each(actuator, m.nu), "sensors": each(sensor, m.nsensor),
+        "lights": each(light, m.nlight), "actuators": each(actuator, m.nactuator), "sensors": each(sensor, m.nsensor),
         "keyframes": each(keyframe, m.nkey), "pairs": each(pair, m.npair), "excludes": each(exclude, m.nexclude),
         "numerics": each(numeric, m.nnumeric), "qpos0": m.qpos0, "qpos_spring": m.qpos_spring,
         "stat": {

@@ -10,6 +10,7 @@ use super::math::{Frame, IDENTITY, MIN_VAL};
 use super::names::{Names, Registry};
 use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
+use super::value::Attrs;
 use super::{
     actuator, asset, contact, custom, equality, geom, inertia, schema, sensor, set0, settings, statistics, tendon, tree,
 };
@@ -137,18 +138,17 @@ fn check_finite(model: &Model, bodies: &[BodySpec]) -> Result<(), MjcfError> {
 /// Reads every setting of every class once, so that a mistake is found even if nothing uses the class.
 fn check_defaults(defaults: &Defaults, settings: &Settings) -> Result<(), MjcfError> {
     let frame = Frame::IDENTITY;
-    for attrs in defaults.all() {
-        match attrs.element.name.as_str() {
-            "joint" => JointSpec::read(&attrs, &frame, settings).map(|_| ())?,
-            "geom" | "site" => geom::check_default(&attrs, settings)?,
-            "pair" => contact::check_default(&attrs)?,
-            "equality" => equality::check_default(&attrs)?,
-            "tendon" => tendon::check_default(&attrs)?,
-            name if ACTUATORS.contains(&name) => actuator::check_default(&attrs)?,
-            _ => {}
-        }
-    }
-    Ok(())
+    let check = |attrs: Attrs| match attrs.element.name.as_str() {
+        "joint" => JointSpec::read(&attrs, &frame, settings).map(|_| ()),
+        "geom" | "site" => geom::check_default(&attrs, settings),
+        "camera" => tree::Lens::read(&attrs).map(|_| ()),
+        "pair" => contact::check_default(&attrs),
+        "equality" => equality::check_default(&attrs),
+        "tendon" => tendon::check_default(&attrs),
+        name if ACTUATORS.contains(&name) => actuator::check_default(&attrs),
+        _ => Ok(()),
+    };
+    defaults.all().try_for_each(|attrs| schema::tolerate(check(attrs)))
 }
 
 fn name(element: &Element) -> String {

@@ -2,6 +2,7 @@
 
 use super::document::Element;
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::schema::check_inherited;
 use super::value::Attrs;
 use crate::hint::nearest;
 use std::collections::{BTreeMap, BTreeSet};
@@ -117,7 +118,9 @@ impl<'a> Defaults<'a> {
     {
         let class = self.named(element, "class")?.or(childclass).unwrap_or(MAIN);
         let layers = self.classes.get(class).and_then(|c| c.layers.get(kind(&element.name)));
-        Ok(Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) })
+        let attrs = Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) };
+        check_inherited(&attrs)?;
+        Ok(attrs)
     }
 
     /// The same for an element whose defaults are kept under a name of their own, such as `equality`.

@@ -136,11 +136,14 @@ impl JointSpec<'_> {
         if self.kind == JointType::Free {
             return Ok(());
         }
-        check_limit(attrs, "limited", "range", self.range, settings)?;
-        if self.limited && self.kind == JointType::Ball && self.range[0] != 0.0 {
-            return Err(self.element.invalid("the range of a ball joint must start with 0"));
-        }
-        if self.kind != JointType::Ball {
+        if self.kind == JointType::Ball {
+            check_switch(attrs, "limited", "range", self.range, settings)?;
+            // without a second number the largest angle is 0, as in MuJoCo
+            if self.limited && self.range[0] != 0.0 {
+                return Err(self.element.invalid("the range of a ball joint must start with 0"));
+            }
+        } else {
+            check_limit(attrs, "limited", "range", self.range, settings)?;
             let force = attrs.array_or("actuatorfrcrange", [0.0; 2])?;
             check_limit(attrs, "actuatorfrclimited", "actuatorfrcrange", force, settings)?;
         }
@@ -157,8 +160,8 @@ pub(crate) fn is_limited(attrs: &Attrs, switch: &str, range: [f64; 2]) -> Result
     })
 }
 
-/// Checks a range and its switch in an element of the model; those of a class may still be completed.
-pub(crate) fn check_limit(
+/// Checks that a range has its switch, if the compiler does not infer it.
+fn check_switch(
     attrs: &Attrs,
     switch: &str,
     name: &str,
@@ -170,6 +173,18 @@ pub(crate) fn check_limit(
         let message = format!("there is '{name}' but not '{switch}', and the compiler's autolimits is false");
         return Err(attrs.element.invalid(message));
     }
+    Ok(())
+}
+
+/// Checks a range and its switch in an element of the model; those of a class may still be completed.
+pub(crate) fn check_limit(
+    attrs: &Attrs,
+    switch: &str,
+    name: &str,
+    range: [f64; 2],
+    settings: &Settings,
+) -> Result<(), MjcfError> {
+    check_switch(attrs, switch, name, range, settings)?;
     if is_limited(attrs, switch, range)? && !(range[0] < range[1]) {
         let [low, high] = range;
         return Err(attrs.element.invalid(format!("'{name}' goes from {low} to {high}; the first must be smaller")));

@@ -1,8 +1,10 @@
 //! What an actuator makes of its control: gain, bias and activation, put together from classes and shortcuts.
 
-use super::document::Element;
+use super::document::{Attr, Element};
 use super::error::MjcfError;
+use super::schema::NO_ACTUATOR;
 use super::value::{Attrs, Tristate};
+use crate::hint::{did_you_mean, nearest};
 use crate::model::Dynamics;
 use std::f64::consts::PI;
 
@@ -28,7 +30,23 @@ pub(crate) struct Law<'a> {
     time_constant: f64,
     /// Part of the range of the joint or tendon that a position servo takes over; 0: none.
     pub inherited_range: f64,
+    /// What is not supported, by the part that may still replace it.
+    refused: [Option<Refused<'a>>; PARTS],
 }
+
+/// An attribute or, without one, an element that is not supported, and why.
+#[derive(Clone, Copy)]
+struct Refused<'a> {
+    element: &'a Element,
+    attribute: Option<&'static str>,
+    reason: &'static str,
+}
+
+/// Parts of a law that can be refused: the element, then the attributes of `<general>`, the kind of gain first.
+const PARTS: usize = 1 + ATTRIBUTES.len();
+const ATTRIBUTES: [&str; 6] = ["gaintype", "biastype", "dyntype", "gainprm", "biasprm", "input"];
+/// Why other laws are refused.
+const LAWS: &str = "only constant and affine laws are supported";
 
 impl<'a> Law<'a> {
     const GENERAL: Law<'static> = Law {
@@ -40,6 +58,7 @@ impl<'a> Law<'a> {
         activation: Activation::None,
         time_constant: 1.0,
         inherited_range: 0.0,
+        refused: [None; PARTS],
     };
 
     /// The law of an actuator: the classes' elements in order, then its own.
@@ -54,6 +73,9 @@ impl<'a> Law<'a> {
                 enclosing.push(law);
             }
             law.apply(element, &enclosing)?;
+        }
+        if let Some(refused) = law.refused.iter().flatten().next() {
+            return Err(refused.element.unsupported(refused.attribute, refused.reason));
         }
         // without its type an affine law has no effect, so it is not stored
         if !law.gain_affine {
@@ -83,7 +105,14 @@ impl<'a> Law<'a> {
 
     /// Whether a shortcut element can take its parameters from this law.
     fn serves(&self, shortcut: &str) -> bool {
-        self.element == shortcut || (self.element == "general" && !self.gain_affine)
+        self.element == shortcut || (self.element == "general" && !self.gain_affine && self.refused[1].is_none())
+    }
+
+    /// Replaces what is refused of an attribute.
+    fn set_part(&mut self, attribute: &'static str, element: &'a Element, reason: Option<&'static str>) {
+        if let Some(at) = ATTRIBUTES.iter().position(|a| *a == attribute) {
+            self.refused[1 + at] = reason.map(|reason| Refused { element, attribute: Some(attribute), reason });
+        }
     }
 
     /// Applies one element. What a shortcut does not set it takes from the law so far, else from the nearest enclosing
@@ -103,6 +132,10 @@ impl<'a> Law<'a> {
         if self.element != name && !known {
             (self.activation, self.time_constant) = (Activation::None, Law::GENERAL.time_constant);
         }
+        // the shortcut sets all parts itself, but what it keeps of a refused element is unknown; adhesion has a constant gain
+        let unknown = self.refused[0].filter(|_| self.element == "general").filter(|of| of.element.name != "adhesion");
+        self.refused = [None; PARTS];
+        self.refused[0] = unknown;
         let kept = self.gain[0];
         match name {
             "position" | "intvelocity" => self.servo(element, &attrs)?,
@@ -128,7 +161,20 @@ impl<'a> Law<'a> {
                 self.time_constant = attrs.number_or("timeconst", self.time_constant)?;
                 self.activation = Activation::Filter;
             }
-            _ => *self = Law::GENERAL,
+            "motor" => *self = Law::GENERAL,
+            // those of a class, which the element may replace
+            _ => {
+                *self = Law::GENERAL;
+                let refused = Some(Refused { element, attribute: None, reason: NO_ACTUATOR });
+                self.refused[0] = refused;
+                if name == "adhesion" {
+                    self.gain[0] = attrs.number_or("gain", kept)?;
+                } else {
+                    self.refused[1] = refused;
+                }
+                self.element = name;
+                return Ok(());
+            }
         }
         (self.element, self.gain_affine, self.bias_affine) =
             (name, name == "damper", !matches!(name, "motor" | "damper"));
@@ -184,14 +230,18 @@ impl<'a> Law<'a> {
     /// `<general>` changes what it gives and keeps the rest.
     fn general(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
         self.element = "general";
+        let mut more = Vec::new();
         for (name, values) in [("gainprm", &mut self.gain), ("biasprm", &mut self.bias)] {
             let mut all = [0.0; 10];
             all[..3].copy_from_slice(values);
             attrs.overlay(name, 0, &mut all)?;
-            if all[3..].iter().any(|x| *x != 0.0) {
-                return Err(element.unsupported(Some(name), "only the first three numbers are supported"));
-            }
             values.copy_from_slice(&all[..3]);
+            if all[3..].iter().any(|x| *x != 0.0) {
+                more.push(name);
+            }
+        }
+        for name in more {
+            self.set_part(name, element, Some("only the first three numbers are supported"));
         }
         let mut dynamics = [0.0; 10];
         dynamics[0] = self.time_constant;
@@ -224,22 +274,38 @@ impl<'a> Law<'a> {
             ("pid", None),
             ("user", None),
         ];
-        let refuse = |name: &str, reason: &str| Err(element.unsupported(Some(name), reason));
-        let affine = "only constant and affine laws are supported";
-        match attrs.keyword("gaintype", &gains)? {
-            Some(None) => return refuse("gaintype", affine),
-            given => self.gain_affine = given.flatten().unwrap_or(self.gain_affine),
+        if let Some(kind) = attrs.keyword("gaintype", &gains)? {
+            self.gain_affine = kind.unwrap_or(false);
+            self.set_part("gaintype", element, kind.is_none().then_some(LAWS));
         }
-        match attrs.keyword("biastype", &biases)? {
-            Some(None) => return refuse("biastype", affine),
-            given => self.bias_affine = given.flatten().unwrap_or(self.bias_affine),
+        if let Some(kind) = attrs.keyword("biastype", &biases)? {
+            self.bias_affine = kind.unwrap_or(false);
+            self.set_part("biastype", element, kind.is_none().then_some(LAWS));
         }
-        match attrs.keyword("dyntype", &activations)? {
-            Some(None) => return refuse("dyntype", "only none, integrator, filter and filterexact are supported"),
-            given => self.activation = given.flatten().unwrap_or(self.activation),
+        if let Some(kind) = attrs.keyword("dyntype", &activations)? {
+            self.activation = kind.unwrap_or(Activation::None);
+            let reason = "only none, integrator, filter and filterexact are supported";
+            self.set_part("dyntype", element, kind.is_none().then_some(reason));
+        }
+        if let Some(attr) = element.attr("input") {
+            let refused = input(element, attr)?;
+            self.set_part("input", element, refused);
         }
         Ok(())
     }
+}
+
+/// Why the inputs that `<general>` names are refused, if they are. A law with one control has one input, and its name
+/// changes nothing.
+fn input(element: &Element, attr: &Attr) -> Result<Option<&'static str>, MjcfError> {
+    const INPUTS: [&str; 8] = ["pos", "vel", "ff", "voltage", "pressure", "none", "expmap", "quat"];
+    let words: Vec<&str> = attr.value.split_ascii_whitespace().collect();
+    if let Some(word) = words.iter().find(|word| !INPUTS.contains(word)) {
+        let hint = did_you_mean(nearest(word, INPUTS));
+        return Err(element.bad_value(attr, format!("'pos', 'vel' or 'pressure'{hint}")));
+    }
+    let one = matches!(words.as_slice(), [] | ["pos" | "vel" | "pressure"]);
+    Ok((!one).then_some("only one input is supported: 'pos', 'vel' or 'pressure'"))
 }
 
 /// Limits of control and activation, and switches that shortcuts set whatever came before them.
@@ -291,7 +357,7 @@ impl Limits {
             "damper" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
                 return Err(element.invalid("the control range of a damper must not be negative"));
             }
-            "damper" => self.ctrl_limited = Tristate::True,
+            "damper" | "adhesion" => self.ctrl_limited = Tristate::True,
             _ => {}
         }
         Ok(())

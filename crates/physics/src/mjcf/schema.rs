@@ -5,6 +5,7 @@
 
 use super::document::{Attr, Element};
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::value::Attrs;
 use crate::hint::nearest;
 
 /// One element that may stand inside another.
@@ -220,8 +221,9 @@ const BODY: &[Rule] = &[
     ),
     rule(
         "camera",
-        "name class pos quat axisangle euler xyaxes zaxis mode target fovy",
-        "focal focalpixel ipd output principal principalpixel projection resolution sensorsize user",
+        "name class pos quat axisangle euler xyaxes zaxis mode target fovy focal focalpixel principal \
+         principalpixel resolution sensorsize",
+        "ipd output projection user",
         "",
     ),
     rule(
@@ -284,17 +286,19 @@ macro_rules! actuator_reads {
         "name class joint jointinparent tendon gear ctrllimited ctrlrange forcelimited forcerange damping armature"
     };
 }
-const NO_ACTUATOR: &str =
+/// Why other actuators are refused.
+pub(crate) const NO_ACTUATOR: &str =
     "only the actuators motor, position, velocity, intvelocity, damper, cylinder and general are supported";
 const ACTUATOR: &[Rule] = &[
     rule(
         "general",
         concat!(
             actuator_reads!(),
-            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange"
+            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input"
         ),
-        actuator_ignores!(),
-        concat!(actuator_refuses!(), " body ffrange velrange input"),
+        // the two ranges are those of inputs that only the refused laws have
+        concat!(actuator_ignores!(), " ffrange velrange"),
+        concat!(actuator_refuses!(), " body"),
     ),
     rule("motor", actuator_reads!(), actuator_ignores!(), actuator_refuses!()),
     rule(
@@ -413,38 +417,91 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 }
 
 /// Attributes that belong to one element and not to a class.
-const NOT_IN_CLASSES: &str = "name class target joint jointinparent tendon geom1 geom2";
+const NOT_IN_CLASSES: &str =
+    "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body";
 
-/// An element of a `<default>` class: an element of the model without what is its own.
-fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
-    const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];
-    match child.name.as_str() {
-        "default" => {
-            checked(child, &section("default", "class", &[]), "")?;
-            return child.children.iter().try_for_each(|inner| default(inner, child));
-        }
-        // meshes are refused where they are used
-        "mesh" => return Ok(()),
-        "equality" => return checked(child, &rule("equality", "active solref solimp", "", ""), ""),
-        "tendon" => return checked(child, &TENDON[0], NOT_IN_CLASSES),
+/// Elements that set defaults, beside those of actuators and the ones with rules of their own.
+const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];
+const DEFAULT: Rule = section("default", "class", &[]);
+const EQUALITY_DEFAULT: Rule = rule("equality", "active solref solimp", "", "");
+/// Actuators that are refused still set what all actuators have.
+const ACTUATOR_DEFAULT: Rule = rule("actuator", "", "", actuator_refuses!());
+
+/// The rule of an element that sets defaults.
+fn rule_of_default(name: &str) -> Option<&'static Rule> {
+    match name {
+        "default" => return Some(&DEFAULT),
+        "equality" => return Some(&EQUALITY_DEFAULT),
+        "tendon" => return TENDON.first(),
+        // of no consequence unless it is used, which is refused
+        "mesh" => return ASSET.iter().find(|r| r.name == name),
         _ => {}
     }
     let tables = [BODY, CONTACT, ASSET].map(|t| t.iter()).into_iter().flatten();
-    let rule = tables.filter(|r| DEFAULTS.contains(&r.name)).chain(ACTUATOR).find(|r| r.name == child.name);
-    match rule {
-        Some(rule) => {
-            checked(child, rule, NOT_IN_CLASSES)?;
-            match &rule.inside {
-                Inside::Rules(inner) => descend(child, inner),
-                _ => Ok(()),
+    tables.filter(|r| DEFAULTS.contains(&r.name)).chain(ACTUATOR).find(|r| r.name == name)
+}
+
+/// An element of a `<default>` class: an element of the model without what is its own.
+///
+/// What is not supported is refused only where an element uses it, see [`check_inherited`].
+fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
+    let Some(rule) = rule_of_default(&child.name) else {
+        let names = ACTUATOR.iter().map(|r| r.name).chain(DEFAULTS).chain(["default", "mesh", "equality", "tendon"]);
+        return Err(unknown_element(child, parent, names));
+    };
+    match &rule.inside {
+        Inside::Refused(_) | Inside::Anything => return Ok(()),
+        Inside::Rules(_) | Inside::Bodies => {}
+    }
+    let except = if rule.name == "default" { "" } else { NOT_IN_CLASSES };
+    tolerate(attributes(child, rule, except))?;
+    match &rule.inside {
+        _ if rule.name == "default" => child.children.iter().try_for_each(|inner| default(inner, child)),
+        Inside::Rules(inner) => tolerate(descend(child, inner)),
+        _ => Ok(()),
+    }
+}
+
+/// Lets pass what is not supported in a class: no element may use it.
+pub(crate) fn tolerate<T>(outcome: Result<T, MjcfError>) -> Result<(), MjcfError> {
+    match outcome {
+        Err(error) if !matches!(error.kind, MjcfErrorKind::Unsupported { .. }) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses what an element of the model inherits from its classes and does not replace.
+pub(crate) fn check_inherited(attrs: &Attrs) -> Result<(), MjcfError> {
+    for (i, layer) in attrs.defaults.iter().enumerate() {
+        let Some(rule) = rule_of_default(&layer.name) else { continue };
+        let rule = if matches!(rule.inside, Inside::Refused(_)) { &ACTUATOR_DEFAULT } else { rule };
+        let words = |attr: &Attr| attr.value.split_ascii_whitespace().count();
+        for (name, neutral) in refuses(rule) {
+            let Some(attr) = layer.attr(name).filter(|attr| !is_neutral(attr, neutral)) else { continue };
+            // a shorter list would replace a part of the numbers only
+            let later = attrs.chain().skip(i + 1).filter_map(|e| e.attr(name));
+            if !later.into_iter().any(|own| words(own) >= words(attr)) {
+                return Err(not_supported(layer, attr, neutral));
             }
         }
-        None => {
-            let names =
-                ACTUATOR.iter().map(|r| r.name).chain(DEFAULTS).chain(["default", "mesh", "equality", "tendon"]);
-            Err(unknown_element(child, parent, names))
+        if let Inside::Rules(inner) = &rule.inside {
+            descend(layer, inner)?;
         }
     }
+    Ok(())
+}
+
+/// Names of the attributes that a rule refuses, each with the values that are no different from its absence.
+fn refuses(rule: &Rule) -> impl Iterator<Item = (&'static str, &'static str)> + use<> {
+    rule.refuses.split_ascii_whitespace().map(|r| r.split_once('=').unwrap_or((r, "")))
+}
+
+fn not_supported(element: &Element, attr: &Attr, neutral: &str) -> MjcfError {
+    let reason = match neutral.split('|').next().unwrap_or_default() {
+        "" => "it is not supported".to_owned(),
+        value => format!("'{}' is not supported, only '{value}'", shorten(&attr.value)),
+    };
+    element.unsupported(Some(&attr.name), reason)
 }
 
 fn unknown_element<'a>(element: &Element, parent: &Element, names: impl Iterator<Item = &'a str>) -> MjcfError {
@@ -473,16 +530,10 @@ fn attributes(element: &Element, rule: &Rule, except: &str) -> Result<(), MjcfEr
         if known().any(|name| name == attr.name) {
             continue;
         }
-        let refuses = || rule.refuses.split_ascii_whitespace().map(|r| r.split_once('=').unwrap_or((r, "")));
+        let refuses = || refuses(rule).filter(|(name, _)| !except.split_ascii_whitespace().any(|e| e == *name));
         match refuses().find(|(name, _)| *name == attr.name) {
             Some((_, neutral)) if is_neutral(attr, neutral) => {}
-            Some((_, neutral)) => {
-                let reason = match neutral.split('|').next().unwrap_or_default() {
-                    "" => "it is not supported".to_owned(),
-                    value => format!("'{}' is not supported, only '{value}'", shorten(&attr.value)),
-                };
-                return Err(element.unsupported(Some(&attr.name), reason));
-            }
+            Some((_, neutral)) => return Err(not_supported(element, attr, neutral)),
             None => {
                 let names = known().chain(refuses().map(|(name, _)| name));
                 return Err(attr.place.error(MjcfErrorKind::UnknownAttribute {

@@ -121,11 +121,14 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool]) -> Result
     Ok(mass_matrix)
 }
 
-/// A body without children that only slides, along its own axes, on a body that does not move.
+/// A body without children that only slides, along its own axes, on the world or on a child of the world without joints.
+///
+/// MuJoCo does not look further up: on a static body that is deeper, or on one that is welded to it, the rule does not hold.
 fn is_lone_slider(model: &Model, index: usize) -> bool {
     /// Frames this close count as equal; MuJoCo's `kFrameEps`.
     const FRAME_EPS: f64 = 1e-6;
     let body = &model.bodies[index];
+    let parent = &model.bodies[body.parent];
     let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
@@ -135,10 +138,10 @@ fn is_lone_slider(model: &Model, index: usize) -> bool {
     };
     !joints.is_empty()
         && !joints.iter().any(pulled)
-        && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, EPS) && aligned(j.axis))
+        && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, FRAME_EPS) && aligned(j.axis))
         && small(&body.ipos, FRAME_EPS)
         && small(&body.iquat[1..], FRAME_EPS)
-        && model.bodies[model.bodies[body.parent].weld_id].dof_count == 0
+        && (body.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
         && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
 }
 

@@ -82,7 +82,7 @@ pub(crate) fn read<'a>(
     settings: &Settings,
     assets: &Assets,
 ) -> Result<Vec<BodySpec<'a>>, MjcfError> {
-    let mut reader = Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY)] };
+    let mut reader = Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY, Frame::IDENTITY)] };
     for section in sections(root, "worldbody") {
         if let Some(attr) = section.attrs.first() {
             return Err(section.invalid(format!("the world has no attributes, but there is '{}'", attr.name)));
@@ -93,7 +93,8 @@ pub(crate) fn read<'a>(
 }
 
 impl<'a> BodySpec<'a> {
-    fn new(element: &'a Element, parent: usize, frame: Frame) -> Self {
+    /// `own` is the frame that the body's attributes give, `frame` the same in the parent's frame.
+    fn new(element: &'a Element, parent: usize, own: Frame, frame: Frame) -> Self {
         BodySpec {
             element,
             parent,
@@ -108,8 +109,8 @@ impl<'a> BodySpec<'a> {
             cameras: Vec::new(),
             lights: Vec::new(),
             mass: 0.0,
-            // MuJoCo leaves a body without mass with its own frame here
-            iframe: frame,
+            // MuJoCo leaves a body without mass with its own frame here, without those of enclosing `<frame>` elements
+            iframe: own,
             inertia: [0.0; 3],
         }
     }
@@ -187,7 +188,8 @@ impl<'a> Reader<'a, '_> {
     ) -> Result<(), MjcfError> {
         let attrs = Attrs::plain(element);
         let class = self.defaults.named(element, "childclass")?.or(childclass);
-        let mut body = BodySpec::new(element, parent, frame.compose(&self.frame(&attrs)?));
+        let own = self.frame(&attrs)?;
+        let mut body = BodySpec::new(element, parent, own, frame.compose(&own));
         body.gravcomp = attrs.number_or("gravcomp", 0.0)?;
         body.mocap = attrs.flag_or("mocap", false)?;
         body.simple = attrs.keyword("simple", &[("false", false), ("auto", true)])?.unwrap_or(true);
@@ -278,11 +280,67 @@ impl CameraSpec<'_> {
     pub fn read<'a>(attrs: &Attrs<'a>, frame: &Frame, settings: &Settings) -> Result<CameraSpec<'a>, MjcfError> {
         let pos = attrs.array_or("pos", [0.0; 3])?;
         let quat = orientation(attrs, settings)?.unwrap_or(IDENTITY);
-        let fovy = attrs.number_or("fovy", 45.0)?;
-        if !(fovy > 0.0 && fovy < 180.0) {
-            return Err(attrs.element.invalid(format!("fovy is {fovy}; expected degrees between 0 and 180")));
-        }
+        let fovy = Lens::read(attrs)?.fovy(attrs.element)?;
         Ok(CameraSpec { element: attrs.element, frame: frame.compose(&Frame { pos, quat }), mode: mode(attrs)?, fovy })
+    }
+}
+
+/// What the field of view follows from: an angle, or a sensor behind a lens.
+pub(crate) struct Lens {
+    fovy: f64,
+    /// Width and height of the sensor, m; 0 without one.
+    sensor: [f64; 2],
+    /// The same in pixels.
+    resolution: [f64; 2],
+    /// Focal lengths, m; the second counts for the vertical angle.
+    focal: [f64; 2],
+    /// Focal lengths in pixels; where it is not 0 it counts instead.
+    focal_pixel: [f64; 2],
+    /// Whether the principal point is elsewhere than in the middle; the angle is that of one in the middle.
+    off_center: bool,
+}
+
+impl Lens {
+    pub fn read(attrs: &Attrs) -> Result<Self, MjcfError> {
+        let own = |name: &str| attrs.element.attr(name).is_some();
+        if own("fovy") && own("sensorsize") {
+            return Err(attrs.element.invalid("there are both 'fovy' and 'sensorsize'"));
+        }
+        let points = [attrs.array_or("principal", [0.0; 2])?, attrs.array_or("principalpixel", [0.0; 2])?];
+        Ok(Lens {
+            off_center: points != [[0.0; 2]; 2],
+            fovy: attrs.number_or("fovy", 45.0)?,
+            sensor: attrs.array_or("sensorsize", [0.0; 2])?,
+            resolution: attrs.array_or("resolution", [1.0; 2])?,
+            focal: attrs.array_or("focal", [0.0; 2])?,
+            focal_pixel: attrs.array_or("focalpixel", [0.0; 2])?,
+        })
+    }
+
+    /// The vertical field of view in degrees, for a principal point in the middle; in single precision, as MuJoCo computes
+    /// that of a sensor.
+    fn fovy(&self, element: &Element) -> Result<f64, MjcfError> {
+        let fovy = self.fovy;
+        if !(fovy > 0.0 && fovy < 180.0) {
+            return Err(element.invalid(format!("fovy is {fovy}; expected degrees between 0 and 180")));
+        }
+        if !self.sensor.iter().all(|size| *size > 0.0) {
+            if self.off_center || [self.focal, self.focal_pixel] != [[0.0; 2]; 2] {
+                let message = "the focal length and the principal point need a 'sensorsize' of two positive numbers";
+                return Err(element.invalid(message));
+            }
+            return Ok(fovy);
+        }
+        let [width, height] = self.resolution;
+        if !(width >= 1.0 && height >= 1.0) {
+            let message = format!("resolution is {width} x {height}; 'sensorsize' needs at least 1 x 1 pixels");
+            return Err(element.invalid(message));
+        }
+        let (size, focal) = (self.sensor[1] as f32, self.focal[1] as f32);
+        let per_pixel = height as f32 / size;
+        let pixels = self.focal_pixel[1] as f32;
+        let focal = if pixels == 0.0 { focal } else { pixels / per_pixel };
+        Ok(f64::from(libm::atan2f(size / 2.0, focal)) * 360.0 / std::f64::consts::PI)
     }
 }
 
