@@ -5,6 +5,7 @@ Reads a JSON list of jobs from standard input, one per pair of geoms:
     GEOM: {"type": "sphere" | ..., "size": [...]} or {"type": "hfield", "size": [4], "heights": [[...], ...]}
 and prints a JSON list with, per job, {"states": [{"geoms": [[position, rotation row by row], ...], "contacts":
 [[dist, pos, normal, tangent], ...], "tie": bool, "rough": bool}, ...]}, geoms and contacts in MuJoCo's order.
+With "degenerate": true the poses are those without a nearest feature of their own, and numbers without rounding errors.
 
 The poses are mixed: any, barely touching, with parallel or perpendicular axes, and nearly so. A state is a tie if a
 displacement of 1e-7 makes the contacts jump (there, rounding decides which features touch), and rough if one of 1e-5
@@ -150,6 +151,23 @@ def sample(rng, job, pair):
     return [(origin, base), (origin + direction * far, q2)]
 
 
+def degenerate(rng, job):
+    """Poses whose numbers are sums of few powers of two: coinciding centers, centers on axes, faces, edges and corners."""
+    sizes = [s for geom in job["geoms"] for s in geom["size"] if geom["type"] != "plane"]
+    places = [0.0, 0.0, *sizes, *(-s for s in sizes), *(sizes[0] + s for s in sizes), 0.03125]
+    origin = rng.choice([0.0, 1.0, -0.5], size=3)
+    local = rng.choice(places, size=3) * (rng.integers(3, size=3) > 0)
+    turns = [np.array(q, dtype=float) for q in [
+        (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 0, 1), (1, 1, 0, 0), (1, 0, 1, 0), (1, 1, 1, 1), (2, 0, 0, 1),
+        (3, 4, 0, 0), (4, 0, 3, 0), (7, 1, 3, 2),
+    ]]
+    first = turns[0]
+    if job["geoms"][0]["type"] not in STATIC and rng.integers(2):
+        first = turns[rng.integers(len(turns))]
+    second = turns[rng.integers(len(turns))]
+    return [(origin, first / np.linalg.norm(first)), (origin + local, second / np.linalg.norm(second))]
+
+
 def jumps(rng, pair, poses, contacts, nudge, factor):
     """Whether a small displacement moves the contacts by more than `factor` times as much."""
     (p1, q1), (p2, q2) = poses
@@ -161,14 +179,30 @@ def jumps(rng, pair, poses, contacts, nudge, factor):
     return False
 
 
+def stays(pair, poses, contacts):
+    """Whether the contacts are the same elsewhere, where numbers are rounded otherwise."""
+    for shift in np.array([[1.0, 2.0, -1.0], [-0.375, 0.125, 0.0], [8.0, -4.0, 16.0], [0.625, 0.5, 0.25]]):
+        there = pair.contacts([(pos + shift, quat) for pos, quat in poses])
+        if there.shape != contacts.shape:
+            return False
+        there[:, 1:4] -= shift
+        if np.abs(there - contacts).max(initial=0) > 1e-9:
+            return False
+    return True
+
+
 def run(job):
     rng = np.random.default_rng(job["seed"])
     pair = Pair(job)
     states = []
     for _ in range(job["states"]):
-        poses = sample(rng, job, pair)
+        poses = degenerate(rng, job) if job.get("degenerate") else sample(rng, job, pair)
         contacts = pair.contacts(poses)
         geoms = [[*pair.d.geom_xpos[i], *pair.d.geom_xmat[i]] for i in range(2)]
+        if job.get("degenerate"):
+            tie = rough = not stays(pair, poses, contacts)
+            states.append({"geoms": geoms, "contacts": contacts.tolist(), "tie": tie, "rough": rough})
+            continue
         tie = jumps(rng, pair, poses, contacts, 1e-7, 1e3)
         rough = tie or jumps(rng, pair, poses, contacts, 1e-5, 20)
         states.append({"geoms": geoms, "contacts": contacts.tolist(), "tie": tie, "rough": rough})

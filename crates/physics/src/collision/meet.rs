@@ -149,9 +149,10 @@ fn touch_pair<T: Real>(
         }
         known = Some(clearance);
     }
-    let first_sphere = Sphere { center: ca, radius: size_a[0] };
-    let sphere = Sphere { center: cb, radius: size_b[0] };
-    let ground = Plane { point: ca, normal: work.contacts.directions[a] };
+    let [first_axis, axis] = [work.contacts.directions[a], work.contacts.directions[b]];
+    let first_sphere = Sphere { center: ca, axis: first_axis, radius: size_a[0] };
+    let sphere = Sphere { center: cb, axis, radius: size_b[0] };
+    let ground = Plane { point: ca, normal: first_axis };
     let found: &[Touch<T>] = match pair.shapes {
         ShapePair::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
         ShapePair::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),

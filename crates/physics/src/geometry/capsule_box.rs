@@ -46,7 +46,8 @@ kernel_fn! {
 /// The contact of the capsule's ball at a place of its segment.
 #[inline(always)]
 fn ball_at<S: Real>(a: &Capsule<S>, b: &Cuboid<S>, along: S, margin: S) -> Touch<S> {
-    sphere_box(&Sphere { center: axpy3(&a.axis, along * a.half, &a.center), radius: a.radius }, b, margin)
+    let center = axpy3(&a.axis, along * a.half, &a.center);
+    sphere_box(&Sphere { center, axis: a.axis, radius: a.radius }, b, margin)
 }
 
 /// The closest place of the segment `center + [-1, 1] arm` to the box, in the box's frame.

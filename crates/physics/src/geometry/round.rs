@@ -2,38 +2,58 @@
 
 use super::*;
 
-/// Contact of two balls; `fallback` is the normal where their centers coincide.
+/// Distance up to which two points are the same: axes that cross (as those of a planar model do) are apart by no more than
+/// rounding.
 #[inline(always)]
-fn balls<T: Real>(p1: &V3<T>, r1: T, p2: &V3<T>, r2: T, margin: T, fallback: &V3<T>) -> Touch<T> {
+fn tiny<T: Real>() -> f64 {
+    TINY.max(4.0 * T::EPSILON)
+}
+
+/// Contact of two balls; `axes` are the z axes of their shapes, which decide where the centers coincide.
+#[inline(always)]
+fn balls<T: Real>(p1: &V3<T>, r1: T, p2: &V3<T>, r2: T, margin: T, axes: [&V3<T>; 2]) -> Touch<T> {
     let d = sub3(p2, p1);
     let len = dot(&d, &d).sqrt();
-    // axes that cross (as those of a planar model do) are apart by no more than rounding
-    let tiny = T::lit(TINY.max(4.0 * T::EPSILON));
+    let tiny = T::lit(tiny::<T>());
     let apart = tiny.lt(len);
     let inv = len.max(tiny).recip();
-    let normal = select3::<T>(apart, &scale3(&d, inv), fallback);
+    let mut normal = scale3(&d, inv);
+    if !T::all(apart) {
+        normal = select3::<T>(apart, &normal, &across(axes[0], axes[1]));
+    }
     let dist = len - r1 - r2;
     let pos = axpy3(&normal, dist.mul_add(T::lit(0.5), r1), p1);
     Touch::new(dist, pos, normal, margin)
 }
 
-/// The x axis.
+/// MuJoCo's normal of shapes whose centers coincide: perpendicular to the z axes of both; the x axis if they are parallel.
 #[inline(always)]
-fn x_axis<T: Real>() -> V3<T> {
-    [T::lit(1.0), T::zero(), T::zero()]
+fn across<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
+    let n = cross(a, b);
+    let sin2 = dot(&n, &n);
+    let turned = T::lit(tiny::<T>() * tiny::<T>()).lt(sin2);
+    let inv = T::select(turned, sin2, T::lit(1.0)).sqrt().recip();
+    let x_axis = [T::lit(1.0), T::zero(), T::zero()];
+    select3::<T>(turned, &scale3(&n, inv), &x_axis)
 }
 
-/// One contact; coinciding centers get the x axis for a normal.
+/// The opposite direction.
+#[inline(always)]
+fn against<T: Real>(a: &V3<T>) -> V3<T> {
+    [-a[0], -a[1], -a[2]]
+}
+
+/// One contact.
 #[inline(always)]
 pub(crate) fn sphere_sphere<T: Real>(a: &Sphere<T>, b: &Sphere<T>, margin: T) -> Touch<T> {
-    balls(&a.center, a.radius, &b.center, b.radius, margin, &x_axis())
+    balls(&a.center, a.radius, &b.center, b.radius, margin, [&a.axis, &b.axis])
 }
 
 /// One contact.
 #[inline(always)]
 pub(crate) fn sphere_capsule<T: Real>(a: &Sphere<T>, b: &Capsule<T>, margin: T) -> Touch<T> {
     let along = clamp(dot(&b.axis, &sub3(&a.center, &b.center)), b.half);
-    balls(&a.center, a.radius, &axpy3(&b.axis, along, &b.center), b.radius, margin, &x_axis())
+    balls(&a.center, a.radius, &axpy3(&b.axis, along, &b.center), b.radius, margin, [&a.axis, &b.axis])
 }
 
 /// Square of the sine up to which the axes of two capsules count as parallel.
@@ -46,17 +66,16 @@ const PARALLEL: f64 = 1e-8;
 pub(crate) fn capsule_capsule<T: Real>(a: &Capsule<T>, b: &Capsule<T>, margin: T) -> [Touch<T>; 2] {
     let axes = axes(a, b);
     let (s, t) = closest(a, b, &axes);
-    let Axes { c, da, db, n, sin2, crossing } = axes;
-    let fallback = crossing_normal(&n, sin2);
+    let Axes { c, da, db, crossing, .. } = axes;
     if T::all(crossing) {
-        return [axis_points(a, s, b, t, margin, &fallback), Touch::none()];
+        return [axis_points(a, s, b, t, margin), Touch::none()];
     }
     let (s0, t0) = beside(-a.half, c, da, db, a.half, b.half);
     let (s1, t1) = beside(a.half, c, da, db, a.half, b.half);
     let (s0, t0) = (T::select(crossing, s, s0), T::select(crossing, t, t0));
-    let mut second = axis_points(a, s1, b, t1, margin, &fallback);
+    let mut second = axis_points(a, s1, b, t1, margin);
     second.on = T::and(second.on, T::not(crossing));
-    [axis_points(a, s0, b, t0, margin, &fallback), second]
+    [axis_points(a, s0, b, t0, margin), second]
 }
 
 /// Distance of two capsules, or balls with a half length of zero.
@@ -75,8 +94,7 @@ struct Axes<T: Real> {
     /// From the first's center to the second's, along either axis.
     da: T,
     db: T,
-    /// Perpendicular to both, and the square of the sine.
-    n: V3<T>,
+    /// Square of the sine of the angle.
     sin2: T,
     /// Lanes in which they are not parallel.
     crossing: T::Mask,
@@ -89,7 +107,7 @@ fn axes<T: Real>(a: &Capsule<T>, b: &Capsule<T>) -> Axes<T> {
     let n = cross(&a.axis, &b.axis);
     let sin2 = dot(&n, &n);
     let crossing = T::lit(PARALLEL).lt(sin2);
-    Axes { c: dot(&a.axis, &b.axis), da: dot(&a.axis, &d), db: dot(&b.axis, &d), n, sin2, crossing }
+    Axes { c: dot(&a.axis, &b.axis), da: dot(&a.axis, &d), db: dot(&b.axis, &d), sin2, crossing }
 }
 
 /// Places on two capsules' axes that are closest to each other; of parallel ones, some such places.
@@ -113,17 +131,9 @@ fn beside<T: Real>(end: T, c: T, da: T, db: T, half_a: T, half_b: T) -> (T, T) {
 
 /// Contact of the balls at given places of two capsules' axes.
 #[inline(always)]
-fn axis_points<T: Real>(a: &Capsule<T>, s: T, b: &Capsule<T>, t: T, margin: T, fallback: &V3<T>) -> Touch<T> {
+fn axis_points<T: Real>(a: &Capsule<T>, s: T, b: &Capsule<T>, t: T, margin: T) -> Touch<T> {
     let (p, q) = (axpy3(&a.axis, s, &a.center), axpy3(&b.axis, t, &b.center));
-    balls(&p, a.radius, &q, b.radius, margin, fallback)
-}
-
-/// Normal of capsules whose axes cross: perpendicular to both; the x axis if they are parallel too.
-#[inline(always)]
-fn crossing_normal<T: Real>(n: &V3<T>, sin2: T) -> V3<T> {
-    let turned = T::lit(TINY * TINY).lt(sin2);
-    let inv = T::select(turned, sin2, T::lit(1.0)).sqrt().recip();
-    select3::<T>(turned, &scale3(n, inv), &x_axis())
+    balls(&p, a.radius, &q, b.radius, margin, [&a.axis, &b.axis])
 }
 
 /// One contact; a center inside the box leaves by the nearest face.
@@ -137,16 +147,18 @@ pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Cuboid<T>, margin: T) -> To
     let mut normal = scale3(&to, len.max(T::lit(TINY)).recip());
     let mut dist = len;
     if !T::all(outside) {
-        // inward normal of the nearest face, the lower one of each axis first
-        let mut depth = b.half[0] - c[0].abs();
-        let mut inward = [negate_where::<T>(zero.lt(c[0]), one), zero, zero];
-        for i in 1..3 {
-            let d = b.half[i] - c[i].abs();
-            let nearer = d.lt(depth);
-            depth = T::select(nearer, d, depth);
-            let mut face = [zero; 3];
-            face[i] = negate_where::<T>(zero.lt(c[i]), one);
-            inward = select3::<T>(nearer, &face, &inward);
+        // inward normal of the nearest face, the lower one of each axis first; on the surface, rounding may give a depth
+        // a sign
+        let mut depth = (b.half[0] + c[0]).abs();
+        let mut inward = [one, zero, zero];
+        for i in 0..3 {
+            for (d, sign) in [((b.half[i] + c[i]).abs(), one), ((b.half[i] - c[i]).abs(), -one)] {
+                let nearer = d.lt(depth);
+                depth = T::select(nearer, d, depth);
+                let mut face = [zero; 3];
+                face[i] = sign;
+                inward = select3::<T>(nearer, &face, &inward);
+            }
         }
         normal = select3::<T>(outside, &normal, &inward);
         dist = T::select(outside, len, -depth);
@@ -173,18 +185,27 @@ pub(crate) fn sphere_cylinder<T: Real>(a: &Sphere<T>, b: &Cylinder<T>, margin: T
     let cap_nearer = outside.lt(above);
     let cap = T::and(within, T::or(T::not(level), cap_nearer));
     let side = T::and(level, T::or(T::not(within), T::not(cap_nearer)));
-    let outward = select3::<T>(T::lit(TINY).lt(rho), &scale3(&out, rho.max(T::lit(TINY)).recip()), &b.axes[0]);
+    let tiny = T::lit(tiny::<T>());
+    let beside = tiny.lt(rho);
+    let mut outward = scale3(&out, rho.max(tiny).recip());
+    if !T::all(beside) {
+        outward = select3::<T>(beside, &outward, &against(&across(&a.axis, axis)));
+    }
     let up = {
         let down = T::not(zero.lt(x));
         [negate_where::<T>(down, axis[0]), negate_where::<T>(down, axis[1]), negate_where::<T>(down, axis[2])]
     };
     // rim: the offset has components `above` along the axis and `outside` across it
     let gap = above.mul_add(above, outside * outside).sqrt();
-    let inv = gap.max(T::lit(TINY)).recip();
-    let rim = axpy3(&outward, outside * inv, &scale3(&up, above * inv));
+    let apart = tiny.lt(gap);
+    let inv = gap.max(tiny).recip();
+    let mut rim = axpy3(&outward, outside * inv, &scale3(&up, above * inv));
+    if !T::all(apart) {
+        rim = select3::<T>(apart, &rim, &against(&across(&a.axis, axis)));
+    }
     let away = select3::<T>(side, &outward, &select3::<T>(cap, &up, &rim));
     let dist = T::select(side, outside, T::select(cap, above, gap)) - a.radius;
-    let normal = [-away[0], -away[1], -away[2]];
+    let normal = against(&away);
     let pos = axpy3(&normal, dist.mul_add(T::lit(0.5), a.radius), &a.center);
     Touch::new(dist, pos, normal, margin)
 }
