@@ -13,7 +13,9 @@ from marathon_envs._native import CommandRange
 from marathon_envs.agents import MarathonAgent
 
 LARGEST = 1e6
-"""A coordinate, velocity, observation or reward beyond this is a broken simulation, though it may still be finite."""
+"""A coordinate or velocity beyond this is a broken simulation, though it may still be finite."""
+STORABLE = float(np.finfo(np.float32).max)
+"""Observations and rewards may be of any size that the arrays hold."""
 TERMINATION_TERM = "termination"
 """Name of the reward term that replaces all others when an agent fails."""
 _AUTORESET = {"nextstep": "next_step", "samestep": "same_step", "disabled": "disabled"}
@@ -306,7 +308,7 @@ class AgentVecEnv:
     def _show(self, mask: BoolArray) -> npt.NDArray[np.float32]:
         """Observe those in a mask, whose episodes have just begun; the rows of others stay."""
         obs = self._observe()
-        sound = (np.abs(obs) < LARGEST).all(1, keepdims=True)
+        sound = (np.abs(obs) < STORABLE).all(1, keepdims=True)
         shown = np.where(sound, obs, 0.0).astype(np.float32)
         self.obs = shown if mask.all() else np.where(mask[:, None], shown, self.obs)
         self._ready = True
@@ -369,8 +371,15 @@ class AgentVecEnv:
 
         # quarantine: nothing that is not a sane number leaves its row
         sound = ~broken & finite.all(1)
-        for values in (agent.sim.qpos, agent.sim.qvel, obs, terms, reported):
-            sound &= (np.abs(values) < LARGEST).all(1)
+        for values, limit in (
+            (agent.sim.qpos, LARGEST),
+            (agent.sim.qvel, LARGEST),
+            (obs, STORABLE),
+            (terms, STORABLE),
+            (terms.sum(1, keepdims=True), STORABLE),
+            (reported, STORABLE),
+        ):
+            sound &= (np.abs(values) < limit).all(1)
         self.steps += 1
         terminated = (failed | ~sound) & ~begun
         truncated = ((self.steps >= self.spec.max_episode_steps) | over) & ~terminated & ~begun

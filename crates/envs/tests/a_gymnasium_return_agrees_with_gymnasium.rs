@@ -380,6 +380,47 @@ fn every_decision_agrees_in_single_precision() {
     agree(true, play_single, &Bars { decision: 1e-4, exempt: 0.02, state: 0.0 });
 }
 
+/// An action far out of range is clipped by the actuators and paid for in full; the episode goes on.
+#[test]
+fn actions_far_out_of_range_cost_what_they_cost_in_gymnasium() {
+    const DECISIONS: usize = 5;
+    // in tasks without limits of controls such an action throws the model out of the world on both sides
+    let ids = ["Ant-v5", "Humanoid-v5", "Hopper-v5", "Walker2d-v5", "HalfCheetah-v5"];
+    for size in [1e3, 1e6f32] {
+        for id in ids {
+            let case = Case::new(id);
+            let mut plan = plan(&case, 11);
+            let signs = |action: &[f32]| action.iter().map(|a| size * a.signum()).collect();
+            for episode in &mut plan.actions {
+                *episode = episode[..DECISIONS].iter().map(|action| signs(action)).collect();
+            }
+            let answer = oracle("gymnasium_tasks.py", &json!([request(&case, &plan, false)]));
+            let n = plan.states.len();
+            let mut env = case.make(n, Some(Isa::F64), Autoreset::Disabled, true);
+            let mut out = env.buffers();
+            env.reset(Some(1), &mut out.obs).unwrap();
+            for (i, state) in plan.states.iter().enumerate() {
+                env.set_state(i, state).unwrap();
+            }
+            env.observe(&vec![true; n], &mut out.obs).unwrap();
+            let mut found = Differences::default();
+            for t in 0..DECISIONS {
+                let actions: Vec<f32> = plan.actions.iter().flat_map(|episode| episode[t].clone()).collect();
+                env.step(&actions, &mut out.as_mut()).unwrap();
+                for i in 0..n {
+                    let theirs = &answer[0]["episodes"][i]["steps"][t];
+                    let own = theirs["reward"].as_f64().unwrap();
+                    assert!(own < -1e4 || id == "Humanoid-v5", "{id}: Gymnasium's reward is {own}");
+                    found.compare(&env, &out, i, theirs);
+                }
+            }
+            let (obs, reward) = (largest(found.obs), largest(found.reward));
+            println!("{id}, actions of {size}: observation {obs:.0e}, reward {reward:.0e}");
+            assert!(obs < 1e-6 && reward < 1e-6 && found.flags == 0, "{id}, {size}: {obs}, {reward}, {}", found.flags);
+        }
+    }
+}
+
 /// A default value of Python's as one of ours.
 fn from_json(value: &Json) -> Value {
     let number = |x: &Json| x.as_f64().or_else(|| x.as_str()?.parse().ok());

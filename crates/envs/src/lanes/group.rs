@@ -13,6 +13,8 @@ use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
 pub(crate) const LARGEST: f64 = 1e6;
+/// Observations and rewards may be of any size that the arrays hold: an action far out of range has a price to match.
+const STORABLE: f64 = f32::MAX as f64;
 
 /// State of `T::LANES` agents and the results of their last decision.
 pub(crate) struct LaneGroup<T: Real> {
@@ -297,11 +299,11 @@ fn store_lanes<T: Real>(values: &[T], lanes: u32, first: usize, rows: &mut [f32]
     }
 }
 
-/// Lanes in which all values are finite and of a sane size.
+/// Lanes in which all values are smaller than `limit`, and thus finite.
 #[inline(always)]
-fn sane<T: Real>(values: &[T]) -> T::Mask {
+fn below<T: Real>(values: &[T], limit: f64) -> T::Mask {
     // a NaN compares false
-    let limit = T::lit(LARGEST);
+    let limit = T::lit(limit);
     let mut ok = T::not(T::none());
     for x in values {
         ok = T::and(ok, x.abs().lt(limit));
@@ -375,13 +377,8 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
         let LaneGroup { physics, obs, terms, info, reward, forward, .. } = group;
         let failed = T::from_bits(ended.terminated);
         let mut ok = T::not(T::from_bits(ended.diverged));
-        ok = T::and(ok, T::and(sane(&physics.qpos), sane(&physics.qvel)));
-        ok = T::and(ok, T::and(sane(obs), sane(terms)));
-        for x in obs.iter_mut().chain(info) {
-            *x = T::masked(ok, *x);
-        }
-        *forward = T::masked(ok, *forward);
-
+        ok = T::and(ok, T::and(below(&physics.qpos, LARGEST), below(&physics.qvel, LARGEST)));
+        ok = T::and(ok, T::and(below(obs, STORABLE), below(terms, STORABLE)));
         if let Some(price) = termination_reward {
             // a failure costs its own price in place of everything else
             let (termination, own) = terms.split_last_mut().expect("there is a term for it");
@@ -391,11 +388,12 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
             *termination = T::masked(failed, T::lit(price));
         }
         *reward = T::zero();
-        for term in terms.iter_mut() {
-            *term = T::masked(ok, *term);
-        }
         for term in &terms[..of_first] {
             *reward += *term;
+        }
+        ok = T::and(ok, below(std::slice::from_ref(reward), STORABLE));
+        for x in terms.iter_mut().chain(obs).chain(info).chain([reward, forward]) {
+            *x = T::masked(ok, *x);
         }
         Ended { terminated: T::bits(T::or(failed, T::not(ok))), diverged: T::bits(T::not(ok)), ..ended }
     }
