@@ -1,7 +1,7 @@
 //! What is wrong with a clip, if anything: limits, ground, overlaps, jumps, slides.
 
 use crate::apart::Couple;
-use crate::clip::Clip;
+use crate::clip::{Clip, Nearness};
 use crate::contact::{self, clearance};
 use crate::effort::{Efforts, efforts};
 use crate::error::MotionError;
@@ -37,6 +37,8 @@ pub struct Report {
     pub slide_speed: f64,
     /// Share of the frames in which a sole stands.
     pub standing: f64,
+    /// How near the clip is to its recording, as its file says.
+    pub fit: Option<Nearness>,
     /// What the clip takes of motors and ground; none for models whose inverse dynamics is not known.
     pub efforts: Option<Efforts>,
 }
@@ -86,6 +88,7 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
         slide: Worst::default(),
         slide_speed: 0.0,
         standing: 0.0,
+        fit: clip.about().fit,
         efforts: efforts(path, clip, model).ok(),
     };
     let body = |i: usize| model.bodies[i].name.clone();
@@ -158,7 +161,9 @@ impl Report {
         warn(overlap, bound::OVERLAP, format!("{} overlap by {:.1} mm", overlap.name, 1e3 * overlap.value));
         warn(speed, bound::SPEED, format!("{} turns at {:.0} rad/s", speed.name, speed.value));
         warn(jump, bound::JUMP, format!("{} jumps by {:.0} rad/s", jump.name, jump.value));
+        let far = self.fit.and_then(|fit| fit.warning());
         warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
+        out.extend(far.map(|text| format!("{text}: it is another motion, or the recording was read in a wrong direction")));
         out
     }
 

@@ -49,6 +49,14 @@ pub enum MotionError {
         /// What differs.
         problem: String,
     },
+    /// The file asks for more than it may.
+    #[error("{}: {problem}", path.display())]
+    Budget {
+        /// The file.
+        path: PathBuf,
+        /// What asks for how much, the limit, and how to raise it.
+        problem: String,
+    },
     /// The file has something that is not supported.
     #[error("{}: {feature} is not supported; {instead}", path.display())]
     Unsupported {

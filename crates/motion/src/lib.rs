@@ -10,6 +10,7 @@
 //! let text = r#"{
 //!   "motion": 1, "name": "bow", "model": "pole", "source": "made up", "license": "CC0-1.0", "loop": "none", "dt": 0.5,
 //!   "joints": [["hip", "hinge"]],
+//!   "checksum": "CHECKSUM",
 //!   "frames": [[0.0], [0.4], [0.6]]
 //! }"#;
 //! let clip = marathon_motion::Clip::parse("bow.motion".as_ref(), text.as_bytes())?;
@@ -23,6 +24,7 @@
 //! ```
 
 mod error;
+mod limits;
 mod rotation;
 mod worst;
 
@@ -52,12 +54,12 @@ mod roles;
 mod retarget;
 
 pub use check::{Report, check};
-pub use clip::{About, Clip, Cycle};
+pub use clip::{About, Clip, Cycle, Nearness};
 pub use contact::contacts;
 pub use effort::{Effort, Efforts, Flight, efforts};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
 pub use retarget::{Fit, Mapping, Wear, fit, retarget, soles};
-pub use skeleton::{Animation, Bone, Keyframe, Skeleton};
+pub use skeleton::{Animation, Bone, Keyframe, Seam, Skeleton};
 pub use tracking::{Places, Tracking};
 pub use worst::Worst;

@@ -40,8 +40,8 @@ const ROLES: [(&str, &[&str]); 11] = [
     ("head", &["head", "spine006"]),
 ];
 
-/// What stands before all names of a skeleton: those of 3ds Max's Biped and of Rigify's deforming bones.
-const PREFIXES: [&str; 5] = ["bip001", "bip01", "def-", "def_", "org-"];
+/// What stands before all names of a skeleton: those of 3ds Max's Biped, Rigify's deforming bones and VRoid's.
+const PREFIXES: [&str; 7] = ["bip001", "bip01", "def-", "def_", "org-", "j_bip_c_", "j_bip_"];
 
 /// Left or right of a figure.
 #[derive(Clone, Copy, PartialEq)]
@@ -53,22 +53,100 @@ enum Side {
 /// The joint of a name or, if no joint has it, of a role: `root`, `chest`, `neck`, `head`, or `left_` or `right_` and `hip`,
 /// `knee`, `ankle`, `toe`, `shoulder`, `elbow`, `wrist`.
 pub(crate) fn find(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
-    if let Some(exact) = skeleton.bones.iter().position(|bone| bone.name == wanted) {
-        return Some(exact);
+    if wanted == "root" {
+        return pelvis(skeleton);
     }
+    exact(skeleton, wanted).or_else(|| by_role(skeleton, wanted))
+}
+
+fn exact(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
+    skeleton.bones.iter().position(|bone| bone.name == wanted)
+}
+
+/// The joint that the thighs hang from, by its name. Some skeletons call the joint that they stand on the root.
+fn pelvis(skeleton: &Skeleton) -> Option<usize> {
+    let named = exact(skeleton, "root").or_else(|| by_role(skeleton, "root"));
+    let thighs = ["left_hip", "right_hip"].map(|name| exact(skeleton, name).or_else(|| by_role(skeleton, name)));
+    let [Some(left), Some(right)] = thighs else { return named };
+    let fork = fork(skeleton, left, right);
+    match (named, fork) {
+        (Some(named), Some(fork)) if named != fork && skeleton.hangs(fork, named) => Some(fork),
+        (Some(named), _) => Some(named),
+        (None, fork) => fork,
+    }
+}
+
+/// The joint that carries a figure: the lowest one that legs and arms hang from; none if names do not tell it.
+pub(crate) fn carrier(skeleton: &Skeleton) -> Option<usize> {
+    let joint = |role: &str| find(skeleton, role);
+    let legs = fork(skeleton, joint("left_hip")?, joint("right_hip")?)?;
+    let arms = fork(skeleton, joint("left_shoulder")?, joint("right_shoulder")?)?;
+    if skeleton.hangs(arms, legs) { Some(legs) } else { fork(skeleton, arms, legs) }
+}
+
+/// The lowest joint that two others hang from.
+pub(crate) fn fork(skeleton: &Skeleton, a: usize, b: usize) -> Option<usize> {
+    let mut at = skeleton.bones[a].parent;
+    while let Some(joint) = at.filter(|joint| !skeleton.hangs(b, *joint)) {
+        at = skeleton.bones[joint].parent;
+    }
+    at
+}
+
+fn by_role(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     let (side, role) = split(wanted);
     let (_, names) = ROLES.iter().find(|(name, _)| *name == role)?;
-    let joints: Vec<_> = skeleton.bones.iter().map(|bone| split(&bone.name)).collect();
-    // where a clavicle is called a shoulder, the arm is called an arm
-    let upper_arm = joints.iter().any(|(_, name)| name == "arm" || name == "upperarm");
-    let fits = |name: &str| !(upper_arm && role == "shoulder" && name == "shoulder");
-    (names.iter().filter(|name| fits(name)))
-        .find_map(|name| joints.iter().position(|(their, joint)| *their == side && joint == name))
+    let prefix = common_prefix(skeleton);
+    let bare = |name: &str| name.get(prefix.len()..).filter(|_| name.starts_with(&*prefix)).unwrap_or(name).to_string();
+    // names as they are, then without what a program has put before or behind all of them
+    let mut readings: [&dyn Fn(&str) -> String; 4] = [
+        &|name| name.to_string(),
+        &|name| bare(name),
+        &|name| without_number(name).to_string(),
+        &|name| without_number(&bare(name)).to_string(),
+    ];
+    // Sketchfab numbers all joints: its Spine_2 is no second spine
+    let numbered = skeleton.bones.iter().filter(|bone| without_number(&bone.name) != bone.name).count();
+    if 5 * numbered >= 3 * skeleton.bones.len() {
+        readings.rotate_left(2);
+    }
+    readings.iter().find_map(|reading| {
+        let joints: Vec<_> = skeleton.bones.iter().map(|bone| split(&reading(&bone.name))).collect();
+        // where a clavicle is called a shoulder, the arm is called an arm
+        let upper_arm = joints.iter().any(|(_, name)| name == "arm" || name == "upperarm");
+        let fits = |name: &str| !(upper_arm && role == "shoulder" && name == "shoulder");
+        (names.iter().filter(|name| fits(name)))
+            .find_map(|name| joints.iter().position(|(their, joint)| *their == side && joint == name))
+    })
+}
+
+/// What stands before the pelvis's name and those of most joints, such as `mixamorig1` or `Character1_`.
+fn common_prefix(skeleton: &Skeleton) -> String {
+    let most = |prefix: &str| {
+        let with = skeleton.bones.iter().filter(|bone| bone.name.starts_with(prefix)).count();
+        5 * with >= 3 * skeleton.bones.len()
+    };
+    let prefixes = skeleton.bones.iter().filter_map(|bone| {
+        let name = without_number(&bone.name);
+        let lower = name.to_ascii_lowercase();
+        let stem = ["hips", "pelvis", "hip"].iter().find_map(|pelvis| lower.strip_suffix(pelvis))?;
+        Some(name[..stem.len()].to_string())
+    });
+    prefixes.filter(|prefix| !prefix.is_empty()).find(|prefix| most(prefix)).unwrap_or_default()
+}
+
+/// A name without the number that tells copies apart: Blender's `Hips.001`, Sketchfab's `Hips_8`.
+fn without_number(name: &str) -> &str {
+    let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    match stem.strip_suffix(['.', '_']) {
+        Some(bare) if stem.len() < name.len() && !bare.is_empty() => bare,
+        _ => name,
+    }
 }
 
 /// A joint's side, and its name without side, prefix and punctuation.
 fn split(name: &str) -> (Option<Side>, String) {
-    let name = name.rsplit(':').next().unwrap_or(name);
+    let name = name.rsplit([':', '|']).next().unwrap_or(name);
     let lower = name.to_ascii_lowercase();
     let lower = PREFIXES.iter().find_map(|prefix| lower.strip_prefix(prefix)).unwrap_or(&lower);
     let lower = lower.trim_start_matches(['_', '.', '-', ' ']);
@@ -160,6 +238,49 @@ mod tests {
                 assert_eq!(find(&skeleton, wanted), Some(i), "{wanted} among {names:?}");
             }
         }
+    }
+
+    #[test]
+    fn what_programs_put_around_names_does_not_hide_them() {
+        let wanted = ["root", "chest", "left_hip", "left_knee", "left_ankle", "right_shoulder", "right_elbow"];
+        let plain = ["Hips", "Spine2", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightArm", "RightForeArm"];
+        let around: [&dyn Fn(usize, &str) -> String; 9] = [
+            &|_, name| format!("mixamorig{name}"),
+            &|_, name| format!("mixamorig1{name}"),
+            &|_, name| format!("mixamorig12:{name}"),
+            &|_, name| format!("Character1_{name}"),
+            &|_, name| format!("{name}.001"),
+            &|i, name| format!("{name}_{i}"),
+            &|i, name| format!("{name}_0{}", 8 + i),
+            &|_, name| format!("Armature|{name}"),
+            &|i, name| format!("mixamorig:{name}_{i}"),
+        ];
+        for around in around {
+            let names: Vec<String> = plain.iter().enumerate().map(|(i, name)| around(i, name)).collect();
+            let skeleton = skeleton(&names.iter().map(String::as_str).collect::<Vec<_>>());
+            for (i, wanted) in wanted.iter().enumerate() {
+                assert_eq!(find(&skeleton, wanted), Some(i), "{wanted} among {names:?}");
+            }
+        }
+        // a number can be a part of the name: Rigify's spine.003 is the chest
+        let rigify = skeleton(&["spine", "spine.001", "spine.002", "spine.003", "thigh.L", "thigh.R"]);
+        assert_eq!(find(&rigify, "chest"), Some(3));
+        assert_eq!(find(&rigify, "root"), Some(0));
+        let vroid = skeleton(&["J_Bip_C_Hips", "J_Bip_C_Chest", "J_Bip_L_UpperLeg", "J_Bip_R_UpperArm"]);
+        assert_eq!(["root", "chest", "left_hip", "right_shoulder"].map(|role| find(&vroid, role)), [0, 1, 2, 3].map(Some));
+    }
+
+    #[test]
+    fn the_root_is_the_joint_that_the_thighs_hang_from() {
+        let names = ["root", "pelvis", "thigh_l", "thigh_r", "ik_foot_root"];
+        let parents = [None, Some(0), Some(1), Some(1), Some(0)];
+        let bones = names.into_iter().zip(parents).map(|(name, parent)| Bone {
+            name: name.into(),
+            parent,
+            offset: [0.0; 3],
+            rest: [1.0, 0.0, 0.0, 0.0],
+        });
+        assert_eq!(find(&Skeleton { bones: bones.collect() }, "root"), Some(1));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::clip::{About, Clip, Cycle};
 use crate::error::MotionError;
 use crate::kinematics::Pose;
 use crate::layout::{JointKind, Layout};
-use crate::rotation::{quat, slerp, wxyz};
+use crate::rotation::{log, quat, slerp, wxyz};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
@@ -55,6 +55,29 @@ pub struct Keyframe {
     pub rotations: Vec<[f64; 4]>,
 }
 
+/// How far the last pose of a motion is from its first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seam {
+    /// How much higher the root is, m.
+    pub height: f64,
+    /// By how much the root is tilted; a turn about the vertical does not count, rad.
+    pub tilt: f64,
+    /// Mean difference of the joints, rad.
+    pub joints: f64,
+}
+
+impl Seam {
+    /// Whether a loop would show it.
+    pub fn shows(&self) -> bool {
+        self.height.abs() > 0.1 || self.tilt > 0.35 || self.joints > 0.35
+    }
+
+    /// Whether the two poses have nothing in common: a loop would float, sink or tumble.
+    pub fn gapes(&self) -> bool {
+        self.height.abs() > 0.25 || self.tilt > 1.0 || self.joints > 1.0
+    }
+}
+
 impl Keyframe {
     /// An instant at this share of the way to another.
     pub(crate) fn blended(&self, to: &Keyframe, share: f64) -> Keyframe {
@@ -65,13 +88,24 @@ impl Keyframe {
 }
 
 impl Skeleton {
+    /// Whether a joint hangs from another, or is it.
+    pub(crate) fn hangs(&self, mut joint: usize, from: usize) -> bool {
+        while joint != from {
+            match self.bones[joint].parent {
+                Some(parent) => joint = parent,
+                None => return false,
+            }
+        }
+        true
+    }
+
     /// The skeleton at rest, its root at the origin.
     pub(crate) fn rest(&self) -> SkeletonPose {
         let rotations: Vec<DQuat> = self.bones.iter().map(|bone| quat(&bone.rest)).collect();
         self.pose(DVec3::ZERO, &rotations)
     }
 
-    fn pose(&self, root: DVec3, rotations: &[DQuat]) -> SkeletonPose {
+    pub(crate) fn pose(&self, root: DVec3, rotations: &[DQuat]) -> SkeletonPose {
         let mut pose = SkeletonPose { pos: Vec::new(), quat: Vec::new() };
         for (bone, rotation) in self.bones.iter().zip(rotations) {
             let (pos, turn) = match bone.parent {
@@ -182,9 +216,30 @@ impl Animation {
     }
 
     /// The motion as an endless one. Recordings never close exactly; what is left is spread over the whole cycle, where it
-    /// shows least.
-    pub fn looped(&self) -> Self {
-        self.with_clip(self.clip.looped(self.clip.duration()))
+    /// shows least. The path is for messages.
+    ///
+    /// # Errors
+    /// As [`Clip::looped`].
+    pub fn looped(&self, path: &Path) -> Result<Self, MotionError> {
+        Ok(self.with_clip(self.clip.looped(path, self.clip.duration())?))
+    }
+
+    /// How far the last pose is from the first.
+    pub fn seam(&self) -> Seam {
+        let (first, last) = (self.clip.frame(0), self.clip.frame(self.clip.frames() - 1));
+        let up = |frame: &[f64]| quat(&frame[3..]) * (quat(&first[3..]).conjugate() * DVec3::Z);
+        let (a, b) = (up(first), up(last));
+        let bones = self.skeleton.bones.len();
+        let angle = |i: usize| {
+            let at = 3 + 4 * i;
+            log(quat(&first[at..]).conjugate() * quat(&last[at..])).length()
+        };
+        let joints: f64 = (1..bones).map(angle).sum();
+        Seam {
+            height: last[2] - first[2],
+            tilt: libm::atan2(a.cross(b).length(), a.dot(b)),
+            joints: joints / (bones - 1).max(1) as f64,
+        }
     }
 
     /// The same skeleton with its motion changed, by the edits of a [`Clip`].

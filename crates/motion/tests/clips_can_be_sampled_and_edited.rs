@@ -139,7 +139,7 @@ fn smoothing_takes_noise_away_and_leaves_what_is_slow() {
         .collect();
     let layout = clean.layout().clone();
     let noisy = Clip::new("noisy".as_ref(), clean.about().clone(), layout, clean.dt(), Some(cycle), &rows).unwrap();
-    let smooth = noisy.smooth(0.01);
+    let smooth = noisy.smooth("waves".as_ref(), 0.01).unwrap();
     let off = |clip: &Clip| (0..200).map(|i| difference(clip.frame(i), clean.frame(i))).fold(0.0, f64::max);
     assert!(off(&noisy) > 0.019 && off(&smooth) < 0.003, "{}, {}", off(&noisy), off(&smooth));
 }
@@ -187,7 +187,7 @@ fn a_mirror_exchanges_left_and_right_and_two_mirrors_do_nothing() {
 fn at_the_origin_a_clip_begins_ahead_and_moves_as_before() {
     let model = model("humanoid");
     let clip = waves(&model, 50, CYCLES[1]);
-    let moved = clip.at_origin();
+    let moved = clip.at_origin("waves".as_ref()).unwrap();
     let first = moved.frame(0);
     assert!(first[0].abs() < 1e-12 && first[1].abs() < 1e-12);
     assert!((2.0 * f64::atan2(first[6], first[3])).abs() < 1e-12);

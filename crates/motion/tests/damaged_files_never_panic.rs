@@ -43,7 +43,10 @@ fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
 
 #[test]
 fn damaged_files_are_read_or_refused_by_name() {
-    let walk = shipped("walker2d", "run").to_bytes();
+    let walk = String::from_utf8(shipped("walker2d", "run").to_bytes()).unwrap();
+    // with it, no change would get past the checksum
+    let walk: String = walk.lines().filter(|line| !line.contains("checksum")).map(|line| format!("{line}\n")).collect();
+    let walk = walk.into_bytes();
     let bvh =
         b"HIERARCHY\nROOT Hips\n{\n  OFFSET 0 0 0\n  CHANNELS 3 Xposition Yposition Zrotation\n  JOINT Leg\n  {\n    \
         OFFSET 0 -80 0\n    CHANNELS 1 Xrotation\n    End Site\n    {\n      OFFSET 0 -10 0\n    }\n  }\n}\n\
@@ -56,17 +59,17 @@ fn damaged_files_are_read_or_refused_by_name() {
     let (mut read, mut refused) = (0, 0);
     for i in 0..30_000 {
         let result = match i % 3 {
-            0 => Clip::parse("f.motion".as_ref(), &damaged(&walk, &mut random)),
-            1 => import::any("f.bvh".as_ref(), &damaged(bvh, &mut random)).map(|a| a.looped().clip().clone()),
+            0 => Clip::parse_without_checksum("f.motion".as_ref(), &damaged(&walk, &mut random)),
+            1 => import::any("f.bvh".as_ref(), &damaged(bvh, &mut random)).and_then(|a| a.looped("f.bvh".as_ref()).map(|a| a.clip().clone())),
             _ => import::any("f.json".as_ref(), &damaged(deepmimic.as_bytes(), &mut random))
-                .map(|a| a.looped().clip().clone()),
+                .and_then(|a| a.looped("f.json".as_ref()).map(|a| a.clip().clone())),
         };
         match result {
             Ok(clip) => {
                 read += 1;
                 assert_eq!(Clip::parse("f.motion".as_ref(), &clip.to_bytes()).as_ref(), Ok(&clip));
                 let _ = clip.resample("f.motion".as_ref(), 0.03);
-                let _ = clip.smooth(0.05);
+                let _ = clip.smooth("f.motion".as_ref(), 0.05);
             }
             Err(error) => {
                 refused += 1;

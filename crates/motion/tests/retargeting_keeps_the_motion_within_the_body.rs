@@ -38,7 +38,7 @@ fn a_clip_onto_its_own_model_is_the_clip_again() {
     for name in ["walk", "run", "backflip", "kick", "spin", "cartwheel"] {
         let clip = shipped("marathon_man", name);
         let animation = Animation::of_clip(name.as_ref(), &model, &clip).unwrap();
-        let animation = if animation.wraps() { animation.looped() } else { animation };
+        let animation = if animation.wraps() { animation.looped("clip".as_ref()).unwrap() } else { animation };
         let hips = ["left_thigh", "right_thigh"];
         let mapping = Mapping::by_name(name.as_ref(), animation.skeleton(), &model, hips).unwrap();
         let again = retarget(name.as_ref(), &animation, &model, &mapping).unwrap();
@@ -154,7 +154,7 @@ fn a_recording_of_another_skeleton_unit_and_pose_moves_the_same_limbs() {
 fn balanced(model: &Model, clip: &Clip, factor: f64) -> (Clip, Fit) {
     let path = Path::new("clip");
     let animation = Animation::of_clip(path, model, clip).unwrap();
-    let animation = if animation.wraps() { animation.looped() } else { animation };
+    let animation = if animation.wraps() { animation.looped("clip".as_ref()).unwrap() } else { animation };
     let parts: Vec<String> = (model.bodies.iter().filter(|body| body.mass > 0.0))
         .map(|body| format!(r#""{0}": {{"joint": "{0}", "rotation": 0.3, "position": 1}}"#, body.name))
         .collect();

@@ -3,11 +3,17 @@
 use crate::error::RunError;
 use crate::text::nearest_path;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
-use marathon_motion::{About, Clip, Mapping, MotionError, import, retarget};
+use marathon_motion::import::{self, Reading};
+use marathon_motion::{About, Clip, Mapping, MotionError, fit, retarget};
 use marathon_physics::Model;
+use marathon_physics::budget::{self, CLIP_FILE, RECORDING_FILE};
 use marathon_physics::hint::did_you_mean;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Component, Path};
+
+/// Distance, m, and angle, rad, from a recording beyond which nobody wants to train on what was made of it.
+const LOST: f64 = 0.15;
+const ASTRAY: f64 = 0.6;
 
 /// Clips that do not come with Marathon: names, and texts of `.motion` files. A name ends in `.motion`, so that it is never
 /// one of those that come with Marathon.
@@ -16,7 +22,7 @@ pub type Clips = BTreeMap<String, String>;
 /// Ending of a clip's file and of its name.
 const MOTION: &str = "motion";
 /// Endings of files that are read.
-const ENDINGS: [&str; 5] = [MOTION, "bvh", "glb", "json", "txt"];
+const ENDINGS: [&str; 8] = [MOTION, "bvh", "glb", "gltf", "vrm", "vrma", "json", "txt"];
 /// Frames per second of a clip that is made of a recording.
 const FPS: f64 = 60.0;
 
@@ -80,7 +86,8 @@ fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError>
         let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
         return Err(missing(path, &format!("a motion (.{})", ENDINGS.join(", .")), near));
     }
-    let bytes = std::fs::read(path).map_err(RunError::io(path, "read"))?;
+    let limit = if ending(path) == MOTION { &CLIP_FILE } else { &RECORDING_FILE };
+    let bytes = budget::read(path, limit).map_err(RunError::io(path, "read"))?;
     let clip = match ending(path).as_str() {
         MOTION => Clip::parse(path, &bytes)?,
         _ => {
@@ -102,21 +109,50 @@ pub fn missing(path: &Path, what: &str, near: Option<String>) -> RunError {
 
 /// What a character makes of a recording, with the mapping that comes with Marathon.
 fn of_recording(path: &Path, bytes: &[u8], model: &Model) -> Result<Clip, MotionError> {
-    let mut animation = import::any(path, bytes)?;
+    let beside = |name: &str| beside(path, name);
+    let reading = Reading { beside: Some(&beside), ..Reading::default() };
+    let mut animation = import::read(path, bytes, &reading)?.animation;
     if animation.wraps() && animation.cycle().is_none() {
-        animation = animation.looped();
+        animation = animation.looped(path)?;
     }
     let animation = animation.with_clip(animation.clip().resample(path, 1.0 / FPS)?);
     let mapping = Mapping::built_in(path, animation.skeleton(), model)?;
     let clip = retarget(path, &animation, model, &mapping)?;
+    let fit = fit(path, &animation, model, &mapping, &clip)?;
+    if fit.position > LOST || fit.bones > ASTRAY {
+        // nobody would see a warning before the training is over
+        let problem = fit.warnings().join("; ");
+        return Err(MotionError::Model { path: path.into(), model: model.name.clone(), problem });
+    }
     let or_unknown = |text: &str| if text.is_empty() { "unknown".into() } else { text.to_string() };
     let about = About {
         name: stem(path),
         model: model.name.clone(),
         source: or_unknown(&clip.about().source),
         license: or_unknown(&clip.about().license),
+        fit: Some(fit.nearness()),
     };
-    Ok(clip.with_about(about).rounded())
+    clip.with_about(about).rounded(path)
+}
+
+/// The bytes of a file that a recording names, which has to be in the recording's folder or below.
+///
+/// # Errors
+/// If it is elsewhere, or cannot be read.
+pub fn beside(recording: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let elsewhere = || "it is not in the folder of the recording".to_string();
+    let name = Path::new(name);
+    if !name.components().all(|part| matches!(part, Component::Normal(_))) {
+        return Err(elsewhere());
+    }
+    let text = |error: std::io::Error| error.to_string();
+    let folder = recording.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (folder, file) = (folder.canonicalize().map_err(text)?, folder.join(name).canonicalize().map_err(text)?);
+    // a link may lead out
+    if !file.starts_with(&folder) {
+        return Err(elsewhere());
+    }
+    budget::read(&file, &RECORDING_FILE).map_err(text)
 }
 
 /// The file's name with the ending `.motion`; with a number, if another clip has it.

@@ -8,6 +8,7 @@ mod show;
 use crate::error::CliError;
 use crate::film::Ghost;
 use clap::{Subcommand, ValueEnum};
+use marathon_motion::import::Up;
 use marathon_runs::TaskOptions;
 use std::path::PathBuf;
 
@@ -31,7 +32,7 @@ pub struct MotionArgs {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// Read a recording (.bvh, .glb, or .txt and .json of DeepMimic) and write it as a clip of a character.
+    /// Read a recording (.bvh, .glb, .gltf, .vrm, .vrma, or .txt and .json of DeepMimic) and write it as a clip of a character.
     Import(ImportArgs),
     /// Write a clip of one character as one of another.
     Retarget(RetargetArgs),
@@ -96,13 +97,27 @@ pub struct Edits {
 /// Options of `motion import`.
 #[derive(Debug, clap::Args)]
 pub struct ImportArgs {
-    /// Recording to read.
+    /// Recording to read. A .motion file is written again with a checksum.
     pub recording: PathBuf,
     /// Character: an agent, or an MJCF file.
     #[arg(long, value_name = "AGENT|F.xml")]
-    pub model: String,
+    pub model: Option<String>,
+    /// Axis of the recording that points up: x, y, z, -x, -y or -z [default: found from the motion].
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, value_parser = up)]
+    pub up: Option<Up>,
+    /// Height of the floor in the recording, meters [default: found from the contacts].
+    #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
+    pub floor: Option<f64>,
+    /// Animation of a glTF file: its name, or its index from 0 [default: the first one].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub animation: Option<String>,
     #[command(flatten)]
     pub edits: Edits,
+}
+
+fn up(text: &str) -> Result<Up, String> {
+    let found = Up::ALL.into_iter().find(|up| up.to_string() == text.trim_start_matches('+').to_ascii_lowercase());
+    found.ok_or_else(|| "expected x, y, z, -x, -y or -z".into())
 }
 
 /// Options of `motion retarget`.

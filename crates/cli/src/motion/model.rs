@@ -5,7 +5,9 @@ use crate::program;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
 use marathon_envs::registry;
 use marathon_motion::Clip;
+use marathon_motion::import::ENDINGS;
 use marathon_physics::Model;
+use marathon_physics::budget::{self, CLIP_FILE};
 use marathon_physics::hint::nearest;
 use marathon_runs::clips::missing;
 use marathon_runs::text::{nearest_path, path_word};
@@ -45,7 +47,7 @@ fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
 /// Reads a clip: a file, or one that comes with Marathon, by its name.
 pub fn clip(path: &Path) -> Result<Clip, CliError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
-    if ["bvh", "glb", "txt"].contains(&ending.as_str()) {
+    if ENDINGS.contains(&ending.as_str()) && ending != "json" {
         let name = path_word(path);
         return Err(CliError::Usage(format!(
             "{name} is a recording, expected a clip; `{} motion import {name} --model MarathonMan --out {}` makes one",
@@ -63,6 +65,6 @@ pub fn clip(path: &Path) -> Result<Clip, CliError> {
         let near = file.or_else(|| nearest(name, names.iter().map(String::as_str)).map(Into::into));
         return Err(missing(path, "a clip (.motion)", near).into());
     }
-    let bytes = std::fs::read(path).map_err(CliError::io(path, "read"))?;
+    let bytes = budget::read(path, &CLIP_FILE).map_err(CliError::io(path, "read"))?;
     Ok(Clip::parse(path, &bytes)?)
 }

@@ -3,6 +3,7 @@
 use super::{Clip, Cycle, quaternions};
 use crate::error::MotionError;
 use crate::layout::{JointKind, Layout};
+use crate::limits;
 use crate::rotation::{about_z, cubic, exp, heading, hermite, log, quat, wxyz};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
@@ -24,27 +25,35 @@ impl Clip {
             return Err(MotionError::value(path, "trim", format!("{from} to {to} s"), expected));
         }
         let rows: Vec<Vec<f64>> = (from_frame..=to_frame).map(|frame| self.frame_at(frame)).collect();
-        Ok(self.rebuilt(self.dt, None, &rows))
+        self.rebuilt(path, self.dt, None, &rows)
     }
 
     /// A cycle from a clip whose last frame is its first again, farther on. What differs between the two beside the
     /// travel is spread over the clip's last `blend` seconds. So is a turn of less than 0.4 rad: people who record a walk
     /// straight ahead do not end exactly as they began.
-    pub fn looped(&self, blend: f64) -> Self {
+    ///
+    /// # Errors
+    /// If there are fewer than three frames, of which the last is the first again, or the travel is beyond what a clip may
+    /// hold.
+    pub fn looped(&self, path: &Path, blend: f64) -> Result<Self, MotionError> {
+        if self.frames() < 3 {
+            let expected = "three or more, of which the last is the first again";
+            return Err(MotionError::value(path, "frames of a loop", self.frames(), expected));
+        }
         let mut cycle = Cycle::between(&self.layout, self.frame(0), self.frame(self.frames() - 1));
         if cycle.yaw.abs() < 0.4 && self.layout.joints[0].kind == JointKind::Free {
             let (a, b) = (self.frame(0), self.frame(self.frames() - 1));
             cycle = Cycle { pos: [b[0] - a[0], b[1] - a[1]], yaw: 0.0 };
         }
-        self.joined(cycle, blend)
+        self.joined(path, cycle, blend)
     }
 
     /// A cycle from a clip whose last frame is its first again after this cycle, but for rounding errors.
-    pub(crate) fn closed(&self, cycle: Cycle) -> Self {
-        self.joined(cycle, self.duration())
+    pub(crate) fn closed(&self, path: &Path, cycle: Cycle) -> Result<Self, MotionError> {
+        self.joined(path, cycle, self.duration())
     }
 
-    fn joined(&self, cycle: Cycle, blend: f64) -> Self {
+    fn joined(&self, path: &Path, cycle: Cycle, blend: f64) -> Result<Self, MotionError> {
         let count = self.frames() - 1;
         let mut rows = self.rows();
         let mut target = rows[0].clone();
@@ -65,25 +74,31 @@ impl Clip {
             }
         }
         rows.pop();
-        self.rebuilt(self.dt, Some(cycle), &rows)
+        self.rebuilt(path, self.dt, Some(cycle), &rows)
     }
 
     /// The same motion with another step between frames, by cubic interpolation. A looping clip keeps its length, so that
     /// its step is the nearest that divides it.
     ///
     /// # Errors
-    /// If the step is not a positive number up to half of the clip.
+    /// If the step is not a number from 0.0001 to half of the clip, or the result would be beyond the limit of memory.
     pub fn resample(&self, path: &Path, dt: f64) -> Result<Self, MotionError> {
         let duration = self.duration();
         let steps = libm::round(duration / dt);
-        if !(dt >= 1e-4 && steps >= 2.0) {
-            let expected = format!("a step from 0.0001 to {:.4} s", duration / 2.0);
-            return Err(MotionError::value(path, "dt", dt, expected));
+        if !(1e-4..=10.0).contains(&dt) {
+            return Err(MotionError::value(path, "dt", dt, "a step from 0.0001 to 10 s"));
         }
+        if !(steps >= 2.0) {
+            let found = format!("{} frames, {duration:.4} s", self.frames());
+            let rate = libm::ceil(2.0 / duration);
+            let expected = format!("two steps of {dt:.4} s or more; a rate of {rate} frames per second has two steps");
+            return Err(MotionError::value(path, "length", found, expected));
+        }
+        limits::check_frames(path, steps, self.layout.nq() + self.layout.nv())?;
         let dt = duration / steps;
         let count = steps as usize + usize::from(self.cycle.is_none());
         let rows: Vec<Vec<f64>> = (0..count).map(|i| self.cubic_at(i as f64 * dt)).collect();
-        Ok(self.rebuilt(dt, self.cycle, &rows))
+        self.rebuilt(path, dt, self.cycle, &rows)
     }
 
     /// `qpos` on the cubic through the frames, at a time within the clip.
@@ -121,10 +136,13 @@ impl Clip {
 
     /// The motion behind a Gaussian filter with this standard deviation, s. The ends of a clip that does not loop stay
     /// where they are.
-    pub fn smooth(&self, seconds: f64) -> Self {
+    ///
+    /// # Errors
+    /// If a loop's neighboring cycles are beyond what a clip may hold.
+    pub fn smooth(&self, path: &Path, seconds: f64) -> Result<Self, MotionError> {
         let sigma = seconds / self.dt;
         if !(sigma > 1e-3) {
-            return self.clone();
+            return Ok(self.clone());
         }
         let reach = libm::ceil(3.0 * sigma) as i64;
         let count = self.frames() as i64;
@@ -153,7 +171,7 @@ impl Clip {
                 row
             })
             .collect();
-        self.rebuilt(self.dt, self.cycle, &rows)
+        self.rebuilt(path, self.dt, self.cycle, &rows)
     }
 
     /// The motion as a mirror shows it that stands along the world's x and z axes: left and right change places.
@@ -185,18 +203,21 @@ impl Clip {
             })
             .collect();
         let cycle = self.cycle.map(|Cycle { pos: [x, y], yaw }| Cycle { pos: [x, -y], yaw: -yaw });
-        Ok(self.rebuilt(self.dt, cycle, &rows))
+        self.rebuilt(path, self.dt, cycle, &rows)
     }
 
     /// The motion begun at the world's origin with the heading +x; heights stay.
     ///
     /// A first joint that slides begins at 0.
-    pub fn at_origin(&self) -> Self {
+    ///
+    /// # Errors
+    /// If the motion then gets beyond what a clip may hold.
+    pub fn at_origin(&self, path: &Path) -> Result<Self, MotionError> {
         let first = self.frame(0);
         let (turn, start) = match self.layout.joints.first().map(|joint| joint.kind) {
             Some(JointKind::Free) => (-heading(quat(&first[3..])), DVec3::new(first[0], first[1], 0.0)),
             Some(JointKind::Slide) => (0.0, DVec3::new(first[0], 0.0, 0.0)),
-            _ => return self.clone(),
+            _ => return Ok(self.clone()),
         };
         let place = |row: &mut Vec<f64>| match self.layout.joints[0].kind {
             JointKind::Free => {
@@ -214,11 +235,11 @@ impl Clip {
             place(&mut next);
             Cycle::between(&self.layout, &rows[0], &next)
         });
-        self.rebuilt(self.dt, cycle, &rows)
+        self.rebuilt(path, self.dt, cycle, &rows)
     }
 
     /// The motion elsewhere: the first body moved by so much, as far as its joints can.
-    pub(crate) fn moved(&self, model: &Model, by: DVec3) -> Self {
+    pub(crate) fn moved(&self, path: &Path, model: &Model, by: DVec3) -> Result<Self, MotionError> {
         let mut rows = self.rows();
         for joint in model.joints.iter().filter(|joint| joint.body == model.joints[0].body) {
             let k = joint.qpos_adr;
@@ -236,16 +257,19 @@ impl Clip {
             let shift = flat - about_z(cycle.yaw) * flat;
             Cycle { pos: [cycle.pos[0] + shift.x, cycle.pos[1] + shift.y], yaw: cycle.yaw }
         });
-        self.rebuilt(self.dt, cycle, &rows)
+        self.rebuilt(path, self.dt, cycle, &rows)
     }
 
     /// The clip with its numbers rounded to six decimals, as files should have them: a micrometer, a microradian.
-    pub fn rounded(&self) -> Self {
+    ///
+    /// # Errors
+    /// If rounding led beyond what a clip may hold.
+    pub fn rounded(&self, path: &Path) -> Result<Self, MotionError> {
         // adding zero makes -0 a 0
         let round = |value: f64| libm::round(value * 1e6) / 1e6 + 0.0;
         let rows: Vec<Vec<f64>> = self.rows().into_iter().map(|row| row.into_iter().map(round).collect()).collect();
         let cycle = self.cycle.map(|Cycle { pos, yaw }| Cycle { pos: pos.map(round), yaw: round(yaw) });
-        self.rebuilt(self.dt, cycle, &rows)
+        self.rebuilt(path, self.dt, cycle, &rows)
     }
 }
 

@@ -9,13 +9,14 @@ use crate::layout::{JointKind, Layout};
 use crate::rotation::{about_z, heading, quat, wrap_angle, wxyz};
 use glam::DVec3;
 use marathon_physics::Model;
+use serde::Serialize;
 use std::path::Path;
 
 /// The largest number of a clip, m or rad. Larger ones are mistakes, and their differences would not stay finite.
 const LARGEST: f64 = 1e6;
 
 /// Where a clip comes from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
     /// Name of the motion.
     pub name: String,
@@ -25,6 +26,31 @@ pub struct About {
     pub source: String,
     /// License under which it may be used.
     pub license: String,
+    /// How near the clip is to the recording that it was made of, if that is known.
+    pub fit: Option<Nearness>,
+}
+
+/// How near a clip is to its recording, as [`fit`](crate::fit) measures it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Nearness {
+    /// Mean distance of the parts, m.
+    pub position: f64,
+    /// Mean angle of the parts, rad.
+    pub rotation: f64,
+}
+
+/// Distance, m, and angle, rad, beyond which a clip is not the recording's motion any more.
+const FAR: f64 = 0.05;
+const TURNED: f64 = 15.0 * std::f64::consts::PI / 180.0;
+
+impl Nearness {
+    /// What to say of a clip that is too far from its recording.
+    pub fn warning(&self) -> Option<String> {
+        let (distance, degrees) = (1e2 * self.position, self.rotation.to_degrees());
+        let far = self.position > FAR || self.rotation > TURNED;
+        let text = || format!("its parts are {distance:.1} cm and {degrees:.0} degrees from the recording's in the mean");
+        far.then(text)
+    }
 }
 
 /// How far a looping clip gets in one cycle: frame 0 of the next cycle is frame 0 turned about the world's vertical
@@ -174,10 +200,12 @@ impl Clip {
         self.frames.chunks(self.layout.nq()).map(<[f64]>::to_vec).collect()
     }
 
-    /// A changed clip; whoever changes it keeps it valid.
-    fn rebuilt(&self, dt: f64, cycle: Option<Cycle>, rows: &[Vec<f64>]) -> Self {
-        let about = self.about.clone();
-        Clip::new("".as_ref(), about, self.layout.clone(), dt, cycle, rows).expect("an edit keeps a clip valid")
+    /// A clip of other frames.
+    ///
+    /// # Errors
+    /// If an edit has led to fewer than two frames, or beyond what a clip may hold.
+    fn rebuilt(&self, path: &Path, dt: f64, cycle: Option<Cycle>, rows: &[Vec<f64>]) -> Result<Self, MotionError> {
+        Clip::new(path, self.about.clone(), self.layout.clone(), dt, cycle, rows)
     }
 }
 

@@ -1,13 +1,15 @@
 //! Biovision's BVH: a hierarchy of joints with Euler angles.
 //!
-//! A file does not tell its unit, nor which way is up. BVH's y points up, but for files whose rest pose reaches further along
-//! z. Lengths are taken for meters, centimeters, inches or CMU's unit, whichever makes the figure nearest to 1.7 m tall.
-//! Positions of joints other than the root are read and dropped: bones keep their length.
+//! A file does not tell its unit, nor which way is up: both are found from the motion. Positions of joints below the pelvis are
+//! read and dropped: bones keep their length.
 
-use super::unit;
+use super::raw::{Local, Raw, chain, cut};
+use super::{Reading, Recording, upright};
 use crate::clip::About;
 use crate::error::MotionError;
+use crate::limits;
 use crate::rotation::{exp, wxyz};
+use crate::roles;
 use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
 use std::path::Path;
@@ -31,11 +33,17 @@ struct Node {
     channels: Vec<Channel>,
 }
 
-/// Words of the text with their lines.
+/// Words of the text with their lines and columns, one after another.
 struct Words<'a> {
     path: &'a Path,
-    words: Vec<(usize, usize, &'a str)>,
-    next: usize,
+    text: &'a str,
+    /// Where the next word begins, in bytes.
+    at: usize,
+    line: usize,
+    /// Where the line begins, in bytes.
+    start: usize,
+    /// Line and column of the last word that was taken.
+    last: (usize, usize),
 }
 
 /// Reads a BVH file; the path is for messages and names the motion.
@@ -43,71 +51,103 @@ struct Words<'a> {
 /// # Errors
 /// If the text is not BVH: the message names the line.
 pub fn bvh(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
+    Ok(read(path, bytes, &Reading::default())?.animation)
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let line = 1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
         MotionError::Syntax { path: path.into(), line, column: 1, problem: "found bytes that are not UTF-8".into() }
     })?;
-    let words = text.lines().enumerate().flat_map(|(i, line)| {
-        line.split_whitespace().map(move |word| (i + 1, 1 + word.as_ptr() as usize - line.as_ptr() as usize, word))
-    });
-    let mut words = Words { path, words: words.collect(), next: 0 };
+    // some editors put a byte order mark before the first word
+    let mut words = Words::new(path, text.strip_prefix('\u{feff}').unwrap_or(text));
     let nodes = hierarchy(&mut words)?;
 
     words.expect("MOTION")?;
-    words.expect("Frames:")?;
-    let (line, count) = (words.line(), words.number()?);
-    if !(2.0..=1e7).contains(&count) || count != count.trunc() {
+    words.label("Frames:")?;
+    let count = words.number()?;
+    let line = words.line;
+    if !(1.0..=1e7).contains(&count) || count != count.trunc() {
         return Err(words.wrong(line, format!("found {count} frames, expected two or more")));
     }
-    words.expect("Frame")?;
-    words.expect("Time:")?;
-    let (line, dt) = (words.line(), words.number()?);
+    words.label("Frame Time:")?;
+    let dt = words.number()?;
     if dt > LONGEST_STEP {
-        return Err(words.wrong(line, format!("found a frame time of {dt}, expected seconds, up to {LONGEST_STEP}")));
+        return Err(words.wrong(words.line, format!("found a frame time of {dt}, expected seconds, up to {LONGEST_STEP}")));
     }
-    let width: usize = nodes.iter().map(|node| node.channels.len()).sum();
-    let numbers: Vec<f64> = (0..count as usize * width)
-        .map(|i| {
-            if words.next == words.words.len() {
-                let problem = format!("the file ends; expected {count} frames");
-                return Err(MotionError::frame(path, i / width.max(1), problem));
-            }
-            words.number()
-        })
-        .collect::<Result<_, _>>()?;
-    if let Some((line, _, word)) = words.words.get(words.next) {
-        return Err(words.wrong(*line, format!("found {word:?}, expected the end after {count} frames")));
-    }
-
-    let rest = rest(&nodes);
-    let extent = |axis: usize| {
-        let heights = rest.iter().map(|pos| pos[axis]);
-        heights.clone().fold(f64::NEG_INFINITY, f64::max) - heights.fold(f64::INFINITY, f64::min)
-    };
-    let z_up = extent(2) > 1.2 * extent(1);
-    let height = if z_up { extent(2) } else { extent(1) };
     if let Some(node) = nodes.iter().find(|node| !(node.offset.abs().max_element() <= 1e6)) {
         let found = format!("{} of {:?}", node.offset, node.name);
         return Err(MotionError::value(path, "OFFSET", found, "numbers from -1000000 to 1000000"));
     }
-    if !(height > 0.0) {
+    if !(rest(&nodes).iter().any(|pos| pos.length() > 0.0)) {
         return Err(MotionError::value(path, "HIERARCHY", "joints that all lie in one point", "a figure"));
     }
-    let unit = unit(height);
-    // y to z, z to -y
-    let upright = if z_up { DQuat::IDENTITY } else { exp(DVec3::X * std::f64::consts::FRAC_PI_2) };
+    let whole = Skeleton {
+        bones: nodes
+            .iter()
+            .map(|node| Bone {
+                name: node.name.clone(),
+                parent: node.parent,
+                offset: node.offset.to_array(),
+                rest: [1.0, 0.0, 0.0, 0.0],
+            })
+            .collect(),
+    };
+    let (skeleton, kept) = cut(&whole, root(&nodes, &whole));
+    let carriers = chain(&whole, kept[0]);
+    limits::check_seconds(path, count * dt)?;
+    // keyframes, the rows of the clip and its frames
+    limits::check_frames(path, count, 4 * nodes.len() + 7)?;
 
-    let bones = nodes.iter().map(|node| Bone {
-        name: node.name.clone(),
-        parent: node.parent,
-        offset: (upright * (unit * node.offset)).to_array(),
-        rest: [1.0, 0.0, 0.0, 0.0],
-    });
-    let skeleton = Skeleton { bones: bones.collect() };
-    let keyframes: Vec<Keyframe> =
-        numbers.chunks(width.max(1)).map(|row| keyframe(&nodes, row, upright, unit)).collect();
+    let width: usize = nodes.iter().map(|node| node.channels.len()).sum();
+    let (mut row, mut keyframes, mut notes) = (vec![0.0; width], Vec::new(), Vec::new());
+    let count = count as usize;
+    while keyframes.len() < count || width > 0 && words.is_more() {
+        for value in &mut row {
+            if !words.is_more() && keyframes.len() < count {
+                let problem = format!("the file ends; expected {count} frames");
+                return Err(MotionError::frame(path, keyframes.len(), problem));
+            }
+            *value = words.number()?;
+        }
+        keyframes.push(keyframe(&nodes, &row, &kept, &carriers));
+        if keyframes.len() == count + 1 {
+            notes.push(format!("the file says {count} frames and has more; all are read"));
+        }
+        limits::check_seconds(path, keyframes.len() as f64 * dt)?;
+    }
+    if words.is_more() {
+        let line = words.line;
+        return Err(words.wrong(line, format!("found more than {count} frames of no channels, expected the end")));
+    }
+    if keyframes.len() < 2 {
+        return Err(words.wrong(line, format!("found {} frames, expected two or more", keyframes.len())));
+    }
     let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-    Animation::new(path, About { name, model: "BVH".into(), ..About::default() }, skeleton, dt, false, &keyframes)
+    let about = About { name, model: "BVH".into(), ..About::default() };
+    let raw = Raw { about, skeleton, dt, keyframes, trust_y: 0.0, notes };
+    upright::settle(path, raw, false, reading)
+}
+
+/// The joint that carries the figure: the pelvis, or else the first joint below which the figure branches or does not travel.
+fn root(nodes: &[Node], whole: &Skeleton) -> usize {
+    if let Some(pelvis) = roles::carrier(whole) {
+        return pelvis;
+    }
+    let mut root = 0;
+    loop {
+        let mut children = (0..nodes.len()).filter(|i| nodes[*i].parent == Some(root));
+        match (children.next(), children.next()) {
+            (Some(only), None) if nodes[only].travels() => root = only,
+            _ => return root,
+        }
+    }
+}
+
+impl Node {
+    fn travels(&self) -> bool {
+        self.channels.iter().any(|channel| matches!(channel, Channel::Position(_)))
+    }
 }
 
 /// The joints; ends of bones are not among them.
@@ -120,7 +160,8 @@ fn hierarchy(words: &mut Words) -> Result<Vec<Node>, MotionError> {
     node(words, &mut nodes, None)?;
     open.push(Some(0));
     while let Some(&inside) = open.last() {
-        let line = words.line();
+        words.skip();
+        let line = words.line;
         match (words.word()?, inside) {
             ("}", _) => {
                 open.pop();
@@ -134,7 +175,8 @@ fn hierarchy(words: &mut Words) -> Result<Vec<Node>, MotionError> {
             }
             ("End", Some(_)) => {
                 words.expect("Site")?;
-                words.expect("{")?;
+                // some programs name the ends
+                while words.word()? != "{" {}
                 open.push(None);
             }
             ("ROOT", _) => return Err(words.wrong(line, "found a second ROOT, expected one figure".into())),
@@ -169,14 +211,15 @@ fn node(words: &mut Words, nodes: &mut Vec<Node>, parent: Option<usize>) -> Resu
 }
 
 fn channels(words: &mut Words) -> Result<Vec<Channel>, MotionError> {
-    let (line, count) = (words.line(), words.number()?);
+    let count = words.number()?;
+    let line = words.line;
     if !(0.0..=6.0).contains(&count) || count != count.trunc() {
         return Err(words.wrong(line, format!("found {count} channels, expected 0 to 6")));
     }
     (0..count as usize)
         .map(|_| {
-            let line = words.line();
             let word = words.word()?;
+            let line = words.line;
             let axis = match word.as_bytes().first() {
                 Some(b'X' | b'x') => 0,
                 Some(b'Y' | b'y') => 1,
@@ -203,13 +246,12 @@ fn rest(nodes: &[Node]) -> Vec<DVec3> {
     pos
 }
 
-fn keyframe(nodes: &[Node], row: &[f64], upright: DQuat, unit: f64) -> Keyframe {
+/// The turns of the joints that are kept, below what carries the first of them.
+fn keyframe(nodes: &[Node], row: &[f64], kept: &[usize], carriers: &[usize]) -> Keyframe {
     let mut numbers = row.iter();
-    let mut root = nodes[0].offset;
-    let rotations = nodes
+    let locals: Vec<Local> = nodes
         .iter()
-        .enumerate()
-        .map(|(i, node)| {
+        .map(|node| {
             let (mut turn, mut at) = (DQuat::IDENTITY, DVec3::ZERO);
             for channel in &node.channels {
                 let value = numbers.next().copied().unwrap_or(0.0);
@@ -219,53 +261,98 @@ fn keyframe(nodes: &[Node], row: &[f64], upright: DQuat, unit: f64) -> Keyframe 
                     Channel::Rotation(axis) => turn *= exp(DVec3::AXES[*axis] * value.to_radians()),
                 }
             }
-            if i == 0 && node.channels.iter().any(|channel| matches!(channel, Channel::Position(_))) {
-                root = at;
-            }
-            wxyz((upright * turn * upright.conjugate()).normalize())
+            Local { pos: if node.travels() { at } else { node.offset }, turn }
         })
         .collect();
-    Keyframe { root: (upright * (unit * root)).to_array(), rotations }
+    let root = carriers[1..].iter().fold(locals[carriers[0]], |place, joint| place.then(locals[*joint]));
+    let rotations = kept.iter().enumerate().map(|(i, joint)| {
+        let turn = if i == 0 { root.turn } else { locals[*joint].turn };
+        wxyz(turn.normalize())
+    });
+    Keyframe { root: root.pos.to_array(), rotations: rotations.collect() }
 }
 
 impl<'a> Words<'a> {
-    /// The line of the next word.
-    fn line(&self) -> usize {
-        let last = self.words.last().map_or(1, |word| word.0);
-        self.words.get(self.next).map_or(last, |word| word.0)
+    fn new(path: &'a Path, text: &'a str) -> Self {
+        let mut words = Words { path, text, at: 0, line: 1, start: 0, last: (0, 1) };
+        words.skip();
+        words
     }
 
+    /// Goes to the next word.
+    fn skip(&mut self) {
+        for (i, letter) in self.text[self.at..].char_indices() {
+            if !letter.is_whitespace() {
+                self.at += i;
+                return;
+            }
+            if letter == '\n' {
+                self.line += 1;
+                self.start = self.at + i + 1;
+            }
+        }
+        self.at = self.text.len();
+    }
+
+    /// Whether there is another word.
+    fn is_more(&mut self) -> bool {
+        self.skip();
+        self.at < self.text.len()
+    }
+
+    /// The next word; its line is the present one from then on.
     fn word(&mut self) -> Result<&'a str, MotionError> {
-        let (_, _, word) = self
-            .words
-            .get(self.next)
-            .copied()
-            .ok_or_else(|| self.wrong(self.line(), "the file ends too early".into()))?;
-        self.next += 1;
+        if !self.is_more() {
+            let line = self.text.lines().count().max(1);
+            return Err(self.wrong(line, "the file ends too early".into()));
+        }
+        self.last = (self.line, 1 + self.at - self.start);
+        let rest = &self.text[self.at..];
+        let word = &rest[..rest.find(char::is_whitespace).unwrap_or(rest.len())];
+        self.at += word.len();
         Ok(word)
     }
 
     fn expect(&mut self, wanted: &str) -> Result<(), MotionError> {
-        let line = self.line();
         match self.word()? {
             word if word.eq_ignore_ascii_case(wanted) => Ok(()),
-            word => Err(self.wrong(line, format!("found {word:?}, expected {wanted}"))),
+            word => Err(self.wrong(self.line, format!("found {word:?}, expected {wanted}"))),
         }
+    }
+
+    /// A label with its colon, with or without spaces within it and after it.
+    fn label(&mut self, label: &str) -> Result<(), MotionError> {
+        let mut first = None;
+        for letter in label.chars().filter(|letter| !letter.is_whitespace()) {
+            self.skip();
+            let (at, _) = *first.get_or_insert((self.at, self.line));
+            if at == self.at {
+                self.last = (self.line, 1 + at - self.start);
+            }
+            match self.text[self.at..].chars().next() {
+                Some(found) if found.eq_ignore_ascii_case(&letter) => self.at += found.len_utf8(),
+                _ => {
+                    let (at, line) = first.unwrap_or((self.at, self.line));
+                    let word = self.text[at..].split_whitespace().next().unwrap_or("");
+                    self.at = at + word.len();
+                    return Err(self.wrong(line, format!("found {word:?}, expected {label}")));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn number(&mut self) -> Result<f64, MotionError> {
-        let line = self.line();
         let word = self.word()?;
         match word.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
-            _ => Err(self.wrong(line, format!("found {word:?}, expected a number"))),
+            _ => Err(self.wrong(self.line, format!("found {word:?}, expected a number"))),
         }
     }
 
-    /// An error at the word before the next one, or else in this line.
+    /// An error at the last word that was taken, or else in this line.
     fn wrong(&self, line: usize, problem: String) -> MotionError {
-        let before = self.next.checked_sub(1).map(|i| self.words[i]);
-        let column = before.filter(|word| word.0 == line).map_or(1, |word| word.1);
+        let column = if self.last.0 == line { self.last.1 } else { 1 };
         MotionError::Syntax { path: self.path.into(), line, column, problem }
     }
 }

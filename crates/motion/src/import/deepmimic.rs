@@ -4,8 +4,10 @@
 //! `[w, x, y, z]` per spherical joint, an angle about z, rad, per knee and elbow. Axes: x forward, y up, z to the right. A
 //! frame's first number is the time to the next frame. In a looping motion the last frame is the first, farther on.
 
+use super::{Reading, Recording, Up, upright};
 use crate::clip::About;
 use crate::error::MotionError;
+use crate::limits;
 use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use serde::Deserialize;
 use std::path::Path;
@@ -57,15 +59,25 @@ struct Document {
 /// # Errors
 /// If the text is no such motion: the message names the line or the frame.
 pub fn deepmimic(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
+    Ok(read(path, bytes, &Reading::default())?.animation)
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
+    if let Some(up) = reading.up.filter(|up| *up != Up::Y) {
+        return Err(MotionError::value(path, "up", up, "y, which points up in all files of DeepMimic"));
+    }
+    limits::check_json(path, bytes)?;
     let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
     let looping = match file.looping.as_deref() {
         Some("wrap") => true,
         None | Some("none") => false,
         Some(other) => return Err(MotionError::value(path, "Loop", format!("{other:?}"), "\"wrap\" or \"none\"")),
     };
+    let between = &file.frames[..file.frames.len().saturating_sub(1)];
+    limits::check_seconds(path, between.iter().filter_map(|frame| frame.first()).sum())?;
     let keyframes: Vec<Keyframe> =
         file.frames.iter().enumerate().map(|(i, frame)| keyframe(path, i, frame)).collect::<Result<_, _>>()?;
-    let (dt, keyframes) = even(path, &file.frames, keyframes)?;
+    let (dt, mut keyframes) = even(path, &file.frames, keyframes)?;
     let bones = JOINTS.map(|(name, parent, offset, _)| Bone {
         name: name.into(),
         parent,
@@ -79,7 +91,9 @@ pub fn deepmimic(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
         ..About::default()
     };
     let skeleton = Skeleton { bones: bones.into() };
-    Animation::new(path, about, skeleton, dt, looping, &keyframes)
+    let notes = upright::ground(&skeleton, &mut keyframes, dt, reading);
+    let animation = Animation::new(path, about, skeleton, dt, looping, &keyframes)?;
+    Ok(Recording { animation, notes: notes.into_iter().collect() })
 }
 
 /// A vector in axes of which z points up.
@@ -134,6 +148,8 @@ fn even(path: &Path, frames: &[Vec<f64>], keyframes: Vec<Keyframe>) -> Result<(f
     if between.iter().all(|frame| (frame[0] - dt).abs() < 0.02 * dt) {
         return Ok((dt, keyframes));
     }
+    let seconds: f64 = between.iter().map(|frame| frame[0]).sum();
+    limits::check_frames(path, seconds / dt, 4 * JOINTS.len() + 7)?;
     let (mut out, mut begin) = (Vec::new(), 0.0);
     for (i, frame) in between.iter().enumerate() {
         let end = begin + frame[0];

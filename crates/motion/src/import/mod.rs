@@ -2,35 +2,86 @@
 
 mod bvh;
 mod deepmimic;
-mod glb;
+mod gltf;
+mod raw;
+mod upright;
 
 pub use bvh::bvh;
 pub use deepmimic::deepmimic;
-pub use glb::glb;
+pub use gltf::glb;
+pub use upright::Up;
 
 use crate::error::MotionError;
 use crate::skeleton::Animation;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Meters of the units in use: meter, centimeter, inch, and CMU's unit, an inch over 0.45.
 const UNITS: [f64; 4] = [1.0, 0.01, 0.0254, 0.0254 / 0.45];
-/// A figure's rest pose from the lowest to the highest joint, m. The head's top is no joint in all files.
+/// A figure from the ankles to the head's joint, m. The head's top is no joint in all files.
 const HEIGHT: f64 = 1.65;
 
-/// Reads a file of any known format, by the ending of its name: `.bvh` is Biovision's, `.glb` is glTF's, `.txt` and `.json` are DeepMimic's.
+/// The bytes of a file beside the recording, by its name.
+pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;
+
+/// How a recording is read.
+#[derive(Clone, Default)]
+pub struct Reading<'a> {
+    /// The file's axis that points up; none: it is found from the motion.
+    pub up: Option<Up>,
+    /// Height of the floor in the file, m; none: it is found from the contacts.
+    pub floor: Option<f64>,
+    /// Name or index of the animation; none: the first one.
+    pub animation: Option<String>,
+    /// Other names of the file's joints by which [`Mapping`](crate::Mapping)'s general names find them.
+    pub known_as: BTreeMap<String, String>,
+    /// Reads the files beside a `.gltf`; none: they are refused.
+    pub beside: Option<Beside<'a>>,
+}
+
+/// A recording as it was read.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The motion.
+    pub animation: Animation,
+    /// What was found that the file does not say, and what was left out, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Endings of the names of files that [`any`] reads.
+pub const ENDINGS: [&str; 7] = ["bvh", "glb", "gltf", "vrm", "vrma", "txt", "json"];
+
+/// Reads a file of any known format as [`read`] does, with nothing said about it.
 ///
 /// # Errors
-/// If the ending is another one, or the file is malformed.
+/// As [`read`].
 pub fn any(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
+    Ok(read(path, bytes, &Reading::default())?.animation)
+}
+
+/// Reads a file of any known format, by the ending of its name: `.bvh` is Biovision's, `.glb`, `.gltf`, `.vrm` and `.vrma` are
+/// glTF's, `.txt` and `.json` are DeepMimic's.
+///
+/// # Errors
+/// If the ending is another one, the file is malformed, or it has no such animation.
+pub fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    if let Some(floor) = reading.floor.filter(|floor| !(floor.abs() <= 1e4)) {
+        return Err(MotionError::value(path, "floor", floor, "a height from -10000 to 10000 m"));
+    }
     match ending.as_str() {
-        "bvh" => bvh(path, bytes),
-        "glb" => glb(path, bytes),
-        "txt" | "json" => deepmimic(path, bytes),
+        "bvh" | "txt" | "json" if reading.animation.is_some() => {
+            let expected = "no name of an animation: only glTF files have several";
+            Err(MotionError::value(path, "animation", format!("{:?}", reading.animation.as_deref().unwrap_or("")), expected))
+        }
+        "bvh" => bvh::read(path, bytes, reading),
+        "glb" | "gltf" | "vrm" | "vrma" => gltf::read(path, bytes, reading),
+        "txt" | "json" => deepmimic::read(path, bytes, reading),
         _ => Err(MotionError::Unsupported {
             path: path.into(),
             feature: format!("a recording with the ending {ending:?}"),
-            instead: "expected .bvh, .glb, or .txt or .json of DeepMimic".into(),
+            instead: "expected .bvh, .glb, .gltf, .vrm, .vrma, or .txt or .json of DeepMimic; Blender writes .fbx as .glb"
+                .into(),
         }),
     }
 }

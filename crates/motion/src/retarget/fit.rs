@@ -2,7 +2,7 @@
 
 use super::mapping::Mapping;
 use super::target::Targets;
-use crate::clip::Clip;
+use crate::clip::{Clip, Nearness};
 use crate::error::MotionError;
 use crate::kinematics::Pose;
 use crate::rotation::log;
@@ -21,8 +21,33 @@ pub struct Fit {
     pub position: f64,
     /// Mean angle of their orientations, rad; parts without a weight of their orientation do not count.
     pub rotation: f64,
+    /// Mean angle of the trunk and of the bones from one part to the next, seen from where they lie in the recording, rad. It
+    /// does not depend on what the skeleton's rest pose says.
+    pub bones: f64,
     /// Furthest distance, m.
     pub furthest: Worst,
+}
+
+/// Shorter bones point nowhere, m.
+const SHORT: f64 = 0.03;
+
+impl Fit {
+    /// What a person should know, one sentence each; none if the clip is near its recording.
+    pub fn warnings(&self) -> Vec<String> {
+        let remedy = "look at the picture; if the figure lies, sinks or faces aside, pass --up or --floor";
+        let bones = Nearness { position: 0.0, rotation: self.bones };
+        let near = Nearness { position: self.position, rotation: self.rotation }.warning();
+        let bones = bones.warning().map(|_| {
+            format!("its bones point {:.0} degrees away from the recording's in the mean", self.bones.to_degrees())
+        });
+        near.into_iter().chain(bones).map(|text| format!("{text}; {remedy}")).collect()
+    }
+
+    /// What the clip's file keeps of it.
+    pub fn nearness(&self) -> Nearness {
+        let round = |value: f64| libm::round(value * 1e4) / 1e4;
+        Nearness { position: round(self.position), rotation: round(self.rotation.max(self.bones)) }
+    }
 }
 
 /// Compares a clip with the animation that [`retarget`](super::retarget) has made it from. The path is for messages.
@@ -43,13 +68,20 @@ pub fn fit(
     }
     let targets = Targets::new(model, mapping, animation);
     let mut fit = Fit::default();
-    let (mut places, mut turns) = (0.0, 0.0);
+    let (mut places, mut turns, mut bones) = (0.0, 0.0, 0.0);
+    let pairs = targets.bones();
     for i in 0..count {
         let (target, pose) = (targets.at(i as i64), Pose::of(model, clip.frame(i)));
         let place = |part: usize| {
             let part = &mapping.parts[part];
             pose.point(part.body, DVec3::from_array(part.local))
         };
+        for (ours, theirs) in targets.directions(&pairs, i as i64, &pose) {
+            if ours.length() > SHORT && theirs.length() > SHORT {
+                fit.bones += libm::atan2(ours.cross(theirs).length(), ours.dot(theirs));
+                bones += 1.0;
+            }
+        }
         let hips = 0.5 * (place(mapping.hips[0]) + place(mapping.hips[1]));
         for (k, part) in mapping.parts.iter().enumerate() {
             let distance = ((place(k) - hips) - (target.pos[k] - target.hips)).length();
@@ -62,6 +94,7 @@ pub fn fit(
             }
         }
     }
+    fit.bones /= f64::max(bones, 1.0);
     fit.position /= f64::max(places, 1.0);
     fit.rotation /= f64::max(turns, 1.0);
     Ok(fit)

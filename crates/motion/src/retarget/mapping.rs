@@ -140,6 +140,20 @@ impl Mapping {
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
+    /// The joints that a mapping's bodies follow, each with the name of the first body that follows it: what a skeleton with
+    /// names of its own means by them. The path is for messages.
+    ///
+    /// # Errors
+    /// If the text is malformed.
+    pub fn known_as(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, String>, MotionError> {
+        let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
+        let mut names = BTreeMap::new();
+        for (body, row) in file.parts.into_iter().filter(|(_, row)| row.toward.is_none()) {
+            names.entry(row.joint).or_insert(body);
+        }
+        Ok(names)
+    }
+
     /// The same mapping with another factor on the law of balance, that only the ground, where it is touched, can change how the
     /// figure turns. It is 1 at first. The larger, the more the result is what a figure could do, and the less what the recording
     /// shows.
@@ -198,7 +212,7 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
         let names = || skeleton.bones.iter().map(|bone| bone.name.as_str());
         roles::find(skeleton, wanted).ok_or_else(|| {
             let hint = did_you_mean(nearest(wanted, names()));
-            let all = names().collect::<Vec<_>>().join(", ");
+            let all = names().map(|name| name.escape_debug().to_string()).collect::<Vec<_>>().join(", ");
             let expected = format!("a joint of the skeleton{hint}; it has {all}");
             MotionError::value(path, &key(field), format!("{wanted:?}"), expected)
         })

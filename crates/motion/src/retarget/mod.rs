@@ -26,6 +26,7 @@ use crate::error::MotionError;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use crate::layout::Layout;
+use crate::limits;
 use crate::rotation::wxyz;
 use crate::skeleton::Animation;
 use glam::DVec3;
@@ -59,6 +60,9 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     // a cycle's last frame is the first of the next
     let count = clip.frames() + usize::from(cycle.is_some());
     let margin = if cycle.is_some() { libm::ceil(MARGIN / dt) as usize } else { 0 };
+    // the normal matrix and its two copies are what takes most
+    let band = 3.0 * 8.0 * (3 * model.nv * model.nv) as f64;
+    limits::check_memory(path, band * (count + 2 * margin) as f64)?;
     let all: Vec<Target> = (0..count + 2 * margin).map(|i| targets.at(i as i64 - margin as i64)).collect();
     let (touches, couples) = (Touch::all(model), Couple::all(model));
     let layout = Layout::of(model);
@@ -124,14 +128,14 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
 
     let mut frames = frames[margin..margin + count].to_vec();
     frames.iter_mut().for_each(|frame| clamp(model, frame));
-    let about = About { model: model.name.clone(), ..clip.about().clone() };
+    let about = About { model: model.name.clone(), fit: None, ..clip.about().clone() };
     let mut result = Clip::new(path, about, layout, dt, None, &frames)?;
     if let Some(cycle) = cycle {
-        result = result.closed(cycle);
+        result = result.closed(path, cycle)?;
     }
-    let result = contact::above_ground(model, &touches, &result);
+    let result = contact::above_ground(path, model, &touches, &result)?;
     let first = Pose::of(model, result.frame(0)).pos[model.joints[0].body];
-    Ok(result.moved(model, -first.with_z(0.0)))
+    result.moved(path, model, -first.with_z(0.0))
 }
 
 /// The highest speed of a hinge, rad/s.

@@ -3,6 +3,7 @@
 use super::align::{Alignment, place};
 use super::mapping::{Mapping, Part};
 use crate::ground::Touch;
+use crate::kinematics::Pose;
 use crate::rotation::slerp;
 use crate::skeleton::Animation;
 use glam::{DQuat, DVec3};
@@ -96,6 +97,33 @@ impl<'a> Targets<'a> {
             .collect();
         let first = self.model.joints.first().map_or(0, |joint| joint.body);
         Target { quat: quats, pos, hips, root: (bodies.0[first] + shift, bodies.1[first]) }
+    }
+
+    /// The bones of which both the model and the skeleton know where they are: the ends of each by part. The trunk, from the
+    /// point between the hips to another part of the trunk, has none for its first end.
+    pub fn bones(&self) -> Vec<(Option<usize>, usize)> {
+        let parts = &self.mapping.parts;
+        let limbs = self.fits.next.iter().enumerate().filter_map(|(i, next)| Some((Some(i), (*next)?)));
+        let limbs = limbs.filter(|(i, next)| i.is_none_or(|i| parts[i].joint != parts[*next].joint));
+        let at = |part: usize| place(&self.fits.rest, &parts[part]);
+        let hips = 0.5 * (at(self.mapping.hips[0]) + at(self.mapping.hips[1]));
+        let trunk = (0..parts.len()).filter(|i| {
+            let way = at(*i) - hips;
+            parts[*i].whole && parts[*i].toward.is_none() && way.y.abs() < 0.02 && way.z > 0.1
+        });
+        let trunk = trunk.max_by(|a, b| at(*a).z.total_cmp(&at(*b).z));
+        limbs.chain(trunk.map(|trunk| (None, trunk))).collect()
+    }
+
+    /// Of each of these bones: how it lies in the model's pose, and how in a frame of the recording.
+    pub fn directions(&self, bones: &[(Option<usize>, usize)], frame: i64, pose: &Pose) -> Vec<(DVec3, DVec3)> {
+        let source = self.animation.pose(frame);
+        let parts = &self.mapping.parts;
+        let ours = |part: usize| place(pose, &parts[part]);
+        let theirs = |part: usize| self.fits.facing * source.pos[parts[part].joint];
+        let middle = |at: &dyn Fn(usize) -> DVec3| 0.5 * (at(self.mapping.hips[0]) + at(self.mapping.hips[1]));
+        let end = |at: &dyn Fn(usize) -> DVec3, from: Option<usize>| from.map_or_else(|| middle(at), at);
+        bones.iter().map(|(from, to)| (ours(*to) - end(&ours, *from), theirs(*to) - end(&theirs, *from))).collect()
     }
 
     /// The model with its parts' bodies turned so, whether its joints allow it or not. The first moving body is at the origin.

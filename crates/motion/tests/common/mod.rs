@@ -2,6 +2,8 @@
 
 #![allow(dead_code)]
 
+pub mod bvh;
+
 use marathon_motion::{About, Clip, Cycle, Layout};
 use marathon_physics::Model;
 use serde_json::Value;

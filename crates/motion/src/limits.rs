@@ -1,0 +1,34 @@
+//! What a file may ask for, checked before work starts.
+
+use crate::error::MotionError;
+use marathon_physics::budget::{MEMORY, OverBudget, RECORDING_SECONDS};
+use std::path::Path;
+
+fn over(path: &Path, what: &str) -> impl FnOnce(OverBudget) -> MotionError {
+    move |error| MotionError::Budget { path: path.into(), problem: format!("{what} {error}") }
+}
+
+/// Whether a motion may be so long, s.
+pub(crate) fn check_seconds(path: &Path, seconds: f64) -> Result<(), MotionError> {
+    RECORDING_SECONDS.check(seconds).map_err(over(path, "the motion"))
+}
+
+/// Whether there may be so many frames of so many numbers; edits hold about three copies.
+pub(crate) fn check_frames(path: &Path, frames: f64, numbers: usize) -> Result<(), MotionError> {
+    check_memory(path, frames * numbers as f64 * 24.0)
+}
+
+/// Whether a motion may take so many bytes of memory.
+pub(crate) fn check_memory(path: &Path, bytes: f64) -> Result<(), MotionError> {
+    MEMORY.check(bytes).map_err(over(path, "the motion"))
+}
+
+/// Whether a JSON document of rows of numbers may be read: a bracket can ask for a row, a comma for a number.
+pub(crate) fn check_json(path: &Path, bytes: &[u8]) -> Result<(), MotionError> {
+    let (rows, numbers) = bytes.iter().fold((0usize, 0usize), |(rows, numbers), byte| match byte {
+        b'[' => (rows + 1, numbers),
+        b',' => (rows, numbers + 1),
+        _ => (rows, numbers),
+    });
+    check_memory(path, 64.0 * rows as f64 + 16.0 * numbers as f64)
+}
