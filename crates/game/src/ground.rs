@@ -5,6 +5,7 @@
 
 use marathon_envs::agents::marathon::terrain::course::{FROM, POINTS, TO};
 use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Options, Registry, registry};
+use marathon_physics::budget;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -176,9 +177,8 @@ fn track(text: &str) -> Option<String> {
 fn source(facts: &Facts) -> Result<String, EnvError> {
     match &facts.model {
         ModelSource::Text(text) => Ok(text.to_string()),
-        ModelSource::File(path) => {
-            std::fs::read_to_string(path).map_err(|e| wrong(facts, format!("{}: {e}", path.display())))
-        }
+        ModelSource::File(path) => budget::read_to_string(path, &budget::MODEL_FILE)
+            .map_err(|e| wrong(facts, format!("{}: {e}", path.display()))),
     }
 }
 

@@ -37,6 +37,23 @@ pub(crate) fn parts(commands: &mut Commands, model: &Model, ragdoll: Entity) -> 
         .collect()
 }
 
+/// Angle along the ground of the forward axis of a model's free body, rad; 0 for a figure in a plane.
+pub fn heading(model: &Model, qpos: &[f64]) -> f64 {
+    let free = model.joints.iter().find(|joint| joint.kind == JointType::Free);
+    let turn = free.and_then(|free| qpos.get(free.qpos_adr + 3..free.qpos_adr + 7));
+    let Some([w, x, y, z]) = turn else { return 0.0 };
+    (2.0 * (x * y + w * z)).atan2(1.0 - 2.0 * (y * y + z * z))
+}
+
+/// Velocity of a model's free body along its own forward axis and to its left on the way from one configuration to another, m/s. `None`
+/// for a figure in a plane.
+pub(crate) fn own_velocity(model: &Model, from: &[f64], to: &[f64], seconds: f64) -> Option<[f32; 2]> {
+    let free = model.joints.iter().find(|joint| joint.kind == JointType::Free)?;
+    let way = [0, 1].map(|i| (to[free.qpos_adr + i] - from[free.qpos_adr + i]) / seconds);
+    let (sin, cos) = heading(model, to).sin_cos();
+    Some([way[0] * cos + way[1] * sin, way[1] * cos - way[0] * sin].map(|x| x as f32))
+}
+
 /// A configuration between two: coordinates linearly, quaternions along the shorter way.
 pub fn mix(model: &Model, a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
     let mut q: Vec<f64> = a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
@@ -60,6 +77,24 @@ pub fn mix(model: &Model, a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_heading_is_that_of_the_free_body() -> Result<(), Box<dyn std::error::Error>> {
+        let text = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>";
+        let model = Model::from_xml_str(text, "ball")?;
+        let turned = |x: f64, y: f64, angle: f64| [x, y, 3.0, (0.5 * angle).cos(), 0.0, 0.0, (0.5 * angle).sin()];
+        assert!((heading(&model, &turned(1.0, 2.0, 1.2)) - 1.2).abs() < 1e-12);
+        // it runs along -x, the way it faces: ahead is positive
+        let around = std::f64::consts::PI;
+        let ahead = own_velocity(&model, &turned(0.0, 0.0, around), &turned(-0.1, 0.0, around), 0.05);
+        let [ahead, left] = ahead.ok_or("it has a free body")?;
+        assert!((ahead - 2.0).abs() < 1e-5 && left.abs() < 1e-5, "{ahead} {left}");
+        let text =
+            "<mujoco><worldbody><body><joint type='slide' axis='1 0 0'/><geom size='.1'/></body></worldbody></mujoco>";
+        let model = Model::from_xml_str(text, "slider")?;
+        assert_eq!((heading(&model, &[1.0]), own_velocity(&model, &[0.0], &[1.0], 0.1)), (0.0, None));
+        Ok(())
+    }
 
     #[test]
     fn quaternions_go_the_shorter_way() -> Result<(), Box<dyn std::error::Error>> {

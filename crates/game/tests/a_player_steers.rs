@@ -301,3 +301,60 @@ fn marathon_man_goes_as_the_stick_says() {
         assert!(error < 0.5, "{error} m/s off {speed}");
     }
 }
+
+/// How episodes have ended.
+#[derive(Resource, Default)]
+struct Ends(Vec<End>);
+
+/// Ten minutes of each: whoever is steered has no time limit, and its episode says so. Once let go, it runs on.
+#[test]
+fn a_steered_character_is_never_taken_back() {
+    for (agent, stick) in [("MarathonManController", 0.3), ("WalkerController", 0.0), ("AntController", 0.3)] {
+        // frames as long as the game allows
+        let mut app = windowless::game(&[agent, "--seed", "5"], Duration::from_millis(200), |app| {
+            app.init_resource::<Ends>();
+            app.add_systems(Update, |mut ends: ResMut<Ends>, mut ended: MessageReader<EpisodeEnded>| {
+                ends.0.extend(ended.read().map(|ended| ended.end));
+            });
+        });
+        let pad = pad(&mut app);
+        push(&mut app, pad, GamepadAxis::LeftStickY, 0.2);
+        push(&mut app, pad, GamepadAxis::LeftStickY, stick);
+        let mut query = app.world_mut().query_filtered::<(&Episode, &RagdollState), With<Actor>>();
+        let (mut last, mut longest) = (None, 0.0_f64);
+        for _ in 0..600 * 5 {
+            app.update();
+            let (episode, state) = query.single(app.world()).expect("one character");
+            let at = app.world().resource::<Marathon>().state(state).map_or(0.0, |state| state.qpos[0]);
+            if let Some((_, before)) = last.filter(|(number, _)| *number == episode.number) {
+                let moved: f64 = at - before;
+                assert!(moved.abs() < 2.0, "{agent} jumps by {moved} m in an episode: {episode:?}");
+            }
+            (last, longest) = (Some((episode.number, at)), longest.max(episode.seconds));
+        }
+        let (episode, _) = query.single(app.world()).expect("one character");
+        assert!(longest > 60.0 && episode.untimed, "{agent}: {longest} s, {episode:?}");
+        let number = episode.number;
+        press(&mut app, pad, GamepadButton::LeftThumb);
+        frames(&mut app, 3);
+        let (episode, _) = query.single(app.world()).expect("one character");
+        assert!(episode.number == number && episode.untimed, "{agent}: {episode:?}");
+        let ends = &app.world().resource::<Ends>().0;
+        assert!(!ends.contains(&End::TimeUp), "{agent}: {ends:?}");
+    }
+}
+
+/// Its own schedule has the task's time limit.
+#[test]
+fn who_is_not_steered_begins_anew_when_its_time_is_up() {
+    let mut app = windowless::game(&["AntController", "--seed", "5"], Duration::from_millis(200), |_| ());
+    let mut query = app.world_mut().query_filtered::<&Episode, With<Actor>>();
+    let mut longest = 0.0_f64;
+    while query.single(app.world()).expect("one Ant").number < 2 {
+        app.update();
+        let episode = query.single(app.world()).expect("one Ant");
+        assert!(!episode.untimed, "{episode:?}");
+        longest = longest.max(episode.seconds);
+        assert!(longest < 60.0, "it has a time limit");
+    }
+}

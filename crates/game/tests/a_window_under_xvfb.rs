@@ -142,6 +142,11 @@ fn it_is_played() -> Result<(), Box<dyn Error>> {
     key("Escape")?;
     std::thread::sleep(Duration::from_secs(5));
     shot("window-4-menu.png")?;
+    // it has learned since it was saved, so that the first asks
+    key("q")?;
+    std::thread::sleep(Duration::from_secs(2));
+    shot("window-5-question.png")?;
+    assert!(game.0.try_wait()?.is_none(), "it asks");
     key("q")?;
     let begun = Instant::now();
     let status = loop {
@@ -193,5 +198,54 @@ fn an_environment_is_shown_in_its_time() -> Result<(), Box<dyn Error>> {
     let mut text = String::new();
     game.0.stderr.take().ok_or("no errors")?.read_to_string(&mut text)?;
     assert!(text.contains("did you mean 'Hopper-v0'") && !text.contains("panicked"), "{text}");
+    Ok(())
+}
+
+/// A signal to end ends it cleanly, and what is recorded is kept. A film tells that it is not written.
+#[test]
+fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
+    let (_screen, display) = screen()?;
+    let folder = tempfile::tempdir()?;
+    for (number, signal) in ["TERM", "INT"].iter().enumerate() {
+        let mut game = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
+        let words = ["hopper", "--quality", "low", "--size", "320x200", "--max-fps", "10", "--press", "0.5:record"];
+        game.args(words).current_dir(folder.path()).env("DISPLAY", &display);
+        let mut game = start(game.stdout(Stdio::piped()).stderr(Stdio::piped()))?;
+        let (tell, told) = channel();
+        let outputs: [Box<dyn Read + Send>; 2] =
+            [Box::new(game.0.stdout.take().ok_or("no output")?), Box::new(game.0.stderr.take().ok_or("no output")?)];
+        for output in outputs {
+            let tell = tell.clone();
+            std::thread::spawn(move || {
+                BufReader::new(output).lines().map_while(Result::ok).for_each(|line| {
+                    let _ = tell.send(line);
+                });
+            });
+        }
+        drop(tell);
+        let mut words = Words(told, String::new());
+        words.wait("recording; the same key ends it", 120);
+        std::thread::sleep(Duration::from_secs(3));
+        Command::new("kill").args([&format!("-{signal}"), &game.0.id().to_string()]).status()?;
+        words.wait("interrupted", 60);
+        assert_eq!(game.0.wait()?.code(), Some(130), "{signal}: {}", words.1);
+        words.1 += &words.0.iter().collect::<Vec<_>>().join("\n");
+        assert!(!words.1.contains("graphics adapter"), "{}", words.1);
+        let path = folder.path().join(format!("hopper-{}.replay", number + 1));
+        assert!(marathon_game::app::Recording::load(&path)?.seconds() > 0.2, "{signal}");
+    }
+    let mut film = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
+    film.args(["hopper", "--quality", "low", "--size", "320x200", "--seconds", "600", "--record", "a.mp4"]);
+    film.args(["--press", "0:record"]).current_dir(folder.path());
+    let mut film = start(film.stdout(Stdio::null()).stderr(Stdio::piped()))?;
+    std::thread::sleep(Duration::from_secs(15));
+    Command::new("kill").args(["-INT", &film.0.id().to_string()]).status()?;
+    assert_eq!(film.0.wait()?.code(), Some(130));
+    let mut text = String::new();
+    film.0.stderr.take().ok_or("no errors")?.read_to_string(&mut text)?;
+    assert!(text.contains("interrupted: a.mp4 is not written"), "{text}");
+    let left: Vec<_> = std::fs::read_dir(folder.path())?.flatten().map(|entry| entry.file_name()).collect();
+    assert!(!left.iter().any(|name| name.to_string_lossy().contains("mp4")), "{left:?}");
+    assert!(folder.path().join("hopper-3.replay").exists(), "{left:?}");
     Ok(())
 }

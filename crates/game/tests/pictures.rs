@@ -137,6 +137,25 @@ fn a_ghost_errors_and_a_skin_are_drawn() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Sliders and cards go with the rest.
+#[test]
+fn without_text_and_bars_nothing_is_over_the_picture() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let watch = draw(folder.path(), "bare.png", &["hopper", "--no-hud"])?;
+    let push = draw(folder.path(), "bare-push.png", &["hopper", "--mode", "push", "--no-hud"])?;
+    assert!(differing(&watch, &push) < 0.002, "{}", differing(&watch, &push));
+    let recorded = ["hopper", "--press", "0.1:record", "--press", "0.6:record"];
+    draw(folder.path(), "recorded.png", &recorded)?;
+    let replay = ["--replay", "hopper-1.replay", "--press", "0:pause"];
+    let shown = draw(folder.path(), "replay.png", &replay)?;
+    let bare = draw(folder.path(), "bare-replay.png", &[&replay[..], &["--no-hud"]].concat())?;
+    // the time line is below the middle
+    let line = |image: &Image| mean(image, [0.35, 0.65], [0.78, 0.84]);
+    let (shown, bare) = (line(&shown), line(&bare));
+    assert!(bare[0] > shown[0] + 20.0, "the card of the time line is dark: {shown:?}, without it {bare:?}");
+    Ok(())
+}
+
 #[test]
 fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
@@ -147,7 +166,15 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
     let shin = skin.windows(9).position(|name| name == b"\"LeftLeg\"").ok_or("a shin")?;
     std::fs::write(folder.path().join("lame.glb"), [&skin[..shin], b"\"LeftLog\"", &skin[shin + 9..]].concat())?;
     std::fs::write(folder.path().join("half.glb"), &skin[..skin.len() / 2])?;
-    let cases: [(&[&str], i32, &[&str]); 18] = [
+    std::fs::write(
+        folder.path().join("draco.glb"),
+        glb(r#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}"#),
+    )?;
+    std::fs::write(
+        folder.path().join("wrong.json"),
+        r#"{"mapping": 1, "model": "hero", "hips": ["a", "b"], "parts": {}}"#,
+    )?;
+    let cases: [(&[&str], i32, &[&str]); 23] = [
         (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
@@ -163,8 +190,21 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (
             &["MarathonMan", "--skin", "lame.glb", "--record", "a.png"],
             1,
-            &["lame.glb", "left_shin", "left_knee", "LeftLog"],
+            &["lame.glb", "left_shin", "left_knee", "LeftLog", "--mapping FILE.json"],
         ),
+        (
+            &["MarathonMan", "--skin", "draco.glb"],
+            1,
+            &["draco.glb", "KHR_draco_mesh_compression", "without compression"],
+        ),
+        (
+            &["MarathonMan", "--skin", "marathon_man", "--mapping", "wrong.json", "--record", "a.png"],
+            1,
+            &["marathon_man cannot be worn by the mapping wrong.json", "found \"hero\"", "expected \"marathon_man\""],
+        ),
+        (&["MarathonMan", "--skin", "marathon_man", "--mapping", "rong.json"], 1, &["did you mean", "wrong.json"]),
+        (&["MarathonMan", "--mapping", "wrong.json"], 2, &["--skin"]),
+        (&["\u{1b}[31mhopper"], 1, &["\\u{1b}[31mhopper"]),
         (&["MarathonMan", "--skin", "half.glb", "--record", "a.png"], 1, &["half.glb cannot be worn"]),
         (&["hopper", "--skin", "marathon_man", "--record", "a.png"], 1, &["no mapping", "marathon_man, humanoid"]),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
@@ -178,8 +218,35 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         for part in parts {
             assert!(text.contains(part), "{words:?} lacks '{part}': {text}");
         }
-        assert!(!text.contains("panicked"), "{words:?}: {text}");
+        assert!(!text.contains("panicked") && !text.contains("stack backtrace"), "{words:?}: {text}");
+        assert!(!text.contains("\u{1b}[31m"), "{words:?}: the terminal is told what a file says");
     }
+    Ok(())
+}
+
+/// A file of glTF that has its JSON alone.
+fn glb(json: &str) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let length = |n: usize| (n as u32).to_le_bytes();
+    [b"glTF", &length(2)[..], &length(20 + json.len()), &length(json.len()), b"JSON", &json].concat()
+}
+
+/// A skeleton whose names nobody knows is worn by a mapping that names them.
+#[test]
+fn a_skin_of_unknown_names_is_worn_by_a_mapping() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+    let skin = std::fs::read(assets.join("skins/marathon_man.glb"))?;
+    let shin = skin.windows(9).position(|name| name == b"\"LeftLeg\"").ok_or("a shin")?;
+    std::fs::write(folder.path().join("hero.glb"), [&skin[..shin], b"\"Limb-07\"", &skin[shin + 9..]].concat())?;
+    let mapping = std::fs::read_to_string(assets.join("motions/mappings/marathon_man.json"))?;
+    std::fs::write(folder.path().join("hero.json"), mapping.replace("\"left_knee\"", "\"Limb-07\""))?;
+    let words = ["MarathonManWalk", "--no-hud", "--option", "start=first", "--skin"];
+    let usual = draw(folder.path(), "skin.png", &[&words[..], &["marathon_man"]].concat())?;
+    let mapped =
+        draw(folder.path(), "skin-mapped.png", &[&words[..], &["hero.glb", "--mapping", "hero.json"]].concat())?;
+    assert!(differing(&usual, &mapped) < 0.002, "{}", differing(&usual, &mapped));
     Ok(())
 }
 

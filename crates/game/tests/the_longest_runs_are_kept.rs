@@ -43,6 +43,7 @@ fn recording(mark: f64) -> Result<Recording, Box<dyn Error>> {
         action: &vec![0.0; spec.act],
         command: &[],
         grounds: &Arc::default(),
+        untimed: false,
     });
     Ok(recording)
 }
@@ -132,6 +133,34 @@ fn a_table_from_elsewhere_takes_no_other_files_away() -> Result<(), Box<dyn Erro
         }
         assert!(mine.exists());
     }
+    Ok(())
+}
+
+/// A table from elsewhere names no files but its own replays, tells the terminal nothing, and runs nothing.
+#[test]
+fn a_strangers_table_does_no_harm() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("runs.sqlite");
+    let mut table = Table::open(&path)?;
+    table.add(&run("boxes", 0, 1.0), &recording(0.0)?)?;
+    let own = table.longest(&course("boxes"), 1)?[0].replay.clone();
+    assert!(own.is_some_and(|replay| replay.exists()));
+    let change = |sql: &str, text: &str| rusqlite::Connection::open(&path)?.execute(sql, [text]);
+    for name in ["/etc/passwd", "../mine", "..", ""] {
+        change("UPDATE runs SET replay = ?1", name)?;
+        assert_eq!(table.longest(&course("boxes"), 1)?[0].replay, None, "{name}");
+    }
+    change("UPDATE runs SET runner = ?1", "\u{1b}]0;title\u{7} \u{9b}31m\n  1  99 m")?;
+    change("UPDATE runs SET course = ?1", "\u{1b}[2J")?;
+    let output = game(&["--runs", "--table", &path.display().to_string()])?;
+    let text = String::from_utf8(output.stdout)?;
+    assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
+    assert!(text.contains("\\u{1b}]0;title") && text.contains("\\n  1  99 m"), "{text}");
+    drop(table);
+    rusqlite::Connection::open(&path)?
+        .execute_batch("CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END")?;
+    let error = Table::open(&path).map(drop).expect_err("a trigger").to_string();
+    assert!(error.contains("views or triggers") && error.contains("--table FILE"), "{error}");
     Ok(())
 }
 

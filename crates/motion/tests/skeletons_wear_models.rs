@@ -138,6 +138,31 @@ fn limbs_of_another_figure_are_parallel_to_the_models() {
     }
 }
 
+/// A figure with legs of a third of their length is as large as the model, not three times as large, and stands on the ground.
+#[test]
+fn a_figure_with_short_legs_is_no_giant() {
+    let model = model("marathon_man");
+    let wear = |skeleton: &Skeleton| {
+        let mapping = Mapping::built_in("figure.glb".as_ref(), skeleton, &model).expect("names that are understood");
+        Wear::new(&model, &mapping, skeleton)
+    };
+    let (usual, mut short) = (figure(), figure());
+    for bone in [2, 3, 5, 6] {
+        short.bones[bone].offset = short.bones[bone].offset.map(|x| x / 3.0);
+    }
+    let (own, shrunk) = (wear(&usual), wear(&short));
+    let larger = shrunk.scale() / own.scale();
+    assert!((1.2..2.0).contains(&larger), "{larger} times as large as with usual legs");
+    let heights = |skeleton: &Skeleton, wear: &Wear| {
+        let frame = wear.pose(&bodies(&model, &model.qpos0));
+        joints(skeleton, wear.scale(), &frame).iter().map(|at| at.z).collect::<Vec<_>>()
+    };
+    let (a, b) = (heights(&usual, &own), heights(&short, &shrunk));
+    assert!((a[3] - b[3]).abs() < 0.03 && (a[6] - b[6]).abs() < 0.03, "feet at {} and {} m", a[3], b[3]);
+    let tall = |heights: &[f64]| heights[11] - heights[3];
+    assert!((tall(&b) / tall(&a) - 1.0).abs() < 0.25, "shoulders {} and {} m above the feet", tall(&a), tall(&b));
+}
+
 /// The skeleton of a skin that rests unturned, z up in place of glTF's y.
 fn skin(path: &Path) -> Skeleton {
     let gltf = gltf::Gltf::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -66,6 +66,10 @@ pub struct Args {
     /// Character that they wear: a .glb file with a skeleton, or marathon_man, which comes with Marathon.
     #[arg(long, value_name = "FILE")]
     pub skin: Option<PathBuf>,
+    /// Which of its bones follows which body, for a skeleton whose names are not known [default: the mapping that comes with
+    /// Marathon for the model].
+    #[arg(long, value_name = "F.json", requires = "skin")]
+    pub mapping: Option<PathBuf>,
     /// How --mode learn learns; the seed is that of everything random.
     #[command(flatten)]
     pub learn: LearnOptions,

@@ -8,6 +8,8 @@ use crate::ragdoll::Anatomy;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::gltf::GltfAssetLabel;
 use bevy::prelude::*;
+use marathon_physics::budget;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The skin that comes with Marathon, and its name.
@@ -22,6 +24,15 @@ const MAGIC: &[u8] = b"glTF";
 pub struct File {
     path: PathBuf,
     bytes: Vec<u8>,
+    /// Text of a mapping file, if the command line names one.
+    mapping: Option<Mapping>,
+}
+
+/// A mapping file.
+#[derive(Clone)]
+struct Mapping {
+    path: PathBuf,
+    text: String,
 }
 
 /// What all characters wear.
@@ -32,6 +43,7 @@ pub struct Costume {
     /// Whether it is worn.
     pub fitting: Fitting,
     scene: Handle<WorldAsset>,
+    mapping: Option<Mapping>,
 }
 
 /// How far one is with a [`Costume`].
@@ -46,23 +58,66 @@ pub enum Fitting {
 }
 
 impl File {
-    /// Reads a skin.
+    /// Reads a skin, and a mapping that tells which of its bones follows which body.
     ///
     /// # Errors
-    /// If there is no such file, or it is no .glb.
-    pub fn read(path: &Path) -> Result<Self, GameError> {
+    /// If there is no such file, it is no .glb, or it needs an extension of glTF that is not supported.
+    pub fn read(path: &Path, mapping: Option<&Path>) -> Result<Self, GameError> {
+        let wrong = |path: &Path, problem: String| GameError::System(format!("{}: {problem}", path.display()));
+        let read = |file: &Path| -> Result<Mapping, GameError> {
+            exists(file)?;
+            let text = budget::read_to_string(file, &budget::CONFIG_FILE).map_err(|e| wrong(file, e.to_string()))?;
+            Ok(Mapping { path: file.into(), text })
+        };
+        let mapping = mapping.map(read).transpose()?;
         let (name, bytes) = SHIPPED;
         if path == Path::new(name) && !path.exists() {
-            return Ok(File { path: path.into(), bytes: bytes.into() });
+            return Ok(File { path: path.into(), bytes: bytes.into(), mapping });
         }
         exists(path)?;
-        let bytes =
-            std::fs::read(path).map_err(|e| GameError::System(format!("cannot read {}: {e}", path.display())))?;
+        let bytes = budget::read(path, &budget::SKIN_FILE)
+            .map_err(|e| GameError::System(format!("{}: {e}", path.display())))?;
         if !bytes.starts_with(MAGIC) {
             let expected = format!("expected a .glb file of glTF 2.0, or {name}, which comes with Marathon");
-            return Err(GameError::System(format!("{}: it is no .glb file, {expected}", path.display())));
+            return Err(wrong(path, format!("it is no .glb file, {expected}")));
         }
-        Ok(File { path: path.into(), bytes })
+        if let Some(problem) = needs(&bytes) {
+            return Err(wrong(path, problem));
+        }
+        Ok(File { path: path.into(), bytes, mapping })
+    }
+}
+
+/// What a .glb file needs that is not supported, with the remedy.
+fn needs(bytes: &[u8]) -> Option<String> {
+    // a header of 12 bytes, then the length and the kind of the first chunk, which is JSON
+    let length = bytes.get(12..16).and_then(|four| Some(u32::from_le_bytes(four.try_into().ok()?) as usize))?;
+    let about: Value = serde_json::from_slice(bytes.get(20..20_usize.checked_add(length)?)?).ok()?;
+    let needed = about["extensionsRequired"].as_array()?.iter().filter_map(Value::as_str);
+    let (name, remedy) = needed.filter_map(|name| Some((name, remedy(name)?))).next()?;
+    Some(format!("it needs the extension {name}, which is not supported; {remedy}"))
+}
+
+/// What makes a file usable that needs an extension of glTF; `None` if it is usable as it is.
+fn remedy(extension: &str) -> Option<&'static str> {
+    match extension {
+        "KHR_lights_punctual"
+        | "KHR_materials_unlit"
+        | "KHR_texture_transform"
+        | "KHR_materials_transmission"
+        | "KHR_materials_ior"
+        | "KHR_materials_emissive_strength" => None,
+        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => Some(
+            "export it without compression; Blender opens such files and writes others if Compression is cleared in its glTF \
+             export",
+        ),
+        "KHR_mesh_quantization" => {
+            Some("export it without quantization, or run `gltf-transform dequantize in.glb out.glb`")
+        }
+        "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" => {
+            Some("export it with PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`")
+        }
+        _ => Some("export it without this extension"),
     }
 }
 
@@ -72,7 +127,8 @@ pub fn lay_out(app: &mut App, file: &File) {
     registry.insert_asset(PLACE.into(), Path::new(PLACE), file.bytes.clone());
     let (server, place) = (app.world().resource::<AssetServer>(), format!("embedded://{PLACE}"));
     let scene = server.load(GltfAssetLabel::Scene(0).from_asset(place));
-    let costume = Costume { path: file.path.clone(), fitting: Fitting::Waiting, scene };
+    let (path, mapping) = (file.path.clone(), file.mapping.clone());
+    let costume = Costume { path, fitting: Fitting::Waiting, scene, mapping };
     app.insert_resource(costume).add_systems(Update, (dress, tell).chain());
 }
 
@@ -84,7 +140,8 @@ fn dress(
     actors: Query<Entity, (With<Actor>, With<Anatomy>, Without<Skin>)>,
 ) {
     for actor in &actors {
-        commands.entity(actor).insert(Skin::new(costume.scene.clone()));
+        let mapping = costume.mapping.as_ref().map(|mapping| mapping.text.clone().into());
+        commands.entity(actor).insert(Skin { scene: costume.scene.clone(), mapping });
     }
 }
 
@@ -97,7 +154,8 @@ fn tell(
 ) {
     let path = costume.path.display().to_string();
     if let Some(UnfitSkin(problem)) = unfit.iter().next() {
-        let text = format!("{path} cannot be worn: {problem}");
+        let mapping = costume.mapping.as_ref().map(|m| format!(" by the mapping {}", m.path.display()));
+        let text = format!("{path} cannot be worn{}: {problem}", mapping.unwrap_or_default());
         if costume.fitting != Fitting::Refused(text.clone()) {
             notes.error(text.clone());
             costume.fitting = Fitting::Refused(text);

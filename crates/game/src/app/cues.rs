@@ -1,6 +1,6 @@
 //! What is done at given times, as if keys had been pressed: films of pushes and balls that anyone can make again.
 
-use crate::app::keys::{Deed, Do};
+use crate::app::keys::{Deed, Pressed};
 use bevy::prelude::*;
 use clap::ValueEnum;
 use marathon_physics::hint::among;
@@ -46,9 +46,9 @@ impl Cues {
 }
 
 /// Does what is due.
-pub fn perform(time: Res<Time<Real>>, mut cues: ResMut<Cues>, mut deeds: MessageWriter<Do>) {
+pub fn perform(time: Res<Time<Real>>, mut cues: ResMut<Cues>, mut pressed: MessageWriter<Pressed>) {
     while let Some(cue) = cues.0.pop_if(|cue| cue.seconds <= time.elapsed_secs()) {
-        deeds.write(Do(cue.deed));
+        pressed.write(Pressed(cue.deed));
     }
 }
 
@@ -76,14 +76,14 @@ mod tests {
     fn each_comes_once_in_its_order() {
         let cue = |seconds, deed| Cue { seconds, deed };
         let mut app = App::new();
-        app.init_resource::<Time<Real>>().add_message::<Do>().add_systems(Update, perform);
+        app.init_resource::<Time<Real>>().add_message::<Pressed>().add_systems(Update, perform);
         let cues = vec![cue(2.0, Deed::Quit), cue(1.0, Deed::Push), cue(1.0, Deed::Throw)];
         app.insert_resource(Cues::new(cues));
         let mut done = Vec::new();
         for _ in 0..5 {
             app.world_mut().resource_mut::<Time<Real>>().advance_by(std::time::Duration::from_millis(500));
             app.update();
-            done.push(app.world_mut().resource_mut::<Messages<Do>>().drain().map(|d| d.0).collect::<Vec<_>>());
+            done.push(app.world_mut().resource_mut::<Messages<Pressed>>().drain().map(|d| d.0).collect::<Vec<_>>());
         }
         assert_eq!(done, [vec![], vec![Deed::Push, Deed::Throw], vec![], vec![Deed::Quit], vec![]]);
     }

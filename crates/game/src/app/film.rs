@@ -5,9 +5,9 @@ use crate::app::args::Args;
 use crate::app::costume::{Costume, Fitting};
 use crate::app::error::GameError;
 use crate::app::learn::Filmed;
-use crate::app::{GamePlugin, TICKS, check_graphics};
+use crate::app::{GamePlugin, TICKS, check_graphics, interrupt, replay};
 use crate::look::FollowCamera;
-use bevy::app::PluginsState;
+use bevy::app::{PluginsState, TerminalCtrlCHandlerPlugin};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
@@ -90,6 +90,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
     let mut sink = Sink::new(out, fps)?;
     check_graphics()?;
     let frame = Duration::from_secs_f64(1.0 / fps);
+    interrupt::listen();
     let (width, height) = args.size();
     let mut app = App::new();
     let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
@@ -101,12 +102,16 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
             .set(render)
             .set(log)
             .disable::<WinitPlugin>()
+            .disable::<TerminalCtrlCHandlerPlugin>()
             .disable::<PipelinedRenderingPlugin>(),
     )
     .add_plugins(game)
     .init_resource::<Reel>()
     .insert_resource(Filmed)
     .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    // a second of a film is a second of its run, at any rate of frames
+    let longest = app.world().resource::<Time<Virtual>>().max_delta().max(frame);
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(longest);
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();
     }
@@ -161,7 +166,12 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
         pace(&mut app, Duration::ZERO);
         std::thread::sleep(Duration::from_millis(2));
     }
-    (0..before).for_each(|_| pace(&mut app, frame));
+    for _ in 0..before {
+        pace(&mut app, frame);
+        if app.should_exit().is_some() || interrupt::requested() {
+            break;
+        }
+    }
     draw(&mut app, true);
     (0..WARM_UP).for_each(|_| pace(&mut app, Duration::ZERO));
     let reader = app.world_mut().spawn(Readback::texture(target)).id();
@@ -169,13 +179,21 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
         reel.0.push_back(read.data.clone());
     });
 
-    let frames = ((args.seconds() * fps).round() as usize).max(1);
+    let mut frames = ((args.seconds() * fps).round() as usize).max(1);
     let (mut drawn, mut taken, mut waited) = (0, 0, 0);
     while taken < frames {
+        if interrupt::requested() {
+            replay::save_running(app.world_mut());
+            return Err(GameError::Interrupted(Some(out.into())));
+        }
         // pictures come back in their order, some frames late
         if drawn < frames {
             pace(&mut app, if drawn == 0 { Duration::ZERO } else { frame });
             drawn += 1;
+            // a film ends with its game
+            if app.should_exit().is_some() {
+                frames = drawn;
+            }
         } else {
             pace(&mut app, Duration::ZERO);
             waited += 1;
@@ -190,6 +208,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
             }
         }
     }
+    replay::save_running(app.world_mut());
     sink.finish()
 }
 

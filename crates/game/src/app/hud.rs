@@ -1,23 +1,24 @@
 //! Text and bars over the picture: who runs how fast, what it is rewarded for, how learning goes, which keys there are.
 
 use crate::app::args::Mode;
-use crate::app::course::builds;
-use crate::app::keys::{Bindings, Deed};
-use crate::app::learn::Lesson;
+use crate::app::hints::Hints;
+use crate::app::keys::Bindings;
+use crate::app::learn::{Filmed, Lesson};
 use crate::app::notes::{Note, Notes};
 use crate::app::replay::Recorder;
 use crate::app::show::{Actor, Focus, Show};
-use crate::app::steer::Steering;
-use crate::look::FollowCamera;
+use crate::app::steer::{Steering, controls};
+use crate::look::{FollowCamera, velocity_told};
 use crate::ragdoll::{AgentCommand, Anatomy, Episode};
 use crate::simulate::Marathon;
+use bevy::input::gamepad::Gamepad;
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{
     self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, Painter, Pos2, Rect, RichText,
     Sense, Stroke, Ui,
 };
-use marathon_envs::{Spec, options::Value};
+use marathon_envs::{CommandRange, Spec, options::Value};
 use std::collections::VecDeque;
 
 /// Decisions that the reward's curve shows.
@@ -25,11 +26,15 @@ const SHOWN: usize = 240;
 /// How fast the scale of a bar forgets, per decision.
 const FORGET: f32 = 0.998;
 
-const CARD: Color32 = Color32::from_rgba_premultiplied(12, 16, 22, 205);
+pub(super) const CARD: Color32 = Color32::from_rgba_premultiplied(12, 16, 22, 205);
 pub(super) const TEXT: Color32 = Color32::from_rgb(236, 240, 244);
 pub(super) const FAINT: Color32 = Color32::from_rgb(158, 170, 182);
 pub(super) const ACCENT: Color32 = Color32::from_rgb(255, 158, 64);
 pub(super) const BAD: Color32 = Color32::from_rgb(255, 106, 96);
+/// Share by which the measured pace of time may be off before the screen tells so.
+const OFF_PACE: f32 = 0.1;
+/// Commanded speed from which on the speed in its direction is told, m/s.
+const TOLD: f64 = 0.1;
 /// Colors of the reward's terms.
 const TERMS: [Color32; 8] = [
     Color32::from_rgb(86, 180, 233),
@@ -75,13 +80,50 @@ pub struct Monitor {
     /// Decisions of everybody at the last look, and how many there are per second.
     looked: (f32, u64),
     rate: f32,
+    pace: Pace,
+}
+
+/// How fast the game's time passes beside the real one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Pace {
+    /// The factor that was asked for when the measurement began; 0 while paused.
+    wanted: f32,
+    /// Real and game seconds since then.
+    seconds: [f64; 2],
+    /// The factor that was measured last, if it was under the same conditions.
+    measured: Option<f32>,
+}
+
+impl Pace {
+    /// Takes in a frame: the factor that is asked for, and the real and the game seconds that it took.
+    fn take_in(&mut self, wanted: f32, real: f64, game: f64) {
+        if wanted != self.wanted {
+            *self = Pace { wanted, ..default() };
+            // the frame in which it changes belongs to neither
+            return;
+        }
+        self.seconds[0] += real;
+        self.seconds[1] += game;
+        if self.seconds[0] >= 1.0 {
+            *self = Pace { wanted, measured: Some((self.seconds[1] / self.seconds[0]) as f32), ..default() };
+        }
+    }
+
+    /// What it is, for the screen: what was asked for, unless the frames are too slow for it.
+    fn told(&self, wanted: f32) -> String {
+        match self.measured.filter(|measured| self.wanted == wanted && (measured / wanted - 1.0).abs() > OFF_PACE) {
+            Some(measured) => format!("time x{measured:.2} (slow frames, x{wanted} asked)"),
+            None => format!("time x{wanted}"),
+        }
+    }
 }
 
 /// Takes in the newest decision of the focus.
 pub fn watch(focus: Res<Focus>, mut monitor: ResMut<Monitor>, actors: Query<(Entity, &Actor, &Episode)>) {
     let Some((entity, _, episode)) = actors.iter().find(|(_, a, _)| a.0 == focus.0) else { return };
     if monitor.whose != Some(entity) {
-        *monitor = Monitor { whose: Some(entity), looked: monitor.looked, rate: monitor.rate, ..default() };
+        let Monitor { looked, rate, pace, .. } = *monitor;
+        *monitor = Monitor { whose: Some(entity), looked, rate, pace, ..default() };
     }
     if monitor.decisions == episode.decisions || episode.terms.is_empty() {
         return;
@@ -97,8 +139,14 @@ pub fn watch(focus: Res<Focus>, mut monitor: ResMut<Monitor>, actors: Query<(Ent
     }
 }
 
-/// Measures how many decisions everybody makes per second.
-pub fn clock(time: Res<Time<Real>>, marathon: Res<Marathon>, mut monitor: ResMut<Monitor>) {
+/// Measures how many decisions everybody makes per second, and how fast time passes.
+pub fn clock(
+    (time, game): (Res<Time<Real>>, Res<Time<Virtual>>),
+    marathon: Res<Marathon>,
+    mut monitor: ResMut<Monitor>,
+) {
+    let wanted = if game.is_paused() { 0.0 } else { game.relative_speed() };
+    monitor.pace.take_in(wanted, time.delta_secs_f64(), game.delta_secs_f64());
     let now = time.elapsed_secs();
     let (then, before) = monitor.looked;
     if now - then >= 1.0 {
@@ -139,6 +187,22 @@ fn spaced(x: f32) -> String {
     format!("{x:+.2}").replace('-', "\u{2212}")
 }
 
+/// The speed that the screen shows: of who turns, in the direction of its command, or else where it faces; of others, along the
+/// track. It is negative where the command is, and for who goes back.
+fn shown_speed(spec: &Spec, episode: &Episode) -> f32 {
+    if !spec.command.iter().any(CommandRange::is_turn) {
+        return episode.speed;
+    }
+    let [ahead, left] = episode.own_velocity;
+    match velocity_told(&spec.command, &episode.command) {
+        Some([a, l, _]) if a.hypot(l) > TOLD => {
+            let (size, sign) = (a.hypot(l), if a < 0.0 { -1.0 } else { 1.0 });
+            (sign / size) as f32 * (a as f32 * ahead + l as f32 * left)
+        }
+        _ => ahead,
+    }
+}
+
 /// Draws everything.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 pub fn draw(
@@ -146,16 +210,20 @@ pub fn draw(
     hud: Res<Hud>,
     show: Res<Show>,
     (focus, bindings, notes): (Res<Focus>, Res<Bindings>, Res<Notes>),
-    (lesson, recorder): (Option<Res<Lesson>>, Option<Res<Recorder>>),
+    (lesson, recorder, filmed): (Option<Res<Lesson>>, Option<Res<Recorder>>, Option<Res<Filmed>>),
     monitor: Res<Monitor>,
     time: Res<Time<Virtual>>,
     frames: Res<Time<Real>>,
     mut smooth: Local<f32>,
     steering: Res<Steering>,
+    pads: Query<(), With<Gamepad>>,
     actors: Query<(&Actor, &Anatomy, &Episode, Option<&AgentCommand>)>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?.clone();
-    say(&ctx, &notes, hud.on);
+    // errors in a film are told where it was started
+    if hud.on || filmed.is_none() {
+        say(&ctx, &notes, hud.on);
+    }
     if !hud.on {
         return Ok(());
     }
@@ -173,10 +241,10 @@ pub fn draw(
                     ui.label(text(13.0, ACCENT, show.mode.name()));
                     ui.label(text(12.0, FAINT, of));
                 });
-                if anatomy.spec.is_some() {
+                if let Some(spec) = &anatomy.spec {
                     ui.horizontal(|ui| {
                         // rounded first: there is no -0.0 m/s
-                        let speed = (episode.speed.max(-9.9) * 10.0).round() / 10.0 + 0.0;
+                        let speed = (shown_speed(spec, episode).max(-9.9) * 10.0).round() / 10.0 + 0.0;
                         ui.label(text(30.0, TEXT, format!("{speed:.1}")).strong());
                         ui.label(text(14.0, FAINT, "m/s"));
                         ui.add_space(8.0);
@@ -203,7 +271,10 @@ pub fn draw(
                     told_by_another(ui, spec, episode);
                 }
                 imitation(ui, anatomy, episode);
-                let speed = if time.is_paused() { "paused".into() } else { format!("time x{}", time.relative_speed()) };
+                let speed = match time.is_paused() {
+                    true => "paused".into(),
+                    false => monitor.pace.told(time.relative_speed()),
+                };
                 let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
                 // what comes from elsewhere is decided elsewhere
                 let decisions = match show.mode {
@@ -238,7 +309,10 @@ pub fn draw(
         learning(&ctx, &lesson);
     }
     if room.x > ROOM[0] || hud.help {
-        keys(&ctx, &bindings, hud.help, &show, *steering);
+        let ranges = actor.and_then(|(_, anatomy, ..)| anatomy.spec.as_ref()).map_or(&[][..], |spec| &spec.command);
+        let controls = if steering.on { controls(ranges) } else { Vec::new() };
+        let hints = Hints { bindings: &bindings, steering: *steering, controls, pads: !pads.is_empty() };
+        hints.draw(&ctx, &show, hud.help, room);
     }
     Ok(())
 }
@@ -375,94 +449,6 @@ fn learning(ctx: &egui::Context, lesson: &Lesson) {
     });
 }
 
-/// The keys: the most useful ones in a line, or all of them.
-fn keys(ctx: &egui::Context, bindings: &Bindings, all: bool, show: &Show, steering: Steering) {
-    let (mode, builds) = (show.mode, builds(show));
-    if all {
-        Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -44.0]).interactable(false).show(ctx, |ui| {
-            card().show(ui, |ui| {
-                // in two halves side by side: a small window is lower than all of them
-                let rows: Vec<_> = bindings.rows().collect();
-                let half = rows.len().div_ceil(2);
-                egui::Grid::new("all keys").num_columns(6).spacing([18.0, 3.0]).show(ui, |ui| {
-                    for (i, first) in rows[..half].iter().enumerate() {
-                        for (_, name, key, button) in [Some(first), rows.get(half + i)].into_iter().flatten() {
-                            ui.label(text(13.0, TEXT, *key).strong());
-                            ui.label(text(13.0, FAINT, button.unwrap_or("")));
-                            ui.label(text(13.0, TEXT, *name));
-                        }
-                        ui.end_row();
-                    }
-                });
-                let wheel = match builds {
-                    true => "left mouse button: drag the end of the next meter   wheel: a step higher or lower",
-                    false => "wheel: closer",
-                };
-                ui.label(text(12.0, FAINT, format!("right mouse button or right stick: turn the camera   {wheel}")));
-                if steering.on {
-                    ui.label(text(
-                        12.0,
-                        FAINT,
-                        "left stick, triggers or arrow keys, A and D, which do nothing else here: tell it what to do",
-                    ));
-                }
-            });
-        });
-    }
-    let useful: &[Deed] = match mode {
-        Mode::Watch => {
-            &[Deed::Menu, Deed::Pause, Deed::NextFocus, Deed::NextAgent, Deed::Camera, Deed::Push, Deed::Learn]
-        }
-        Mode::Imitate => &[
-            Deed::Menu,
-            Deed::Ghost,
-            Deed::Errors,
-            Deed::NextAgent,
-            Deed::Push,
-            Deed::Throw,
-            Deed::Camera,
-            Deed::Learn,
-        ],
-        Mode::Push => &[Deed::Menu, Deed::Push, Deed::Throw, Deed::Restart, Deed::Camera, Deed::Contacts],
-        Mode::Learn => &[Deed::Menu, Deed::Pause, Deed::Faster, Deed::Save, Deed::Restart, Deed::Learn],
-        Mode::Testbed => &[Deed::Menu, Deed::Pause, Deed::Step, Deed::Restart, Deed::Joints, Deed::Contacts],
-        Mode::Course if builds => &[Deed::Menu, Deed::Higher, Deed::Lower, Deed::Restart, Deed::Runs],
-        Mode::Course => &[Deed::Menu, Deed::Pause, Deed::Restart, Deed::Runs, Deed::Slower, Deed::Camera],
-        Mode::Outside => &[Deed::Menu, Deed::NextFocus, Deed::Camera, Deed::Hud],
-        Mode::Replay => &[Deed::Menu, Deed::Pause, Deed::Back, Deed::Ahead, Deed::Slower, Deed::Camera],
-    };
-    Area::new(Id::new("keys")).anchor(Align2::CENTER_BOTTOM, [0.0, -10.0]).interactable(false).show(ctx, |ui| {
-        Frame::new().fill(CARD).corner_radius(CornerRadius::same(6)).inner_margin(Margin::symmetric(10, 4)).show(
-            ui,
-            |ui| {
-                ui.horizontal(|ui| {
-                    if steering.on {
-                        ui.label(text(12.0, ACCENT, "arrows").strong());
-                        ui.label(text(12.0, TEXT, "steer"));
-                        ui.add_space(4.0);
-                    }
-                    if builds {
-                        ui.label(text(12.0, ACCENT, "mouse").strong());
-                        ui.label(text(12.0, TEXT, "build"));
-                        ui.add_space(4.0);
-                    }
-                    let shown = |deed: Deed| match deed {
-                        Deed::Help => true,
-                        Deed::Release => steering.on && mode != Mode::Course,
-                        _ => useful.contains(&deed),
-                    };
-                    for (deed, name, key, _) in bindings.rows().filter(|row| shown(row.0)) {
-                        let name = if (deed, mode) == (Deed::NextAgent, Mode::Imitate) { "next clip" } else { name };
-                        ui.label(text(12.0, ACCENT, key).strong());
-                        ui.label(text(12.0, TEXT, name));
-                        ui.add_space(4.0);
-                    }
-                });
-            },
-        );
-    });
-}
-
 /// Messages; without text and bars, errors alone.
 fn say(ctx: &egui::Context, notes: &Notes, all: bool) {
     let shown = |note: &&Note| all || note.error;
@@ -478,4 +464,52 @@ fn say(ctx: &egui::Context, notes: &Notes, all: bool) {
             ui.add_space(4.0);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use marathon_runs::Setting;
+
+    #[test]
+    fn slow_frames_are_told() {
+        let mut pace = Pace::default();
+        let frames = |pace: &mut Pace, wanted: f32, real: f64, game: f64| {
+            (0..10).for_each(|_| pace.take_in(wanted, real, game));
+            pace.told(wanted)
+        };
+        assert_eq!(frames(&mut pace, 1.0, 0.2, 0.2), "time x1");
+        // a frame of half a second has a quarter of a second of the game
+        assert_eq!(frames(&mut pace, 1.0, 0.5, 0.25), "time x0.50 (slow frames, x1 asked)");
+        // what was measured before a change says nothing of what comes after it
+        assert_eq!(pace.told(2.0), "time x2");
+        pace.take_in(2.0, 0.2, 0.4);
+        assert_eq!(pace.told(2.0), "time x2");
+        assert_eq!(frames(&mut pace, 2.0, 0.2, 0.4), "time x2");
+    }
+
+    #[test]
+    fn speed_is_told_as_its_command_is() -> Result<(), Box<dyn std::error::Error>> {
+        let spec = Setting::named("AntController")?.factory()?.spec().clone();
+        let names: Vec<&str> = spec.command.iter().map(|range| range.name.as_str()).collect();
+        let speeds = spec.command.iter().filter(|range| range.is_speed()).count();
+        assert_eq!(speeds, 2, "{names:?}");
+        let told = |ahead: f64, left: f64, own: [f32; 2]| {
+            let mut speeds = [ahead, left].into_iter();
+            let mut number =
+                |range: &CommandRange| if range.is_speed() { speeds.next().unwrap_or_default() } else { 0.0 };
+            let command = spec.command.iter().map(&mut number).collect();
+            // along the track it goes the other way
+            let episode = Episode { command, own_velocity: own, speed: -7.0, ..default() };
+            shown_speed(&spec, &episode)
+        };
+        assert_eq!(told(2.0, 0.0, [1.9, 0.3]), 1.9, "it runs where it faces, wherever that is");
+        assert_eq!(told(-1.0, 0.0, [-0.9, 0.3]), -0.9, "it goes back");
+        assert_eq!(told(0.0, 0.0, [0.1, 0.3]), 0.1, "it stands");
+        assert_eq!(told(0.0, -1.0, [0.1, -0.8]), 0.8, "aside, as told");
+        assert!((told(1.0, 1.0, [1.0, 1.0]) - 2.0_f32.sqrt()).abs() < 1e-6);
+        let hopper = Setting::named("hopper")?.factory()?.spec().clone();
+        assert_eq!(shown_speed(&hopper, &Episode { speed: 1.5, ..default() }), 1.5);
+        Ok(())
+    }
 }

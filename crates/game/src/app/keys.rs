@@ -1,10 +1,13 @@
 //! Keys and buttons: what they do, what they are called, and how they are changed and kept.
 
-use crate::app::steer::{BUTTON_KEYS, BUTTONS, KEYS as STEERING_KEYS, Steering};
+use crate::app::ask::{self, Question};
+use crate::app::menu::Menu;
+use crate::app::steer::Steering;
 use bevy::input::gamepad::{Gamepad, GamepadButton};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
 use clap::ValueEnum;
+use marathon_physics::budget;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -208,11 +211,15 @@ impl Default for Bindings {
 #[derive(Resource, Default)]
 pub struct Rebinding(pub Option<Deed>);
 
-/// What keys and buttons ask for in this frame.
+/// What keys and buttons ask for; what loses something is [asked about](crate::app::ask) first.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pressed(pub Deed);
+
+/// What is done in this frame.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Do(pub Deed);
 
-/// Turns keys and buttons into [`Do`] messages.
+/// Turns keys and buttons into [`Do`] messages, with a question before something is lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct KeysPlugin;
 
@@ -220,9 +227,11 @@ impl Plugin for KeysPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Bindings>()
             .init_resource::<Rebinding>()
+            .init_resource::<Question>()
+            .add_message::<Pressed>()
             .add_message::<Do>()
             .add_systems(Startup, load)
-            .add_systems(PreUpdate, (read, rebind).chain().after(bevy::input::InputSystems));
+            .add_systems(PreUpdate, (read, rebind, ask::gate).chain().after(bevy::input::InputSystems));
     }
 }
 
@@ -230,6 +239,18 @@ impl Bindings {
     /// All deeds in the order of the help: name, key, button.
     pub fn rows(&self) -> impl Iterator<Item = (Deed, &'static str, &'static str, Option<&'static str>)> {
         self.rows.iter().map(|(deed, name, key, button)| (*deed, *name, key_name(*key), button.map(button_name)))
+    }
+
+    /// The same with the names of those keys and buttons alone that do it while others steer.
+    pub fn free_rows(
+        &self,
+        steering: Steering,
+    ) -> impl Iterator<Item = (Deed, &'static str, Option<&'static str>, Option<&'static str>)> {
+        self.rows.iter().map(move |(deed, name, key, button)| {
+            let key = Some(*key).filter(|key| !steering.takes_key(*key)).map(key_name);
+            let button = button.filter(|button| !steering.takes_button(*button)).map(button_name);
+            (*deed, *name, key, button)
+        })
     }
 
     /// Name of the key that does something.
@@ -278,11 +299,11 @@ impl Bindings {
     }
 }
 
-fn key_name(key: KeyCode) -> &'static str {
+pub(super) fn key_name(key: KeyCode) -> &'static str {
     KEYS.iter().find(|(known, _)| *known == key).map_or("?", |(_, name)| name)
 }
 
-fn button_name(button: GamepadButton) -> &'static str {
+pub(super) fn button_name(button: GamepadButton) -> &'static str {
     BUTTON_NAMES.iter().find(|(known, _)| *known == button).map_or("?", |(_, name)| name)
 }
 
@@ -323,28 +344,43 @@ pub(super) fn read(
     rebinding: Res<Rebinding>,
     wants: Option<Res<EguiWantsInput>>,
     steering: Option<Res<Steering>>,
-    mut deeds: MessageWriter<Do>,
+    mut pressed: MessageWriter<Pressed>,
 ) {
     // a text field has the keyboard, or the next key is to be bound
     let typing = wants.is_some_and(|w| w.wants_keyboard_input()) || rebinding.0.is_some();
-    let Steering { on, buttons } = steering.map_or_else(Steering::default, |steering| *steering);
+    let steering = steering.map_or_else(Steering::default, |steering| *steering);
     for (deed, _, key, button) in &bindings.rows {
-        let taken = typing || on && STEERING_KEYS.contains(key) || buttons && BUTTON_KEYS.contains(key);
+        let taken = typing || steering.takes_key(*key);
         let key = !taken && keys.just_pressed(*key);
-        let own = button.filter(|button| !(buttons && BUTTONS.contains(button)));
+        let own = button.filter(|button| !steering.takes_button(*button));
         let button = own.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
         if key || button {
-            deeds.write(Do(*deed));
+            pressed.write(Pressed(*deed));
         }
     }
 }
 
-/// Binds the next key that is pressed, if one is asked for, and keeps the bindings.
-fn rebind(keys: Res<ButtonInput<KeyCode>>, mut bindings: ResMut<Bindings>, mut rebinding: ResMut<Rebinding>) {
+/// Binds the next key that is pressed, if one is asked for, and keeps the bindings. Esc, or a menu that closes, leaves them as they
+/// are.
+fn rebind(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut bindings: ResMut<Bindings>,
+    mut rebinding: ResMut<Rebinding>,
+    menu: Option<Res<Menu>>,
+) {
     let Some(deed) = rebinding.0 else { return };
+    if keys.just_pressed(KeyCode::Escape) || menu.is_some_and(|menu| !menu.open) {
+        rebinding.0 = None;
+        return;
+    }
     let Some(key) = keys.get_just_pressed().find(|key| KEYS.iter().any(|(known, _)| known == *key)) else { return };
     bindings.bind(deed, *key);
     rebinding.0 = None;
+    keep(&bindings);
+}
+
+/// Keeps the bindings for later games.
+pub(super) fn keep(bindings: &Bindings) {
     if let Some(path) = Bindings::path() {
         let kept = path.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|e| e.to_string());
         let kept = kept.and_then(|()| {
@@ -359,8 +395,10 @@ fn rebind(keys: Res<ButtonInput<KeyCode>>, mut bindings: ResMut<Bindings>, mut r
 
 /// Takes in the kept bindings.
 fn load(mut bindings: ResMut<Bindings>) {
-    if let Some(text) = Bindings::path().and_then(|path| std::fs::read_to_string(path).ok()) {
-        *bindings = Bindings::load(&text);
+    let Some(path) = Bindings::path().filter(|path| path.exists()) else { return };
+    match budget::read_to_string(&path, &budget::CONFIG_FILE) {
+        Ok(text) => *bindings = Bindings::load(&text),
+        Err(error) => warn!("{}: {error}; the keys are as they come", path.display()),
     }
 }
 

@@ -58,6 +58,8 @@ pub(crate) struct Filmed;
 struct Board {
     progress: Progress,
     newest: Option<Arc<Policy>>,
+    /// The policy that was saved last, or that may go unsaved, and the seconds of learning then.
+    settled: (Option<Arc<Policy>>, f64),
     stop: bool,
 }
 
@@ -132,6 +134,45 @@ impl Lesson {
         board(&self.shared).newest.clone()
     }
 
+    /// Seconds of learning whose result is not saved; `None` if there is nothing to save.
+    pub fn unsaved(&self) -> Option<f64> {
+        let board = board(&self.shared);
+        let (settled, at) = &board.settled;
+        let newest = board.newest.as_ref()?;
+        let same = settled.as_ref().is_some_and(|settled| Arc::ptr_eq(settled, newest));
+        let now = board.progress.curve.last().map_or(0.0, |point| point.seconds);
+        (!same).then_some(now - at)
+    }
+
+    /// The newest policy is saved, or may go.
+    pub fn settle(&self) {
+        let mut board = board(&self.shared);
+        let now = board.progress.curve.last().map_or(0.0, |point| point.seconds);
+        board.settled = (board.newest.clone(), now);
+    }
+
+    /// Saves the newest policy, and tells so.
+    fn save(&self, why: &str, notes: &mut Notes) {
+        let Some(policy) = self.newest() else {
+            notes.say(format!("{why}there is nothing to save yet"));
+            return;
+        };
+        match save(&policy, &self.setting.agent) {
+            Ok(path) => {
+                self.settle();
+                notes.say(format!("{why}saved as {}", path.display()));
+            }
+            Err(error) => notes.error(format!("{why}{error}")),
+        }
+    }
+
+    /// Saves what nobody has saved or given up, before the lesson ends.
+    fn leave(&self, notes: &mut Notes) {
+        if self.unsaved().is_some() {
+            self.save("the policy that was learning is ", notes);
+        }
+    }
+
     /// Lets it wait at the end of an iteration, or go on.
     pub fn pause(&self, paused: bool) {
         board(&self.shared).progress.paused = paused;
@@ -182,7 +223,8 @@ pub fn attend(
     }
     let wanted = show.mode == Mode::Learn && show.source == Source::Trainer;
     let right = lesson.as_ref().is_some_and(|l| l.setting == script.setting && l.ground == show.ground);
-    if lesson.is_some() && !(wanted && right) {
+    if let Some(lesson) = lesson.filter(|_| !(wanted && right)) {
+        lesson.leave(&mut notes);
         commands.remove_resource::<Lesson>();
     }
     if wanted && !right && !*failed {
@@ -258,14 +300,9 @@ pub fn obey(
     for Do(deed) in deeds.read() {
         match (deed, &lesson) {
             (Deed::Pause, Some(lesson)) => lesson.pause(time.is_paused()),
-            (Deed::Save, Some(lesson)) => match lesson.newest() {
-                Some(policy) => match save(&policy, &lesson.setting.agent) {
-                    Ok(path) => notes.say(format!("saved as {}", path.display())),
-                    Err(error) => notes.error(error),
-                },
-                None => notes.say("there is nothing to save yet"),
-            },
-            (Deed::Restart, Some(_)) if show.mode == Mode::Learn => {
+            (Deed::Save, Some(lesson)) => lesson.save("", &mut notes),
+            (Deed::Restart, Some(lesson)) if show.mode == Mode::Learn => {
+                lesson.leave(&mut notes);
                 commands.remove_resource::<Lesson>();
                 notes.say("from random weights again");
                 show.again();
@@ -278,6 +315,13 @@ pub fn obey(
             }
             _ => {}
         }
+    }
+}
+
+/// Saves what has been learned when the game ends, unless it may go.
+pub fn keep_at_exit(exit: MessageReader<AppExit>, lesson: Option<Res<Lesson>>, mut notes: ResMut<Notes>) {
+    if let Some(lesson) = lesson.filter(|_| !exit.is_empty()) {
+        lesson.leave(&mut notes);
     }
 }
 

@@ -1,10 +1,11 @@
 //! The menu: mode, agent, policy, how many; keys. And the sliders of the modes that have some.
 
 use crate::app::args::Mode;
+use crate::app::ask::{Asked, Question, Stakes};
 use crate::app::course;
-use crate::app::hud::card;
+use crate::app::hud::{Hud, card};
 use crate::app::imitate::{FOLLOWER, choose_clip, clip_of, follows_clip};
-use crate::app::keys::{Bindings, Rebinding};
+use crate::app::keys::{Bindings, Deed, Rebinding, keep};
 use crate::app::show::{Actor, Show, Source};
 use crate::app::weather::Weather;
 use crate::ground::Ground;
@@ -18,11 +19,19 @@ use marathon_envs::{AgentState, registry};
 use marathon_physics::model::JointType;
 use std::path::PathBuf;
 
+/// Title of the menu's window.
+const TITLE: &str = "Marathon";
+/// Width of the menu, and what stays free of the window beside and above it, points.
+const WIDTH: f32 = 560.0;
+const MARGIN: f32 = 70.0;
+
 /// Whether the menu is open, and what has been chosen in it so far.
 #[derive(Resource, Default)]
 pub struct Menu {
     /// It is open.
     pub open: bool,
+    /// Its choice comes on stage although something is lost.
+    pub(super) agreed: bool,
     choice: Option<Show>,
     /// Policies of runs in the present folder: file, and what it is called.
     runs: Vec<(PathBuf, String)>,
@@ -33,6 +42,7 @@ impl Menu {
     pub fn toggle(&mut self) {
         self.open = !self.open;
         self.choice = None;
+        self.agreed = false;
     }
 }
 
@@ -52,9 +62,10 @@ pub fn draw(
     mut contexts: EguiContexts,
     mut menu: ResMut<Menu>,
     mut show: ResMut<Show>,
-    bindings: Res<Bindings>,
+    mut bindings: ResMut<Bindings>,
     mut rebinding: ResMut<Rebinding>,
     mut exit: MessageWriter<AppExit>,
+    (stakes, mut question): (Stakes<'_>, ResMut<Question>),
 ) -> Result {
     if !menu.open {
         return Ok(());
@@ -65,34 +76,23 @@ pub fn draw(
     if fresh {
         menu.runs = runs(&choice.agent);
     }
-    let (mut start, mut quit, mut open) = (false, false, true);
-    egui::Window::new("Marathon")
-        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
-        .collapsible(false)
-        .resizable(false)
-        .open(&mut open)
-        .show(&ctx, |ui| {
-            ui.set_width(430.0);
-            let before = choice.agent.clone();
-            choose(ui, &mut choice, &menu.runs);
-            if choice.agent != before {
-                menu.runs = runs(&choice.agent);
-                if matches!(choice.source, Source::File(_)) {
-                    choice.source = Source::Shipped;
-                }
-            }
-            ui.add_space(8.0);
-            ui.horizontal(|ui| {
-                start = ui.button(RichText::new("  Start  ").size(17.0).strong()).clicked();
-                quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
-            });
-            ui.add_space(6.0);
-            ui.collapsing("Keys", |ui| keys(ui, &bindings, &mut rebinding));
-        });
+    let Menu { runs, .. } = &mut *menu;
+    let Picked { start, quit, open } = window(&ctx, &mut choice, runs, (&mut bindings, &mut rebinding), None);
+    let mut start = start;
     if quit {
-        exit.write(AppExit::Success);
+        match stakes.at_the_end() {
+            Some(text) => question.0 = Some((Asked::Deed(Deed::Quit), text)),
+            None => {
+                exit.write(AppExit::Success);
+            }
+        }
     }
-    if start {
+    let agreed = std::mem::take(&mut menu.agreed);
+    if let Some(text) = stakes.at_a_start().filter(|_| start && !agreed) {
+        question.0 = Some((Asked::Start, text));
+        start = false;
+    }
+    if start || agreed {
         choice.again();
         *show = choice;
         menu.open = false;
@@ -101,6 +101,51 @@ pub fn draw(
         menu.choice = Some(choice).filter(|_| open);
     }
     Ok(())
+}
+
+/// What has been clicked in the menu.
+struct Picked {
+    start: bool,
+    quit: bool,
+    open: bool,
+}
+
+/// The menu's window; `unfold` opens or closes its list of keys.
+fn window(
+    ctx: &egui::Context,
+    choice: &mut Show,
+    of_runs: &mut Vec<(PathBuf, String)>,
+    (bindings, rebinding): (&mut ResMut<'_, Bindings>, &mut Rebinding),
+    unfold: Option<bool>,
+) -> Picked {
+    let mut picked = Picked { start: false, quit: false, open: true };
+    let room = ctx.content_rect().size() - egui::Vec2::splat(MARGIN);
+    egui::Window::new(TITLE)
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .collapsible(false)
+        .resizable(false)
+        .open(&mut picked.open)
+        .max_height(room.y)
+        .vscroll(true)
+        .show(ctx, |ui| {
+            ui.set_width(WIDTH.min(room.x));
+            let before = choice.agent.clone();
+            choose(ui, choice, of_runs);
+            if choice.agent != before {
+                *of_runs = runs(&choice.agent);
+                if matches!(choice.source, Source::File(_)) {
+                    choice.source = Source::Shipped;
+                }
+            }
+            ui.add_space(8.0);
+            ui.horizontal(|ui| {
+                picked.start = ui.button(RichText::new("  Start  ").size(17.0).strong()).clicked();
+                picked.quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
+            });
+            ui.add_space(6.0);
+            egui::CollapsingHeader::new("Keys").open(unfold).show(ui, |ui| keys(ui, bindings, rebinding));
+        });
+    picked
 }
 
 fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
@@ -195,23 +240,42 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
     });
 }
 
-fn keys(ui: &mut Ui, bindings: &Bindings, rebinding: &mut Rebinding) {
-    egui::Grid::new("bindings").num_columns(3).spacing([16.0, 4.0]).show(ui, |ui| {
-        for (deed, name, key, button) in bindings.rows() {
-            ui.label(name);
-            let waits = rebinding.0 == Some(deed);
-            if ui.button(if waits { "press a key" } else { key }).clicked() {
-                rebinding.0 = if waits { None } else { Some(deed) };
+fn keys(ui: &mut Ui, bindings: &mut ResMut<Bindings>, rebinding: &mut Rebinding) {
+    // in two halves side by side, so that all of them fit a window
+    let rows: Vec<_> = bindings.rows().collect();
+    let half = rows.len().div_ceil(2);
+    egui::Grid::new("bindings").num_columns(6).spacing([14.0, 4.0]).show(ui, |ui| {
+        for (i, first) in rows[..half].iter().enumerate() {
+            for (deed, name, key, button) in [Some(first), rows.get(half + i)].into_iter().flatten() {
+                ui.label(*name);
+                let waits = rebinding.0 == Some(*deed);
+                if ui.button(if waits { "press a key" } else { key }).clicked() {
+                    rebinding.0 = if waits { None } else { Some(*deed) };
+                }
+                ui.label(button.unwrap_or(""));
             }
-            ui.label(button.unwrap_or(""));
             ui.end_row();
+        }
+    });
+    ui.horizontal(|ui| {
+        if ui.button("all keys as they come").clicked() {
+            **bindings = Bindings::default();
+            rebinding.0 = None;
+            keep(bindings);
+        }
+        if rebinding.0.is_some() {
+            ui.label(RichText::new("Esc leaves it as it is").weak());
         }
     });
 }
 
 /// Sliders of the push mode.
-pub fn circumstances(mut contexts: EguiContexts, show: Res<Show>, mut weather: ResMut<Weather>) -> Result {
-    if show.mode != Mode::Push {
+pub fn circumstances(
+    mut contexts: EguiContexts,
+    (show, hud): (Res<Show>, Res<Hud>),
+    mut weather: ResMut<Weather>,
+) -> Result {
+    if show.mode != Mode::Push || !hud.on {
         return Ok(());
     }
     let ctx = contexts.ctx_mut()?.clone();
@@ -240,7 +304,7 @@ pub fn circumstances(mut contexts: EguiContexts, show: Res<Show>, mut weather: R
 /// Sliders of the test bed: one per motor, and one per joint while the time stands still.
 pub fn motors(
     mut contexts: EguiContexts,
-    show: Res<Show>,
+    (show, hud): (Res<Show>, Res<Hud>),
     time: Res<Time<Virtual>>,
     mut commands: Commands,
     mut marathon: ResMut<Marathon>,
@@ -256,6 +320,9 @@ pub fn motors(
         commands.entity(entity).insert(Controls(vec![0.0; model.nu]));
         return Ok(());
     };
+    if !hud.on {
+        return Ok(());
+    }
     Area::new(Id::new("motors")).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).show(&ctx, |ui| {
         card().show(ui, |ui| {
             let height = 0.42 * ctx.content_rect().height();
@@ -298,4 +365,56 @@ pub fn motors(
         });
     });
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::args::Args;
+    use clap::Parser;
+
+    /// Where the menu with all keys is in a window of some points, on each of whose modes.
+    fn places(width: f32, height: f32) -> Result<Vec<(Mode, egui::Rect)>, Box<dyn std::error::Error>> {
+        let show = Show::of(&Args::parse_from(["marathon-game"]))?;
+        let mut places = Vec::new();
+        for mode in [Mode::Watch, Mode::Imitate, Mode::Course, Mode::Testbed] {
+            let mut world = World::new();
+            world.init_resource::<Bindings>();
+            let (ctx, mut choice) = (egui::Context::default(), Show { mode, ..show.clone() });
+            // sizes settle in some frames
+            for _ in 0..6 {
+                let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
+                ctx.begin_pass(egui::RawInput { screen_rect: Some(screen), ..Default::default() });
+                let mut bindings = world.resource_mut::<Bindings>().into();
+                let mut runs = Vec::new();
+                window(&ctx, &mut choice, &mut runs, (&mut bindings, &mut Rebinding::default()), Some(true));
+                let _ = ctx.end_pass();
+            }
+            let place = ctx.memory(|memory| memory.area_rect(Id::new(TITLE))).ok_or("the menu is drawn")?;
+            places.push((mode, place));
+        }
+        Ok(places)
+    }
+
+    /// Title, tabs and last row are on the screen; a small window scrolls.
+    #[test]
+    fn the_menu_with_its_keys_fits_the_window() -> Result<(), Box<dyn std::error::Error>> {
+        for (width, height) in [(1280.0, 720.0), (1000.0, 600.0), (727.0, 409.0)] {
+            for (mode, place) in places(width, height)? {
+                let inside = place.min.x >= 0.0 && place.min.y >= 0.0 && place.max.x <= width && place.max.y <= height;
+                assert!(inside, "{mode:?} in {width} x {height}: {place:?}");
+            }
+        }
+        // without scrolling
+        let free = places(1280.0, 4000.0)?;
+        for ((mode, whole), (_, shown)) in free.into_iter().zip(places(1280.0, 720.0)?) {
+            assert!(
+                whole.height() <= shown.height() + 1.0,
+                "{mode:?}: {} of {} points",
+                shown.height(),
+                whole.height()
+            );
+        }
+        Ok(())
+    }
 }

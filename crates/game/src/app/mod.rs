@@ -1,6 +1,7 @@
 //! The `marathon-game` app: an app around the plugin.
 
 mod args;
+mod ask;
 mod control;
 mod costume;
 mod course;
@@ -9,8 +10,10 @@ mod error;
 mod feed;
 mod film;
 mod hands;
+mod hints;
 mod hud;
 mod imitate;
+mod interrupt;
 mod keys;
 mod learn;
 mod menu;
@@ -26,6 +29,7 @@ mod stream;
 mod weather;
 
 pub use args::{Args, CameraArg, GroundArg, Mode, QualityArg};
+pub use ask::{Asked, Question};
 pub use costume::{Costume, Fitting};
 pub use course::{Choice, Course, KEPT, List, MOST_STEPS, Part, Place, ROWS, Run, Runs, Site, Step, Table};
 pub use cues::{Cue, Cues};
@@ -34,8 +38,9 @@ pub use feed::{Board, Feed, Sight};
 pub use hands::{Hands, Hold};
 pub use hud::Hud;
 pub use imitate::{GhostAt, Imitation, Reading};
-pub use keys::{Bindings, Deed, Do, KeysPlugin};
+pub use keys::{Bindings, Deed, Do, KeysPlugin, Pressed, Rebinding};
 pub use learn::{Lesson, Teaching};
+pub use menu::Menu;
 pub use notes::{Note, Notes};
 pub use recording::{Recording, Row};
 pub use replay::{Playback, Recorder};
@@ -48,6 +53,7 @@ use crate::look::{
     FollowCamera, FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
 };
 use crate::plugin::{MarathonPlugin, MarathonSystems};
+use bevy::app::TerminalCtrlCHandlerPlugin;
 use bevy::prelude::*;
 use bevy::window::{PresentMode, WindowResolution};
 use bevy_egui::{EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui};
@@ -62,7 +68,7 @@ use std::time::{Duration, Instant};
 const TICKS: f64 = 100.0;
 
 /// Runs the app with the words of a command line and returns its exit code: 0 after a proper end, 1 if it could not start,
-/// 2 if the command line makes no sense.
+/// 2 if the command line makes no sense, 130 after Ctrl-C.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = match Args::try_parse_from(words) {
         Ok(args) => args,
@@ -74,7 +80,12 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            let told = error::plain(&error.to_string());
+            if let GameError::Interrupted(_) = error {
+                eprintln!("{told}");
+                return ExitCode::from(interrupt::CODE);
+            }
+            eprintln!("error: {told}");
             ExitCode::FAILURE
         }
     }
@@ -112,8 +123,12 @@ pub fn run(args: &Args) -> Result<(), GameError> {
         present_mode: PresentMode::AutoVsync,
         ..default()
     };
+    interrupt::listen();
     let mut app = App::new();
-    app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() })).add_plugins(game);
+    // a window that is closed may ask first
+    let windows = WindowPlugin { primary_window: Some(window), close_when_requested: false, ..default() };
+    app.add_plugins(DefaultPlugins.set(windows).disable::<TerminalCtrlCHandlerPlugin>()).add_plugins(game);
+    app.add_systems(Update, (ask::close, interrupt::obey));
     if args.max_fps > 0 {
         app.insert_resource(Pace(Duration::from_secs_f64(1.0 / f64::from(args.max_fps))));
     }
@@ -121,7 +136,10 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     match (app.run(), outside.and_then(|shared| feed::board(&shared).end.take())) {
         (_, Some(Err(text))) => Err(GameError::Outside(text)),
         (AppExit::Success, _) => Ok(()),
-        (AppExit::Error(_), _) => Err(GameError::NoGraphics),
+        _ if interrupt::requested() => Err(GameError::Interrupted(None)),
+        (AppExit::Error(_), _) => {
+            Err(GameError::System("the window system or the graphics driver has stopped the game; see above".into()))
+        }
     }
 }
 
@@ -210,7 +228,7 @@ impl GamePlugin {
         if args.mlagents_port.is_some() || args.watch_stream {
             show.mode = Mode::Outside;
         }
-        let skin = args.skin.as_deref().map(costume::File::read).transpose()?;
+        let skin = args.skin.as_deref().map(|skin| costume::File::read(skin, args.mapping.as_deref())).transpose()?;
         Ok(GamePlugin { args: args.clone(), show, playback, feed: None, skin, quality: args.quality() })
     }
 }
@@ -249,13 +267,17 @@ impl Plugin for GamePlugin {
         .init_resource::<hud::Monitor>()
         .add_systems(Startup, (open, hands::connect))
         .add_systems(PreUpdate, hands::play.before(bevy::input::InputSystems))
-        .add_systems(PreUpdate, (cues::perform, steer::steer.after(bevy::input::InputSystems).before(keys::read)))
+        .add_systems(
+            PreUpdate,
+            (cues::perform.before(ask::gate), steer::steer.after(bevy::input::InputSystems).before(keys::read)),
+        )
         .add_systems(
             Update,
             (
                 (control::time, control::stage, learn::obey, replay::obey, replay::scrub, feed::obey).chain(),
                 (imitate::take_files, imitate::take_clip, imitate::enter, imitate::obey).chain(),
                 (
+                    replay::close,
                     show::set_stage,
                     replay::set_stage,
                     feed::set_stage,
@@ -278,6 +300,7 @@ impl Plugin for GamePlugin {
             )
                 .chain(),
         )
+        .add_systems(Last, (replay::keep_at_exit, learn::keep_at_exit))
         .add_systems(FixedUpdate, (hud::watch, replay::record).after(MarathonSystems::Report))
         .add_systems(
             EguiPrimaryContextPass,
@@ -291,6 +314,7 @@ impl Plugin for GamePlugin {
                 replay::time_line,
                 course::list,
                 menu::draw,
+                ask::draw,
             )
                 .chain(),
         );

@@ -6,6 +6,7 @@ use crate::app::show::{Show, Source, file_stem};
 use crate::asset::PolicyAsset;
 use crate::herd::part_of;
 use marathon_learn::{Policy as Net, checksum};
+use marathon_physics::budget;
 use marathon_runs::{Setting, policy_file};
 use std::path::Path;
 
@@ -96,6 +97,6 @@ pub fn read_opponent(show: &Show, setting: &Setting) -> Result<Option<(PolicyAss
 fn read_file(path: &Path, setting: &Setting, role: usize) -> Result<(PolicyAsset, String), String> {
     let policy = setting.factory().and_then(|factory| policy_file::read(path, part_of(factory.spec(), role).as_ref()));
     let policy = policy.map_err(|e| e.to_string())?;
-    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let bytes = budget::read(path, &budget::POLICY_FILE).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok((policy.into(), name_of(path, &bytes)))
 }

@@ -5,7 +5,7 @@
 use crate::app::error::GameError;
 use crate::ground::Ground;
 use crate::stage;
-use marathon_physics::Model;
+use marathon_physics::{Model, budget};
 use marathon_runs::Setting;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::Value;
@@ -41,6 +41,8 @@ pub struct Recording {
     actions: Vec<f32>,
     /// Commands, `[frames][agents][numbers]`.
     commands: Vec<f64>,
+    /// 1 in episodes without a time limit, `[frames][agents]`; files of earlier versions have none.
+    untimed: Vec<f32>,
     /// Grounds, in the order of their frames.
     grounds: Vec<Lie>,
 }
@@ -67,6 +69,8 @@ pub struct Row<'a> {
     pub command: &'a [f64],
     /// Elevations of its height fields.
     pub grounds: &'a Arc<Vec<Vec<f32>>>,
+    /// Whether its episode has no time limit, as when a player steers.
+    pub untimed: bool,
 }
 
 impl Recording {
@@ -74,8 +78,8 @@ impl Recording {
     pub fn new(setting: Setting, ground: Ground, dt: f64, places: Vec<f32>) -> Self {
         let agents = places.len() / 3;
         let (numbers, terms, actions, grounds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (qpos, commands) = (Vec::new(), Vec::new());
-        Recording { setting, ground, dt, agents, places, qpos, numbers, terms, actions, commands, grounds }
+        let (qpos, commands, untimed) = (Vec::new(), Vec::new(), Vec::new());
+        Recording { setting, ground, dt, agents, places, qpos, numbers, terms, actions, commands, untimed, grounds }
     }
 
     /// Number of frames.
@@ -97,6 +101,7 @@ impl Recording {
         self.terms.extend(row.terms);
         self.actions.extend(row.action);
         self.commands.extend(row.command);
+        self.untimed.push(f32::from(u8::from(row.untimed)));
         let known = self.grounds.iter().rev().find(|lie| lie.agent == agent);
         if known.map_or(!row.grounds.is_empty(), |lie| !Arc::ptr_eq(&lie.fields, row.grounds)) {
             self.grounds.push(Lie { frame, agent, fields: row.grounds.clone() });
@@ -132,6 +137,17 @@ impl Recording {
     /// What an agent was told; empty if it takes no commands.
     pub fn command(&self, frame: usize, agent: usize) -> &[f64] {
         self.row(&self.commands, frame, agent)
+    }
+
+    /// Whether an agent's episode has no time limit in a frame; false in recordings of earlier versions.
+    pub fn untimed(&self, frame: usize, agent: usize) -> bool {
+        self.row(&self.untimed, frame, agent).first().is_some_and(|untimed| *untimed > 0.5)
+    }
+
+    /// Memory that it takes, bytes, but for its grounds.
+    pub fn bytes(&self) -> usize {
+        let singles = self.numbers.len() + self.terms.len() + self.actions.len() + self.untimed.len();
+        4 * singles + 8 * (self.qpos.len() + self.commands.len())
     }
 
     /// Elevations of an agent's height fields in a frame, m above their zero; none in recordings of earlier versions.
@@ -176,6 +192,7 @@ impl Recording {
             ("terms", Dtype::F32, shape(self.terms.len()), single(&self.terms)),
             ("actions", Dtype::F32, shape(self.actions.len()), single(&self.actions)),
             ("commands", Dtype::F64, shape(self.commands.len()), double(&self.commands)),
+            ("untimed", Dtype::F32, shape(self.untimed.len()), single(&self.untimed)),
             ("lies", Dtype::F64, vec![lies.len() / LIE, LIE], double(&lies)),
             ("elevations", Dtype::F32, vec![elevations.len() / 2, 2], single(&elevations)),
         ];
@@ -217,6 +234,22 @@ impl Recording {
         (lies, elevations)
     }
 
+    /// What is wrong with grounds that the agent's model has no height fields for.
+    fn wrong_ground(&self) -> Result<Option<String>, GameError> {
+        if self.grounds.is_empty() {
+            return Ok(None);
+        }
+        let Setting { agent, options, .. } = &self.setting;
+        let make = || -> Result<_, GameError> { Ok(self.ground.agent_with(agent, options)?.model()?) };
+        let model = self.setting.with_clips(make)?;
+        let points: Vec<usize> = model.hfields.iter().map(|field| field.nrow * field.ncol).collect();
+        let fits = |lie: &&Lie| lie.fields.iter().map(Vec::len).eq(points.iter().copied());
+        Ok(self.grounds.iter().find(|lie| !fits(lie)).map(|lie| {
+            let found: Vec<usize> = lie.fields.iter().map(Vec::len).collect();
+            format!("its ground in frame {} has {found:?} points, expected {points:?}", lie.frame)
+        }))
+    }
+
     /// Reads a recording.
     ///
     /// # Errors
@@ -224,7 +257,7 @@ impl Recording {
     pub fn load(path: &Path) -> Result<Self, GameError> {
         crate::app::show::exists(path)?;
         let bad = |problem: String| GameError::Replay { path: path.into(), problem };
-        let bytes = std::fs::read(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
+        let bytes = budget::read(path, &budget::REPLAY_FILE).map_err(|e| bad(e.to_string()))?;
         let no_recording = |e: &dyn std::fmt::Display| bad(format!("not a recording of the game ({e})"));
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| no_recording(&e))?;
         let meta = header.metadata().clone().unwrap_or_default();
@@ -243,8 +276,10 @@ impl Recording {
             let known = Ground::ALL.map(Ground::name).join(", ");
             bad(format!("its ground is '{found}', expected one of: {known}, track"))
         })?;
-        let dt = about["dt"].as_f64().filter(|dt| *dt > 0.0 && dt.is_finite());
-        let dt = dt.ok_or_else(|| bad("it has no 'dt', expected the seconds between its frames".into()))?;
+        let dt = about["dt"].as_f64().filter(|dt| *dt > 0.0 && *dt <= LONGEST_FRAME);
+        let expected =
+            || format!("its 'dt' is {}, expected seconds between frames, up to {LONGEST_FRAME}", about["dt"]);
+        let dt = dt.ok_or_else(|| bad(expected()))?;
         let (_, agents, places) = tensors.read("places", 3)?;
         let (frames, with_poses, qpos) = tensors.read("qpos", spec.nq)?;
         let (others, with_numbers, numbers) = tensors.read("numbers", NUMBERS)?;
@@ -255,6 +290,12 @@ impl Recording {
             || [others, more] != [frames; 2]
         {
             return Err(bad("its tensors are about different numbers of agents or frames".into()));
+        }
+        if agents > MOST_AGENTS {
+            return Err(bad(format!("it has {agents} agents, expected up to {MOST_AGENTS}")));
+        }
+        if let Some(i) = qpos.iter().position(|x| x.abs() > FARTHEST) {
+            return Err(bad(format!("tensor 'qpos', number {i} is {}, expected up to {FARTHEST:e}", qpos[i])));
         }
         let (numbers, terms, places) = (narrow(&numbers), narrow(&terms), narrow(&places));
         let mut recording = Recording { agents, qpos, numbers, terms, ..Recording::new(setting, ground, dt, places) };
@@ -267,13 +308,31 @@ impl Recording {
             }
             (recording.actions, recording.commands) = (narrow(&actions), commands);
             let (lies, elevations) = (tensors.read("lies", LIE)?.2, tensors.read("elevations", 2)?.2);
+            let points: f64 = elevations.as_chunks::<2>().0.iter().map(|[_, times]| times.max(0.0)).sum();
+            budget::MEMORY.check(4.0 * points).map_err(|e| bad(e.to_string()))?;
             recording.grounds = unpacked(&lies, &narrow(&elevations), &recording)
                 .ok_or_else(|| bad("its tensors 'lies' and 'elevations' do not fit each other".into()))?;
+            if let Some(problem) = recording.wrong_ground()? {
+                return Err(bad(problem));
+            }
+        }
+        if tensors.has("untimed") {
+            let (a, b, untimed) = tensors.read("untimed", 1)?;
+            if (a, b) != (frames, agents) {
+                return Err(bad("its tensors are about different numbers of agents or frames".into()));
+            }
+            recording.untimed = narrow(&untimed);
         }
         Ok(recording)
     }
 }
 
+/// Most agents of a recording: as many as the command line allows.
+const MOST_AGENTS: usize = 256;
+/// Longest time between two frames, s.
+const LONGEST_FRAME: f64 = 10.0;
+/// Largest coordinate, m or rad.
+const FARTHEST: f64 = 1e9;
 /// Numbers of a height field in a file: frame, agent, field, runs of equal elevations.
 const LIE: usize = 4;
 /// Most points of a height field that a file may tell of.
@@ -355,7 +414,12 @@ mod tests {
         let setting = Setting::named("hopper")?;
         let spec = setting.factory()?.spec().clone();
         let mut recording = Recording::new(setting, Ground::Hills, spec.dt, vec![0.0, 0.0, 0.0, 0.0, 0.0, -2.0]);
-        let grounds = [3.5, -0.25].map(|z| Arc::new(vec![vec![0.0, 0.0, 0.0, z, z, 1.0]]));
+        let field = Ground::Hills.agent("hopper")?.model()?.hfields[0].clone();
+        let grounds = [3.5, -0.25].map(|z| {
+            let mut points = vec![1.0; field.nrow * field.ncol];
+            points[..5].copy_from_slice(&[0.0, 0.0, 0.0, z, z]);
+            Arc::new(vec![points])
+        });
         for frame in 0..5 {
             for agent in 0..2 {
                 // in double precision alone
@@ -367,6 +431,7 @@ mod tests {
                     action: &vec![0.1 * frame as f32; spec.act],
                     command: &[],
                     grounds: &grounds[usize::from(frame >= 2 && agent == 1)],
+                    untimed: frame == 2 && agent == 0,
                 });
             }
         }
@@ -383,6 +448,7 @@ mod tests {
         assert_eq!(read, recording);
         // the ground of the second agent changes once
         let third = |frame, agent| read.grounds(frame, agent).map(|fields| fields[0][3]);
+        assert!(read.untimed(2, 0) && !read.untimed(2, 1) && !read.untimed(3, 0));
         assert_eq!([third(4, 0), third(1, 1), third(2, 1), third(4, 1)], [3.5, 3.5, -0.25, -0.25].map(Some));
         let model = marathon_envs::agent("hopper")?.model()?;
         let pose = |seconds: f64| recording.pose(&model, 1, seconds)[0] - 1e-12;
@@ -415,6 +481,7 @@ mod tests {
         assert_eq!((read.frames(), read.agents, read.ground), (5, 2, Ground::Hills));
         assert_eq!(read.qpos(4, 1)[0], 140.0);
         assert!(read.action(4, 1).is_empty() && read.command(4, 1).is_empty() && read.grounds(4, 1).is_none());
+        assert!(!read.untimed(4, 1));
         Ok(())
     }
 
@@ -448,6 +515,60 @@ mod tests {
             elevations[1] = times;
             assert!(unpacked(&lies, &elevations, &recording).is_none(), "{times}");
         }
+        Ok(())
+    }
+
+    /// A file of some kilobytes whose grounds have 16 billion points asks for 64 GB.
+    #[test]
+    fn a_small_file_that_asks_for_much_is_refused() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("c.replay");
+        let whole = {
+            sample()?.save(&path)?;
+            std::fs::read(&path)?
+        };
+        let (_, header) = SafeTensors::read_metadata(&whole)?;
+        let read = SafeTensors::deserialize(&whole)?;
+        let changed = |changes: &[(&str, Vec<usize>, Vec<u8>)]| -> Result<String, Box<dyn std::error::Error>> {
+            let mut views: HashMap<String, TensorView<'_>> = read.tensors().into_iter().collect();
+            for (name, shape, data) in changes {
+                let kind = read.tensor(name)?.dtype();
+                views.insert((*name).into(), TensorView::new(kind, shape.clone(), data)?);
+            }
+            std::fs::write(&path, safetensors::serialize(views, header.metadata().clone())?)?;
+            Ok(Recording::load(&path).map(|_| ()).expect_err("it is refused").to_string())
+        };
+        let double = |x: &[f64]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        let single = |x: &[f32]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        let lies: Vec<f64> = (0..4000).flat_map(|i| [0.0, 0.0, f64::from(i), 1.0]).collect();
+        let elevations: Vec<f32> = (0..4000).flat_map(|_| [0.0, 4e6]).collect();
+        let error =
+            changed(&[("lies", vec![4000, LIE], double(&lies)), ("elevations", vec![4000, 2], single(&elevations))])?;
+        assert!(error.contains("c.replay: asks for 64 GB; the limit 'memory' is 2 GB"), "{error}");
+        // grounds of another size than those of the model
+        let error = changed(&[
+            ("lies", vec![1, LIE], double(&[0.0, 0.0, 0.0, 1.0])),
+            ("elevations", vec![1, 2], single(&[0.0, 7.0])),
+        ])?;
+        assert!(error.contains("has [7] points, expected [2442]"), "{error}");
+        let poses = read.tensor("qpos")?;
+        let far = [&1e12_f64.to_le_bytes()[..], &poses.data()[8..]].concat();
+        let error = changed(&[("qpos", poses.shape().to_vec(), far)])?;
+        assert!(error.contains("tensor 'qpos', number 0 is 1000000000000"), "{error}");
+        // more characters than any command line allows
+        let nothing = |name: &str, columns: usize| {
+            let size = read.tensor(name).map_or(0, |tensor| tensor.dtype().bitsize() / 8);
+            let shape = if name == "places" { vec![300, columns] } else { vec![1, 300, columns] };
+            (vec![0_u8; 300 * columns * size], shape)
+        };
+        let mut many = Vec::new();
+        for name in ["places", "qpos", "numbers", "terms"] {
+            let columns = *read.tensor(name)?.shape().last().ok_or("a shape")?;
+            let (data, shape) = nothing(name, columns);
+            many.push((name, shape, data));
+        }
+        let error = changed(&many)?;
+        assert!(error.contains("it has 300 agents, expected up to 256"), "{error}");
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::app::args::Mode;
 use crate::app::error::GameError;
-use crate::app::hud::card;
+use crate::app::hud::{Hud, card};
 use crate::app::keys::{Deed, Do};
 use crate::app::notes::Notes;
 use crate::app::puppets::{self, Kind};
@@ -12,9 +12,11 @@ use crate::herd::Still;
 use crate::look::FollowCamera;
 use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
 use crate::simulate::{Marathon, Seat};
+use crate::stage;
 use bevy::prelude::*;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{Align2, Area, Id, Slider};
+use marathon_physics::budget;
 use marathon_runs::Setting;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,6 +26,8 @@ use std::time::Duration;
 const LEAP: f64 = 0.5;
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
+/// Share of the largest replay that states and actions may take; the rest is for grounds.
+const FILLED: f64 = 0.75;
 
 /// A recording that is being made.
 #[derive(Resource)]
@@ -31,12 +35,20 @@ pub struct Recorder {
     recording: Recording,
     /// Time of the newest frame.
     until: Duration,
+    /// The stage that is recorded, by the version of its show.
+    stage: u64,
 }
 
 impl Recorder {
     /// Length so far, s.
     pub fn seconds(&self) -> f64 {
         self.recording.seconds()
+    }
+
+    /// Whether it is as long as a replay may be.
+    fn is_full(&self) -> bool {
+        let most = budget::REPLAY_FILE.most().unwrap_or(0) as f64;
+        self.recording.frames() >= LONGEST || self.recording.bytes() as f64 > FILLED * most
     }
 }
 
@@ -82,13 +94,7 @@ pub fn obey(
     for _ in deeds.read().filter(|d| d.0 == Deed::Record) {
         if let Some(recorder) = &recorder {
             commands.remove_resource::<Recorder>();
-            match keep(&recorder.recording) {
-                Ok(path) => {
-                    let (path, film) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
-                    notes.say(format!("saved as {path}; a film of it: marathon-game --replay {path} --record {film}"));
-                }
-                Err(error) => notes.error(error.to_string()),
-            }
+            finish(recorder, "", &mut notes);
             continue;
         }
         if matches!(show.mode, Mode::Testbed | Mode::Replay | Mode::Outside) {
@@ -100,8 +106,50 @@ pub fn obey(
         let Some((_, anatomy, _)) = all.first() else { continue };
         let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
         let recording = Recording::new(script.setting.clone(), script.ground, anatomy.dt, places);
-        commands.insert_resource(Recorder { recording, until: Duration::ZERO });
+        commands.insert_resource(Recorder { recording, until: Duration::ZERO, stage: script.version });
         notes.say("recording; the same key ends it");
+    }
+}
+
+/// Ends a recording when other characters come on stage, or when it has become as long as a replay may be.
+pub fn close(mut commands: Commands, show: Res<Show>, recorder: Option<Res<Recorder>>, mut notes: ResMut<Notes>) {
+    let Some(recorder) = recorder else { return };
+    let why = match () {
+        () if recorder.stage != show.version => "other characters come on stage: ",
+        () if recorder.is_full() => "the recording is as long as one may be: ",
+        () => return,
+    };
+    commands.remove_resource::<Recorder>();
+    finish(&recorder, why, &mut notes);
+}
+
+/// Saves the recording that is still being made when the game ends.
+pub fn keep_at_exit(world: &mut World) {
+    if world.resource::<Messages<AppExit>>().is_empty() {
+        return;
+    }
+    save_running(world);
+}
+
+/// Ends the recording that is being made, if there is one, and saves it.
+pub fn save_running(world: &mut World) {
+    if let Some(recorder) = world.remove_resource::<Recorder>() {
+        world.resource_scope(|_, mut notes: Mut<Notes>| finish(&recorder, "", &mut notes));
+    }
+}
+
+/// Saves a recording and tells so.
+fn finish(recorder: &Recorder, why: &str, notes: &mut Notes) {
+    if recorder.recording.frames() == 0 {
+        notes.say(format!("{why}nothing was recorded"));
+        return;
+    }
+    match keep(&recorder.recording) {
+        Ok(path) => {
+            let (path, film) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
+            notes.say(format!("{why}saved as {path}; a film of it: marathon-game --replay {path} --record {film}"));
+        }
+        Err(error) => notes.error(format!("{why}the recording cannot be saved: {error}")),
     }
 }
 
@@ -122,7 +170,7 @@ pub fn record(
     let mut all: Vec<_> = actors.iter().collect();
     all.sort_by_key(|(actor, ..)| actor.0);
     let Recorder { recording, until } = &mut *recorder;
-    if all.len() != recording.agents || recording.frames() >= LONGEST {
+    if all.len() != recording.agents {
         return;
     }
     let trails: Vec<_> = all.iter().filter_map(|(_, seat, _)| marathon.resident(**seat)).map(|r| &r.trail).collect();
@@ -152,6 +200,7 @@ pub fn take(recording: &mut Recording, still: &Still, episode: &Episode, terms: 
         action: &still.action,
         command: &still.command,
         grounds: &still.grounds,
+        untimed: episode.untimed,
     });
 }
 
@@ -190,9 +239,15 @@ pub fn play(
         episode.seconds = at;
         episode.distance = f64::from(numbers[0]);
         (episode.speed, episode.reward, episode.total) = (numbers[1], numbers[2], f64::from(numbers[3]));
+        let fresh = numbers[4] > 0.5 || now == 0;
+        let before = (!fresh).then(|| recording.qpos(now - 1, actor.0));
+        let here = recording.qpos(now, actor.0);
+        let own = before.and_then(|before| stage::own_velocity(&anatomy.model, before, here, recording.dt));
+        episode.own_velocity = own.unwrap_or_default();
         episode.terms = recording.terms(now, actor.0).to_vec();
         episode.action = recording.action(now, actor.0).to_vec();
         episode.command = recording.command(now, actor.0).to_vec();
+        episode.untimed = recording.untimed(now, actor.0);
     }
 }
 
@@ -213,8 +268,8 @@ pub fn scrub(mut deeds: MessageReader<Do>, playback: Option<ResMut<Playback>>) {
 }
 
 /// The time line.
-pub fn time_line(mut contexts: EguiContexts, playback: Option<ResMut<Playback>>) -> Result {
-    let Some(mut playback) = playback else { return Ok(()) };
+pub fn time_line(mut contexts: EguiContexts, hud: Res<Hud>, playback: Option<ResMut<Playback>>) -> Result {
+    let Some(mut playback) = playback.filter(|_| hud.on) else { return Ok(()) };
     let ctx = contexts.ctx_mut()?.clone();
     let width = (ctx.content_rect().width() * 0.4).max(120.0);
     Area::new(Id::new("time line")).anchor(Align2::CENTER_BOTTOM, [0.0, -48.0]).show(&ctx, |ui| {

@@ -53,7 +53,7 @@ pub struct Show {
     /// Model of the test bed.
     pub model: Option<PathBuf>,
     /// Raised when the stage is to be set anew.
-    version: u64,
+    pub(super) version: u64,
 }
 
 /// What moves the characters.
@@ -88,6 +88,8 @@ pub struct Script {
     pub ground: Ground,
     /// The policies of the task's roles, by file and checksum.
     pub names: [Option<String>; 2],
+    /// The version of the show that is on stage.
+    pub(super) version: u64,
     written: Option<SystemTime>,
     looked: f32,
 }
@@ -276,7 +278,7 @@ pub fn set_stage(
     *staged = show.version;
     actors.iter().for_each(|actor| commands.entity(actor).despawn());
     focus.0 = 0;
-    *script = Script::default();
+    *script = Script { version: show.version, ..default() };
     if matches!(show.mode, Mode::Replay | Mode::Outside) {
         return;
     }

@@ -4,9 +4,10 @@
 
 use crate::app::args::Mode;
 use crate::app::course::Part;
-use crate::app::keys::{Deed, Do};
-use crate::app::show::{Actor, Focus, Show};
-use crate::ragdoll::{AgentCommand, Anatomy};
+use crate::app::keys::{Deed, Do, button_name, key_name};
+use crate::app::show::{Actor, Focus, Script, Show};
+use crate::ground::Ground;
+use crate::ragdoll::{AgentCommand, Anatomy, Restart};
 use crate::simulate::RagdollState;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::prelude::*;
@@ -48,6 +49,18 @@ pub struct Mappings {
     pub pad: Mapping,
     /// Of the keyboard.
     pub keys: Mapping,
+}
+
+impl Steering {
+    /// Whether a key steers, and does nothing else meanwhile.
+    pub fn takes_key(&self, key: KeyCode) -> bool {
+        self.on && KEYS.contains(&key) || self.buttons && BUTTON_KEYS.contains(&key)
+    }
+
+    /// Whether a button of a gamepad steers, and does nothing else meanwhile.
+    pub fn takes_button(&self, button: GamepadButton) -> bool {
+        self.buttons && BUTTONS.contains(&button)
+    }
 }
 
 impl Default for Mappings {
@@ -119,8 +132,46 @@ pub struct Steering {
     pub buttons: bool,
 }
 
+/// What a control that steers does, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Control {
+    /// Keys.
+    pub keys: &'static str,
+    /// The same on a gamepad.
+    pub pad: &'static str,
+    /// The number of the command that it sets.
+    pub does: String,
+}
+
+/// The controls that steer an agent with such a command, as [`told`] reads them.
+pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
+    let control = |keys, pad, i: usize| Control { keys, pad, does: ranges[i].name.replace('_', " ") };
+    let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
+    let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
+    match kinds {
+        [Some(speed), None, Some(button)] => {
+            vec![control("Left Right", "left stick", speed), control("Up", "left stick up", button)]
+        }
+        [Some(speed), None, None] => vec![control("arrows", "left stick", speed)],
+        [Some(speed), Some(turn), _] => {
+            let mut all = vec![control("Up Down", "left stick", speed), control("Left Right", "left stick", turn)];
+            if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
+                all.push(Control { does: "step aside".into(), ..control("A D", "triggers", speed + 1 + second) });
+            }
+            let names = BUTTON_KEYS.map(key_name).into_iter().zip(BUTTONS.map(button_name));
+            all.extend(buttons(ranges).zip(names).map(|(i, (key, pad))| control(key, pad, i)));
+            all
+        }
+        _ => {
+            let keys = [("Up Down", "left stick"), ("Left Right", "left stick")];
+            keys.into_iter().take(ranges.len()).enumerate().map(|(i, (keys, pad))| control(keys, pad, i)).collect()
+        }
+    }
+}
+
 /// Tells the character in focus what the first gamepad and the keys say, and those behind it what the other gamepads say. Once a
-/// character has been told something, it stays under command until [`Deed::Release`], or until it is nobody's.
+/// character has been told something, it stays under command until [`Deed::Release`], or until it is nobody's. Nobody who is
+/// steered is taken back to the start when the task's time is up; on a course, runs end by their rules.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 pub fn steer(
     mut commands: Commands,
@@ -128,12 +179,12 @@ pub fn steer(
     pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
     mut deeds: MessageReader<Do>,
-    (show, focus): (Res<Show>, Res<Focus>),
+    (show, script, focus): (Res<Show>, Res<Script>, Res<Focus>),
     mut steering: ResMut<Steering>,
     mappings: Res<Mappings>,
     time: Res<Time<Real>>,
     mut said: Local<Said>,
-    actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>), With<RagdollState>>,
+    mut actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>, &mut Restart), With<RagdollState>>,
 ) {
     let on_course = show.mode == Mode::Course;
     // on a course, who runs is one and the same to the end
@@ -142,7 +193,7 @@ pub fn steer(
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
     said.hear(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
     let (mut own, count) = (Steering::default(), actors.iter().count());
-    for (entity, actor, anatomy, command) in &actors {
+    for (entity, actor, anatomy, command, mut restart) in &mut actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
         let led = (player < said.players() || on_course) && !ranges.is_empty() && !spectator;
@@ -150,11 +201,16 @@ pub fn steer(
         if led && player == 0 {
             own = Steering { on: true, buttons: buttons(ranges).next().is_some() };
         }
+        let steered = led && !released && (command.is_some() || deflection != REST);
+        let timed = Restart { on_time_up: !steered && script.ground != Ground::Track, ..*restart };
+        if !on_course && *restart != timed {
+            *restart = timed;
+        }
         if !led || released {
             if command.is_some() {
                 commands.entity(entity).remove::<AgentCommand>();
             }
-        } else if command.is_some() || deflection != REST {
+        } else if steered {
             let wanted = AgentCommand(Some(told(ranges, deflection)));
             if command != Some(&wanted) {
                 commands.entity(entity).insert(wanted);
@@ -301,6 +357,28 @@ mod tests {
         assert_eq!(told(&ranges, [1.0, 0.0, 0.0, 1.0, 0.0]), [3.0, 0.0, 1.0, 0.0, 0.0]);
         assert_eq!(told(&ranges, [0.0, 0.0, 0.0, 0.0, 1.0]), [0.0, 0.0, 0.0, 1.0, 0.0]);
         assert_eq!((buttons(&ranges).count(), buttons(&ranges[..2]).count(), buttons(&ranges[2..]).count()), (3, 0, 0));
+    }
+
+    #[test]
+    fn controls_have_the_names_of_what_they_set() {
+        let range = |name, unit| CommandRange::new(name, 0.0..=1.0, unit);
+        let told = |ranges: &[CommandRange]| {
+            controls(ranges).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
+        };
+        let all = [range("speed", "m/s"), range("left", "m/s"), range("turn", "rad/s"), range("jump", "")];
+        let with_all = [
+            "Up Down/left stick: speed",
+            "Left Right/left stick: turn",
+            "A D/triggers: step aside",
+            "W/A: jump",
+            "V/B: back flip",
+        ];
+        assert_eq!(told(&[&all[..], &[range("back_flip", "")]].concat()), with_all);
+        let planar = ["Left Right/left stick: speed", "Up/left stick up: jump"];
+        assert_eq!(told(&[all[0].clone(), all[3].clone()]), planar);
+        assert_eq!(told(&all[..1]), ["arrows/left stick: speed"]);
+        assert_eq!(told(&all[3..]), ["Up Down/left stick: jump"]);
+        assert!(told(&[]).is_empty());
     }
 
     #[test]

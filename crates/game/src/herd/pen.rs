@@ -2,6 +2,7 @@
 
 use super::{Event, Herd, HerdError, Resident, Still};
 use crate::ragdoll::{Character, Controls, End, Held, Restart};
+use crate::stage;
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
 use marathon_envs::{Autoreset, BLOCK, Role, Step, VecEnv, VecEnvOptions};
@@ -191,6 +192,9 @@ impl Pen {
             Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new(), None),
         };
         if let Some(resident) = &mut self.lanes[lane] {
+            let before = resident.trail.back().filter(|_| !fresh);
+            let own = before.and_then(|before| stage::own_velocity(&self.model, &before.qpos, &qpos, self.dt));
+            resident.episode.own_velocity = own.unwrap_or_default();
             resident.episode.command.clone_from(&command);
             if *resident.grounds != grounds {
                 resident.grounds = Arc::new(grounds);
@@ -344,6 +348,8 @@ impl Pen {
             }
             return up;
         }
+        let Restart { after_fall, on_time_up } = resident.restart;
+        episode.untimed |= !on_time_up;
         episode.decisions += 1;
         episode.seconds = episode.decisions as f64 * self.dt;
         if agent {
@@ -359,11 +365,10 @@ impl Pen {
             episode.farthest = episode.farthest.max(episode.distance);
             episode.speed = out.forward[lane] / self.dt as f32;
         }
-        let Restart { after_fall, on_time_up } = resident.restart;
         let end = match () {
             () if diverged => End::Broke,
             () if terminated => End::Fell,
-            () if truncated && on_time_up => End::TimeUp,
+            () if truncated && !episode.untimed => End::TimeUp,
             () if asked => End::Asked,
             () => return false,
         };

@@ -4,6 +4,7 @@ use crate::axes::to_game;
 use crate::look::joint_places;
 use crate::ragdoll::{Anatomy, Episode, Part, Target};
 use crate::simulate::{Marathon, Seat};
+use crate::stage;
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
 use marathon_envs::CommandRange;
@@ -171,15 +172,8 @@ fn joints(
     }
 }
 
-/// Angle along the ground of the forward axis of a model's free body, rad; 0 for a figure in a plane.
-fn heading(model: &Model, qpos: &[f64]) -> f64 {
-    let Some(free) = model.joints.iter().find(|joint| joint.kind == JointType::Free) else { return 0.0 };
-    let [w, x, y, z] = [3, 4, 5, 6].map(|i| qpos[free.qpos_adr + i]);
-    (2.0 * (x * y + w * z)).atan2(1.0 - 2.0 * (y * y + z * z))
-}
-
 /// What a command says: velocity ahead and to the left, m/s, and turn, rad/s. None if it says nothing about velocities.
-fn velocity_told(ranges: &[CommandRange], command: &[f64]) -> Option<[f64; 3]> {
+pub(crate) fn velocity_told(ranges: &[CommandRange], command: &[f64]) -> Option<[f64; 3]> {
     let mut speeds = ranges.iter().zip(command).filter(|(range, _)| range.is_speed()).map(|(_, x)| *x);
     let ahead = speeds.next()?;
     let turn = ranges.iter().zip(command).find(|(range, _)| range.is_turn()).map_or(0.0, |(_, x)| *x);
@@ -196,7 +190,7 @@ fn told(
         let Some([ahead, left, turn]) = velocity_told(ranges, &episode.command) else { continue };
         let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
         let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &still.qpos) else { continue };
-        let heading = heading(&anatomy.model, &still.qpos);
+        let heading = stage::heading(&anatomy.model, &still.qpos);
         let point = |[x, y]: [f64; 2]| {
             let at = to_game([pose.com[0] + x, pose.com[1] + y, 0.0]) * Vec3::new(1.0, 0.0, 1.0);
             track.transform_point(at) + Vec3::Y * 0.02
@@ -246,15 +240,5 @@ mod tests {
         assert_eq!(velocity_told(&ranges, &[1.0, 2.0, 0.5, -1.0]), Some([2.0, -1.0, 0.5]));
         assert_eq!(velocity_told(&ranges[..2], &[1.0, 2.0]), Some([2.0, 0.0, 0.0]));
         assert_eq!(velocity_told(&ranges[..1], &[1.0]), None);
-    }
-
-    #[test]
-    fn a_heading_is_that_of_the_free_body() {
-        let text = "<mujoco><worldbody><body><freejoint/><geom size=\".1\"/></body></worldbody></mujoco>";
-        let model = Model::from_xml_str(text, "ball").unwrap();
-        let (sin, cos) = 0.6f64.sin_cos();
-        assert!((heading(&model, &[1.0, 2.0, 3.0, cos, 0.0, 0.0, sin]) - 1.2).abs() < 1e-12);
-        let text = "<mujoco><worldbody><body><joint type=\"slide\" axis=\"1 0 0\"/><geom size=\".1\"/></body></worldbody></mujoco>";
-        assert_eq!(heading(&Model::from_xml_str(text, "slider").unwrap(), &[1.0]), 0.0);
     }
 }

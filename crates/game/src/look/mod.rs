@@ -13,6 +13,7 @@ mod skin;
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
 pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
+pub(crate) use marks::velocity_told;
 pub use marks::{Marks, MarksPlugin};
 pub use scenery::{Quality, SceneryPlugin};
 pub use skin::{Dressed, Skin, SkinPlugin, UnfitSkin};

@@ -211,10 +211,15 @@ fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(Wear, Transf
     };
     let (path, model) = (Path::new("skin"), &*anatomy.model);
     let mapping = match &skin.mapping {
-        Some(text) => Mapping::parse(path, text.as_bytes(), &skeleton, model),
-        None => Mapping::built_in(path, &skeleton, model),
+        Some(text) => Mapping::parse(path, text.as_bytes(), &skeleton, model).map_err(|error| error.to_string()),
+        None => Mapping::built_in(path, &skeleton, model).map_err(|error| {
+            format!(
+                "{error}; rename its bones, as Mixamo or Blender's Rigify calls them, or write a mapping that names them: --mapping \
+                 FILE.json, as `marathon motion import` takes it"
+            )
+        }),
     };
-    let wear = Wear::new(model, &mapping.map_err(|error| error.to_string())?, &skeleton);
+    let wear = Wear::new(model, &mapping?, &skeleton);
     Ok((wear, above, bones))
 }
 

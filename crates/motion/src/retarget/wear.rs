@@ -1,9 +1,10 @@
 //! The way back: a skeleton that moves as a model does, with bones of its own lengths. A skinned mesh needs it to be worn.
 
-use super::align::Alignment;
+use super::align::{Alignment, place};
 use super::mapping::Mapping;
+use crate::kinematics::Pose;
 use crate::rotation::{quat, slerp, wxyz};
-use crate::skeleton::{Keyframe, Skeleton};
+use crate::skeleton::{Keyframe, Skeleton, SkeletonPose};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 
@@ -17,7 +18,12 @@ pub struct Wear {
     /// Of each hip: the body, the place in it where the thigh turns, and the joint of the skeleton.
     hips: [(usize, DVec3, usize); 2],
     scale: f64,
+    /// Where the skeleton's hips are beside the model's, in the frame of the body that the thighs hang from.
+    shift: (usize, DVec3),
 }
+
+/// Share by which a figure may be larger or smaller beside the model than its legs are before the figure decides its size.
+const OUT_OF_PROPORTION: f64 = 0.3;
 
 /// What turns a bone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +40,8 @@ impl Wear {
     /// A skeleton that is to move as a model. A mapping's parts turn their joints; the joints between two that one part lies
     /// between, such as those of a spine, share the turn; all others keep their rest pose.
     pub fn new(model: &Model, mapping: &Mapping, skeleton: &Skeleton) -> Self {
-        let Alignment { rest: model_rest, source, facing, align, scale, .. } = Alignment::new(model, mapping, skeleton);
+        let Alignment { rest: model_rest, source, facing, align, scale, leg, .. } =
+            Alignment::new(model, mapping, skeleton);
         let rest: Vec<DQuat> = source.quat.iter().map(|turn| facing * *turn).collect();
         let mut follows = vec![Follows::Parent; skeleton.bones.len()];
         for (part, align) in mapping.parts.iter().zip(&align).filter(|(part, _)| part.whole && part.toward.is_none()) {
@@ -57,16 +64,25 @@ impl Wear {
             let part = &mapping.parts[hip];
             (part.body, DVec3::from_array(part.local), part.joint)
         });
-        Wear { skeleton: skeleton.clone(), rest, follows, hips, scale }
+        let ratio = figure(model, mapping, &model_rest, &source).unwrap_or(scale);
+        let proportionate = (ratio / scale - 1.0).abs() <= OUT_OF_PROPORTION;
+        let pelvis = model.bodies[hips[0].0].parent;
+        // shorter legs than the model's still reach the ground
+        let lower = if proportionate { 0.0 } else { leg * (1.0 - ratio / scale) };
+        let down = model_rest.quat[pelvis].conjugate() * DVec3::new(0.0, 0.0, -lower);
+        let scale = if proportionate { scale } else { ratio };
+        Wear { skeleton: skeleton.clone(), rest, follows, hips, scale, shift: (pelvis, down) }
     }
 
-    /// Factor on the skeleton's lengths with which its legs are as long as the model's.
+    /// Factor on the skeleton's lengths with which its legs are as long as the model's; of a figure with much longer or shorter
+    /// legs than the model has for its size, the factor with which trunk, arms and legs together are.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
     /// The skeleton, with its lengths times [`Wear::scale`], while the model's bodies are at these places: position, m, and
-    /// orientation, `[w, x, y, z]`, of each. The skeleton's hips are where the model's are.
+    /// orientation, `[w, x, y, z]`, of each. The skeleton's hips are where the model's are, or as much lower or higher as its legs are
+    /// shorter or longer.
     ///
     /// # Panics
     /// If there are fewer places than the model has bodies.
@@ -97,8 +113,29 @@ impl Wear {
             let (place, turn) = body(i);
             root += 0.5 * (place + turn * local - places[joint]);
         }
+        let (pelvis, shift) = self.shift;
+        if shift != DVec3::ZERO {
+            root += body(pelvis).1 * shift;
+        }
         Keyframe { root: root.to_array(), rotations }
     }
+}
+
+/// The lengths between a model's parts and those above them over the same lengths of a skeleton; none without such lengths.
+fn figure(model: &Model, mapping: &Mapping, rest: &Pose, source: &SkeletonPose) -> Option<f64> {
+    let parts = || mapping.parts.iter().filter(|part| part.whole && part.toward.is_none());
+    let (mut ours, mut theirs) = (0.0, 0.0);
+    for part in parts() {
+        let up = std::iter::successors(Some(model.bodies[part.body].parent), |body| {
+            (*body != 0).then(|| model.bodies[*body].parent)
+        });
+        let above = up.take_while(|body| *body != 0).find_map(|body| parts().find(|part| part.body == body));
+        if let Some(above) = above {
+            ours += place(rest, part).distance(place(rest, above));
+            theirs += source.pos[part.joint].distance(source.pos[above.joint]);
+        }
+    }
+    (ours > 1e-3 && theirs > 1e-3).then(|| ours / theirs)
 }
 
 /// The bones between one bone and another that it hangs from, or that hangs from it, from the first on; none otherwise.

@@ -1,8 +1,9 @@
 //! The table of the longest runs: a SQLite database in the user's folder for data, with the best replays beside it.
 
-use crate::app::error::GameError;
+use crate::app::error::{GameError, plain_line};
 use crate::app::recording::Recording;
 use etcetera::BaseStrategy;
+use marathon_physics::budget;
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Transaction, named_params};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -113,6 +114,11 @@ pub fn default_path() -> Result<PathBuf, GameError> {
     Ok(folder.join("marathon/runs.sqlite"))
 }
 
+/// A replay in the folder of a table's; none if its name leads elsewhere, as one in a stranger's table may.
+fn within(folder: &Path, name: &str) -> Option<PathBuf> {
+    (Path::new(name).file_name() == Some(name.as_ref())).then(|| folder.join(name))
+}
+
 /// What is wrong with a table, and what to do about it.
 fn wrong(path: &Path, error: &rusqlite::Error) -> GameError {
     let remedy = "move it away, and a new one begins, or name another: --table FILE";
@@ -143,11 +149,19 @@ impl Table {
     }
 
     fn connect(path: &Path, flags: OpenFlags) -> Result<Self, GameError> {
+        let refuse = |problem: String| Err(GameError::Table { path: path.into(), problem });
+        if let Ok(facts) = std::fs::metadata(path) {
+            if !facts.is_file() {
+                return refuse("found a folder or a device, expected a file; name another: --table FILE".into());
+            }
+            if let Err(error) = budget::TABLE_FILE.check(facts.len() as f64) {
+                return refuse(format!("{error}, or name another file: --table FILE"));
+            }
+        }
         let wrong = |error: rusqlite::Error| wrong(path, &error);
         let mut connection = Connection::open_with_flags(path, flags).map_err(wrong)?;
         connection.busy_timeout(PATIENCE).map_err(wrong)?;
         let found: i64 = connection.query_row("PRAGMA user_version", [], |row| row.get(0)).map_err(wrong)?;
-        let refuse = |problem: String| Err(GameError::Table { path: path.into(), problem });
         match found {
             VERSION => {}
             0 => {
@@ -172,6 +186,14 @@ impl Table {
                     "a later version of the game wrote it: its tables have version {found}, this one knows {VERSION}; {remedy}"
                 ));
             }
+        }
+        // a stranger's view may never end, and its triggers do what they like
+        let programs = "SELECT count(*) FROM sqlite_schema WHERE type IN ('view', 'trigger')";
+        let programs: i64 = connection.query_row(programs, [], |row| row.get(0)).map_err(wrong)?;
+        if programs > 0 {
+            return refuse(
+                "it has views or triggers, which a table of runs has not; name another: --table FILE".into(),
+            );
         }
         Ok(Table { connection, path: path.into() })
     }
@@ -212,10 +234,9 @@ impl Table {
         let pruned = prune(&begun, &run.course).and_then(|gone| begun.commit().map(|()| gone));
         match pruned {
             Ok(gone) => {
-                // a table from elsewhere may name what is no replay of its
-                for name in gone.iter().filter(|name| Path::new(name).file_name() == Some(name.as_ref())) {
+                for replay in gone.iter().filter_map(|name| within(&folder, name)) {
                     // a file that stays takes room, no more
-                    let _ = std::fs::remove_file(folder.join(name));
+                    let _ = std::fs::remove_file(replay);
                 }
                 Ok(place)
             }
@@ -263,7 +284,7 @@ impl Table {
                     ended: row.get(9)?,
                     date: row.get(10)?,
                     version: row.get(11)?,
-                    replay: row.get::<_, Option<String>>(12)?.map(|name| folder.join(name)),
+                    replay: row.get::<_, Option<String>>(12)?.and_then(|name| within(&folder, &name)),
                 })
             })?;
             rows.collect()
@@ -349,15 +370,16 @@ pub fn listing(path: &Path) -> Result<String, GameError> {
     let mut text = format!("{}\n", path.display());
     for course in table.courses()? {
         let Course { agent, kind, difficulty, part } = &course;
-        text += &format!("\n{agent}   {kind}, difficulty {difficulty}   {part}\n");
+        text += &format!("\n{}\n", plain_line(&format!("{agent}   {kind}, difficulty {difficulty}   {part}")));
         for (i, run) in table.longest(&course, KEPT)?.iter().enumerate() {
             let Run { distance, seconds, ended, date, runner, builder, .. } = run;
             let replay = run.replay.as_ref().map(|path| format!("   {}", path.display())).unwrap_or_default();
             let [seed, number, episode] = run.draw;
-            text += &format!(
-                "{:>4}  {distance:>6.2} m  {seconds:>6.2} s  {ended:<10}  {date}  {runner} on {builder}, seed {seed}:{number}:{episode}{replay}\n",
+            let row = format!(
+                "{:>4}  {distance:>6.2} m  {seconds:>6.2} s  {ended:<10}  {date}  {runner} on {builder}, seed {seed}:{number}:{episode}{replay}",
                 i + 1
             );
+            text += &format!("{}\n", plain_line(&row));
         }
     }
     Ok(text)

@@ -1,0 +1,45 @@
+//! What R records is kept whatever else happens: other keys, other characters, the end of the game.
+#![cfg(feature = "render")]
+
+#[path = "common/windowless.rs"]
+mod windowless;
+
+use clap::ValueEnum;
+use marathon_game::app::{Deed, Lesson, Recording};
+use std::error::Error;
+use std::path::Path;
+use std::time::Duration;
+use windowless::frames;
+
+/// The recordings in a folder.
+fn recordings(folder: &Path) -> Result<Vec<Recording>, Box<dyn Error>> {
+    let files = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
+    let replays = files.filter(|path| path.extension().is_some_and(|end| end == "replay"));
+    Ok(replays.map(|path| Recording::load(&path)).collect::<Result<_, _>>()?)
+}
+
+/// Recordings go to the present folder, which a process has one of: one test goes through all keys.
+#[test]
+fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
+    let home = std::env::current_dir()?;
+    for deed in Deed::value_variants() {
+        let name = deed.to_possible_value().ok_or("it has a name")?.get_name().to_string();
+        let folder = tempfile::tempdir()?;
+        std::env::set_current_dir(folder.path())?;
+        let presses = ["0.3:record".to_string(), format!("1.2:{name}"), "2.5:record".into()];
+        let presses = presses.iter().flat_map(|press| ["--press", press]);
+        let words: Vec<&str> = ["hopper", "--agents", "2", "--threads", "1"].into_iter().chain(presses).collect();
+        let mut app = windowless::game(&words, Duration::from_millis(20), |_| ());
+        frames(&mut app, 150);
+        // a trainer that nobody needs ends
+        app.world_mut().remove_resource::<Lesson>();
+        let all = recordings(folder.path()).map_err(|error| format!("{name}: {error}"))?;
+        assert!(all.iter().all(|recording| recording.frames() > 1), "{name}");
+        // the first one lasts from its start to the key at least, time that is stopped or fast aside
+        let first = all.iter().find(|recording| recording.setting.agent == "Hopper-v0" && recording.agents == 2);
+        let seconds = first.ok_or_else(|| format!("{name}: it is lost"))?.seconds();
+        assert!(seconds > 0.8, "{name}: {seconds} s");
+    }
+    std::env::set_current_dir(home)?;
+    Ok(())
+}

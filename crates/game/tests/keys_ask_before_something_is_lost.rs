@@ -1,0 +1,125 @@
+//! A key that would lose something asks first: the same key says yes, S saves, Esc says no. And keys are bound anew without accidents.
+#![cfg(feature = "render")]
+
+#[path = "common/devices.rs"]
+mod devices;
+#[path = "common/windowless.rs"]
+mod windowless;
+
+use bevy::input::ButtonState;
+use bevy::prelude::*;
+use marathon_game::app::{Asked, Bindings, Deed, Lesson, Menu, Mode, Question, Rebinding, Show};
+use std::error::Error;
+use std::time::{Duration, Instant};
+use windowless::frames;
+
+fn app(words: &[&str]) -> App {
+    windowless::game(words, Duration::from_millis(20), |_| ())
+}
+
+fn press(app: &mut App, key: KeyCode) {
+    devices::key(app, key, ButtonState::Pressed);
+    devices::key(app, key, ButtonState::Released);
+}
+
+fn asked(app: &App) -> Option<Asked> {
+    app.world().resource::<Question>().0.as_ref().map(|(asked, _)| *asked)
+}
+
+#[test]
+fn quitting_asks_while_the_menu_is_open() {
+    let mut app = app(&["hopper"]);
+    press(&mut app, KeyCode::Escape);
+    assert!(app.world().resource::<Menu>().open);
+    press(&mut app, KeyCode::KeyQ);
+    assert_eq!((asked(&app), app.should_exit()), (Some(Asked::Deed(Deed::Quit)), None));
+    // no
+    press(&mut app, KeyCode::Escape);
+    assert_eq!((asked(&app), app.should_exit(), app.world().resource::<Menu>().open), (None, None, true));
+    press(&mut app, KeyCode::KeyQ);
+    devices::key(&mut app, KeyCode::KeyQ, ButtonState::Pressed);
+    assert!(app.should_exit().is_some_and(|exit| exit.is_success()));
+}
+
+#[test]
+fn quitting_does_not_ask_when_nothing_is_lost() {
+    let mut app = app(&["hopper"]);
+    devices::key(&mut app, KeyCode::KeyQ, ButtonState::Pressed);
+    assert!(app.should_exit().is_some_and(|exit| exit.is_success()));
+}
+
+/// Policies and recordings go to the present folder, which a process has one of: one test has all that save something.
+#[test]
+fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Error>> {
+    let (home, folder) = (std::env::current_dir()?, tempfile::tempdir()?);
+    std::env::set_current_dir(folder.path())?;
+    let file = |name: &str| folder.path().join(name);
+    let learning = || {
+        let mut app = app(&["hopper", "--mode", "learn", "--threads", "1"]);
+        let begun = Instant::now();
+        while app.world().get_resource::<Lesson>().is_none_or(|lesson| lesson.unsaved().is_none()) {
+            app.update();
+            std::thread::sleep(Duration::from_millis(5));
+            assert!(begun.elapsed() < Duration::from_secs(120), "no progress");
+        }
+        app
+    };
+    let mut app = learning();
+    for key in [KeyCode::KeyQ, KeyCode::KeyL, KeyCode::KeyX, KeyCode::KeyN] {
+        press(&mut app, key);
+        assert!(asked(&app).is_some() && app.should_exit().is_none(), "{key:?}");
+        press(&mut app, KeyCode::Escape);
+        assert!(asked(&app).is_none() && app.world().get_resource::<Lesson>().is_some(), "{key:?}");
+        assert!(!app.world().resource::<Menu>().open, "{key:?}: Esc answers");
+    }
+    // yes, after it has been saved
+    press(&mut app, KeyCode::KeyL);
+    press(&mut app, KeyCode::KeyS);
+    frames(&mut app, 2);
+    assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
+    assert!(file("hopper-live-1.safetensors").exists());
+    // yes, without
+    let mut app = learning();
+    press(&mut app, KeyCode::KeyL);
+    press(&mut app, KeyCode::KeyL);
+    frames(&mut app, 2);
+    assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
+    assert!(!file("hopper-live-2.safetensors").exists());
+    // what ends a lesson in another way saves it
+    let mut app = learning();
+    let mut show = app.world_mut().resource_mut::<Show>();
+    show.mode = Mode::Watch;
+    show.again();
+    frames(&mut app, 2);
+    assert!(file("hopper-live-2.safetensors").exists());
+
+    let mut app = crate::app(&["walker"]);
+    press(&mut app, KeyCode::KeyR);
+    frames(&mut app, 30);
+    press(&mut app, KeyCode::KeyQ);
+    assert_eq!(asked(&app), Some(Asked::Deed(Deed::Quit)));
+    press(&mut app, KeyCode::Escape);
+    assert!(!file("walker2d-1.replay").exists());
+    press(&mut app, KeyCode::KeyQ);
+    devices::key(&mut app, KeyCode::KeyQ, ButtonState::Pressed);
+    assert!(app.should_exit().is_some() && file("walker2d-1.replay").exists());
+    std::env::set_current_dir(home)?;
+    Ok(())
+}
+
+#[test]
+fn esc_leaves_a_binding_as_it_is_and_a_closed_menu_mutes_no_key() {
+    let mut app = app(&["hopper"]);
+    press(&mut app, KeyCode::Escape);
+    app.world_mut().resource_mut::<Rebinding>().0 = Some(Deed::Push);
+    press(&mut app, KeyCode::Escape);
+    assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
+    assert!(app.world().resource::<Rebinding>().0.is_none() && app.world().resource::<Menu>().open);
+    // the menu is closed by its button while a key is waited for
+    app.world_mut().resource_mut::<Rebinding>().0 = Some(Deed::Push);
+    app.world_mut().resource_mut::<Menu>().open = false;
+    frames(&mut app, 2);
+    press(&mut app, KeyCode::Space);
+    assert!(app.world().resource::<Time<Virtual>>().is_paused(), "keys are heard");
+    assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
+}
