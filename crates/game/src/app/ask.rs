@@ -166,7 +166,7 @@ pub fn draw(
     window.order(egui::Order::Foreground).show(&ctx, |ui| {
         ui.label(text(15.0, TEXT, words));
         ui.add_space(8.0);
-        ui.horizontal_wrapped(|ui| {
+        ui.horizontal(|ui| {
             let mut offer = |label: String, choice: Answer| {
                 if ui.add(Button::new(text(14.0, TEXT, label))).clicked() {
                     answer = Some(choice);

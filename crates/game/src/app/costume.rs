@@ -93,8 +93,8 @@ fn needs(bytes: &[u8]) -> Option<String> {
     // a header of 12 bytes, then the length and the kind of the first chunk, which is JSON
     let length = bytes.get(12..16).and_then(|four| Some(u32::from_le_bytes(four.try_into().ok()?) as usize))?;
     let about: Value = serde_json::from_slice(bytes.get(20..20_usize.checked_add(length)?)?).ok()?;
-    let needed = about["extensionsRequired"].as_array()?.iter().filter_map(Value::as_str);
-    let (name, remedy) = needed.filter_map(|name| Some((name, remedy(name)?))).next()?;
+    let mut needed = about["extensionsRequired"].as_array()?.iter().filter_map(Value::as_str);
+    let (name, remedy) = needed.find_map(|name| Some((name, remedy(name)?)))?;
     Some(format!("it needs the extension {name}, which is not supported; {remedy}"))
 }
 

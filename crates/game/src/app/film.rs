@@ -166,9 +166,11 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
         pace(&mut app, Duration::ZERO);
         std::thread::sleep(Duration::from_millis(2));
     }
+    let mut over = false;
     for _ in 0..before {
         pace(&mut app, frame);
-        if app.should_exit().is_some() || interrupt::requested() {
+        over = app.should_exit().is_some();
+        if over || interrupt::requested() {
             break;
         }
     }
@@ -191,7 +193,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
             pace(&mut app, if drawn == 0 { Duration::ZERO } else { frame });
             drawn += 1;
             // a film ends with its game
-            if app.should_exit().is_some() {
+            if over || app.should_exit().is_some() {
                 frames = drawn;
             }
         } else {

@@ -7,7 +7,16 @@ use crate::app::hud::{ACCENT, CARD, FAINT, TEXT, card, text};
 use crate::app::keys::{Bindings, Deed};
 use crate::app::show::Show;
 use crate::app::steer::{Control, Steering};
-use bevy_egui::egui::{self, Align2, Area, CornerRadius, Frame, Id, Margin, Ui, Vec2};
+use bevy_egui::egui::text::LayoutJob;
+use bevy_egui::egui::{self, Align2, Area, CornerRadius, FontId, Frame, Id, Label, Margin, TextFormat, Vec2};
+use std::ops::Range;
+
+/// Width below which the line has little beside what steers: it must not cover the figure, points.
+const NARROW: f32 = 900.0;
+
+/// Distance between two hints, and what stays free beside the line, points.
+const GAP: f32 = 12.0;
+const BESIDE: f32 = 48.0;
 
 /// What the keys do now.
 pub struct Hints<'a> {
@@ -84,19 +93,26 @@ impl Hints<'_> {
         if all {
             self.list(ctx, show);
         }
-        let line = self.line(show);
+        let hints: Vec<_> = self.line(show, room.x).iter().map(|(key, does)| hint(key, does)).collect();
+        let widths: Vec<f32> =
+            ctx.fonts_mut(|fonts| hints.iter().map(|hint| fonts.layout_job(hint.clone()).size().x + GAP).collect());
+        let rows = broken(&widths, room.x - BESIDE);
         let area = Area::new(Id::new("keys")).anchor(Align2::CENTER_BOTTOM, [0.0, -10.0]).interactable(false);
         area.show(ctx, |ui| {
             let frame = Frame::new().fill(CARD).corner_radius(CornerRadius::same(6));
             frame.inner_margin(Margin::symmetric(10, 4)).show(ui, |ui| {
-                ui.set_max_width(room.x - 48.0);
-                ui.horizontal_wrapped(|ui| line.iter().for_each(|(key, does)| hint(ui, key, does)));
+                for row in rows {
+                    ui.horizontal(|ui| {
+                        ui.spacing_mut().item_spacing.x = GAP;
+                        hints[row].iter().for_each(|hint| drop(ui.add(Label::new(hint.clone()).extend())));
+                    });
+                }
             });
         });
     }
 
-    /// Keys of the line, and what they do: those that steer first.
-    fn line(&self, show: &Show) -> Vec<(String, String)> {
+    /// Keys of the line in a picture of some width, and what they do: those that steer first.
+    fn line(&self, show: &Show, width: f32) -> Vec<(String, String)> {
         let steers = |control: &Control| match self.pads {
             true => format!("{} | pad {}", control.keys, control.pad),
             false => control.keys.to_string(),
@@ -105,7 +121,7 @@ impl Hints<'_> {
         if builds(show) {
             line.push(("mouse".into(), "build".into()));
         }
-        let useful = useful(show);
+        let useful = if width < NARROW { &[Deed::Menu][..] } else { useful(show) };
         let shown = |deed: Deed| match deed {
             Deed::Help => true,
             Deed::Release => works(deed, show, self.steering),
@@ -157,14 +173,27 @@ impl Hints<'_> {
     }
 }
 
-fn hint(ui: &mut Ui, key: &str, does: &str) {
-    // a key and what it does stay together where the line breaks
-    let mut words = egui::text::LayoutJob::default();
+/// A key and what it does.
+fn hint(key: &str, does: &str) -> LayoutJob {
+    let mut words = LayoutJob::default();
     for (color, part) in [(ACCENT, format!("{key} ")), (TEXT, does.to_string())] {
-        words.append(&part, 0.0, egui::TextFormat::simple(egui::FontId::proportional(12.0), color));
+        words.append(&part, 0.0, TextFormat::simple(FontId::proportional(12.0), color));
     }
-    ui.add(egui::Label::new(words).extend());
-    ui.add_space(4.0);
+    words
+}
+
+/// Breaks a line of things with these widths into rows of a width; a thing that is wider has a row of its own.
+fn broken(widths: &[f32], room: f32) -> Vec<Range<usize>> {
+    let (mut rows, mut first, mut filled) = (Vec::new(), 0, 0.0);
+    for (i, width) in widths.iter().enumerate() {
+        if filled + width > room && i > first {
+            rows.push(first..i);
+            (first, filled) = (i, 0.0);
+        }
+        filled += width;
+    }
+    rows.push(first..widths.len());
+    rows
 }
 
 #[cfg(test)]
@@ -182,7 +211,7 @@ mod tests {
         let steering = Steering { on: !ranges.is_empty(), buttons: controls(&ranges).iter().any(|c| c.keys == "W") };
         let bindings = Bindings::default();
         let hints = Hints { bindings: &bindings, steering, controls: controls(&ranges), pads };
-        Ok((hints.line(&show), hints.rows(&show)))
+        Ok((hints.line(&show, 1280.0), hints.rows(&show)))
     }
 
     #[test]
@@ -205,6 +234,13 @@ mod tests {
         let (line, _) = hints(&["MarathonManController"], true)?;
         assert!(line.contains(&("W | pad A".into(), "jump".into())), "{line:?}");
         Ok(())
+    }
+
+    #[test]
+    fn a_line_breaks_where_it_is_too_long() {
+        assert_eq!(broken(&[3.0, 3.0, 3.0, 9.0, 1.0], 6.0), [0..2, 2..3, 3..4, 4..5]);
+        assert_eq!(broken(&[3.0], 6.0), [0..1]);
+        assert_eq!(broken(&[], 6.0), [0..0]);
     }
 
     #[test]

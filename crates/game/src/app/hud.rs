@@ -51,8 +51,9 @@ const TERMS: [Color32; 8] = [
 const FULL: [f32; 2] = [1000.0, 600.0];
 /// Smallest scale at which they can be read.
 const SMALLEST: f32 = 0.66;
-/// Width below which the line of keys, and height below which the reward's bars are left out, points.
-const ROOM: [f32; 2] = [640.0, 320.0];
+/// Width below which the line of keys, and width and height below which the reward's bars are left out: they would cover the figure,
+/// points.
+const ROOM: [f32; 3] = [640.0, 900.0, 320.0];
 /// Height of the reward's bars with what is below them, and of each, points.
 const REWARDS: [f32; 2] = [120.0, 20.0];
 /// Distance of the reward's bars from the lower edge, and of those above a time line, points.
@@ -299,7 +300,10 @@ pub fn draw(
         let free = room.y - lift - above.map_or(0.0, |card| card.bottom());
         // on a course one looks at what comes
         let fits = |terms: usize| {
-            show.mode != Mode::Course && room.y > ROOM[1] && free > REWARDS[0] + REWARDS[1] * terms as f32
+            show.mode != Mode::Course
+                && room.x > ROOM[1]
+                && room.y > ROOM[2]
+                && free > REWARDS[0] + REWARDS[1] * terms as f32
         };
         if let Some(spec) = anatomy.spec.as_ref().filter(|spec| fits(spec.reward_terms.len())) {
             rewards(&ctx, &monitor, &spec.reward_terms, episode, lift);

@@ -211,7 +211,7 @@ impl Default for Bindings {
 #[derive(Resource, Default)]
 pub struct Rebinding(pub Option<Deed>);
 
-/// What keys and buttons ask for; what loses something is [asked about](crate::app::ask) first.
+/// What keys and buttons ask for. It becomes a [`Do`], with a [`Question`] before it if something would be lost.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pressed(pub Deed);
 

@@ -77,8 +77,12 @@ pub fn draw(
         menu.runs = runs(&choice.agent);
     }
     let Menu { runs, .. } = &mut *menu;
-    let Picked { start, quit, open } = window(&ctx, &mut choice, runs, (&mut bindings, &mut rebinding), None);
+    let Picked { start, quit, reset, open } = window(&ctx, &mut choice, runs, (&bindings, &mut *rebinding), None);
     let mut start = start;
+    if reset {
+        *bindings = Bindings::default();
+        keep(&bindings);
+    }
     if quit {
         match stakes.at_the_end() {
             Some(text) => question.0 = Some((Asked::Deed(Deed::Quit), text)),
@@ -107,6 +111,8 @@ pub fn draw(
 struct Picked {
     start: bool,
     quit: bool,
+    /// All keys are to be as they come.
+    reset: bool,
     open: bool,
 }
 
@@ -115,10 +121,10 @@ fn window(
     ctx: &egui::Context,
     choice: &mut Show,
     of_runs: &mut Vec<(PathBuf, String)>,
-    (bindings, rebinding): (&mut ResMut<'_, Bindings>, &mut Rebinding),
+    (bindings, rebinding): (&Bindings, &mut Rebinding),
     unfold: Option<bool>,
 ) -> Picked {
-    let mut picked = Picked { start: false, quit: false, open: true };
+    let mut picked = Picked { start: false, quit: false, reset: false, open: true };
     let room = ctx.content_rect().size() - egui::Vec2::splat(MARGIN);
     egui::Window::new(TITLE)
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
@@ -143,7 +149,9 @@ fn window(
                 picked.quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
             });
             ui.add_space(6.0);
-            egui::CollapsingHeader::new("Keys").open(unfold).show(ui, |ui| keys(ui, bindings, rebinding));
+            egui::CollapsingHeader::new("Keys").open(unfold).show(ui, |ui| {
+                picked.reset = keys(ui, bindings, rebinding);
+            });
         });
     picked
 }
@@ -240,7 +248,8 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
     });
 }
 
-fn keys(ui: &mut Ui, bindings: &mut ResMut<Bindings>, rebinding: &mut Rebinding) {
+/// The keys, to be changed by a click. Returns whether all are to be as they come.
+fn keys(ui: &mut Ui, bindings: &Bindings, rebinding: &mut Rebinding) -> bool {
     // in two halves side by side, so that all of them fit a window
     let rows: Vec<_> = bindings.rows().collect();
     let half = rows.len().div_ceil(2);
@@ -258,15 +267,15 @@ fn keys(ui: &mut Ui, bindings: &mut ResMut<Bindings>, rebinding: &mut Rebinding)
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("all keys as they come").clicked() {
-            **bindings = Bindings::default();
+        let reset = ui.button("all keys as they come").clicked();
+        if reset {
             rebinding.0 = None;
-            keep(bindings);
-        }
-        if rebinding.0.is_some() {
+        } else if rebinding.0.is_some() {
             ui.label(RichText::new("Esc leaves it as it is").weak());
         }
-    });
+        reset
+    })
+    .inner
 }
 
 /// Sliders of the push mode.
@@ -378,16 +387,13 @@ mod tests {
         let show = Show::of(&Args::parse_from(["marathon-game"]))?;
         let mut places = Vec::new();
         for mode in [Mode::Watch, Mode::Imitate, Mode::Course, Mode::Testbed] {
-            let mut world = World::new();
-            world.init_resource::<Bindings>();
             let (ctx, mut choice) = (egui::Context::default(), Show { mode, ..show.clone() });
             // sizes settle in some frames
             for _ in 0..6 {
                 let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
                 ctx.begin_pass(egui::RawInput { screen_rect: Some(screen), ..Default::default() });
-                let mut bindings = world.resource_mut::<Bindings>().into();
-                let mut runs = Vec::new();
-                window(&ctx, &mut choice, &mut runs, (&mut bindings, &mut Rebinding::default()), Some(true));
+                let keys = (&Bindings::default(), &mut Rebinding::default());
+                window(&ctx, &mut choice, &mut Vec::new(), keys, Some(true));
                 let _ = ctx.end_pass();
             }
             let place = ctx.memory(|memory| memory.area_rect(Id::new(TITLE))).ok_or("the menu is drawn")?;

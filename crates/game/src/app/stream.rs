@@ -9,15 +9,17 @@ use crate::app::error::GameError;
 use crate::app::feed::{Feed, Shared, Sight, board};
 use crate::app::puppets::Kind;
 use marathon_envs::registry;
-use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
+use marathon_physics::{Model, budget};
 use serde_json::Value;
 use std::io::{BufRead, Read, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest first line, bytes: a large model.
-const LONGEST_LINE: u64 = 64 << 20;
+/// Longest time between two frames, s.
+const LONGEST_FRAME: f64 = 10.0;
+/// Largest coordinate that is shown, m or rad.
+const FARTHEST: f64 = 1e9;
 
 /// Reads the first line, and the frames on a thread of their own.
 ///
@@ -26,7 +28,10 @@ const LONGEST_LINE: u64 = 64 << 20;
 pub fn watch(mut input: impl BufRead + Send + 'static, output: impl Write + Send + 'static) -> Result<Feed, GameError> {
     let bad = |problem: String| GameError::Stream(problem);
     let mut line = String::new();
-    input.by_ref().take(LONGEST_LINE).read_line(&mut line).map_err(|e| bad(e.to_string()))?;
+    // it may have a whole model in it
+    let most = budget::MODEL_FILE.most().map_err(|e| bad(e.to_string()))?;
+    input.by_ref().take(most.saturating_add(1)).read_line(&mut line).map_err(|e| bad(e.to_string()))?;
+    budget::MODEL_FILE.check(line.len() as f64).map_err(|e| bad(format!("its first line {e}")))?;
     let about: Value = serde_json::from_str(&line).map_err(|e| bad(format!("its first line is no JSON ({e})")))?;
     let kind = match about["agent"].as_str() {
         Some(name) => {
@@ -39,8 +44,10 @@ pub fn watch(mut input: impl BufRead + Send + 'static, output: impl Write + Send
                 (None, Some(path)) => Model::from_xml_file(path),
                 (None, None) => return Err(bad("its first line has none of 'agent', 'model', 'file'".into())),
             };
-            let dt = about["dt"].as_f64().filter(|dt| *dt > 0.0 && dt.is_finite());
-            let dt = dt.ok_or_else(|| bad("'dt' is missing, expected the seconds between two frames".into()))?;
+            let dt = about["dt"].as_f64().filter(|dt| *dt > 0.0 && *dt <= LONGEST_FRAME);
+            let expected =
+                || format!("'dt' is {}, expected seconds between two frames, up to {LONGEST_FRAME}", about["dt"]);
+            let dt = dt.ok_or_else(|| bad(expected()))?;
             Kind::new(Arc::new(model.map_err(Box::new)?), None, dt)
         }
     };
@@ -78,7 +85,9 @@ fn frames(
         if begins > 0.5 {
             *episode = crate::ragdoll::Episode { number: episode.number + 1, ..Default::default() };
         } else {
-            let moved = numbers[2] - sight.qpos.first().copied().unwrap_or(numbers[2]);
+            // a model that cannot move has no coordinates
+            let now = numbers.get(2).copied().unwrap_or_default();
+            let moved = now - sight.qpos.first().copied().unwrap_or(now);
             episode.decisions += 1;
             episode.seconds = episode.decisions as f64 * dt;
             episode.reward = reward as f32;
@@ -88,7 +97,7 @@ fn frames(
         }
         sight.qpos.clear();
         sight.qpos.extend_from_slice(&numbers[2..]);
-        if sight.qpos.iter().all(|x| x.is_finite()) {
+        if sight.qpos.iter().all(|x| x.abs() <= FARTHEST) {
             board(shared).sights = vec![sight.clone()];
         }
         next += Duration::from_secs_f64(dt);
@@ -145,7 +154,8 @@ mod tests {
             ("", "no JSON"),
             ("{}", "none of 'agent', 'model', 'file'"),
             ("{\"agent\": \"hoper\"}", "did you mean"),
-            ("{\"model\": \"<mujoco/>\"}", "'dt' is missing"),
+            ("{\"model\": \"<mujoco/>\"}", "'dt' is null, expected seconds"),
+            ("{\"model\": \"<mujoco/>\", \"dt\": 1e300}", "expected seconds between two frames, up to 10"),
             ("{\"model\": \"<mujocco/>\", \"dt\": 0.1}", "mujoc"),
         ] {
             let error = watch(Cursor::new(line.to_string()), std::io::sink()).map(|_| ()).expect_err(line).to_string();
