@@ -15,9 +15,10 @@ SHAPES = ["Plane", "Hfield", "Sphere", "Capsule", "Ellipsoid", "Cylinder", "Box"
 MODES = ["Fixed", "Track", "TrackCom", "TargetBody", "TargetBodyCom"]
 INTEGRATORS = {0: "Euler", 1: "Rk4", 2: "Implicit", 3: "ImplicitFast"}
 CONES = ["Pyramidal", "Elliptic"]
+SOLVERS = ["Pgs", "Cg", "Newton"]
 FLAGS = [
     "constraint", "equality", "limit", "contact", "frictionloss", "spring", "damper", "gravity", "clampctrl", "warmstart",
-    "actuation", "refsafe", "eulerdamp", "filterparent",
+    "actuation", "refsafe", "eulerdamp", "filterparent", "island",
 ]
 SENSORS = {
     "TOUCH": "Touch", "ACCELEROMETER": "Accelerometer", "VELOCIMETER": "Velocimeter", "GYRO": "Gyro",
@@ -75,7 +76,8 @@ def options(m):
     return {
         "timestep": o.timestep, "gravity": o.gravity, "integrator": INTEGRATORS[int(o.integrator)],
         "cone": CONES[int(o.cone)], "impratio": o.impratio, "iterations": o.iterations,
-        "ls_iterations": o.ls_iterations, "tolerance": o.tolerance, "flags": {f: not disabled[f] for f in FLAGS},
+        "ls_iterations": o.ls_iterations, "tolerance": o.tolerance, "ls_tolerance": o.ls_tolerance,
+        "solver": SOLVERS[int(o.solver)], "flags": {f: not disabled[f] for f in FLAGS},
         "density": o.density, "viscosity": o.viscosity, "wind": o.wind, "magnetic": o.magnetic,
         "contact_override": {
             "margin": o.o_margin, "solref": o.o_solref, "solimp": o.o_solimp, "friction": o.o_friction,

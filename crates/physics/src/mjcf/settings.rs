@@ -4,7 +4,7 @@ use super::document::Element;
 use super::error::MjcfError;
 use super::joint::{SOLIMP, SOLREF};
 use super::value::{Attrs, Tristate};
-use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Vec3};
+use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Solver, Vec3};
 
 /// One of the three Euler rotations.
 #[derive(Clone, Copy, Debug)]
@@ -136,6 +136,8 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
         iterations: 100,
         ls_iterations: 50,
         tolerance: 1e-8,
+        ls_tolerance: 0.01,
+        solver: Solver::Newton,
         contact_override: None,
         flags: Flags {
             constraint: true,
@@ -152,6 +154,7 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
             refsafe: true,
             eulerdamp: true,
             filterparent: true,
+            island: true,
         },
     };
     // the parameters of the override are read whether it is on or not
@@ -192,6 +195,7 @@ fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> 
         return Err(element.bad_value(attr, "a number greater than zero"));
     }
     opt.tolerance = at_least_zero("tolerance", attrs.number_or("tolerance", opt.tolerance)?)?;
+    opt.ls_tolerance = at_least_zero("ls_tolerance", attrs.number_or("ls_tolerance", opt.ls_tolerance)?)?;
     for (name, value) in [("iterations", &mut opt.iterations), ("ls_iterations", &mut opt.ls_iterations)] {
         if let Some(attr) = element.attr(name) {
             let given = attrs.integer_or(name, 0)?;
@@ -215,8 +219,8 @@ fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> 
     }
     let cones = [("pyramidal", Cone::Pyramidal), ("elliptic", Cone::Elliptic)];
     opt.cone = attrs.keyword("cone", &cones)?.unwrap_or(opt.cone);
-    // every solver finds the same forces; only the spelling is checked
-    attrs.keyword("solver", &[("PGS", ()), ("CG", ()), ("Newton", ())])?;
+    let solvers = [("PGS", Solver::Pgs), ("CG", Solver::Cg), ("Newton", Solver::Newton)];
+    opt.solver = attrs.keyword("solver", &solvers)?.unwrap_or(opt.solver);
     attrs.keyword("jacobian", &[("dense", ()), ("sparse", ()), ("auto", ())])?;
     Ok(())
 }
@@ -241,6 +245,7 @@ fn flags(element: &Element, flags: &mut Flags) -> Result<Option<bool>, MjcfError
             "refsafe" => Some(&mut flags.refsafe),
             "eulerdamp" => Some(&mut flags.eulerdamp),
             "filterparent" => Some(&mut flags.filterparent),
+            "island" => Some(&mut flags.island),
             _ => None,
         };
         let value = attrs.keyword(&attr.name, &[("disable", false), ("enable", true)])?;

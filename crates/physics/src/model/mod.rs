@@ -105,10 +105,27 @@ pub struct Options {
     pub ls_iterations: usize,
     /// Solver tolerance: scaled cost improvement at which a lane counts as converged.
     pub tolerance: f64,
+    /// Tolerance of the line search, as a fraction of the solver's.
+    pub ls_tolerance: f64,
+    /// Solver that the file names.
+    pub solver: Solver,
     /// Parameters that replace those of every contact (`<flag override="enable"/>`), if any.
     pub contact_override: Option<ContactOverride>,
     /// `<flag>` switches that this engine honours.
     pub flags: Flags,
+}
+
+/// Algorithm of the constraint solver, as the file names it. All of them find the same minimum; they differ where a low cap
+/// ends them before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Solver {
+    /// Projected Gauss-Seidel.
+    Pgs,
+    /// Conjugate gradients.
+    Cg,
+    /// Newton's method.
+    #[default]
+    Newton,
 }
 
 /// Parameters that all contacts share when `<flag override="enable"/>` (MuJoCo `o_margin`, `o_solref`...).
@@ -155,6 +172,8 @@ pub struct Flags {
     pub eulerdamp: bool,
     /// Parents and children are excluded from colliding with each other.
     pub filterparent: bool,
+    /// Trees that no constraint ties together are solved on their own.
+    pub island: bool,
 }
 
 /// How the state is advanced in time.

@@ -157,12 +157,12 @@ impl<T: Real> Block<T> {
 
     /// Edges of the pyramid at `u`: pairs for each tangent.
     #[inline(always)]
-    fn edge(&self, u: &RowValues<T>, e: usize) -> T {
+    pub(super) fn edge(&self, u: &RowValues<T>, e: usize) -> T {
         let j = e / 2;
         if e.is_multiple_of(2) { self.mu[j].mul_add(u[j + 1], u[0]) } else { self.mu[j].neg_mul_add(u[j + 1], u[0]) }
     }
 
-    fn edges(&self) -> usize {
+    pub(super) fn edges(&self) -> usize {
         2 * (self.dim - 1)
     }
 

@@ -9,8 +9,9 @@ pub(super) struct ConePoint<T: Real> {
     pub bottom: T::Mask,
     /// It slides.
     pub middle: T::Mask,
-    /// Scaled normal value, `excess = normal - slope * sliding`, inverse of the sliding speed.
+    /// Scaled normal value, sliding speed, `excess = normal - slope * sliding`, inverse of the sliding speed.
     pub normal: T,
+    pub sliding: T,
     pub excess: T,
     pub inv_sliding: T,
     /// Stiffness of the curved part.
@@ -39,6 +40,7 @@ impl<T: Real> ConePoint<T> {
             bottom: T::and(inside, full),
             middle: T::and(inside, T::not(full)),
             normal,
+            sliding,
             excess,
             inv_sliding: one.div(sliding.max(T::lit(1e-30))),
             weight: block.d[0].div(safe),

@@ -6,6 +6,7 @@
 mod block;
 mod blocks;
 mod cone;
+mod cost;
 mod floor;
 mod jacobian;
 mod joint;
@@ -13,6 +14,7 @@ mod row;
 
 pub(crate) use block::{Block, RowValues, Source, at};
 pub(crate) use blocks::ConstraintRows;
+pub(crate) use cost::RowCost;
 pub(crate) use floor::FloorRow;
 pub(crate) use jacobian::{Jacobian, Side};
 pub(crate) use joint::{DryRow, LimitRow};

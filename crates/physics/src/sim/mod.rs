@@ -7,6 +7,7 @@
 
 mod actuator;
 mod broad;
+mod caps;
 mod contact_params;
 mod contacts;
 mod equality;
@@ -24,6 +25,7 @@ mod weld;
 
 pub(crate) use actuator::{Activation, ActuatorSpec, TransmissionSpec};
 pub(crate) use broad::Broad;
+pub(crate) use caps::Caps;
 pub(crate) use contacts::Contacts;
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};
@@ -83,6 +85,8 @@ pub struct Sim<T: Real> {
     /// Contacts have elliptic cones.
     pub(crate) elliptic: bool,
     pub(crate) warmstart: bool,
+    /// The solver's settings in models whose cap ends it before it has converged.
+    pub(crate) capped: Option<Caps>,
     pub(crate) max_newton: usize,
     /// Rows between moving bodies beyond which an agent is factorized on its own.
     pub(crate) most_rows: usize,
@@ -144,6 +148,7 @@ impl<T: Real> Sim<T> {
             planar: link::is_planar(model, &links),
             elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
+            capped: Caps::new(model, &options),
             max_newton: options.max_newton.unwrap_or(model.opt.iterations),
             most_rows: options.most_coupled_rows.unwrap_or(MOST_COUPLED_ROWS),
             max_line_search: model.opt.ls_iterations,

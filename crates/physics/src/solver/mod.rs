@@ -18,11 +18,16 @@
 //! the exact minimum. The others search along the segment for the point where that sum vanishes. Lanes never wait for
 //! each other's decisions: a lane that is done is frozen. On the curved side of an elliptic cone no point is exact; there
 //! a lane is done when the predicted improvement falls below MuJoCo's tolerance, or below rounding.
+//!
+//! All this is for models whose solver converges. Where the model's cap ends the iteration before that, the result depends
+//! on the way, and the way is MuJoCo's ([`capped`]).
 
 mod blocks;
+mod capped;
 mod coupled;
 mod crowd;
 mod newton;
 mod search;
 
+pub(crate) use capped::solve as solve_capped;
 pub(crate) use newton::{apply_forces, solve};

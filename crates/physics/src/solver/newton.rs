@@ -19,36 +19,13 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
         && work.rows.blocks.is_empty();
     let any_coupled = blocks::any_coupled(work);
     work.solver.crowded = if any_coupled { crowd::start(sim, work) } else { T::none() };
-    // lanes whose tree is corrected for its coupled blocks, and those beside them
-    let (crowd, trees) = (T::any(work.solver.crowded), !T::all(work.solver.crowded));
-    let coupled = any_coupled && trees;
     let mut done = T::none();
     // lanes that stopped at a Newton point of their own active set
     let mut arrived = T::none();
     let mut iteration = 0;
     loop {
         assemble::<T, S>(sim, work);
-        if crowd {
-            crowd::factorize(sim, work, T::and(work.solver.crowded, T::not(done)));
-        }
-        if coupled {
-            // links that are not stale keep their inward pass, without the correction of the last iteration
-            let fresh = work.solver.stale.contains(&true);
-            work.solver.drive.copy_from_slice(&work.solver.tree_drive);
-            factorize::<T, S>(sim, work, true);
-            work.solver.tree_drive.copy_from_slice(&work.solver.drive);
-            coupled::factorize(sim, work, fresh);
-            coupled::correct(sim, work, true);
-        } else if trees {
-            factorize::<T, S>(sim, work, true);
-        }
-        work.solver.stale.fill(false);
-        if trees {
-            accelerate::<T, S>(sim, work);
-        }
-        if crowd {
-            crowd::solve(sim, work, T::and(work.solver.crowded, T::not(done)), false);
-        }
+        solve_system::<T, S>(sim, work, T::not(done), any_coupled);
         iteration += 1;
         if free {
             work.solver.qacc.copy_from_slice(&work.solver.solution);
@@ -80,13 +57,42 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
         }
     }
     true_forces(work);
-    refine::<T, S>(sim, work, arrived, coupled);
+    refine::<T, S>(sim, work, arrived, any_coupled && !T::all(work.solver.crowded));
     report_forces(sim, work);
     work.stats.solves += 1;
     work.stats.newton += iteration as u64;
     work.stats.max_newton = work.stats.max_newton.max(iteration as u64);
     if !free {
         work.stats.unconverged += T::bits(T::not(done)).count_ones() as u64;
+    }
+}
+
+/// Solves the present system: the Newton point, into `solution` and `link_acc`. Of agents in crowds, only those in `live`
+/// matter.
+#[inline(always)]
+pub(super) fn solve_system<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, live: T::Mask, any_coupled: bool) {
+    // lanes whose tree is corrected for its coupled blocks, and those beside them
+    let (crowd, trees) = (T::any(work.solver.crowded), !T::all(work.solver.crowded));
+    if crowd {
+        crowd::factorize(sim, work, T::and(work.solver.crowded, live));
+    }
+    if any_coupled && trees {
+        // links that are not stale keep their inward pass, without the correction of the last iteration
+        let fresh = work.solver.stale.contains(&true);
+        work.solver.drive.copy_from_slice(&work.solver.tree_drive);
+        factorize::<T, S>(sim, work, true);
+        work.solver.tree_drive.copy_from_slice(&work.solver.drive);
+        coupled::factorize(sim, work, fresh);
+        coupled::correct(sim, work, true);
+    } else if trees {
+        factorize::<T, S>(sim, work, true);
+    }
+    work.solver.stale.fill(false);
+    if trees {
+        accelerate::<T, S>(sim, work);
+    }
+    if crowd {
+        crowd::solve(sim, work, T::and(work.solver.crowded, live), false);
     }
 }
 
@@ -143,7 +149,7 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
 
 /// Stiffness and right-hand side of the present active set, for the links where it changed.
 #[inline(always)]
-fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
     for (l, link) in sim.links.iter().enumerate() {
         if !work.solver.stale[l] {
@@ -189,7 +195,7 @@ fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 
 /// Row values at the Newton point; lanes whose active set differs there from the one that was solved with.
 #[inline(always)]
-fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
+pub(super) fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     let mut changed = T::none();
     for c in work.rows.contacts.iter_mut() {
         changed = T::or(changed, c.newton_point(&work.solver.link_acc[c.link]));
@@ -319,7 +325,7 @@ pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
 
 /// Normal forces for the readings.
 #[inline(always)]
-fn report_forces<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
+pub(super) fn report_forces<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     work.contacts.normal_force.fill(T::zero());
     for c in &work.rows.contacts {
         work.contacts.normal_force[c.geom] += c.force[0];

@@ -6,7 +6,7 @@ use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
 use crate::dynamics::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
-use crate::solver::solve;
+use crate::solver::{solve, solve_capped};
 use crate::state::{Group, Work};
 
 /// Frames, axes, inertias.
@@ -77,6 +77,19 @@ kernel_fn! {
     }
 }
 
+kernel_fn! {
+    /// The same by MuJoCo's own iteration, for models whose cap ends it early.
+    fn capped_fwd_constraint<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve_capped::<T, Full>(sim, group, work);
+    }
+}
+kernel_fn! {
+    /// The same for a planar model.
+    fn planar_capped_fwd_constraint<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        solve_capped::<T, Planar>(sim, group, work);
+    }
+}
+
 /// A part of [`Sim::forward`]; public for the benchmark of the stages alone.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
@@ -138,10 +151,11 @@ impl<T: Real> Sim<T> {
     }
 
     fn fwd_constraint(&self, work: &mut Work<T>, group: &Group<T>) {
-        if self.planar {
-            planar_fwd_constraint(self, group, work);
-        } else {
-            fwd_constraint(self, group, work);
+        match (self.planar, self.capped.is_some()) {
+            (false, false) => fwd_constraint(self, group, work),
+            (true, false) => planar_fwd_constraint(self, group, work),
+            (false, true) => capped_fwd_constraint(self, group, work),
+            (true, true) => planar_capped_fwd_constraint(self, group, work),
         }
     }
 

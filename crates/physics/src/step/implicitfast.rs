@@ -52,7 +52,8 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     work.solver.stale.fill(true);
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
-    if sim.hard {
+    // where the solver has not converged, the forces are not what the accelerations need
+    if sim.hard && sim.capped.is_none() {
         damp::<T, S>(sim, work);
     }
     if sim.implicit_fast {

@@ -1,5 +1,6 @@
 //! Scratch memory of a step.
 
+mod capped;
 mod contacts;
 mod forces;
 mod motion;
@@ -7,6 +8,7 @@ mod readings;
 mod rk4;
 mod solver;
 
+pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;

@@ -4,6 +4,7 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::multifrontal::Crowd;
 use crate::sim::Sim;
+use crate::state::Capped;
 use crate::state::coupling::Coupling;
 
 /// Memory of the constraint solver and of the recursion that it runs.
@@ -40,6 +41,7 @@ pub(crate) struct Solver<T: Real> {
     /// Forces that links need, for `bring_inward`: a residual.
     pub link_force: Vec<V6<T>>,
     pub coupling: Coupling<T>,
+    pub capped: Capped<T>,
     /// Per lane, once one has had a crowd: its factorization.
     pub crowds: Vec<Crowd<T::Scalar>>,
     /// Lanes that are solved by it in the present step.
@@ -69,6 +71,7 @@ impl<T: Real> Solver<T> {
             root_factor: vec![[[z; 6]; 6]; sim.trees],
             link_force: vec![[z; 6]; nl],
             coupling: Coupling::new(nl, nv),
+            capped: Capped::new(sim),
             crowds: Vec::new(),
             crowded: T::none(),
         }

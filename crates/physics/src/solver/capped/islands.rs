@@ -1,0 +1,113 @@
+//! Islands: trees that constraints tie together. MuJoCo solves each for itself, so each has its own line search and stops
+//! when it has converged.
+
+use crate::lanes::{Real, kernel_fn};
+use crate::rows::Jacobian;
+use crate::sim::Sim;
+use crate::state::{Capped, Work};
+
+kernel_fn! {
+    /// Finds the islands of every lane, and the trees that rows belong to.
+    pub(super) fn find<'a, T>(sim: &'a Sim<T>, work: &'a Work<T>, c: &'a mut Capped<T>) {
+        let tree_of_dof = |d: usize| sim.links[sim.dof_link[d]].tree;
+        let alone = sim.capped.as_ref().is_some_and(|x| x.islands);
+        for (i, root) in c.island.iter_mut().enumerate() {
+            *root = if alone { i / T::LANES } else { 0 };
+        }
+        c.constrained.fill(0);
+        for row in &work.rows.contacts {
+            c.constrained[sim.links[row.link].tree] |= T::bits(row.on);
+        }
+        for row in &work.rows.limits {
+            c.constrained[tree_of_dof(row.dof)] |= T::bits(row.on);
+        }
+        for row in &work.rows.dry {
+            c.constrained[tree_of_dof(row.dof)] |= T::bits(T::not(T::none()));
+        }
+        c.homes.clear();
+        c.first_home.clear();
+        for b in work.rows.blocks.iter() {
+            c.first_home.push(c.homes.len());
+            let on = T::bits(b.on);
+            match &b.jacobian {
+                Jacobian::Points { sides, .. } => {
+                    for (link, lanes) in &sides[1].links {
+                        let (tree, bits) = (sim.links[*link].tree, T::bits(*lanes) & on);
+                        c.homes.push((tree, *lanes));
+                        c.constrained[tree] |= bits;
+                        for (other, others) in &sides[0].links {
+                            unite::<T>(&mut c.island, sim.links[*other].tree, tree, bits & T::bits(*others));
+                            c.constrained[sim.links[*other].tree] |= bits & T::bits(*others);
+                        }
+                    }
+                }
+                Jacobian::Joints(terms) => {
+                    for (i, (dof, _)) in terms.iter().enumerate() {
+                        let tree = tree_of_dof(*dof);
+                        c.constrained[tree] |= on;
+                        if i == 0 {
+                            c.homes.push((tree, T::not(T::none())));
+                        } else {
+                            unite::<T>(&mut c.island, tree_of_dof(terms[0].0), tree, on);
+                        }
+                    }
+                }
+            }
+        }
+        c.first_home.push(c.homes.len());
+        for i in 0..c.island.len() {
+            // earlier trees have their roots already
+            c.island[i] = c.island[c.island[i] * T::LANES + i % T::LANES];
+        }
+        if !alone {
+            let all = c.constrained.iter().fold(0, |a, b| a | b);
+            c.constrained.fill(all);
+        }
+        c.live.copy_from_slice(&c.constrained);
+    }
+}
+
+/// Makes one island of those of two trees, in some lanes.
+fn unite<T: Real>(island: &mut [usize], a: usize, b: usize, lanes: u32) {
+    for lane in (0..T::LANES).filter(|lane| lanes >> lane & 1 == 1) {
+        let root = |mut tree: usize| {
+            while island[tree * T::LANES + lane] != tree {
+                tree = island[tree * T::LANES + lane];
+            }
+            tree
+        };
+        let (a, b) = (root(a), root(b));
+        island[a.max(b) * T::LANES + lane] = a.min(b);
+    }
+}
+
+/// Adds the sums of trees to those of their islands' first trees.
+pub(super) fn gather<T: Real>(island: &[usize], sums: &mut [[T; 3]]) {
+    for tree in 1..sums.len() {
+        for lane in 0..T::LANES {
+            let root = island[tree * T::LANES + lane];
+            if root != tree {
+                for k in 0..3 {
+                    let x = T::widen(sums[root][k].get(lane)) + T::widen(sums[tree][k].get(lane));
+                    sums[root][k].set(lane, T::scalar(x));
+                }
+            }
+        }
+    }
+}
+
+impl<T: Real> Capped<T> {
+    /// Trees and lanes that are the first of an island that still moves.
+    pub(super) fn leads(&self, tree: usize, lane: usize) -> bool {
+        self.live[tree] >> lane & 1 == 1 && self.island[tree * T::LANES + lane] == tree
+    }
+
+    /// The island that a tree leads stays where it is from now on.
+    pub(super) fn stop(&mut self, tree: usize, lane: usize) {
+        for other in tree..self.live.len() {
+            if self.island[other * T::LANES + lane] == tree {
+                self.live[other] &= !(1 << lane);
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Memory of the solver for models whose cap ends the iteration before it has converged.
+
+use crate::algebra::spatial::*;
+use crate::lanes::Real;
+use crate::sim::Sim;
+
+/// Memory of the solver for models whose cap ends the iteration before it has converged.
+#[derive(Clone, Debug)]
+pub(crate) struct Capped<T: Real> {
+    /// Acceleration without constraints, and the links' accelerations then.
+    pub smooth: Vec<T>,
+    pub smooth_acc: Vec<V6<T>>,
+    /// Accelerations of the links at the present point, and on the way from there to the Newton point.
+    pub here: Vec<V6<T>>,
+    pub way: Vec<V6<T>>,
+    /// The way itself.
+    pub direction: Vec<T>,
+    /// Derivative of the cost by the accelerations.
+    pub gradient: Vec<T>,
+    /// Inertia of each link with all that it carries.
+    pub composite: Vec<Inertia<T>>,
+    /// By tree: fraction of the way; derivatives of the cost of moving the masses.
+    pub alpha: Vec<T>,
+    pub masses: Vec<[T; 2]>,
+    /// By tree: sums over its degrees of freedom or rows, or over those of its island at the island's first tree.
+    pub sums: Vec<[T; 3]>,
+    /// By tree and lane: the first tree of its island.
+    pub island: Vec<usize>,
+    /// By tree: lanes where a constraint acts on it, and lanes where it still moves, as bits.
+    pub constrained: Vec<u32>,
+    pub live: Vec<u32>,
+    /// Trees whose islands the blocks belong to, with their lanes; where each block's begin.
+    pub homes: Vec<(usize, T::Mask)>,
+    pub first_home: Vec<usize>,
+    /// By tree and lane, at an island's first tree: 1 / (the sum of its diagonal of the mass matrix), and the last
+    /// improvement of the cost.
+    pub scale: Vec<f64>,
+    pub improvement: Vec<f64>,
+}
+
+impl<T: Real> Default for Capped<T> {
+    fn default() -> Self {
+        Capped {
+            smooth: Vec::new(),
+            smooth_acc: Vec::new(),
+            here: Vec::new(),
+            way: Vec::new(),
+            direction: Vec::new(),
+            gradient: Vec::new(),
+            composite: Vec::new(),
+            alpha: Vec::new(),
+            masses: Vec::new(),
+            sums: Vec::new(),
+            island: Vec::new(),
+            constrained: Vec::new(),
+            live: Vec::new(),
+            homes: Vec::new(),
+            first_home: Vec::new(),
+            scale: Vec::new(),
+            improvement: Vec::new(),
+        }
+    }
+}
+
+impl<T: Real> Capped<T> {
+    /// Memory for a model; none if its solver is not of this kind.
+    pub fn new(sim: &Sim<T>) -> Self {
+        if sim.capped.is_none() {
+            return Capped::default();
+        }
+        let z = T::zero();
+        let (nl, nv, trees) = (sim.links.len(), sim.model.nv, sim.trees);
+        Capped {
+            smooth: vec![z; nv],
+            smooth_acc: vec![[z; 6]; nl],
+            here: vec![[z; 6]; nl],
+            way: vec![[z; 6]; nl],
+            direction: vec![z; nv],
+            gradient: vec![z; nv],
+            composite: vec![[z; 10]; nl],
+            alpha: vec![z; trees],
+            masses: vec![[z; 2]; trees],
+            sums: vec![[z; 3]; trees],
+            island: vec![0; trees * T::LANES],
+            constrained: vec![0; trees],
+            live: vec![0; trees],
+            homes: Vec::new(),
+            first_home: Vec::new(),
+            scale: vec![0.0; trees * T::LANES],
+            improvement: vec![0.0; trees * T::LANES],
+        }
+    }
+}
