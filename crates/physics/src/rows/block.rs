@@ -351,10 +351,21 @@ impl<T: Real> Row<T> for Block<T> {
 
     #[inline(always)]
     fn slope(&self, alpha: T) -> [T; 2] {
-        let z = T::zero();
-        let (mut u, mut du) = ([z; 6], [z; 6]);
+        let mut du = [T::zero(); 6];
         for k in 0..self.dim {
             du[k] = self.next[k] - self.u[k];
+        }
+        self.slope_along(&du, alpha)
+    }
+}
+
+impl<T: Real> Block<T> {
+    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    #[inline(always)]
+    pub(super) fn slope_along(&self, du: &RowValues<T>, alpha: T) -> [T; 2] {
+        let z = T::zero();
+        let mut u = [z; 6];
+        for k in 0..self.dim {
             u[k] = du[k].mul_add(alpha, self.u[k]);
         }
         match self.cost {
@@ -379,14 +390,14 @@ impl<T: Real> Row<T> for Block<T> {
             Cost::Pyramid => {
                 let (mut s1, mut s2) = (z, z);
                 for e in 0..self.edges() {
-                    let (x, dx) = (self.edge(&u, e), self.edge(&du, e));
+                    let (x, dx) = (self.edge(&u, e), self.edge(du, e));
                     let pushing = T::masked(x.lt(z), dx);
                     s1 = pushing.mul_add(x, s1);
                     s2 = pushing.mul_add(dx, s2);
                 }
                 [self.d[0] * s1, self.d[0] * s2]
             }
-            Cost::Elliptic => self.elliptic_slope(&u, &du),
+            Cost::Elliptic => self.elliptic_slope(&u, du),
         }
     }
 }

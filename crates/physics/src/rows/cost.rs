@@ -8,12 +8,13 @@ use super::joint::{DryRow, LimitRow};
 use crate::lanes::Real;
 use crate::sim::Cost;
 
-/// The cost of a constraint.
+/// The cost of a constraint, at the present point and along a way from there, which is kept in the place of the Newton
+/// point: the difference of two points would lose the digits of a short way.
 pub(crate) trait RowCost<T: Real> {
     /// Cost at the present point.
     fn cost(&self) -> T;
-    /// Cost at a fraction of the way to the Newton point, minus that of the present point.
-    fn rise(&self, alpha: T) -> T;
+    /// Cost at a fraction of the way less that of the present point, and its first and second derivative there.
+    fn along(&self, alpha: T) -> [T; 3];
 }
 
 /// Twice the cost of a row of unit stiffness that pushes below zero, from `x` on by `by`, minus that at `x`.
@@ -67,18 +68,14 @@ impl<T: Real> RowCost<T> for FloorRow<T> {
     }
 
     #[inline(always)]
-    fn rise(&self, alpha: T) -> T {
-        let du = [
-            (self.next[0] - self.u[0]) * alpha,
-            (self.next[1] - self.u[1]) * alpha,
-            (self.next[2] - self.u[2]) * alpha,
-        ];
-        let (e, de) = (self.edges(&self.u), self.edges(&du));
+    fn along(&self, alpha: T) -> [T; 3] {
+        let (e, de) = (self.edges(&self.u), self.edges(&self.next));
         let mut sum = T::zero();
         for k in 0..4 {
-            sum += push_rise(e[k], de[k]);
+            sum += push_rise(e[k], de[k] * alpha);
         }
-        self.d * sum * T::lit(0.5)
+        let [slope, curvature] = self.slope_along(&self.next, alpha);
+        [self.d * sum * T::lit(0.5), slope, curvature]
     }
 }
 
@@ -89,8 +86,10 @@ impl<T: Real> RowCost<T> for LimitRow<T> {
     }
 
     #[inline(always)]
-    fn rise(&self, alpha: T) -> T {
-        self.d * push_rise(self.u, (self.next - self.u) * alpha) * T::lit(0.5)
+    fn along(&self, alpha: T) -> [T; 3] {
+        let rise = self.d * push_rise(self.u, self.next * alpha) * T::lit(0.5);
+        let [slope, curvature] = self.slope_along(self.next, alpha);
+        [rise, slope, curvature]
     }
 }
 
@@ -101,8 +100,10 @@ impl<T: Real> RowCost<T> for DryRow<T> {
     }
 
     #[inline(always)]
-    fn rise(&self, alpha: T) -> T {
-        dry_rise(self.d, T::splat(self.loss), self.u, (self.next - self.u) * alpha)
+    fn along(&self, alpha: T) -> [T; 3] {
+        let rise = dry_rise(self.d, T::splat(self.loss), self.u, self.next * alpha);
+        let [slope, curvature] = self.slope_along(self.next, alpha);
+        [rise, slope, curvature]
     }
 }
 
@@ -176,24 +177,25 @@ impl<T: Real> RowCost<T> for Block<T> {
     }
 
     #[inline(always)]
-    fn rise(&self, alpha: T) -> T {
-        let mut by = [T::zero(); 6];
+    fn along(&self, alpha: T) -> [T; 3] {
+        let (mut by, half) = ([T::zero(); 6], T::lit(0.5));
         for k in 0..self.dim {
-            by[k] = (self.next[k] - self.u[k]) * alpha;
+            by[k] = self.next[k] * alpha;
         }
-        let twice = match self.cost {
-            Cost::Push => self.d[0] * push_rise(self.u[0], by[0]),
-            Cost::Equal => self.flat_rise(&self.u, &by),
-            Cost::Dry => return T::masked(self.on, dry_rise(self.d[0], self.mu[0], self.u[0], by[0])),
+        let [slope, curvature] = self.slope_along(&self.next, alpha);
+        let rise = match self.cost {
+            Cost::Push => half * self.d[0] * push_rise(self.u[0], by[0]),
+            Cost::Equal => half * self.flat_rise(&self.u, &by),
+            Cost::Dry => T::masked(self.on, dry_rise(self.d[0], self.mu[0], self.u[0], by[0])),
             Cost::Pyramid => {
                 let mut sum = T::zero();
                 for e in 0..self.edges() {
                     sum += push_rise(self.edge(&self.u, e), self.edge(&by, e));
                 }
-                self.d[0] * sum
+                half * self.d[0] * sum
             }
-            Cost::Elliptic => self.cone_rise(&by),
+            Cost::Elliptic => half * self.cone_rise(&by),
         };
-        twice * T::lit(0.5)
+        [rise, slope, curvature]
     }
 }

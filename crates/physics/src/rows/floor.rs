@@ -165,6 +165,22 @@ impl<T: Real> FloorRow<T> {
     }
 }
 
+impl<T: Real> FloorRow<T> {
+    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    #[inline(always)]
+    pub(super) fn slope_along(&self, du: &V3<T>, alpha: T) -> [T; 2] {
+        let u = [du[0].mul_add(alpha, self.u[0]), du[1].mul_add(alpha, self.u[1]), du[2].mul_add(alpha, self.u[2])];
+        let (e, de) = (self.edges(&u), self.edges(du));
+        let (mut s1, mut s2) = (T::zero(), T::zero());
+        for k in 0..4 {
+            let pushing = T::masked(e[k].lt(T::zero()), de[k]);
+            s1 = pushing.mul_add(e[k], s1);
+            s2 = pushing.mul_add(de[k], s2);
+        }
+        [self.d * s1, self.d * s2]
+    }
+}
+
 impl<T: Real> Row<T> for FloorRow<T> {
     #[inline(always)]
     fn ends(&self) -> [T; 3] {
@@ -174,15 +190,6 @@ impl<T: Real> Row<T> for FloorRow<T> {
 
     #[inline(always)]
     fn slope(&self, alpha: T) -> [T; 2] {
-        let du = sub3(&self.next, &self.u);
-        let u = [du[0].mul_add(alpha, self.u[0]), du[1].mul_add(alpha, self.u[1]), du[2].mul_add(alpha, self.u[2])];
-        let (e, de) = (self.edges(&u), self.edges(&du));
-        let (mut s1, mut s2) = (T::zero(), T::zero());
-        for k in 0..4 {
-            let pushing = T::masked(e[k].lt(T::zero()), de[k]);
-            s1 = pushing.mul_add(e[k], s1);
-            s2 = pushing.mul_add(de[k], s2);
-        }
-        [self.d * s1, self.d * s2]
+        self.slope_along(&sub3(&self.next, &self.u), alpha)
     }
 }

@@ -77,6 +77,16 @@ impl<T: Real> LimitRow<T> {
     }
 }
 
+impl<T: Real> LimitRow<T> {
+    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    #[inline(always)]
+    pub(super) fn slope_along(&self, du: T, alpha: T) -> [T; 2] {
+        let u = du.mul_add(alpha, self.u);
+        let pushing = T::masked(u.lt(T::zero()), self.d * du);
+        [pushing * u, pushing * du]
+    }
+}
+
 impl<T: Real> Row<T> for LimitRow<T> {
     #[inline(always)]
     fn ends(&self) -> [T; 3] {
@@ -86,10 +96,7 @@ impl<T: Real> Row<T> for LimitRow<T> {
 
     #[inline(always)]
     fn slope(&self, alpha: T) -> [T; 2] {
-        let du = self.next - self.u;
-        let u = du.mul_add(alpha, self.u);
-        let pushing = T::masked(u.lt(T::zero()), self.d * du);
-        [pushing * u, pushing * du]
+        self.slope_along(self.next - self.u, alpha)
     }
 }
 
@@ -142,6 +149,16 @@ impl<T: Real> DryRow<T> {
     }
 }
 
+impl<T: Real> DryRow<T> {
+    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    #[inline(always)]
+    pub(super) fn slope_along(&self, du: T, alpha: T) -> [T; 2] {
+        let u = du.mul_add(alpha, self.u);
+        let (sticking, _) = self.zone(u);
+        [-(du * self.true_force(u)), T::masked(sticking, self.d * du) * du]
+    }
+}
+
 impl<T: Real> Row<T> for DryRow<T> {
     #[inline(always)]
     fn ends(&self) -> [T; 3] {
@@ -151,9 +168,6 @@ impl<T: Real> Row<T> for DryRow<T> {
 
     #[inline(always)]
     fn slope(&self, alpha: T) -> [T; 2] {
-        let du = self.next - self.u;
-        let u = du.mul_add(alpha, self.u);
-        let (sticking, _) = self.zone(u);
-        [-(du * self.true_force(u)), T::masked(sticking, self.d * du) * du]
+        self.slope_along(self.next - self.u, alpha)
     }
 }

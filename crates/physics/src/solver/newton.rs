@@ -195,7 +195,7 @@ pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 
 /// Row values at the Newton point; lanes whose active set differs there from the one that was solved with.
 #[inline(always)]
-pub(super) fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
+fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     let mut changed = T::none();
     for c in work.rows.contacts.iter_mut() {
         changed = T::or(changed, c.newton_point(&work.solver.link_acc[c.link]));

@@ -17,7 +17,6 @@ mod stages;
 
 use super::{blocks, crowd, newton};
 use crate::algebra::planar::Space;
-use crate::algebra::spatial::*;
 use crate::dynamics::{accelerate, factorize, link_accelerations};
 use crate::lanes::Real;
 use crate::sim::{Caps, Sim};
@@ -61,7 +60,6 @@ fn iterate<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, group: &Group<T>, work:
         work.solver.stale.fill(true);
         newton::assemble::<T, S>(sim, work);
         newton::solve_system::<T, S>(sim, work, T::from_bits(lanes(c)), any_coupled);
-        newton::newton_point(work);
         direction::<T, S>(sim, work, c);
         predicted_ends(sim, caps, c, iteration, &small);
         if lanes(c) == 0 {
@@ -248,8 +246,12 @@ fn direction<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped
     }
     for (l, link) in sim.links.iter().enumerate() {
         let tree = link.tree;
-        let mut way = work.solver.link_acc[l];
-        S::sub(&mut way, &c.here[l]);
+        // by the joints' steps, not by the difference of the links' accelerations: rounding is the same in all of them then
+        let mut way = link.parent.map_or([T::zero(); 6], |p| c.way[p]);
+        for d in link.dofs.clone() {
+            c.direction[d] = work.solver.solution[d] - work.solver.qacc[d];
+            way = S::axpy(&work.motion.axis[d], c.direction[d], &way);
+        }
         let mut away = c.here[l];
         S::sub(&mut away, &c.smooth_acc[l]);
         let momentum = S::momentum(&work.motion.inertia[l], &way);
@@ -257,16 +259,16 @@ fn direction<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped
         c.masses[tree][1] += S::dot(&way, &momentum);
         c.way[l] = way;
         for d in link.dofs.clone() {
-            let step = work.solver.solution[d] - work.solver.qacc[d];
+            let step = c.direction[d];
             let (away, armature) = (work.solver.qacc[d] - c.smooth[d], T::splat(sim.armature[d]) * step);
             c.masses[tree][0] = armature.mul_add(away, c.masses[tree][0]);
             c.masses[tree][1] = armature.mul_add(step, c.masses[tree][1]);
             c.sums[tree][0] = c.gradient[d].mul_add(step, c.sums[tree][0]);
             c.sums[tree][1] = step.mul_add(step, c.sums[tree][1]);
-            c.direction[d] = step;
         }
     }
     islands::gather(&c.island, &mut c.sums);
+    stages::measure_way(work, c);
 }
 
 /// Stops the islands whose Newton point promises an improvement below the tolerance.

@@ -1,7 +1,7 @@
 //! The stages of the iteration over all rows.
 
 use crate::lanes::{Real, kernel_fn};
-use crate::rows::{Block, Jacobian, Row, RowCost};
+use crate::rows::{Block, Jacobian, RowCost};
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
@@ -113,6 +113,24 @@ kernel_fn! {
 }
 
 kernel_fn! {
+    /// What the rows measure along the way, in the place of their Newton points.
+    pub(super) fn measure_way<'a, T>(work: &'a mut Work<T>, c: &'a Capped<T>) {
+        for row in work.rows.contacts.iter_mut() {
+            row.next = row.of_motion(&c.way[row.link]);
+        }
+        for row in work.rows.limits.iter_mut() {
+            row.next = row.sign * c.direction[row.dof];
+        }
+        for row in work.rows.dry.iter_mut() {
+            row.next = c.direction[row.dof];
+        }
+        for b in work.rows.blocks.iter_mut() {
+            b.next = b.of_motion(&c.way, &c.direction);
+        }
+    }
+}
+
+kernel_fn! {
     /// By tree, the cost at the fractions `alpha` of the way less that at its start, with its derivatives.
     pub(super) fn evaluate<'a, T>(sim: &'a Sim<T>, work: &'a Work<T>, c: &'a mut Capped<T>) {
         let half = T::lit(0.5);
@@ -151,11 +169,11 @@ kernel_fn! {
 }
 
 #[inline(always)]
-fn add<T: Real>(sums: &mut [T; 3], row: &(impl Row<T> + RowCost<T>), alpha: T) {
-    let [slope, curvature] = row.slope(alpha);
-    sums[0] += row.rise(alpha);
-    sums[1] += slope;
-    sums[2] += curvature;
+fn add<T: Real>(sums: &mut [T; 3], row: &impl RowCost<T>, alpha: T) {
+    let along = row.along(alpha);
+    for k in 0..3 {
+        sums[k] += along[k];
+    }
 }
 
 kernel_fn! {
@@ -192,6 +210,6 @@ fn move_block<T: Real>(b: &mut Block<T>, alpha: T, live: T::Mask) {
 }
 
 #[inline(always)]
-fn step<T: Real>(alpha: T, live: T::Mask, here: T, there: T) -> T {
-    T::select(live, alpha.mul_add(there - here, here), here)
+fn step<T: Real>(alpha: T, live: T::Mask, here: T, way: T) -> T {
+    T::select(live, alpha.mul_add(way, here), here)
 }
