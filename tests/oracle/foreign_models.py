@@ -10,15 +10,18 @@ Otherwise reads JSON from standard input. For `null`, prints the list of the fil
      "error": why MuJoCo does not load it or null, "warns": whether MuJoCo warns about its reference configuration,
      "empty": whether it has neither bodies nor geoms, as parts for inclusion have not,
      "nq": .., "nv": .., "nu": .., "ngeom": .., "features": [..]}
-For a list of jobs {"xml": path, "states": n, "seed": s}, prints random states as dynamics.py does, but only those in
-which MuJoCo's answer is well defined:
+For a list of jobs {"xml": path, "states": n, "seed": s, "converges": bool}, prints random states as dynamics.py does, but
+only those in which MuJoCo's answer is well defined:
     {"states": [..], "skipped": states that were drawn and left out}
+The solver's settings are those of the file. Where they let it converge ("converges"), the answers are those of the same
+problem solved to the end, and `own` is the acceleration under the file's settings, with the number of iterations.
 Sensor values that rounding decides are null.
 """
 
 import copy
 import hashlib
 import json
+import os
 import re
 import subprocess
 import sys
@@ -57,12 +60,18 @@ def install():
 
 
 def files():
-    """Every XML file whose root is <mujoco>, as pairs of id and path."""
+    """Every XML file whose root is <mujoco>, as pairs of id and path; those of the folder MARATHON_MODELS if it is set."""
+    if "MARATHON_MODELS" in os.environ:
+        return models_in([(Path(os.environ["MARATHON_MODELS"]), ["."])])
     if not INSTALLED.is_dir():
         sys.exit("the packages of tests/oracle/foreign_packages.txt are missing: run ./test.sh, which installs them")
     site = Path(mujoco.__file__).parents[1]
+    return models_in([(site, PACKAGES), (INSTALLED, ["."])])
+
+
+def models_in(places):
     found = []
-    for base, folders in [(site, PACKAGES), (INSTALLED, ["."])]:
+    for base, folders in places:
         for folder in folders:
             for path in (base / folder).rglob("*.xml"):
                 text = path.read_text(errors="replace")
@@ -175,14 +184,17 @@ def state_of(model, data, rng):
 
 
 def run(job):
-    model = mujoco.MjModel.from_xml_path(job["xml"])
-    model.opt.tolerance = 1e-14
-    model.opt.ls_tolerance = 1e-10
-    model.opt.iterations = 200
-    model.opt.ls_iterations = 100
-    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    model.opt.ccd_tolerance = CCD_TOLERANCE
-    model.opt.ccd_iterations = CCD_ITERATIONS
+    own = mujoco.MjModel.from_xml_path(job["xml"])
+    own.opt.ccd_tolerance = CCD_TOLERANCE
+    own.opt.ccd_iterations = CCD_ITERATIONS
+    model = own
+    if job["converges"]:
+        model = copy.copy(own)
+        model.opt.tolerance = 1e-14
+        model.opt.ls_tolerance = 1e-10
+        model.opt.iterations = 200
+        model.opt.ls_iterations = 100
+        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     data = mujoco.MjData(model)
     rng = np.random.default_rng(job["seed"])
     draws = [state_of(model, data, rng) for _ in range(job["states"])]
@@ -192,6 +204,11 @@ def run(job):
             break
         draws.append(state_of(model, data, rng))
     states = [s for s in draws if s is not None]
+    data = mujoco.MjData(own)
+    for s in states:
+        forward(own, data, [s[k] for k in ("qpos", "qvel", "ctrl", "act")])
+        s["own"] = data.qacc.tolist()
+        s["iterations"] = int(data.solver_niter.max())
     return {"states": states, "skipped": len(draws) - len(states)}
 
 
