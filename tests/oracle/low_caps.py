@@ -1,8 +1,10 @@
 """What MuJoCo's solver makes of models whose cap ends it early, under the models' own settings.
 
 Reads a JSON list of jobs from standard input:
-    {"xml": text, "seed": s, "trajectories": n, "steps": k}    states along trajectories from random states
-    {"xml": text, "stand": steps}                              the end of a trajectory from the first keyframe, or the reference
+    {"xml": text, "seed": s, "trajectories": n, "steps": k, "home": h}
+        states along n trajectories from random states, or one from the first keyframe (or the reference) if `home`
+    {"xml": text, "stand": steps}
+        the end of a trajectory from there
 and prints a JSON list. Of the first kind, {"states": [..]}: each state with the acceleration that the solver starts from
 (`warm`), MuJoCo's acceleration, constraint forces, and next state, the iterations it took, and `settled`: the answer does
 not depend on rounding. Of the second kind, {"qpos": [..]}, and {"nudged": [[..]]}: the same with masses changed by 1e-6.
@@ -24,6 +26,12 @@ NUDGE, AMPLIFICATION = 1e-9, 1e3
 def put(model, data, state):
     mujoco.mj_resetData(model, data)
     data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:], data.qacc_warmstart[:] = state
+
+
+def go_home(model, data):
+    mujoco.mj_resetData(model, data)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
 
 
 def settled(model, data, state, rng):
@@ -48,9 +56,10 @@ def states(job):
     rng = np.random.default_rng(job["seed"])
     out = []
     for _ in range(job["trajectories"]):
-        q, v, u = dynamics.random_state(model, rng, True, spread=0.05)
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, 0.3 * v, u
+        go_home(model, data)
+        if not job.get("home"):
+            q, v, u = dynamics.random_state(model, rng, True, spread=0.05)
+            data.qpos[:], data.qvel[:], data.ctrl[:] = q, 0.3 * v, u
         for _ in range(job["steps"]):
             before = [x.copy() for x in (data.qpos, data.qvel, data.act, data.ctrl, data.qacc_warmstart)]
             mujoco.mj_step(model, data)
@@ -70,8 +79,7 @@ def states(job):
 
 def end(model, steps):
     data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+    go_home(model, data)
     for _ in range(steps):
         mujoco.mj_step(model, data)
     return data.qpos.copy()

@@ -28,6 +28,8 @@ class Generator:
 
     def __init__(self, seed):
         self.rng = np.random.default_rng([2026, seed])
+        # the solver's caps are drawn apart from the rest: low ones came later
+        self.caps = np.random.default_rng([2029, seed])
         self.count = {}
         self.joints, self.bodies, self.geoms, self.sites, self.tendons, self.actuators = [], [], [], [], [], []
         self.limited, self.limited_tendons = set(), set()
@@ -529,6 +531,9 @@ class Generator:
             out["density"] = self.maybe(0.7, lambda: self.log(1, 1000))
             out["viscosity"] = self.maybe(0.7, lambda: self.log(1e-5, 1))
             out["wind"] = self.maybe(0.5, lambda: self.vector(2.0))
+        if self.caps.random() < 0.3:
+            out["iterations"], out["ls_iterations"] = self.caps.integers(1, 6), self.caps.integers(4, 11)
+            out["solver"] = "CG" if self.caps.random() < 0.2 else None
         flags = {}
         for flag in ["gravity", "limit", "equality", "frictionloss", "contact", "spring", "damper", "clampctrl",
                      "warmstart", "actuation", "refsafe", "eulerdamp", "filterparent", "constraint"]:

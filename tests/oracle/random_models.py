@@ -62,12 +62,13 @@ def random_state(model, rng):
 
 
 def tightened(model):
-    """Solves to the end."""
-    model.opt.tolerance = 1e-14
-    model.opt.ls_tolerance = 1e-10
-    model.opt.iterations = 300
-    model.opt.ls_iterations = 200
-    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    """Solves to the end, if the model's cap does not end the solver before."""
+    if model.opt.iterations >= 50:
+        model.opt.tolerance = 1e-14
+        model.opt.ls_tolerance = 1e-10
+        model.opt.iterations = 300
+        model.opt.ls_iterations = 200
+        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     model.opt.ccd_tolerance = 1e-15
     model.opt.ccd_iterations = 1000
     return model

@@ -53,7 +53,7 @@ fn text(name: &str, settings: &str) -> String {
     text.replace(old, settings)
 }
 
-fn settings(cap: (usize, usize), cone: &str, impratio: usize) -> String {
+fn settings_of(cap: (usize, usize), cone: &str, impratio: usize) -> String {
     let (iterations, ls_iterations) = cap;
     format!("iterations='{iterations}' ls_iterations='{ls_iterations}' cone='{cone}' impratio='{impratio}'")
 }
@@ -63,7 +63,7 @@ fn combinations() -> Vec<String> {
     let mut out = Vec::new();
     for cap in CAPS {
         for cone in CONES {
-            out.extend(IMPEDANCES.map(|impratio| settings(cap, cone, impratio)));
+            out.extend(IMPEDANCES.map(|impratio| settings_of(cap, cone, impratio)));
         }
     }
     out
@@ -110,10 +110,14 @@ fn compare(models: &[&str], settings: &[String]) {
             names.push(format!("{name} {s}"));
         }
     }
+    compare_jobs(jobs, &names);
+}
+
+fn compare_jobs(jobs: Vec<Value>, names: &[String]) {
     let answers = common::oracle("low_caps.py", &Value::Array(jobs.clone()));
     let (mut wrong, mut worst, mut single_worst) = (Vec::new(), 0.0_f64, Vec::new());
     let (mut compared, mut unsettled, mut ended) = (0, 0, BTreeMap::new());
-    for ((job, answer), name) in jobs.iter().zip(answers.as_array().expect("a list")).zip(&names) {
+    for ((job, answer), name) in jobs.iter().zip(answers.as_array().expect("a list")).zip(names) {
         let xml = job["xml"].as_str().expect("text");
         let model = Model::from_xml_str(xml, "capped.xml").unwrap_or_else(|e| panic!("{name}: {e}"));
         let sim = Sim::<f64>::new(&model, SimOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -184,6 +188,15 @@ fn other_settings_of_the_solver_agree() {
 }
 
 #[test]
+fn conjugate_gradients_agree() {
+    let mut settings = Vec::new();
+    for cap in [(1, 5), (3, 8), (10, 20), (30, 50)] {
+        settings.extend(CONES.map(|cone| settings_of(cap, cone, 1) + " solver='CG'"));
+    }
+    compare(&["quadruped", "company"], &settings);
+}
+
+#[test]
 fn switched_off_islands_and_warm_starts_agree() {
     let mut settings = Vec::new();
     for flag in ["island", "warmstart"] {
@@ -191,6 +204,20 @@ fn switched_off_islands_and_warm_starts_agree() {
         settings.push(format!("iterations='2' ls_iterations='6'><flag {flag}='disable'/></option><option"));
     }
     compare(&["company"], &settings);
+}
+
+/// Along the whole of MuJoCo's stand, whether or not rounding decides how it ends.
+#[test]
+fn every_step_of_a_stand_agrees() {
+    let (mut jobs, mut names) = (Vec::new(), Vec::new());
+    for name in ["four_legs", "quadruped"] {
+        for cap in [(1, 5), (2, 6)] {
+            let xml = text(name, &settings_of(cap, "pyramidal", 1));
+            jobs.push(json!({"xml": xml, "seed": 0, "trajectories": 1, "steps": STAND, "home": true}));
+            names.push(format!("{name} {cap:?}"));
+        }
+    }
+    compare_jobs(jobs, &names);
 }
 
 /// Height, trunk and joints at the end of a stand, of every lane width.

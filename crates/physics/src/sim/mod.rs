@@ -149,7 +149,7 @@ impl<T: Real> Sim<T> {
             elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
             capped: Caps::new(model, &options),
-            max_newton: options.max_newton.unwrap_or(model.opt.iterations),
+            max_newton: caps::cap(model, &options),
             most_rows: options.most_coupled_rows.unwrap_or(MOST_COUPLED_ROWS),
             max_line_search: model.opt.ls_iterations,
             tolerance: c(tolerance),

@@ -38,6 +38,8 @@ enum Phase {
 pub(super) struct LineSearch {
     phase: Phase,
     wanted: f64,
+    /// Rounds to the precision in which the cost is evaluated.
+    round: fn(f64) -> f64,
     /// Slope at which a point counts as the minimum.
     enough: f64,
     most: usize,
@@ -62,12 +64,14 @@ pub(super) struct Found {
 }
 
 impl LineSearch {
-    /// A search that takes slopes below `enough` for zero and evaluates the cost about `most` times.
-    pub fn new(enough: f64, most: usize) -> Self {
+    /// A search that takes slopes below `enough` for zero and evaluates the cost, at fractions that `round` leaves alone,
+    /// about `most` times.
+    pub fn new(enough: f64, most: usize, round: fn(f64) -> f64) -> Self {
         let p = Point::default();
         LineSearch {
             phase: Phase::Start,
             wanted: 0.0,
+            round,
             enough,
             most,
             evaluations: 0,
@@ -143,7 +147,7 @@ impl LineSearch {
 
     fn ask(&mut self, phase: Phase, alpha: f64) -> Option<Found> {
         self.phase = phase;
-        self.wanted = alpha;
+        self.wanted = (self.round)(alpha);
         None
     }
 
@@ -151,6 +155,10 @@ impl LineSearch {
     fn one_sided(&mut self) -> Option<Found> {
         let first = self.ends[0];
         if self.sign * first.slope <= -self.enough && self.evaluations < self.most {
+            // a search that does not move gets the same answers until the cap
+            if (self.round)(first.newton()) == first.alpha {
+                return found(&first);
+            }
             self.ends[1] = first;
             return self.ask(Phase::OneSided, first.newton());
         }

@@ -2,7 +2,8 @@
 //!
 //! The minimum does not depend on the way there. The point after one, two or five iterations does, and it is what such a
 //! model was tuned with, so here the way is MuJoCo's (`engine_solver.c`): the start is the better of the last step's
-//! acceleration and the one without constraints; the direction is Newton's, `a1 - a`, for the active set at the present point;
+//! acceleration and the one without constraints; the direction is
+//! Newton's, `a1 - a`, for the active set at the present point, or that of conjugate gradients ([`conjugate`]);
 //! the line search is MuJoCo's evaluation by evaluation ([`line`]); every island of trees ends by its own improvement,
 //! gradient, or predicted improvement ([`islands`]).
 //!
@@ -11,6 +12,7 @@
 //! factorization, and with it the cost of moving the masses, `1/2 (a - a_s)' M (a - a_s)`. M is never formed: products with it
 //! are sums over the momenta of links.
 
+mod conjugate;
 mod islands;
 mod line;
 mod stages;
@@ -57,10 +59,18 @@ fn iterate<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, group: &Group<T>, work:
         if lanes(c) == 0 || iteration >= caps.iterations {
             break;
         }
-        work.solver.stale.fill(true);
-        newton::assemble::<T, S>(sim, work);
-        newton::solve_system::<T, S>(sim, work, T::from_bits(lanes(c)), any_coupled);
-        direction::<T, S>(sim, work, c);
+        if caps.conjugate {
+            conjugate::precondition::<T, S>(sim, work, c);
+            conjugate::direction(sim, work, c, iteration);
+        } else {
+            work.solver.stale.fill(true);
+            newton::assemble::<T, S>(sim, work);
+            newton::solve_system::<T, S>(sim, work, T::from_bits(lanes(c)), any_coupled);
+            for d in 0..sim.model.nv {
+                c.direction[d] = work.solver.solution[d] - work.solver.qacc[d];
+            }
+        }
+        way::<T, S>(sim, work, c);
         predicted_ends(sim, caps, c, iteration, &small);
         if lanes(c) == 0 {
             break;
@@ -237,9 +247,9 @@ fn ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iteration: usize)
     small
 }
 
-/// The way to the Newton point, and what the masses cost along it.
+/// What the links and rows do along the direction, and what the masses cost there.
 #[inline(always)]
-fn direction<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
+fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     for tree in 0..sim.trees {
         c.sums[tree] = [T::zero(); 3];
         c.masses[tree] = [T::zero(); 2];
@@ -249,7 +259,6 @@ fn direction<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped
         // by the joints' steps, not by the difference of the links' accelerations: rounding is the same in all of them then
         let mut way = link.parent.map_or([T::zero(); 6], |p| c.way[p]);
         for d in link.dofs.clone() {
-            c.direction[d] = work.solver.solution[d] - work.solver.qacc[d];
             way = S::axpy(&work.motion.axis[d], c.direction[d], &way);
         }
         let mut away = c.here[l];
@@ -271,7 +280,8 @@ fn direction<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped
     stages::measure_way(work, c);
 }
 
-/// Stops the islands whose Newton point promises an improvement below the tolerance.
+/// Stops the islands whose direction promises an improvement below the tolerance: Newton's at any point, if the gradient is small
+/// too at the start; that of conjugate gradients at the start, where it bounds what there is to gain.
 #[inline(always)]
 fn predicted_ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iteration: usize, small: &[u32]) {
     for tree in 0..sim.trees {
@@ -280,8 +290,12 @@ fn predicted_ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iterati
                 continue;
             }
             let promise = -0.5 * c.scale[tree * T::LANES + lane] * T::widen(c.sums[tree][0].get(lane));
-            let flat = iteration > 0 || small[tree] >> lane & 1 == 1;
-            if flat && promise.max(0.0) < caps.tolerance {
+            let counts = match (iteration, caps.conjugate) {
+                (0, true) => true,
+                (0, false) => small[tree] >> lane & 1 == 1,
+                (_, conjugate) => !conjugate,
+            };
+            if counts && promise.max(0.0) < caps.tolerance {
                 c.stop(tree, lane);
             }
         }
@@ -302,7 +316,7 @@ fn search<T: Real>(sim: &Sim<T>, caps: &Caps, work: &mut Work<T>, c: &mut Capped
                 continue;
             }
             let enough = caps.tolerance * caps.ls_tolerance * length / c.scale[at];
-            searches[at] = Some(LineSearch::new(enough, caps.ls_iterations));
+            searches[at] = Some(LineSearch::new(enough, caps.ls_iterations, rounded::<T>));
         }
     }
     let mut waiting = searches.iter().filter(|s| s.is_some()).count();
@@ -337,6 +351,10 @@ fn search<T: Real>(sim: &Sim<T>, caps: &Caps, work: &mut Work<T>, c: &mut Capped
         }
     }
     share(sim, c);
+}
+
+fn rounded<T: Real>(x: f64) -> f64 {
+    T::widen(T::scalar(x))
 }
 
 /// Every tree goes as far as the first of its island.

@@ -17,6 +17,9 @@ pub(crate) struct Capped<T: Real> {
     pub direction: Vec<T>,
     /// Derivative of the cost by the accelerations.
     pub gradient: Vec<T>,
+    /// Of conjugate gradients: the gradient before the last step, and what it was preconditioned to.
+    pub old_gradient: Vec<T>,
+    pub old_descent: Vec<T>,
     /// Inertia of each link with all that it carries.
     pub composite: Vec<Inertia<T>>,
     /// By tree: fraction of the way; derivatives of the cost of moving the masses.
@@ -47,6 +50,8 @@ impl<T: Real> Default for Capped<T> {
             way: Vec::new(),
             direction: Vec::new(),
             gradient: Vec::new(),
+            old_gradient: Vec::new(),
+            old_descent: Vec::new(),
             composite: Vec::new(),
             alpha: Vec::new(),
             masses: Vec::new(),
@@ -77,6 +82,8 @@ impl<T: Real> Capped<T> {
             way: vec![[z; 6]; nl],
             direction: vec![z; nv],
             gradient: vec![z; nv],
+            old_gradient: vec![z; nv],
+            old_descent: vec![z; nv],
             composite: vec![[z; 10]; nl],
             alpha: vec![z; trees],
             masses: vec![[z; 2]; trees],
