@@ -11,14 +11,13 @@ import sys
 import mujoco
 import numpy as np
 
+from converging import solve_to_the_end
+
 
 def main():
     job = json.load(sys.stdin)
     model = mujoco.MjModel.from_xml_string(job["xml"])
-    model.opt.tolerance = 0
-    model.opt.iterations = 200
-    model.opt.ls_iterations = 200
-    model.opt.ls_tolerance = 1e-6
+    solve_to_the_end(model.opt)
     data = mujoco.MjData(model)
     answers = []
     for state in job["states"]:

@@ -38,6 +38,8 @@ from dm_control import suite
 from dm_control.suite import cheetah, hopper, humanoid, walker
 from dm_control.utils import rewards
 
+from converging import solve_to_the_end
+
 TASKS = {
     "cheetah": cheetah.Cheetah,
     "hopper": hopper.Hopper,
@@ -52,8 +54,7 @@ def make(job):
         own = {k.lstrip("_"): v for k, v in vars(env.task).items() if k in ("_move_speed", "_pure_state", "_hopping")}
         env._task = TASKS[job["domain"]](random=1, **{**own, **job["kwargs"]})
     if job.get("converge"):
-        opt = env.physics.model.ptr.opt
-        opt.iterations, opt.tolerance, opt.ls_iterations, opt.ls_tolerance = 200, 1e-14, 100, 1e-10
+        solve_to_the_end(env.physics.model.ptr.opt)
     return env
 
 

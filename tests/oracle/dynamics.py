@@ -14,6 +14,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from converging import solve_to_the_end
+
 sys.path.append(str(Path(__file__).resolve().parents[2] / "crates/cli/src/bench"))
 from mujoco_side import ground_contacts_only  # the benchmark's: what is compared and what is timed are the same contacts
 
@@ -165,10 +167,7 @@ def run(job):
     model = mujoco.MjModel.from_xml_path(job["xml"])
     if job.get("ground_only", True):
         ground_contacts_only(model)
-    model.opt.tolerance = 1e-14
-    model.opt.ls_tolerance = 1e-10
-    model.opt.iterations = 200
-    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    solve_to_the_end(model.opt)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(job.get("seed", 0))
     states = []

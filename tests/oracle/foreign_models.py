@@ -10,11 +10,11 @@ Otherwise reads JSON from standard input. For `null`, prints the list of the fil
      "error": why MuJoCo does not load it or null, "warns": whether MuJoCo warns about its reference configuration,
      "empty": whether it has neither bodies nor geoms, as parts for inclusion have not,
      "nq": .., "nv": .., "nu": .., "ngeom": .., "features": [..]}
-For a list of jobs {"xml": path, "states": n, "seed": s, "converges": bool}, prints random states as dynamics.py does, but
+For a list of jobs {"xml": path, "states": n, "seed": s}, prints random states as dynamics.py does, but
 only those in which MuJoCo's answer is well defined:
     {"states": [..], "skipped": states that were drawn and left out}
-The solver's settings are those of the file. Where they let it converge ("converges"), the answers are those of the same
-problem solved to the end, and `own` is the acceleration under the file's settings, with the number of iterations.
+The solver's settings are those of the file. Where they let it converge, the answers are those of the same problem solved to
+the end, and `own` is the acceleration under the file's settings, with the number of iterations.
 Sensor values that rounding decides are null.
 """
 
@@ -31,6 +31,7 @@ import mujoco
 import numpy as np
 
 import dynamics
+from converging import converges, solve_to_the_end
 
 HERE = Path(__file__).parent
 INSTALLED = Path(sys.prefix) / "foreign-models"
@@ -188,13 +189,9 @@ def run(job):
     own.opt.ccd_tolerance = CCD_TOLERANCE
     own.opt.ccd_iterations = CCD_ITERATIONS
     model = own
-    if job["converges"]:
+    if converges(own.opt):
         model = copy.copy(own)
-        model.opt.tolerance = 1e-14
-        model.opt.ls_tolerance = 1e-10
-        model.opt.iterations = 200
-        model.opt.ls_iterations = 100
-        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        solve_to_the_end(model.opt)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(job["seed"])
     draws = [state_of(model, data, rng) for _ in range(job["states"])]

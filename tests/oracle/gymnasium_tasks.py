@@ -27,6 +27,8 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 
+from converging import solve_to_the_end
+
 
 def numbers(info):
     return {k: float(v) for k, v in info.items() if np.ndim(v) == 0}
@@ -47,11 +49,7 @@ def arguments(env):
 
 
 def converge(model):
-    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    model.opt.iterations = 200
-    model.opt.tolerance = 1e-14
-    model.opt.ls_iterations = 100
-    model.opt.ls_tolerance = 1e-10
+    solve_to_the_end(model.opt)
 
 
 def step(env, action):

@@ -25,6 +25,7 @@ import numpy as np
 
 import compiled_model
 import dynamics
+from converging import converges, solve_to_the_end
 from foreign_models import LARGEST_ACCELERATION, put, warned
 from model_generator import Generator, random_model, with_keyframe
 
@@ -63,12 +64,8 @@ def random_state(model, rng):
 
 def tightened(model):
     """Solves to the end, if the model's cap does not end the solver before."""
-    if model.opt.iterations >= 50:
-        model.opt.tolerance = 1e-14
-        model.opt.ls_tolerance = 1e-10
-        model.opt.iterations = 300
-        model.opt.ls_iterations = 200
-        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    if converges(model.opt):
+        solve_to_the_end(model.opt)
     model.opt.ccd_tolerance = 1e-15
     model.opt.ccd_iterations = 1000
     return model
