@@ -8,7 +8,9 @@
 
 mod common;
 
+use marathon_physics::model::Solver;
 use marathon_physics::{Batch, BatchOptions, Isa, Model, Variation};
+use std::path::PathBuf;
 
 /// Starts and controls of agent number `id`, from a hash of the number alone.
 fn noise(id: usize, k: usize) -> f64 {
@@ -74,7 +76,17 @@ fn models() -> Vec<Model> {
         "full/medium",
     ]
     .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
-    agents.iter().chain(&others).map(|p| Model::from_xml_file(p).unwrap_or_else(|e| panic!("{e}"))).collect()
+    let capped = ["capped/quadruped", "capped/company", "full/pile", "full/elliptic"]
+        .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
+    let load = |p: &PathBuf| Model::from_xml_file(p).unwrap_or_else(|e| panic!("{e}"));
+    // with a low cap another solver runs, in which every agent and island has its own line search
+    let low = capped.iter().enumerate().map(|(i, p)| {
+        let mut model = load(p);
+        (model.opt.iterations, model.opt.ls_iterations) = (4, 8);
+        model.opt.solver = if i == 1 { Solver::Cg } else { Solver::Newton };
+        model
+    });
+    agents.iter().chain(&others).map(load).chain(low).collect()
 }
 
 #[test]
