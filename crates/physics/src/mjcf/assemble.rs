@@ -8,6 +8,7 @@ use super::geom::GeomSpec;
 use super::joint::JointSpec;
 use super::math::{Frame, IDENTITY, MIN_VAL};
 use super::names::{Names, Registry};
+use super::room::Room;
 use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
@@ -18,17 +19,17 @@ use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
 use std::collections::BTreeMap;
 
-/// Compiles the document; `file` reads the files that it refers to.
-pub(crate) fn compile(root: &Element, file: &ReadFile) -> Result<Model, MjcfError> {
+/// Compiles the document; `file` reads the files that it refers to, `room` counts the memory that it asks for.
+pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Model, MjcfError> {
     schema::check(root)?;
     let opt = settings::options(root)?;
     let mut settings = Settings::read(root)?;
     settings.medium = opt.density != 0.0 || opt.viscosity != 0.0;
     let given = settings::statistics(root)?;
-    let defaults = Defaults::read(root)?;
+    let defaults = Defaults::read(root, room)?;
     check_defaults(&defaults, &settings)?;
 
-    let assets = asset::read(root, &settings, file)?;
+    let assets = asset::read(root, &settings, file, room)?;
     let mut bodies = tree::read(root, &defaults, &settings, &assets)?;
     inertia::compile(&mut bodies, &settings)?;
     let materials = materials(root, &defaults)?;
@@ -54,7 +55,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile) -> Result<Model, MjcfErro
         keyframes: Vec::new(),
         pairs: Vec::new(),
         excludes: Vec::new(),
-        numerics: custom::numerics(root)?,
+        numerics: custom::numerics(root, room)?,
         qpos0: Vec::new(),
         qpos_spring: Vec::new(),
         stat: Statistics { mean_inertia: 1.0, mean_mass: 1.0, extent: 2.0, center: [0.0; 3] },
@@ -74,14 +75,14 @@ pub(crate) fn compile(root: &Element, file: &ReadFile) -> Result<Model, MjcfErro
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
     actuator::compile(root, &defaults, &names, &settings, &mut model)?;
-    model.sensors = sensor::compile(root, &names, &model)?;
-    model.keyframes = custom::keyframes(root, &model)?;
+    model.sensors = sensor::compile(root, &names, &model, room)?;
+    model.keyframes = custom::keyframes(root, &model, room)?;
 
     let pose = set0::Pose::new(&model);
     model.equalities = equality::compile(root, &defaults, &names, &model, &pose)?;
     let simple: Vec<bool> = bodies.iter().map(|b| b.simple).collect();
     let mass_matrix =
-        set0::weights(&mut model, &pose, &simple).map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
+        set0::weights(&mut model, &pose, &simple, room).map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
     tendon::weights(&mut model, &mass_matrix);
     actuator::resolve_damping(&mut model, &mass_matrix);

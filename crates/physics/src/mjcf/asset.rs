@@ -4,6 +4,7 @@ use super::document::Element;
 use super::error::MjcfError;
 use super::math::EPS;
 use super::names::Names;
+use super::room::Room;
 use super::settings::{Settings, entries};
 use super::value::{Attrs, numbers};
 use crate::model::HField;
@@ -25,13 +26,18 @@ pub(crate) struct Assets<'a> {
 }
 
 /// Reads all height fields.
-pub(crate) fn read<'a>(root: &'a Element, settings: &Settings, file: &ReadFile) -> Result<Assets<'a>, MjcfError> {
+pub(crate) fn read<'a>(
+    root: &'a Element,
+    settings: &Settings,
+    file: &ReadFile,
+    room: &Room,
+) -> Result<Assets<'a>, MjcfError> {
     let of_kind = |kind: &'static str| entries(root, "asset").filter(move |e| e.name == kind);
     let (mut hfields, mut hfield_names) = (Vec::new(), Names::new("height field"));
     for (i, element) in of_kind("hfield").enumerate() {
         let name = asset_name(element)?;
         hfield_names.add_as(name, element, i)?;
-        hfields.push(hfield(element, name, settings, file)?);
+        hfields.push(hfield(element, name, settings, file, room)?);
     }
     let mut mesh_names = Names::new("mesh");
     for (i, element) in of_kind("mesh").enumerate() {
@@ -57,7 +63,13 @@ struct Grid {
     values: Vec<f32>,
 }
 
-fn hfield(element: &Element, name: &str, settings: &Settings, read: &ReadFile) -> Result<HField, MjcfError> {
+fn hfield(
+    element: &Element,
+    name: &str,
+    settings: &Settings,
+    read: &ReadFile,
+    room: &Room,
+) -> Result<HField, MjcfError> {
     let attrs = Attrs::plain(element);
     let Some(size) = attrs.array::<4>("size")? else {
         return Err(element.invalid("the attribute 'size' is missing"));
@@ -77,9 +89,11 @@ fn hfield(element: &Element, name: &str, settings: &Settings, read: &ReadFile) -
                 Some(kind) => kind == "image/png",
                 None => attr.value.to_ascii_lowercase().ends_with(".png"),
             };
-            if is_png { from_png(&bytes) } else { from_binary(&bytes) }.map_err(failed)?
+            let grid = if is_png { from_png(&bytes) } else { from_binary(&bytes) }.map_err(failed)?;
+            room.take_for(element, grid.values.len(), size_of::<f32>())?;
+            grid
         }
-        None => from_attributes(element, &attrs)?,
+        None => from_attributes(element, &attrs, room)?,
     };
     if grid.nrow < 2 || grid.ncol < 2 {
         return Err(
@@ -91,7 +105,7 @@ fn hfield(element: &Element, name: &str, settings: &Settings, read: &ReadFile) -
 }
 
 /// `nrow`, `ncol` and `elevation`, whose first row is the one with the largest y; flat without elevations.
-fn from_attributes(element: &Element, attrs: &Attrs) -> Result<Grid, MjcfError> {
+fn from_attributes(element: &Element, attrs: &Attrs, room: &Room) -> Result<Grid, MjcfError> {
     let mut counts = [0; 2];
     for (name, count) in ["nrow", "ncol"].into_iter().zip(&mut counts) {
         *count = usize::try_from(attrs.integer_or(name, 0)?).unwrap_or(0);
@@ -102,6 +116,7 @@ fn from_attributes(element: &Element, attrs: &Attrs) -> Result<Grid, MjcfError> 
     let [nrow, ncol] = counts;
     let points = nrow.checked_mul(ncol).filter(|n| *n <= MAX_POINTS);
     let points = points.ok_or_else(|| element.invalid(format!("a grid has at most {MAX_POINTS} points")))?;
+    room.take_for(element, points, size_of::<f32>())?;
     let values = match element.attr("elevation") {
         Some(attr) => {
             let given = numbers(element, attr, points, points)?;

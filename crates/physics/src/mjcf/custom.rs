@@ -4,6 +4,7 @@ use super::document::Element;
 use super::error::MjcfError;
 use super::math::{EPS, IDENTITY, quat_norm};
 use super::names::Names;
+use super::room::Room;
 use super::settings::{entries, sections};
 use super::value::{Attrs, numbers};
 use crate::model::{JointType, Keyframe, Model, Quat};
@@ -12,7 +13,7 @@ use crate::model::{JointType, Keyframe, Model, Quat};
 const LARGEST: usize = 100_000;
 
 /// `<custom><numeric>` by name, in document order.
-pub(crate) fn numerics(root: &Element) -> Result<Vec<(String, Vec<f64>)>, MjcfError> {
+pub(crate) fn numerics(root: &Element, room: &Room) -> Result<Vec<(String, Vec<f64>)>, MjcfError> {
     let elements = || entries(root, "custom").filter(|e| e.name == "numeric");
     Names::collect("numeric", elements())?;
     elements()
@@ -29,6 +30,7 @@ pub(crate) fn numerics(root: &Element) -> Result<Vec<(String, Vec<f64>)>, MjcfEr
                     let expected = format!("an integer from {} to {LARGEST}", data.len());
                     return Err(element.bad_value(attr, expected));
                 }
+                room.take_for(element, size, size_of::<f64>())?;
                 data.resize(size, 0.0);
             }
             if data.is_empty() {
@@ -40,7 +42,7 @@ pub(crate) fn numerics(root: &Element) -> Result<Vec<(String, Vec<f64>)>, MjcfEr
 }
 
 /// `<keyframe>`: what a key leaves out is the reference configuration at rest.
-pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, MjcfError> {
+pub(crate) fn keyframes(root: &Element, model: &Model, room: &Room) -> Result<Vec<Keyframe>, MjcfError> {
     let elements = || entries(root, "keyframe").filter(|e| e.name == "key");
     Names::collect("keyframe", elements())?;
     let mocap = || model.bodies.iter().filter(|b| b.mocap);
@@ -54,8 +56,11 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
         mpos: mocap().map(|b| b.pos).collect(),
         mquat: mocap().map(|b| b.quat).collect(),
     };
+    let mocaps = mocap().count();
+    let size = 300 + 8 * (model.nq + model.nv + model.nu + model.na + 7 * mocaps);
     let mut keys = Vec::new();
     for element in elements() {
+        room.take_for(element, 1, size)?;
         let attrs = Attrs::plain(element);
         let mut key = reference();
         key.name = element.text("name").unwrap_or_default().to_owned();
@@ -102,6 +107,7 @@ pub(crate) fn keyframes(root: &Element, model: &Model) -> Result<Vec<Keyframe>, 
         if count > LARGEST {
             return Err(section.bad_value(attr, format!("an integer from 0 to {LARGEST}")));
         }
+        room.take_for(section, count.saturating_sub(keys.len()), size)?;
         keys.resize_with(keys.len().max(count), reference);
     }
     Ok(keys)

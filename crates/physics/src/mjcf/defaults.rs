@@ -2,6 +2,7 @@
 
 use super::document::Element;
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::room::Room;
 use super::schema::check_inherited;
 use super::value::Attrs;
 use crate::hint::nearest;
@@ -44,15 +45,28 @@ struct Class<'a> {
     actuator_ends: Vec<usize>,
 }
 
+impl Class<'_> {
+    /// Bytes of a copy.
+    fn size(&self) -> usize {
+        300 + self.layers.values().map(|elements| 100 + 8 * elements.len()).sum::<usize>()
+    }
+}
+
+/// Classes may be nested this deep: every element reads its attributes through all of them.
+const MAX_CLASSES: usize = 50;
+/// Elements of one kind that may set the defaults of a class, those of the classes around it included.
+const MAX_LAYERS: usize = 200;
+
 /// All default classes of a model.
 pub(crate) struct Defaults<'a> {
     classes: BTreeMap<&'a str, Class<'a>>,
+    room: &'a Room,
 }
 
 impl<'a> Defaults<'a> {
     /// Reads every `<default>` section of the model.
-    pub fn read(root: &'a Element) -> Result<Self, MjcfError> {
-        let mut defaults = Defaults { classes: BTreeMap::from([(MAIN, Class::default())]) };
+    pub fn read(root: &'a Element, room: &'a Room) -> Result<Self, MjcfError> {
+        let mut defaults = Defaults { classes: BTreeMap::from([(MAIN, Class::default())]), room };
         for section in root.children.iter().filter(|e| e.name == "default") {
             if section.text("class").is_some_and(|c| c != MAIN) {
                 let message = format!("the outermost default class is named '{MAIN}'; leave 'class' out");
@@ -72,7 +86,12 @@ impl<'a> Defaults<'a> {
                 let message = format!("there is already a <{}> in this class", shorten(&element.name));
                 return Err(element.invalid(message));
             }
-            class.layers.entry(kind(&element.name)).or_default().push(element);
+            let layers = class.layers.entry(kind(&element.name)).or_default();
+            layers.push(element);
+            if layers.len() > MAX_LAYERS {
+                let message = format!("more than {MAX_LAYERS} of these set the defaults of one class");
+                return Err(element.invalid(message));
+            }
         }
         let actuators = class.layers.get("actuator").map_or(0, Vec::len);
         match class.actuator_ends.last_mut() {
@@ -88,6 +107,11 @@ impl<'a> Defaults<'a> {
             if self.classes.contains_key(name) {
                 return Err(nested.invalid(format!("the default class '{}' is already defined", shorten(name))));
             }
+            if class.actuator_ends.len() >= MAX_CLASSES {
+                return Err(nested.invalid(format!("default classes are nested more than {MAX_CLASSES} deep")));
+            }
+            // one for the class, one while it is read
+            self.room.take_for(nested, 2, class.size())?;
             let mut inner = class.clone();
             inner.actuator_ends.push(actuators);
             self.classes.insert(name, inner);
@@ -119,6 +143,8 @@ impl<'a> Defaults<'a> {
         let class = self.named(element, "class")?.or(childclass).unwrap_or(MAIN);
         let layers = self.classes.get(class).and_then(|c| c.layers.get(kind(&element.name)));
         let attrs = Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) };
+        // reading through many layers takes time, which counts as if each were kept
+        self.room.take_for(element, attrs.defaults.len().saturating_sub(10), 100)?;
         check_inherited(&attrs)?;
         Ok(attrs)
     }

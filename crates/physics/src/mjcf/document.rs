@@ -1,6 +1,7 @@
 //! The XML document: elements with their places, `<include>` already expanded.
 
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::room::{ELEMENT, Room};
 use crate::hint::nearest;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -10,6 +11,8 @@ use std::rc::Rc;
 const MAX_DEPTH: usize = 200;
 /// Elements, text pieces and comments per file; keeps memory in proportion.
 const MAX_NODES: u32 = 4_000_000;
+/// Attributes of an element; the parser compares each with all others.
+const MAX_ATTRIBUTES: usize = 500;
 
 /// Where something stands: file and line.
 #[derive(Clone, Debug)]
@@ -93,8 +96,8 @@ impl Element {
 pub(crate) type Resolve<'a> = dyn Fn(&str) -> Result<String, String> + 'a;
 
 /// Parses `text` and expands its includes with `resolve`. `name` is the file's name for messages.
-pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve) -> Result<Element, MjcfError> {
-    let mut loader = Loader { resolve, included: BTreeSet::new() };
+pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve, room: &Room) -> Result<Element, MjcfError> {
+    let mut loader = Loader { resolve, room, included: BTreeSet::new() };
     let root = loader.file(text, name, "", 0)?;
     if root.name != "mujoco" {
         let found = shorten(&root.name);
@@ -118,8 +121,36 @@ fn without_dashes_in_comments(text: &str) -> Cow<'_, str> {
     out
 }
 
+/// Line of the first start tag with too many attributes, if there is one.
+fn crowded_tag(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let find = |from: usize, end: &str| text[from..].find(end).map_or(bytes.len(), |i| from + i + end.len());
+    let mut at = 0;
+    while let Some(start) = bytes[at..].iter().position(|b| *b == b'<').map(|i| at + i) {
+        at = start + 1;
+        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+        if let Some((_, end)) = skipped.iter().find(|(begin, _)| bytes[start..].starts_with(begin.as_bytes())) {
+            at = find(start, end);
+            continue;
+        }
+        let mut values = 0;
+        while let Some(&byte) = bytes.get(at).filter(|b| **b != b'>') {
+            at += 1;
+            if byte == b'"' || byte == b'\'' {
+                values += 1;
+                at = bytes[at..].iter().position(|b| *b == byte).map_or(bytes.len(), |i| at + i + 1);
+            }
+        }
+        if values > MAX_ATTRIBUTES {
+            return Some(1 + bytes[..start].iter().filter(|b| **b == b'\n').count());
+        }
+    }
+    None
+}
+
 struct Loader<'a> {
     resolve: &'a Resolve<'a>,
+    room: &'a Room,
     included: BTreeSet<String>,
 }
 
@@ -130,6 +161,11 @@ impl Loader<'_> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let text = &*without_dashes_in_comments(text);
         // no DTD, hence no entity bombs; the parser itself does not recurse over elements
+        if let Some(line) = crowded_tag(text) {
+            let place = Place { file: file.clone(), line };
+            let message = format!("an element has more than {MAX_ATTRIBUTES} attributes");
+            return Err(place.error(MjcfErrorKind::Syntax(message)));
+        }
         let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
         let document = roxmltree::Document::parse_with_options(text, options).map_err(|error| {
             let place = Place { file: file.clone(), line: error.pos().row as usize };
@@ -159,6 +195,8 @@ impl Loader<'_> {
             children: Vec::new(),
             place: place(node.range().start),
         };
+        self.room.take_for(&element, 1, ELEMENT)?;
+        self.room.take_for(&element, 1, node.attributes().map(|a| 100 + a.value().len()).sum())?;
         if depth >= MAX_DEPTH {
             return Err(element.invalid(format!("elements are nested more than {MAX_DEPTH} deep")));
         }

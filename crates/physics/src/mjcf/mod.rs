@@ -8,8 +8,8 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together, `set0` and `statistics` compute what follows from the reference
-//! configuration.
+//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together, `set0` (with `factor`) and `statistics` compute what follows from the reference
+//! configuration. `room` counts the memory that all of them ask for.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.
 
@@ -22,6 +22,7 @@ mod defaults;
 mod document;
 mod equality;
 mod error;
+mod factor;
 mod geom;
 mod inertia;
 mod joint;
@@ -29,6 +30,7 @@ mod law;
 mod math;
 mod names;
 mod orientation;
+mod room;
 mod schema;
 mod sensor;
 mod set0;
@@ -40,7 +42,9 @@ mod value;
 
 pub use error::{MjcfError, MjcfErrorKind};
 
+use crate::budget::{self, MODEL_FILE};
 use crate::model::Model;
+use room::Room;
 use std::path::{Path, PathBuf};
 
 impl Model {
@@ -50,18 +54,18 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// The file or an included one cannot be read or is not a valid, supported model.
+    /// The file or an included one cannot be read, is not a valid, supported model, or asks for more than the
+    /// [budget](crate::budget) allows.
     pub fn from_xml_file(path: impl AsRef<Path>) -> Result<Model, MjcfError> {
         let path = path.as_ref();
         let shown = path.display().to_string();
-        let text = read(path).map_err(|reason| MjcfError {
+        let text = read(path).and_then(utf8).map_err(|reason| MjcfError {
             file: shown.clone(),
             line: 0,
             kind: MjcfErrorKind::Read(reason),
         })?;
         let dir: PathBuf = path.parent().map(Path::to_owned).unwrap_or_default();
-        let root = document::parse(&text, &shown, &|file| utf8(named(&dir.join(file))?))?;
-        assemble::compile(&root, &|file| named(&dir.join(file)))
+        Self::from_xml_str_with(&text, &shown, &|file| read(&dir.join(file)))
     }
 
     /// Compiles a model given as text, without other files. `name` stands for the file in messages.
@@ -84,22 +88,15 @@ impl Model {
         name: &str,
         resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Model, MjcfError> {
-        let root = document::parse(xml, name, &|file| utf8(resolve(file)?))?;
-        assemble::compile(&root, resolve)
+        let room = Room::default();
+        let root = document::parse(xml, name, &|file| utf8(resolve(file)?), &room)?;
+        assemble::compile(&root, resolve, &room)
     }
 }
 
-fn read(path: &Path) -> Result<String, String> {
-    utf8(std::fs::read(path).map_err(|e| e.to_string())?)
-}
-
-/// The bytes of a file that a model names: a device or pipe may never end.
-fn named(path: &Path) -> Result<Vec<u8>, String> {
-    match std::fs::metadata(path) {
-        Ok(about) if !about.is_file() => Err("found a folder, device or pipe, expected a file".to_owned()),
-        Ok(_) => std::fs::read(path).map_err(|e| e.to_string()),
-        Err(e) => Err(e.to_string()),
-    }
+/// The bytes of a file within the budget.
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    budget::read(path, &MODEL_FILE).map_err(|e| e.to_string())
 }
 
 fn utf8(bytes: Vec<u8>) -> Result<String, String> {

@@ -107,7 +107,8 @@ const TOP: &[Rule] = &[
     rule("statistic", "center extent meaninertia meanmass meansize", "", ""),
     section("visual", "", VISUAL),
     section("default", "class", &[]),
-    section("extension", "", &[NO_PLUGIN]),
+    // a plugin acts only through an instance or where an element uses it
+    section("extension", "", &[section("plugin", "plugin", &[refused("instance", "plugins are not supported")])]),
     section("asset", "", ASSET),
     section("worldbody", "", BODY),
     section("deformable", "", &[refused("flex", NO_FLEX), anything("skin")]),

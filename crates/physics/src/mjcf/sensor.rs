@@ -3,6 +3,7 @@
 use super::document::Element;
 use super::error::MjcfError;
 use super::names::{Names, Registry};
+use super::room::Room;
 use super::settings::entries;
 use super::value::Attrs;
 use crate::model::{GeomType, JointType, Model, Sensor, SensorObject, SensorType, TendonKind};
@@ -107,12 +108,19 @@ const RAY_FIELDS: &[(&str, usize)] =
     &[("dist", 1), ("dir", 3), ("origin", 3), ("point", 3), ("normal", 3), ("depth", 1)];
 
 /// Compiles all sensors.
-pub(crate) fn compile(root: &Element, names: &Registry, model: &Model) -> Result<Vec<Sensor>, MjcfError> {
+pub(crate) fn compile(
+    root: &Element,
+    names: &Registry,
+    model: &Model,
+    room: &Room,
+) -> Result<Vec<Sensor>, MjcfError> {
     Names::collect("sensor", entries(root, "sensor"))?;
     let mut sensors = Vec::new();
     let mut adr = 0;
     for element in entries(root, "sensor") {
         let sensor = sensor(element, names, model, adr)?;
+        // agents keep the values in vectors of up to 16 numbers
+        room.take_for(element, sensor.dim, 16 * size_of::<f64>())?;
         adr += sensor.dim;
         sensors.push(sensor);
     }

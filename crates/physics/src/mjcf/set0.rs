@@ -3,9 +3,13 @@
 //! In the reference configuration every joint is at rest, so the world poses are the bodies' own frames chained, and
 //! the mass matrix falls into one dense block per kinematic tree.
 
+use super::factor::Factor;
 use super::math::*;
+use super::room::Room;
 use super::tendon::moments;
+use crate::budget::OverBudget;
 use crate::model::{JointType, Model, Tendon, Vec3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A tree with more degrees of freedom than this is refused: its dense mass matrix would not fit.
 const MAX_TREE_DOFS: usize = 4096;
@@ -43,11 +47,13 @@ pub(crate) enum Set0Error {
     TooLarge(usize),
     /// The mass matrix of the tree of this body is not positive definite.
     Singular(usize),
+    /// The mass matrices take too much memory with that of the tree of this body.
+    OverBudget(usize, OverBudget),
 }
 
 impl Set0Error {
     pub fn body(&self) -> usize {
-        let (Set0Error::TooLarge(body) | Set0Error::Singular(body)) = self;
+        let (Set0Error::TooLarge(body) | Set0Error::Singular(body) | Set0Error::OverBudget(body, _)) = self;
         *body
     }
 }
@@ -57,6 +63,7 @@ impl std::fmt::Display for Set0Error {
         match self {
             Set0Error::TooLarge(_) => write!(f, "its tree has more than {MAX_TREE_DOFS} degrees of freedom"),
             Set0Error::Singular(_) => write!(f, "the mass matrix of its tree is not positive definite"),
+            Set0Error::OverBudget(_, over) => write!(f, "the model {over}"),
         }
     }
 }
@@ -65,31 +72,35 @@ impl std::fmt::Display for Set0Error {
 pub(crate) struct MassMatrix {
     /// Its diagonal, armature included.
     pub diagonal: Vec<f64>,
-    /// First dof, number of dofs and lower factor of each tree's block.
-    blocks: Vec<(usize, usize, Vec<f64>)>,
+    /// First dof, number of dofs and factor of each tree's block.
+    blocks: Vec<(usize, usize, Factor)>,
 }
 
 impl MassMatrix {
     /// `v inv(M) v'` for a vector that is zero except for some dofs, given as `(dof, value)`.
     pub fn inverse_form(&self, values: &[(usize, f64)]) -> f64 {
-        let within = |start: usize, n: usize| values.iter().filter(move |(dof, _)| (start..start + n).contains(dof));
-        let block = |(start, n, factor): &(usize, usize, Vec<f64>)| {
-            if within(*start, *n).next().is_none() {
-                return 0.0;
-            }
-            let mut rhs = vec![0.0; *n];
-            within(*start, *n).for_each(|(dof, value)| rhs[dof - start] += value);
-            solve_lower(factor, *n, rhs).iter().map(|x| x * x).sum()
-        };
-        self.blocks.iter().map(block).sum()
+        let of_dof = |dof: usize| self.blocks.partition_point(|(start, ..)| *start <= dof) - 1;
+        let mut touched: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for (dof, value) in values {
+            let block = of_dof(*dof);
+            let (start, n, _) = &self.blocks[block];
+            touched.entry(block).or_insert_with(|| vec![0.0; *n])[dof - start] += value;
+        }
+        touched.into_iter().map(|(block, rhs)| self.blocks[block].2.inverse_form(rhs)).sum()
     }
 }
 
 /// Sets the inverse weights of bodies and dofs, and returns the mass matrix.
 ///
 /// `simple` says for each body whether it may be treated as a lone slider.
-pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool]) -> Result<MassMatrix, Set0Error> {
+pub(crate) fn weights(
+    model: &mut Model,
+    pose: &Pose,
+    simple: &[bool],
+    room: &Room,
+) -> Result<MassMatrix, Set0Error> {
     let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
+    let heavy = HeavyTendons::new(model);
     let mut first = 0;
     while first < model.nv {
         let root = model.bodies[model.dofs[first].body].root_id;
@@ -98,19 +109,22 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool]) -> Result
         if count > MAX_TREE_DOFS {
             return Err(Set0Error::TooLarge(root));
         }
+        room.take(count * count, size_of::<f64>()).map_err(|over| Set0Error::OverBudget(root, over))?;
         let tree = Tree::new(model, pose, root, first, count);
-        let mass = tree.mass_matrix(model, pose);
+        let mass = tree.mass_matrix(model, pose, &heavy);
         for i in 0..count {
             mass_matrix.diagonal[first + i] = mass[i * count + i];
         }
-        let factor = cholesky(mass, count).ok_or(Set0Error::Singular(root))?;
+        let within = |dof: usize| model.dofs[dof].parent.map(|parent| parent - first);
+        let parents: Vec<Option<usize>> = (first..first + count).map(within).collect();
+        let factor = Factor::new(mass, &parents).ok_or(Set0Error::Singular(root))?;
         tree.set_weights(model, pose, &factor);
         mass_matrix.blocks.push((first, count, factor));
         first += count;
     }
     // MuJoCo takes the mass alone for a lone slider: no armature, no mean over the three directions
     for body in 1..model.bodies.len() {
-        if simple[body] && is_lone_slider(model, body) {
+        if simple[body] && is_lone_slider(model, body, &heavy) {
             let weight = 1.0 / model.bodies[body].mass.max(MIN_VAL);
             model.bodies[body].invweight0 = [weight, 0.0];
             let first = model.bodies[body].dof_start;
@@ -124,7 +138,7 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool]) -> Result
 /// A body without children that only slides, along its own axes, on the world or on a child of the world without joints.
 ///
 /// MuJoCo does not look further up: on a static body that is deeper, or on one that is welded to it, the rule does not hold.
-fn is_lone_slider(model: &Model, index: usize) -> bool {
+fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
     /// Frames this close count as equal; MuJoCo's `kFrameEps`.
     const FRAME_EPS: f64 = 1e-6;
     let body = &model.bodies[index];
@@ -132,17 +146,33 @@ fn is_lone_slider(model: &Model, index: usize) -> bool {
     let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
-    let pulled = |j: &crate::model::Joint| {
-        let mut heavy = model.tendons.iter().filter(|t| t.armature != 0.0);
-        heavy.any(|t| moments(model, t).iter().any(|(dof, _)| *dof == j.dof_adr))
-    };
     !joints.is_empty()
-        && !joints.iter().any(pulled)
+        && !joints.iter().any(|j| heavy.0.contains_key(&j.dof_adr))
         && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, FRAME_EPS) && aligned(j.axis))
         && small(&body.ipos, FRAME_EPS)
         && small(&body.iquat[1..], FRAME_EPS)
         && (body.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
         && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
+}
+
+/// Tendons with inertia, by the dofs that they pull.
+struct HeavyTendons(BTreeMap<usize, Vec<usize>>);
+
+impl HeavyTendons {
+    fn new(model: &Model) -> Self {
+        let mut by_dof: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (i, tendon) in model.tendons.iter().enumerate().filter(|(_, t)| t.armature != 0.0) {
+            for (dof, _) in moments(model, tendon) {
+                by_dof.entry(dof).or_default().push(i);
+            }
+        }
+        HeavyTendons(by_dof)
+    }
+
+    /// Those that pull any of these dofs, in the model's order.
+    fn of(&self, dofs: std::ops::Range<usize>) -> BTreeSet<usize> {
+        self.0.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
+    }
 }
 
 /// Spatial inertia about the tree's reference point: mass, first moment, second moment by rows.
@@ -191,7 +221,7 @@ impl Tree {
     }
 
     /// Lower triangle of the mass matrix by rows, armature included.
-    fn mass_matrix(&self, model: &Model, pose: &Pose) -> Vec<f64> {
+    fn mass_matrix(&self, model: &Model, pose: &Pose, heavy: &HeavyTendons) -> Vec<f64> {
         let n = self.motions.len();
         let mut composite: Vec<SpatialInertia> =
             self.bodies.clone().map(|b| spatial_inertia(model, pose, b, self.origin)).collect();
@@ -211,8 +241,8 @@ impl Tree {
             }
             mass[i * n + i] += model.dofs[self.first + i].armature;
         }
-        for tendon in model.tendons.iter().filter(|t| t.armature != 0.0) {
-            self.add_armature(model, tendon, &mut mass);
+        for tendon in heavy.of(self.first..self.first + n) {
+            self.add_armature(model, &model.tendons[tendon], &mut mass);
         }
         mass
     }
@@ -221,12 +251,14 @@ impl Tree {
     /// mass matrix has no other entries.
     fn add_armature(&self, model: &Model, tendon: &Tendon, mass: &mut [f64]) {
         let n = self.motions.len();
-        let moments = moments(model, tendon);
-        let own = || moments.iter().filter(|(dof, _)| (self.first..self.first + n).contains(dof));
-        for (i, at_i) in own() {
+        let own = self.first..self.first + n;
+        // a tendon names a joint once
+        let arms: Vec<(usize, f64)> = moments(model, tendon).into_iter().filter(|(dof, _)| own.contains(dof)).collect();
+        let by_dof: BTreeMap<usize, f64> = arms.iter().copied().collect();
+        for (i, at_i) in &arms {
             let mut ancestor = Some(*i);
             while let Some(j) = ancestor {
-                if let Some((_, at_j)) = own().find(|(dof, _)| *dof == j) {
+                if let Some(at_j) = by_dof.get(&j) {
                     mass[(i - self.first) * n + j - self.first] += tendon.armature * at_i * at_j;
                 }
                 ancestor = model.dofs[j].parent;
@@ -235,18 +267,21 @@ impl Tree {
     }
 
     /// Mean diagonals of `J inv(M) J'`, for each joint and for the center of mass of each body.
-    fn set_weights(&self, model: &mut Model, pose: &Pose, factor: &[f64]) {
+    fn set_weights(&self, model: &mut Model, pose: &Pose, factor: &Factor) {
         let n = self.motions.len();
-        let inverse = |rhs: Vec<f64>| solve_lower(factor, n, rhs).iter().map(|x| x * x).sum::<f64>();
 
         let single: Vec<f64> = (0..n)
             .map(|i| {
                 let mut rhs = vec![0.0; n];
                 rhs[i] = 1.0;
-                inverse(rhs)
+                factor.inverse_form(rhs)
             })
             .collect();
-        for joint in model.joints.iter().filter(|j| self.bodies.contains(&j.body)) {
+        let joints = self.bodies.clone().flat_map(|b| {
+            let body = &model.bodies[b];
+            body.joint_start..body.joint_start + body.joint_count
+        });
+        for joint in joints.map(|j| &model.joints[j]) {
             let start = joint.dof_adr - self.first;
             // number of groups of dofs that share a mean, and their size
             let (groups, size) = match joint.kind {
@@ -281,7 +316,7 @@ impl Tree {
                 }
                 dof = model.dofs[j].parent;
             }
-            let diagonal: Vec<f64> = rows.into_iter().map(inverse).collect();
+            let diagonal: Vec<f64> = rows.into_iter().map(|row| factor.inverse_form(row)).collect();
             let translation = diagonal[..3].iter().sum::<f64>() / 3.0;
             let rotation = diagonal[3..].iter().sum::<f64>() / 3.0;
             model.bodies[b].invweight0 = [translation, rotation];
@@ -337,32 +372,4 @@ fn motion(model: &Model, pose: &Pose, dof: usize, origin: Vec3) -> Motion {
         JointType::Slide => sliding(rotate(frame.quat, joint.axis)),
         JointType::Hinge => turning(rotate(frame.quat, joint.axis)),
     }
-}
-
-/// Lower factor of a symmetric positive definite matrix, `None` if it is not one.
-fn cholesky(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
-    for j in 0..n {
-        for i in j..n {
-            let (row_i, row_j) = (&a[i * n..i * n + j], &a[j * n..j * n + j]);
-            let sum = a[i * n + j] - row_i.iter().zip(row_j).map(|(x, y)| x * y).sum::<f64>();
-            if i == j {
-                if !(sum >= MIN_VAL) || !sum.is_finite() {
-                    return None;
-                }
-                a[i * n + j] = sum.sqrt();
-            } else {
-                a[i * n + j] = sum / a[j * n + j];
-            }
-        }
-    }
-    Some(a)
-}
-
-/// Solves `L x = rhs`.
-fn solve_lower(factor: &[f64], n: usize, mut x: Vec<f64>) -> Vec<f64> {
-    for i in 0..n {
-        let sum: f64 = factor[i * n..i * n + i].iter().zip(&x).map(|(l, x)| l * x).sum();
-        x[i] = (x[i] - sum) / factor[i * n + i];
-    }
-    x
 }

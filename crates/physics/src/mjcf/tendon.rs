@@ -9,6 +9,7 @@ use super::set0::MassMatrix;
 use super::settings::{Settings, entries};
 use super::value::{Attrs, numbers};
 use crate::model::{JointType, Model, Tendon, TendonKind};
+use std::collections::BTreeSet;
 
 /// Both ends of `springlength` when the file leaves them to the spring configuration.
 const UNSET: f64 = -1.0;
@@ -122,6 +123,7 @@ fn tendon(
 /// Joints of a fixed tendon and their coefficients.
 fn path(element: &Element, names: &Registry, model: &Model) -> Result<Vec<(usize, f64)>, MjcfError> {
     let mut path: Vec<(usize, f64)> = Vec::new();
+    let mut known = BTreeSet::new();
     for part in &element.children {
         let joint = names.joints.required(part, "joint")?;
         let Some(attr) = part.attr("coef") else {
@@ -132,7 +134,7 @@ fn path(element: &Element, names: &Registry, model: &Model) -> Result<Vec<(usize
         if !matches!(model.joints[joint].kind, JointType::Hinge | JointType::Slide) {
             return Err(part.invalid(format!("the joint '{name}' is neither a hinge nor a slide")));
         }
-        if path.iter().any(|(known, _)| *known == joint) {
+        if !known.insert(joint) {
             return Err(part.invalid(format!("the joint '{name}' is repeated")));
         }
         path.push((joint, coef));

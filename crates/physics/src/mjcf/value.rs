@@ -57,6 +57,7 @@ impl<'a> Attrs<'a> {
     /// Lays the numbers given over `out`; each text must have at least `at_least` and at most `out.len()`.
     pub fn overlay(&self, name: &str, at_least: usize, out: &mut [f64]) -> Result<bool, MjcfError> {
         let mut found = false;
+        let at_least = at_least.min(out.len());
         for element in self.chain() {
             let Some(attr) = element.attr(name) else { continue };
             // as in MuJoCo, an empty text is no value
@@ -136,6 +137,7 @@ pub(crate) fn keyword<T: Copy>(element: &Element, attr: &Attr, choices: &[(&str,
 pub(crate) fn numbers(element: &Element, attr: &Attr, at_least: usize, at_most: usize) -> Result<Vec<f64>, MjcfError> {
     let values: Option<Vec<f64>> = attr.value.split_ascii_whitespace().map(number).collect();
     let expected = || match (at_least, at_most) {
+        (_, 0) => "no numbers: the model has none of these".to_owned(),
         (1, 1) => "a number".to_owned(),
         (least, most) if least == most => format!("{least} numbers"),
         (0, usize::MAX) => "numbers".to_owned(),

@@ -1,0 +1,29 @@
+//! How much memory a model may take.
+
+use super::document::Element;
+use super::error::MjcfError;
+use crate::budget::{MEMORY, OverBudget};
+use std::cell::Cell;
+
+/// Bytes of an element, with what the model keeps of it.
+pub(crate) const ELEMENT: usize = 1000;
+/// A simulation keeps a copy of its model.
+const COPIES: f64 = 2.0;
+
+/// What a model takes of the memory that one file may ask for. Whatever a file's numbers decide the size of is counted here
+/// before it is made.
+#[derive(Default)]
+pub(crate) struct Room(Cell<f64>);
+
+impl Room {
+    /// Takes room for `count` things of `bytes` bytes.
+    pub fn take(&self, count: usize, bytes: usize) -> Result<(), OverBudget> {
+        self.0.set(self.0.get() + COPIES * count as f64 * bytes as f64);
+        MEMORY.check(self.0.get())
+    }
+
+    /// The same for what an element asks for.
+    pub fn take_for(&self, element: &Element, count: usize, bytes: usize) -> Result<(), MjcfError> {
+        self.take(count, bytes).map_err(|over| element.invalid(format!("the model {over}")))
+    }
+}
