@@ -102,6 +102,14 @@ fn numbers_must_be_numbers_and_as_many_as_needed() {
 
 #[test]
 fn contradictions() {
+    check(
+        &with_section("<keyframe><key act='1'/></keyframe>"),
+        &["'act' is '1'; expected no numbers: the model has none"],
+    );
+    check(&with_section("<keyframe><key mpos='1 2 3'/></keyframe>"), &["expected no numbers: the model has none"]);
+    check(&in_body("<camera fovy='30' sensorsize='1 1'/>"), &["there are both 'fovy' and 'sensorsize'"]);
+    check(&in_body("<camera focal='1 1'/>"), &["need a 'sensorsize'"]);
+    check(&in_body("<camera sensorsize='1 1' focal='1 1' resolution='0 9'/>"), &["resolution is 0 x 9"]);
     check(&in_body("<geom size='1' quat='1 0 0 0' euler='0 0 0'/>"), &["only one orientation", "quat and euler"]);
     check(&in_body("<geom size='1' quat='0 0 0 0'/>"), &["'quat' is '0 0 0 0'; expected a quaternion"]);
     check(&in_body("<geom size='1' xyaxes='1 0 0 2 0 0'/>"), &["expected a y axis"]);
@@ -417,8 +425,69 @@ fn what_is_no_file_is_not_read() {
             std::thread::spawn(move || done.send(Model::from_xml_file(path).map(|_| ()).map_err(|e| e.to_string())));
             let result = wait.recv_timeout(std::time::Duration::from_secs(20)).expect("it does not wait for ever");
             let message = result.expect_err("an error");
-            assert!(message.contains("found a folder, device or pipe, expected a file"), "{text}: {message}");
+            assert!(message.contains("expected a regular file"), "{text}: {message}");
         }
     }
+    for name in ["pipe", "folder"].map(|name| folder.join(name)).into_iter().chain(["/dev/zero".into()]) {
+        let (done, wait) = std::sync::mpsc::channel();
+        std::thread::spawn(move || done.send(Model::from_xml_file(name).map(|_| ()).map_err(|e| e.to_string())));
+        let result = wait.recv_timeout(std::time::Duration::from_secs(20)).expect("it does not wait for ever");
+        let message = result.expect_err("an error");
+        assert!(message.contains("cannot read the file: found a "), "{message}");
+    }
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// What a class sets and this engine does not have is refused where an element uses it, and only there.
+#[test]
+fn unsupported_defaults_are_refused_where_they_are_used() {
+    let with = |default: &str, body: &str, rest: &str| {
+        in_body(body)
+            .replace("<worldbody>", &format!("<default>{default}</default><worldbody>"))
+            .replace("</worldbody>", &format!("</worldbody>{rest}"))
+    };
+    let motor = "<actuator><motor joint='j'/></actuator>";
+    let general = "<actuator><general joint='j'/></actuator>";
+    for unused in [
+        "<muscle force='5'/>",
+        "<adhesion gain='5' ctrlrange='0 1'/>",
+        "<dcmotor motorconst='1' resistance='2'/>",
+        "<pid kp='5'/>",
+        "<orientation kp='5'/>",
+        "<general gaintype='muscle' biastype='muscle' dyntype='muscle'/>",
+        "<general input='ff'/>",
+        "<tendon springyield='1'/>",
+        "<pair adhesion='1'/>",
+        "<site mesh='m'/>",
+        "<default class='a'><joint springyield='1'/><geom adhesion='1' type='sdf'/><motor delay='1'/></default>",
+    ] {
+        Model::from_xml_str(&with(unused, "", ""), "unused.xml").unwrap_or_else(|e| panic!("{e}"));
+        let message = Model::from_xml_str(&with(unused, "", motor), "motor.xml").map_err(|e| e.to_string());
+        assert!(message.is_ok() || unused.contains("delay"), "{unused}: {message:?}");
+    }
+    check(&with("<muscle force='5'/>", "", general), &["<muscle>: only the actuators motor"]);
+    check(
+        &with("<general gaintype='muscle'/>", "", general),
+        &["<general> attribute 'gaintype'", "constant and affine"],
+    );
+    check(&with("<general input='pos vel'/>", "", general), &["'input'", "only one input"]);
+    check(&with("<general delay='1'/>", "", motor), &["<general> attribute 'delay'", "'1' is not supported, only '0'"]);
+    check(&with("<muscle delay='1'/>", "", motor), &["<muscle> attribute 'delay'"]);
+    check(&with("<joint springyield='1'/>", "<joint/>", ""), &["'springyield'", "only '0'"]);
+    check(&with("<geom adhesion='1'/>", "<geom size='1'/>", ""), &["<geom> attribute 'adhesion'"]);
+    check(&with("<geom surfacevel='0 0 1'/>", "<geom size='1' surfacevel='0'/>", ""), &["'surfacevel'"]);
+    let replaced =
+        with("<default class='a'><geom adhesion='1'/></default>", "<geom class='a' size='1' adhesion='0'/>", "");
+    assert!(Model::from_xml_str(&replaced, "replaced.xml").is_ok());
+    // a misspelled name is a mistake even in a class that nothing uses
+    check(&with("<general inptu='pos'/>", "", ""), &["did you mean 'input'?"]);
+    check(&with("", "", "<actuator><general joint='j' input='poss'/></actuator>"), &["did you mean 'pos'?"]);
+    check(&with("", "", "<actuator><general joint='j' input='pos vel'/></actuator>"), &["only one input is supported"]);
+    // plugins that are declared and not used
+    let declared =
+        with("", "", "").replace("<default>", "<extension><plugin plugin='mujoco.pid'/></extension><default>");
+    assert!(Model::from_xml_str(&declared, "declared.xml").is_ok());
+    let instance =
+        declared.replace("<plugin plugin='mujoco.pid'/>", "<plugin plugin='a'><instance name='i'/></plugin>");
+    check(&instance, &["<instance name=\"i\">: plugins are not supported"]);
 }

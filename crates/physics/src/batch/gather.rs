@@ -134,7 +134,7 @@ struct Part<'a> {
 
 impl<T: Real> LaneBatch<T> {
     pub(super) fn gather_rows(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {
-        let LaneBatch { sim, groups, works, felt, .. } = self;
+        let LaneBatch { sim, groups, works, helpers, felt, .. } = self;
         let share = groups.len().div_ceil(works.len());
         let mut rest: Vec<Part<'_>> = wanted
             .iter_mut()
@@ -146,23 +146,19 @@ impl<T: Real> LaneBatch<T> {
                 read_group(sim, group, felt, work, i, &mut parts);
             }
         };
-        if works.len() == 1 {
-            return read(groups, felt, &mut works[0], rest);
-        }
-        std::thread::scope(|scope| {
-            for ((groups, felt), work) in groups.chunks(share).zip(felt.chunks(share)).zip(works) {
-                // every thread gets the rows of its own agents
-                let mut own = Vec::new();
-                for part in &mut rest {
-                    let rows = std::mem::take(&mut part.rows);
-                    let (mine, others) = rows.split_at_mut(rows.len().min(share * T::LANES * part.width));
-                    part.rows = others;
-                    own.push(Part { rows: mine, ..*part });
-                }
-                let read = &read;
-                scope.spawn(move || read(groups, felt, work, own));
+        let shares = groups.chunks(share).zip(felt.chunks(share)).zip(works);
+        let read = &read;
+        helpers.run(shares.map(|((groups, felt), work)| {
+            // every thread gets the rows of its own agents
+            let mut own = Vec::new();
+            for part in &mut rest {
+                let rows = std::mem::take(&mut part.rows);
+                let (mine, others) = rows.split_at_mut(rows.len().min(share * T::LANES * part.width));
+                part.rows = others;
+                own.push(Part { rows: mine, ..*part });
             }
-        });
+            move || read(groups, felt, work, own)
+        }));
     }
 }
 

@@ -1,6 +1,7 @@
 //! The agents of a batch in lanes of one width.
 
 use super::gather::Felt;
+use super::pool::Helpers;
 use super::{BodyReading, Quantity};
 use crate::lanes::Real;
 use crate::readings::Readings;
@@ -37,6 +38,7 @@ pub(super) struct LaneBatch<T: Real> {
     pub(super) groups: Vec<Group<T>>,
     /// One per thread.
     pub(super) works: Vec<Work<T>>,
+    pub(super) helpers: Helpers,
     /// Contacts of each group in the last step.
     pub(super) felt: Vec<Felt<T>>,
     /// Earlier states, oldest first.
@@ -48,7 +50,8 @@ impl<T: Real> LaneBatch<T> {
         let groups = vec![Group::new(&sim); agents.div_ceil(T::LANES)];
         let works = vec![Work::new(&sim); threads.min(groups.len())];
         let felt = vec![Felt::new(sim.model()); groups.len()];
-        LaneBatch { sim: Arc::new(sim), groups, works, felt, past: VecDeque::new() }
+        let helpers = Helpers::new(works.len() - 1);
+        LaneBatch { sim: Arc::new(sim), groups, works, helpers, felt, past: VecDeque::new() }
     }
 
     fn slot(agent: usize) -> (usize, usize) {
@@ -65,7 +68,7 @@ impl<T: Real> Lanes for LaneBatch<T> {
     }
 
     fn step(&mut self, substeps: usize) {
-        let LaneBatch { sim, groups, works, felt, .. } = self;
+        let LaneBatch { sim, groups, works, helpers, felt, .. } = self;
         let share = groups.len().div_ceil(works.len());
         let run = |groups: &mut [Group<T>], felt: &mut [Felt<T>], work: &mut Work<T>| {
             for (group, felt) in groups.iter_mut().zip(felt) {
@@ -74,14 +77,9 @@ impl<T: Real> Lanes for LaneBatch<T> {
                 felt.keep(work);
             }
         };
-        if works.len() == 1 {
-            return run(groups, felt, &mut works[0]);
-        }
-        std::thread::scope(|scope| {
-            for ((groups, felt), work) in groups.chunks_mut(share).zip(felt.chunks_mut(share)).zip(works) {
-                scope.spawn(move || run(groups, felt, work));
-            }
-        });
+        let shares = groups.chunks_mut(share).zip(felt.chunks_mut(share)).zip(works);
+        let run = &run;
+        helpers.run(shares.map(|((groups, felt), work)| move || run(groups, felt, work)));
     }
 
     fn broken(&self) -> Vec<usize> {

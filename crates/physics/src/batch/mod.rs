@@ -7,6 +7,7 @@
 mod blowup;
 mod gather;
 mod lanes;
+mod pool;
 pub mod workload;
 
 pub use blowup::{Blowup, Replay};

@@ -108,12 +108,7 @@ const RAY_FIELDS: &[(&str, usize)] =
     &[("dist", 1), ("dir", 3), ("origin", 3), ("point", 3), ("normal", 3), ("depth", 1)];
 
 /// Compiles all sensors.
-pub(crate) fn compile(
-    root: &Element,
-    names: &Registry,
-    model: &Model,
-    room: &Room,
-) -> Result<Vec<Sensor>, MjcfError> {
+pub(crate) fn compile(root: &Element, names: &Registry, model: &Model, room: &Room) -> Result<Vec<Sensor>, MjcfError> {
     Names::collect("sensor", entries(root, "sensor"))?;
     let mut sensors = Vec::new();
     let mut adr = 0;

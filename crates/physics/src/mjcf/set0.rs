@@ -93,12 +93,7 @@ impl MassMatrix {
 /// Sets the inverse weights of bodies and dofs, and returns the mass matrix.
 ///
 /// `simple` says for each body whether it may be treated as a lone slider.
-pub(crate) fn weights(
-    model: &mut Model,
-    pose: &Pose,
-    simple: &[bool],
-    room: &Room,
-) -> Result<MassMatrix, Set0Error> {
+pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool], room: &Room) -> Result<MassMatrix, Set0Error> {
     let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
     let heavy = HeavyTendons::new(model);
     let mut first = 0;

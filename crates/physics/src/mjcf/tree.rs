@@ -82,7 +82,8 @@ pub(crate) fn read<'a>(
     settings: &Settings,
     assets: &Assets,
 ) -> Result<Vec<BodySpec<'a>>, MjcfError> {
-    let mut reader = Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY, Frame::IDENTITY)] };
+    let mut reader =
+        Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY, Frame::IDENTITY)] };
     for section in sections(root, "worldbody") {
         if let Some(attr) = section.attrs.first() {
             return Err(section.invalid(format!("the world has no attributes, but there is '{}'", attr.name)));

@@ -1,0 +1,102 @@
+//! A model file cannot make the reader work or allocate without end: whatever its numbers and names decide the size of is
+//! checked against the budget (`MARATHON_LIMITS`) before work starts, and no step takes quadratic time.
+
+use marathon_physics::Model;
+use std::time::{Duration, Instant};
+
+/// Time that a hostile file of one megabyte may take on a busy machine.
+const LONGEST: Duration = Duration::from_secs(10);
+
+fn repeat(n: usize, one: impl Fn(usize) -> String) -> String {
+    (0..n).map(one).collect()
+}
+
+/// Loads a model within the time; the error if it is refused.
+#[track_caller]
+fn load(name: &str, text: &str) -> Result<Model, String> {
+    let start = Instant::now();
+    let result = Model::from_xml_str(text, name).map_err(|e| e.to_string());
+    let time = start.elapsed();
+    assert!(time < LONGEST, "{name}: {time:?}");
+    result
+}
+
+#[track_caller]
+fn refused(name: &str, text: &str, expected: &str) {
+    let error = load(name, text).expect_err(name);
+    assert!(error.contains(expected), "{name}: {error}");
+}
+
+/// What the limit on memory says.
+const MEMORY: &str = "the limit 'memory' is 2 GB; set MARATHON_LIMITS=memory=";
+
+#[test]
+fn what_numbers_decide_the_size_of_is_refused_before_it_is_made() {
+    let numbers = repeat(20_000, |i| format!("<numeric name='n{i}' size='100000'/>"));
+    refused("numbers", &format!("<mujoco><custom>{numbers}</custom></mujoco>"), MEMORY);
+    let bodies = repeat(3000, |_| "<body><joint/><geom size='1'/></body>".to_owned());
+    let keys = format!("<mujoco><size nkey='100000'/><worldbody>{bodies}</worldbody></mujoco>");
+    refused("keys", &keys, MEMORY);
+    let sensors = "<user dim='100000'/>".repeat(20_000);
+    refused("sensors", &format!("<mujoco><sensor>{sensors}</sensor></mujoco>"), MEMORY);
+    let fields = repeat(300, |i| format!("<hfield name='h{i}' nrow='4096' ncol='4096' size='1 1 1 1'/>"));
+    refused("fields", &format!("<mujoco><asset>{fields}</asset></mujoco>"), MEMORY);
+    let elements = "<geom size='1'/>".repeat(1_100_000);
+    refused("elements", &format!("<mujoco><worldbody>{elements}</worldbody></mujoco>"), MEMORY);
+}
+
+#[test]
+fn classes_are_bounded_in_depth_and_number() {
+    let nested = |depth: usize, kinds: &str, leaves: usize| {
+        let open = repeat(depth, |i| format!("<default class='c{i}'>{kinds}"));
+        let leaves = repeat(leaves, |i| format!("<default class='d{i}'/>"));
+        format!("<mujoco><default>{open}{leaves}{}</default></mujoco>", "</default>".repeat(depth))
+    };
+    assert!(load("some classes", &nested(40, "<geom/><joint/>", 1000)).is_ok());
+    refused("deep classes", &nested(60, "", 0), "nested more than 50 deep");
+    let kinds = "<geom/><joint/><site/><camera/><light/><pair/><tendon/><motor/>";
+    refused("many classes", &nested(48, kinds, 300_000), MEMORY);
+    let sections = "<default><geom size='1'/></default>".repeat(20_000);
+    refused("sections", &format!("<mujoco>{sections}</mujoco>"), "more than 200 of these set the defaults");
+}
+
+#[test]
+fn reading_takes_time_in_proportion() {
+    let attributes = repeat(40_000, |i| format!(" a{i}='1'"));
+    refused("attributes", &format!("<mujoco{attributes}/>"), "an element has more than 500 attributes");
+    // comments and texts are no attributes
+    let comment = "<!-- a='1' -- -->".repeat(1000);
+    assert!(load("comments", &format!("<mujoco>{comment}</mujoco>")).is_ok());
+
+    let one = |i: usize| format!("<body><joint name='j{i}'/><geom size='1'/></body>");
+    let world = |bodies: &str, rest: &str| format!("<mujoco><worldbody>{bodies}</worldbody>{rest}</mujoco>");
+    let bodies = repeat(20_000, one);
+    assert!(load("bodies", &world(&bodies, "")).is_ok());
+    let tendons = repeat(20_000, |i| format!("<fixed armature='1'><joint joint='j{i}' coef='1'/></fixed>"));
+    assert!(load("tendons", &world(&bodies, &format!("<tendon>{tendons}</tendon>"))).is_ok());
+    let path = repeat(20_000, |i| format!("<joint joint='j{i}' coef='1'/>"));
+    assert!(load("a tendon", &world(&bodies, &format!("<tendon><fixed>{path}</fixed></tendon>"))).is_ok());
+    let servos = repeat(20_000, |i| format!("<position joint='j{i}' dampratio='1'/>"));
+    assert!(load("servos", &world(&bodies, &format!("<actuator>{servos}</actuator>"))).is_ok());
+
+    // one tree with a large mass matrix
+    let tree = format!("<body><freejoint/><geom size='1'/>{}</body>", repeat(4000, one));
+    let model = load("tree", &world(&tree, "")).expect("it is not too large");
+    assert!(model.dofs.iter().all(|d| d.invweight0.is_finite() && d.invweight0 > 0.0));
+}
+
+/// A file that is included under ever new names of the same folder.
+#[cfg(unix)]
+#[test]
+fn includes_share_one_budget() {
+    let folder = std::env::temp_dir().join(format!("marathon-includes-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::os::unix::fs::symlink(".", folder.join("d")).unwrap();
+    let paths = repeat(30, |i| format!("<include file='{}a.xml'/>", "d/".repeat(1 + i)));
+    std::fs::write(folder.join("main.xml"), format!("<mujoco>{paths}</mujoco>")).unwrap();
+    let geoms = "<geom size='1'/>".repeat(100_000);
+    std::fs::write(folder.join("a.xml"), format!("<mujoco><worldbody>{geoms}</worldbody></mujoco>")).unwrap();
+    let error = Model::from_xml_file(folder.join("main.xml")).expect_err("too many").to_string();
+    assert!(error.contains(MEMORY), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
