@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::bvh::{JOINTS, Layout, Rest, Truth, usual, y_up};
+use common::bvh::{ARMS, HIPS, JOINTS, Layout, Rest, Truth, usual, y_up};
 use common::{all_shipped, model};
 use glam::{DQuat, DVec3};
 use marathon_motion::import::{Reading, Up};
@@ -33,11 +33,11 @@ fn shown(animation: &Animation, frame: usize) -> (Vec<DVec3>, Vec<DQuat>) {
     (places, turned)
 }
 
-/// Mean distance of the joints from the truth, m, and the mean angle of their turns, degrees, but for where the figure looks and
-/// starts.
+/// Mean distance of the joints from the truth, m, and the mean angle by which trunk and legs have turned otherwise, degrees, but for
+/// where the figure looks and starts. Arms may rest elsewhere: their directions are compared when they are retargeted.
 fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     // the model's reference pose faces +x
-    let hips = |places: &[DVec3]| (places[5] - places[9]).with_z(0.0).normalize();
+    let hips = |places: &[DVec3]| (places[HIPS[0]] - places[HIPS[1]]).with_z(0.0).normalize();
     let order: Vec<usize> = JOINTS
         .iter()
         .map(|(name, ..)| animation.skeleton().bones.iter().position(|bone| bone.name == *name).expect("a joint"))
@@ -51,7 +51,7 @@ fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     let level = (0..truth.clip.frames()).max_by(|a, b| {
         let flat = |frame: usize| {
             let places = truth.places(&truth.pose(frame));
-            (places[5] - places[9]).with_z(0.0).length()
+            (places[HIPS[0]] - places[HIPS[1]]).with_z(0.0).length()
         };
         flat(*a).total_cmp(&flat(*b))
     });
@@ -65,18 +65,21 @@ fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     let here = truth.turns(&truth.pose(level));
     let face = |turn: DQuat| heading((turn * DVec3::X).with_z(0.0));
     let rest = DQuat::from_rotation_z(face(world.conjugate() * here[0]) - face(there[0]));
-    let (mut way, mut angle, mut count) = (0.0, 0.0, 0.0);
+    let (mut way, mut angle, mut count, mut turned) = (0.0, 0.0, 0.0, 0.0);
     for frame in (0..truth.clip.frames()).step_by(3) {
         let pose = truth.pose(frame);
         let (places, turns) = ordered(frame);
         let (wanted, bodies) = (truth.places(&pose), truth.turns(&pose));
         for i in 0..JOINTS.len() {
             way += (world * places[i] + shift - wanted[i]).length();
-            angle += (world * turns[i] * rest).angle_between(bodies[i]).to_degrees();
             count += 1.0;
+            if !ARMS.contains(&i) {
+                angle += (world * turns[i] * rest).angle_between(bodies[i]).to_degrees();
+                turned += 1.0;
+            }
         }
     }
-    (way / count, angle / count)
+    (way / count, angle / turned)
 }
 
 /// Layouts of files, each with what is special about it.

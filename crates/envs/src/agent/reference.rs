@@ -186,7 +186,10 @@ impl<T: Real> Reference<T> {
         let rows: f64 = clips.iter().map(|clip| rows_of(clip, dt).0 as f64).sum();
         let numbers = model.nq + model.nv + 2 * columns.width;
         let asked = budget::MEMORY.check(size_of::<f64>() as f64 * rows * numbers as f64);
-        asked.map_err(|error| format!("what it follows, {} clips, {error}", clips.len()))?;
+        asked.map_err(|error| {
+            let names = if clips.len() == 1 { "the clip".to_string() } else { format!("{} clips", clips.len()) };
+            format!("a table of {names} {error}")
+        })?;
         let timeline = Timeline::new(clips, dt);
         let sim = Sim::new(model, super::bindings::sim_options()).map_err(|error| error.to_string())?;
         let mut table = Vec::new();

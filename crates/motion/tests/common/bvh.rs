@@ -7,26 +7,33 @@ use marathon_motion::Clip;
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 
-/// Joints by name, parent, and the body that they turn with.
-pub const JOINTS: [(&str, Option<usize>, &str); 17] = [
+/// Joints by name, parent, and the body that they turn with, in the order of a file.
+pub const JOINTS: [(&str, Option<usize>, &str); 19] = [
     ("Hips", None, "butt"),
     ("Spine", Some(0), "lower_waist"),
     ("Spine1", Some(1), "torso"),
     ("Neck", Some(2), "torso"),
     ("Head", Some(3), "torso"),
-    ("LeftUpLeg", Some(0), "left_thigh"),
-    ("LeftLeg", Some(5), "left_shin"),
-    ("LeftFoot", Some(6), "left_foot"),
-    ("LeftToeBase", Some(7), "left_foot"),
-    ("RightUpLeg", Some(0), "right_thigh"),
-    ("RightLeg", Some(9), "right_shin"),
-    ("RightFoot", Some(10), "right_foot"),
-    ("RightToeBase", Some(11), "right_foot"),
     ("LeftArm", Some(2), "left_upper_arm"),
-    ("LeftForeArm", Some(13), "left_larm"),
+    ("LeftForeArm", Some(5), "left_larm"),
+    ("LeftHand", Some(6), "left_hand"),
     ("RightArm", Some(2), "right_upper_arm"),
-    ("RightForeArm", Some(15), "right_larm"),
+    ("RightForeArm", Some(8), "right_larm"),
+    ("RightHand", Some(9), "right_hand"),
+    ("LeftUpLeg", Some(0), "left_thigh"),
+    ("LeftLeg", Some(11), "left_shin"),
+    ("LeftFoot", Some(12), "left_foot"),
+    ("LeftToeBase", Some(13), "left_foot"),
+    ("RightUpLeg", Some(0), "right_thigh"),
+    ("RightLeg", Some(15), "right_shin"),
+    ("RightFoot", Some(16), "right_foot"),
+    ("RightToeBase", Some(17), "right_foot"),
 ];
+
+/// The left and the right hip.
+pub const HIPS: [usize; 2] = [11, 15];
+/// The joints of the arms.
+pub const ARMS: std::ops::Range<usize> = 5..11;
 
 /// How a file shows the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +81,9 @@ impl Truth {
         Truth { model: model("marathon_man"), clip: shipped("marathon_man", name) }
     }
 
+    /// A body, or that of the hand, which is a part of the forearm.
     fn body(&self, name: &str) -> usize {
+        let name = name.replace("hand", "larm");
         self.model.bodies.iter().position(|body| body.name == name).expect("a body")
     }
 
@@ -86,6 +95,10 @@ impl Truth {
             pose.point(body, DVec3::from_array(at))
         };
         let of = |body: &str, local: [f64; 3]| pose.point(self.body(body), DVec3::from_array(local));
+        let geom = |name: &str| {
+            let geom = self.model.geoms.iter().find(|geom| geom.name == name).expect("a geom");
+            pose.point(geom.body, DVec3::from_array(geom.pos))
+        };
         JOINTS
             .iter()
             .map(|(name, _, body)| match *name {
@@ -97,6 +110,7 @@ impl Truth {
                 "Head" => of("torso", [0.0, 0.0, 0.2]),
                 "LeftToeBase" => of("left_foot", [0.13, 0.0, -0.055]),
                 "RightToeBase" => of("right_foot", [0.13, 0.0, -0.055]),
+                "LeftHand" | "RightHand" => geom(body),
                 _ => anchor(body),
             })
             .collect()

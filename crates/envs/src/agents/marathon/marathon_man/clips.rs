@@ -48,14 +48,31 @@ static SHIPPED: [Shipped; 17] = shipped![
     "stand",
 ];
 
-/// Clips of callers.
+/// Most numbers that the clips of callers hold together, 256 MB. Older ones are forgotten.
+const MOST_NUMBERS: usize = 32_000_000;
+
+/// Clips of callers, the latest last.
 static ADDED: RwLock<Vec<(String, Arc<Clip>)>> = RwLock::new(Vec::new());
 
-/// Makes a clip known under a name, in place of the one that has it so far. What has been made with that one keeps it.
+/// Makes a clip known under a name, in place of the one that has it so far. What has been made with that one keeps it. Where
+/// all clips of callers together take more than 256 MB, the oldest ones are forgotten.
 pub fn add(name: &str, clip: Clip) {
     let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
     added.retain(|(known, _)| known != name);
     added.push((name.into(), Arc::new(clip)));
+    forget(&mut added, MOST_NUMBERS);
+}
+
+/// Forgets the oldest clips until the others hold no more than so many numbers; the latest one stays.
+fn forget(clips: &mut Vec<(String, Arc<Clip>)>, most: usize) {
+    let numbers = |clip: &Clip| clip.frames() * (clip.layout().nq() + clip.layout().nv());
+    let mut sum = 0;
+    let kept = clips.iter().rev().take_while(|(_, clip)| {
+        sum += numbers(clip);
+        sum <= most
+    });
+    let kept = kept.count().max(1).min(clips.len());
+    clips.drain(..clips.len() - kept);
 }
 
 /// The clip of a name.
@@ -131,5 +148,24 @@ impl ClipNames {
         let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
         let Some(missing) = missing else { return Ok(()) };
         Err(format!("option clip is '{missing}', expected a clip that is known{}", among(missing, &known)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_clips_are_forgotten() {
+        let clip = shipped("stand").unwrap();
+        let one = clip.frames() * (clip.layout().nq() + clip.layout().nv());
+        let mut clips: Vec<_> = ["a", "b", "c"].into_iter().map(|name| (name.to_string(), clip.clone())).collect();
+        let names = |clips: &[(String, Arc<Clip>)]| clips.iter().map(|(name, _)| name.clone()).collect::<String>();
+        forget(&mut clips, 3 * one);
+        assert_eq!(names(&clips), "abc");
+        forget(&mut clips, 2 * one);
+        assert_eq!(names(&clips), "bc");
+        forget(&mut clips, 0);
+        assert_eq!(names(&clips), "c");
     }
 }
