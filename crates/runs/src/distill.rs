@@ -14,7 +14,7 @@ use crate::setting::{CLIP, Setting, TaskOptions};
 use marathon_envs::options::Value;
 use marathon_envs::{Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::{
-    Activation, BlockPolicy, Control, Distiller, Halfway, Lessons, Policy, PolicyMeta, can_be_had, checksum,
+    Activation, BlockPolicy, Control, Distiller, Error, Halfway, Lessons, Policy, PolicyMeta, can_be_had, checksum,
 };
 use marathon_physics::budget::AGENTS_MEMORY;
 use marathon_physics::lanes::Isa;
@@ -284,8 +284,12 @@ impl School {
             classes.push(Class { env, step, teacher, sees });
         }
         let log_std = (0..spec.act).map(|i| mean(classes.iter().map(|class| class.teacher.log_std()[i]))).collect();
-        let hidden = |error: marathon_learn::Error| RunError::option("hidden", format!("asks for a {error}"));
-        let mut student = Distiller::new(meta, log_std, options.seed, Isa::best()).map_err(hidden)?;
+        let mut student = Distiller::new(meta, log_std, options.seed, Isa::best()).map_err(|error| match error {
+            Error::Mismatch { found, expected, .. } => {
+                RunError::option("hidden", format!("makes a network of {found}, expected {expected}"))
+            }
+            other => other.into(),
+        })?;
         if let Some((known, path)) = known.zip(options.initialize_from.as_ref()) {
             student.start_from(&known, &policy_file::seen_by(&known, path, &spec)?)?;
         }

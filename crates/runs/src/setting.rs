@@ -8,6 +8,7 @@ use marathon_envs::shard::task_of_role;
 use marathon_envs::{ModelSource, Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
 use marathon_learn::policy::options;
+use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -173,6 +174,12 @@ impl Setting {
         if self.clips.len() > MOST_CLIPS {
             let problem = format!("has {} clips, expected at most {MOST_CLIPS}", self.clips.len());
             return Err(RunError::option("option", problem).into());
+        }
+        // a policy of a stranger may name a device or a pipe, which never end
+        if let Some(ModelSource::File(path)) = self.model()
+            && std::fs::metadata(&path).is_ok_and(|facts| !facts.is_file())
+        {
+            budget::read(&path, &budget::MODEL_FILE).map_err(RunError::io(&path, "read"))?;
         }
         let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
         clips::name(&self.clips)?;
