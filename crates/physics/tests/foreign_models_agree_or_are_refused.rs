@@ -7,7 +7,7 @@
 //!
 //! Every model runs under its own settings of the solver. Where they end MuJoCo's iteration before it has converged, all of
 //! that holds for the point where it ends. Where they let it converge, its answer is only as exact as the file's
-//! tolerance: the accelerations agree within that tolerance, and the same problem solved to the end on both sides agrees to 1e-8.
+//! tolerance. There the accelerations agree within that tolerance, and everything agrees to 1e-8 when both sides solve to the end.
 //!
 //! `MARATHON_MODELS=FOLDER` tries the models of a folder instead. `docs/models.md` lists what became of each file. The test fails if the list is out of date; run it with
 //! `MARATHON_BLESS=1` to write it anew.
@@ -177,8 +177,8 @@ fn converges(model: &Model) -> bool {
     model.opt.iterations >= 50
 }
 
-/// Compares the acceleration under the file's own settings with MuJoCo's, in units of what the tolerance allows: both are
-/// within it of the least cost, and the cost rises with the square of the distance, measured by the mass matrix.
+/// Compares the acceleration under the file's own settings with MuJoCo's, in units of what the tolerance allows. Both are
+/// within it of the least cost. The cost rises with the square of the distance, measured by the mass matrix.
 fn in_tolerances(sim: &Sim<f64>, states: &[State]) -> f64 {
     let (model, mut work) = (sim.model(), Work::new(sim));
     let errors = states.iter().map(|state| {

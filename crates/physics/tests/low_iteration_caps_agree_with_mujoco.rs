@@ -3,8 +3,8 @@
 //!
 //! Fast versions of legged robots allow the solver one to five iterations with a line search of four to eight evaluations.
 //! MuJoCo's answer is then not the minimum, and the robot was tuned with that answer. In double precision the acceleration,
-//! the constraint forces and the next state equal MuJoCo's along trajectories from random states, for every cap, both friction cones and
-//! both impedance ratios that such files use; in single precision, robots stand as they do in MuJoCo.
+//! the constraint forces and the next state equal MuJoCo's along trajectories from random states. That holds for every cap,
+//! both friction cones and both impedance ratios that such files use. On every lane width, robots stand as they do in MuJoCo.
 
 mod common;
 

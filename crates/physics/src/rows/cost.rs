@@ -1,5 +1,5 @@
-//! The cost of rows, and by how much it rises along a segment: differences are taken zone by zone, as MuJoCo does, so that
-//! they keep their digits where two costs are nearly equal.
+//! The cost of rows, and by how much it rises along a segment. Differences are taken zone by zone, as MuJoCo does: so they
+//! keep their digits where two costs are nearly equal.
 
 use super::block::{Block, RowValues};
 use super::cone::ConePoint;
@@ -8,8 +8,8 @@ use super::joint::{DryRow, LimitRow};
 use crate::lanes::Real;
 use crate::sim::Cost;
 
-/// The cost of a constraint, at the present point and along a way from there, which is kept in the place of the Newton
-/// point: the difference of two points would lose the digits of a short way.
+/// The cost of a constraint, at the present point and along a way from there. The way is kept in the place of the Newton
+/// point: the difference of two points would lose the digits of a short one.
 pub(crate) trait RowCost<T: Real> {
     /// Cost at the present point.
     fn cost(&self) -> T;

@@ -3,8 +3,8 @@
 use super::options::SimOptions;
 use crate::model::{Model, Solver};
 
-/// Caps below this are followed to the letter. MuJoCo's Newton solver converges in fewer iterations: it takes 25 at most
-/// in 6,700 steps from random states of the 186 models of `docs/models.md` that it was tried on, and 10 in 99.5 % of them.
+/// Caps below this are followed to the letter. MuJoCo's Newton solver converges in fewer iterations. In 6,700 steps from
+/// random states of 186 models of `docs/models.md`, it takes 25 at most, and 10 in 99.5 % of them.
 pub(crate) const LEAST_ORDINARY_CAP: usize = 50;
 
 /// The solver's settings in models whose cap ends it before it has converged.

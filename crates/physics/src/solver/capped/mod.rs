@@ -1,16 +1,18 @@
 //! MuJoCo's own iteration, for models whose cap ends it before it has converged.
 //!
-//! The minimum does not depend on the way there. The point after one, two or five iterations does, and it is what such a
-//! model was tuned with, so here the way is MuJoCo's (`engine_solver.c`): the start is the better of the last step's
-//! acceleration and the one without constraints; the direction is
-//! Newton's, `a1 - a`, for the active set at the present point, or that of conjugate gradients ([`conjugate`]);
-//! the line search is MuJoCo's evaluation by evaluation ([`line`]); every island of trees ends by its own improvement,
-//! gradient, or predicted improvement ([`islands`]).
+//! The minimum does not depend on the way there. The point after one, two or five iterations does, and such a model was
+//! tuned with that point. So here the way is MuJoCo's (`engine_solver.c`):
 //!
-//! The Newton points come from the same factorizations as in the other iteration ([`newton`](super::newton)). What that one
-//! saves by its identities is computed here: the acceleration without constraints `a_s`, which costs one more
-//! factorization, and with it the cost of moving the masses, `1/2 (a - a_s)' M (a - a_s)`. M is never formed: products with it
-//! are sums over the momenta of links.
+//! * The start is the better of the last step's acceleration and the one without constraints.
+//! * The direction is Newton's, `a1 - a`, for the active set at the present point, or that of conjugate gradients
+//!   ([`conjugate`]).
+//! * The line search evaluates the same points as MuJoCo's ([`line`]).
+//! * Every island of trees stops by its own improvement, gradient, or predicted improvement ([`islands`]).
+//!
+//! The Newton points come from the same factorizations as in the other iteration ([`newton`](super::newton)). This one has no
+//! identities to save work with. It computes the acceleration without constraints `a_s`, which costs one more factorization,
+//! and the cost of moving the masses, `1/2 (a - a_s)' M (a - a_s)`. M is never formed: products with it are sums over the
+//! momenta of links.
 
 mod conjugate;
 mod islands;
