@@ -104,7 +104,7 @@ def test_numbers_beyond_all_sense_are_refused_by_name(call: Callable[[], Any], m
 
 def test_a_run_that_does_not_fit_is_a_memory_error() -> None:
     with pytest.raises(MemoryError, match="fewer agents"):
-        train("hopper", agents=16 * 10**8)
+        train("hopper", agents=32_000_000)
 
 
 def test_evaluate_refuses_more_episodes_than_make_sense() -> None:

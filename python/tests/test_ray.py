@@ -127,7 +127,8 @@ def pid(actor: Any) -> int:
 
 
 def test_a_worker_that_stops_answering_is_replaced(want: marathon_envs.TrainResult) -> None:
-    workers = Workers(2, answer_timeout=10)
+    # a new process takes seconds until it plays, on a busy machine many
+    workers = Workers(2, answer_timeout=30)
     stopped = []
 
     def stop(row: dict[str, Any]) -> None:
