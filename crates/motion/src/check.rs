@@ -163,7 +163,9 @@ impl Report {
         warn(jump, bound::JUMP, format!("{} jumps by {:.0} rad/s", jump.name, jump.value));
         let far = self.fit.and_then(|fit| fit.warning());
         warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
-        out.extend(far.map(|text| format!("{text}: it is another motion, or the recording was read in a wrong direction")));
+        out.extend(
+            far.map(|text| format!("{text}: it is another motion, or the recording was read in a wrong direction")),
+        );
         out
     }
 

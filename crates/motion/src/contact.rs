@@ -95,12 +95,7 @@ pub(crate) fn clearance(touches: &[Touch], pose: &Pose) -> f64 {
 }
 
 /// The clip lifted as a whole, so that nothing is below the ground.
-pub(crate) fn above_ground(
-    path: &Path,
-    model: &Model,
-    touches: &[Touch],
-    clip: &Clip,
-) -> Result<Clip, MotionError> {
+pub(crate) fn above_ground(path: &Path, model: &Model, touches: &[Touch], clip: &Clip) -> Result<Clip, MotionError> {
     let depth = (0..clip.frames()).map(|i| -clearance(touches, &Pose::of(model, clip.frame(i)))).fold(0.0, f64::max);
     clip.moved(path, model, DVec3::Z * depth)
 }

@@ -99,12 +99,10 @@ fn by_role(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     let prefix = common_prefix(skeleton);
     let bare = |name: &str| name.get(prefix.len()..).filter(|_| name.starts_with(&*prefix)).unwrap_or(name).to_string();
     // names as they are, then without what a program has put before or behind all of them
-    let mut readings: [&dyn Fn(&str) -> String; 4] = [
-        &|name| name.to_string(),
-        &|name| bare(name),
-        &|name| without_number(name).to_string(),
-        &|name| without_number(&bare(name)).to_string(),
-    ];
+    let mut readings: [&dyn Fn(&str) -> String; 4] =
+        [&|name| name.to_string(), &|name| bare(name), &|name| without_number(name).to_string(), &|name| {
+            without_number(&bare(name)).to_string()
+        }];
     // Sketchfab numbers all joints: its Spine_2 is no second spine
     let numbered = skeleton.bones.iter().filter(|bone| without_number(&bone.name) != bone.name).count();
     if 5 * numbered >= 3 * skeleton.bones.len() {
@@ -267,7 +265,10 @@ mod tests {
         assert_eq!(find(&rigify, "chest"), Some(3));
         assert_eq!(find(&rigify, "root"), Some(0));
         let vroid = skeleton(&["J_Bip_C_Hips", "J_Bip_C_Chest", "J_Bip_L_UpperLeg", "J_Bip_R_UpperArm"]);
-        assert_eq!(["root", "chest", "left_hip", "right_shoulder"].map(|role| find(&vroid, role)), [0, 1, 2, 3].map(Some));
+        assert_eq!(
+            ["root", "chest", "left_hip", "right_shoulder"].map(|role| find(&vroid, role)),
+            [0, 1, 2, 3].map(Some)
+        );
     }
 
     #[test]

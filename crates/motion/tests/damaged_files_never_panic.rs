@@ -60,7 +60,8 @@ fn damaged_files_are_read_or_refused_by_name() {
     for i in 0..30_000 {
         let result = match i % 3 {
             0 => Clip::parse_without_checksum("f.motion".as_ref(), &damaged(&walk, &mut random)),
-            1 => import::any("f.bvh".as_ref(), &damaged(bvh, &mut random)).and_then(|a| a.looped("f.bvh".as_ref()).map(|a| a.clip().clone())),
+            1 => import::any("f.bvh".as_ref(), &damaged(bvh, &mut random))
+                .and_then(|a| a.looped("f.bvh".as_ref()).map(|a| a.clip().clone())),
             _ => import::any("f.json".as_ref(), &damaged(deepmimic.as_bytes(), &mut random))
                 .and_then(|a| a.looped("f.json".as_ref()).map(|a| a.clip().clone())),
         };

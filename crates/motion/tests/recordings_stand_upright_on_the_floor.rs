@@ -91,12 +91,18 @@ fn layouts() -> Vec<(&'static str, Layout)> {
         ("bones along z", Layout { rest: Rest::Along(DVec3::Z), ..usual() }),
         ("bones along -y, in meters", Layout { rest: Rest::Along(DVec3::NEG_Y), unit: 1.0, ..usual() }),
         ("z up", Layout { world: z_up, ..usual() }),
-        ("motion with z up, rest with y up", Layout { world: z_up, rest: Rest::Standing, rest_turned: false, ..usual() }),
+        (
+            "motion with z up, rest with y up",
+            Layout { world: z_up, rest: Rest::Standing, rest_turned: false, ..usual() },
+        ),
         ("bones along x, z up", Layout { rest: Rest::Along(DVec3::X), world: z_up, ..usual() }),
         ("floor at -1 m", Layout { floor: -1.0, ..usual() }),
         ("floor at 3 m", Layout { floor: 3.0, ..usual() }),
         ("twisted pelvis", Layout { rest: Rest::Twisted(90.0), ..usual() }),
-        ("bones along z, floor at 3 m, z up", Layout { rest: Rest::Along(DVec3::Z), floor: 3.0, world: z_up, ..usual() }),
+        (
+            "bones along z, floor at 3 m, z up",
+            Layout { rest: Rest::Along(DVec3::Z), floor: 3.0, world: z_up, ..usual() },
+        ),
     ]
 }
 

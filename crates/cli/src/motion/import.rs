@@ -24,7 +24,9 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
         return again(args, json);
     }
     let Some(name) = &args.model else {
-        return Err(CliError::Usage("--model is missing, expected the character that is to move: an agent or an MJCF file".into()));
+        return Err(CliError::Usage(
+            "--model is missing, expected the character that is to move: an agent or an MJCF file".into(),
+        ));
     };
     let model = model::load(name)?;
     let known_as = match &args.edits.mapping {
@@ -33,13 +35,8 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     };
     let bytes = budget::read(path, &RECORDING_FILE).map_err(CliError::io(path, "read"))?;
     let beside = |name: &str| clips::beside(path, name);
-    let reading = Reading {
-        up: args.up,
-        floor: args.floor,
-        animation: args.animation.clone(),
-        known_as,
-        beside: Some(&beside),
-    };
+    let reading =
+        Reading { up: args.up, floor: args.floor, animation: args.animation.clone(), known_as, beside: Some(&beside) };
     let Recording { animation, notes } = read::read(path, &bytes, &reading)?;
     write(path, animation, &model, &args.edits, notes, json)
 }
@@ -49,8 +46,14 @@ fn again(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     let (path, edits) = (&args.recording, &args.edits);
     let bytes = budget::read(path, &CLIP_FILE).map_err(CliError::io(path, "read"))?;
     let clip = Clip::parse_without_checksum(path, &bytes)?;
-    let changes = edits.mapping.is_some() || edits.trim.is_some() || edits.mirror || edits.forward || edits.smooth > 0.0;
-    if changes || edits.looping != Looping::Auto || args.up.is_some() || args.floor.is_some() || args.animation.is_some() {
+    let changes =
+        edits.mapping.is_some() || edits.trim.is_some() || edits.mirror || edits.forward || edits.smooth > 0.0;
+    if changes
+        || edits.looping != Looping::Auto
+        || args.up.is_some()
+        || args.floor.is_some()
+        || args.animation.is_some()
+    {
         return Err(CliError::Usage(format!(
             "{} is a clip already: `import` only writes its checksum; `{} motion retarget` edits clips",
             path_word(path),

@@ -14,8 +14,8 @@
 
 use super::{About, Clip, Cycle, Nearness};
 use crate::error::MotionError;
-use crate::limits;
 use crate::layout::{JointKind, Layout};
+use crate::limits;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::Path;

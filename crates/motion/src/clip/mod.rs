@@ -48,7 +48,8 @@ impl Nearness {
     pub fn warning(&self) -> Option<String> {
         let (distance, degrees) = (1e2 * self.position, self.rotation.to_degrees());
         let far = self.position > FAR || self.rotation > TURNED;
-        let text = || format!("its parts are {distance:.1} cm and {degrees:.0} degrees from the recording's in the mean");
+        let text =
+            || format!("its parts are {distance:.1} cm and {degrees:.0} degrees from the recording's in the mean");
         far.then(text)
     }
 }

@@ -8,8 +8,8 @@ use super::{Reading, Recording, upright};
 use crate::clip::About;
 use crate::error::MotionError;
 use crate::limits;
-use crate::rotation::{exp, wxyz};
 use crate::roles;
+use crate::rotation::{exp, wxyz};
 use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
 use std::path::Path;
@@ -73,7 +73,9 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     words.label("Frame Time:")?;
     let dt = words.number()?;
     if dt > LONGEST_STEP {
-        return Err(words.wrong(words.line, format!("found a frame time of {dt}, expected seconds, up to {LONGEST_STEP}")));
+        return Err(
+            words.wrong(words.line, format!("found a frame time of {dt}, expected seconds, up to {LONGEST_STEP}"))
+        );
     }
     if let Some(node) = nodes.iter().find(|node| !(node.offset.abs().max_element() <= 1e6)) {
         let found = format!("{} of {:?}", node.offset, node.name);

@@ -72,7 +72,12 @@ pub fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, M
     match ending.as_str() {
         "bvh" | "txt" | "json" if reading.animation.is_some() => {
             let expected = "no name of an animation: only glTF files have several";
-            Err(MotionError::value(path, "animation", format!("{:?}", reading.animation.as_deref().unwrap_or("")), expected))
+            Err(MotionError::value(
+                path,
+                "animation",
+                format!("{:?}", reading.animation.as_deref().unwrap_or("")),
+                expected,
+            ))
         }
         "bvh" => bvh::read(path, bytes, reading),
         "glb" | "gltf" | "vrm" | "vrma" => gltf::read(path, bytes, reading),
@@ -80,8 +85,9 @@ pub fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, M
         _ => Err(MotionError::Unsupported {
             path: path.into(),
             feature: format!("a recording with the ending {ending:?}"),
-            instead: "expected .bvh, .glb, .gltf, .vrm, .vrma, or .txt or .json of DeepMimic; Blender writes .fbx as .glb"
-                .into(),
+            instead:
+                "expected .bvh, .glb, .gltf, .vrm, .vrma, or .txt or .json of DeepMimic; Blender writes .fbx as .glb"
+                    .into(),
         }),
     }
 }

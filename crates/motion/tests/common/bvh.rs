@@ -154,7 +154,8 @@ impl Truth {
                 }
             })
             .collect();
-        let offset = |i: usize| JOINTS[i].1.map_or(DVec3::ZERO, |up| own[up].conjugate() * (rest[i] - rest[up]) / layout.unit);
+        let offset =
+            |i: usize| JOINTS[i].1.map_or(DVec3::ZERO, |up| own[up].conjugate() * (rest[i] - rest[up]) / layout.unit);
         let mut out = String::from("HIERARCHY\n");
         fn joint(i: usize, out: &mut String, offset: &dyn Fn(usize) -> DVec3) {
             let (word, places) = if i == 0 { ("ROOT", "6 Xposition Yposition Zposition") } else { ("JOINT", "3") };

@@ -49,8 +49,10 @@ impl<'a> Buffers<'a> {
             _ => 0,
         };
         if size == 0 || accessor.kind != kind {
-            let found = format!("accessor {index} of {} of type {}", accessor.kind.escape_debug(), accessor.component_type);
-            let expected = if whole { format!("{kind} of floats or normalized integers") } else { format!("{kind} of floats") };
+            let found =
+                format!("accessor {index} of {} of type {}", accessor.kind.escape_debug(), accessor.component_type);
+            let expected =
+                if whole { format!("{kind} of floats or normalized integers") } else { format!("{kind} of floats") };
             return wrong(place, found, &expected);
         }
         let key = format!("accessors[{index}]");
@@ -127,7 +129,9 @@ impl<'a> Buffers<'a> {
         let name = unescaped(uri);
         let found = format!("the file {name:?}");
         match self.beside {
-            Some(read) => read(&name).map(Cow::Owned).or_else(|reason| wrong(format!("{found}: {reason}"), "a file beside this one")),
+            Some(read) => read(&name)
+                .map(Cow::Owned)
+                .or_else(|reason| wrong(format!("{found}: {reason}"), "a file beside this one")),
             None => wrong(found, "data within this file; export as .glb"),
         }
     }
@@ -148,7 +152,8 @@ fn number(kind: u32, bytes: &[u8]) -> f64 {
 fn unescaped(uri: &str) -> String {
     let (mut out, mut rest) = (Vec::new(), uri.as_bytes());
     while let Some((first, behind)) = rest.split_first() {
-        let code = std::str::from_utf8(behind.get(..2).unwrap_or(&[])).ok().and_then(|hex| u8::from_str_radix(hex, 16).ok());
+        let code =
+            std::str::from_utf8(behind.get(..2).unwrap_or(&[])).ok().and_then(|hex| u8::from_str_radix(hex, 16).ok());
         match (first, code) {
             (b'%', Some(byte)) => {
                 out.push(byte);

@@ -186,9 +186,8 @@ pub(super) fn read<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Document, Option
         _ => (objects, entries),
     });
     limits::check_memory(path, 256.0 * objects as f64 + 16.0 * entries as f64)?;
-    let document: Document = serde_json::from_slice(json).map_err(|error| {
-        MotionError::value(path, "glTF", error, "a .glb, .gltf, .vrm or .vrma file of glTF 2.0")
-    })?;
+    let document: Document = serde_json::from_slice(json)
+        .map_err(|error| MotionError::value(path, "glTF", error, "a .glb, .gltf, .vrm or .vrma file of glTF 2.0"))?;
     if !document.asset.version.starts_with("2.") {
         let found = format!("version {:?}", document.asset.version);
         return Err(MotionError::value(path, "asset", found, "version 2.0 of glTF"));
@@ -202,7 +201,10 @@ fn chunks<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]
     let wrong = |found: String, expected: &str| Err(MotionError::value(path, "glTF", found, expected));
     let length = word(8).unwrap_or(0);
     if length < HEADER || length > bytes.len() {
-        return wrong(format!("a length of {length} bytes"), &format!("the file's, {}, in its third word", bytes.len()));
+        return wrong(
+            format!("a length of {length} bytes"),
+            &format!("the file's, {}, in its third word", bytes.len()),
+        );
     }
     if word(4) != Some(2) {
         return wrong(format!("version {}", word(4).unwrap_or(0)), "version 2 in the second word");

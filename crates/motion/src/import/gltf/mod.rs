@@ -70,7 +70,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
         return Err(wrong(&place, "no joint that turns".into(), "rotations of the skeleton's joints"));
     }
     let order = order(path, nodes, &joints, &parents)?;
-    let locals: Vec<(Local, f64)> = order.iter().map(|(node, _)| local(path, &nodes[*node], *node)).collect::<Result<_, _>>()?;
+    let locals: Vec<(Local, f64)> =
+        order.iter().map(|(node, _)| local(path, &nodes[*node], *node)).collect::<Result<_, _>>()?;
     // lengths below a node grow by its scale and those of all above it
     let mut scales: Vec<f64> = Vec::with_capacity(order.len());
     for ((_, parent), (_, own)) in order.iter().zip(&locals) {
@@ -121,7 +122,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
             };
             let at = |i: usize| Local { pos: pos(i), turn: turn(i) };
             let root = carriers[1..].iter().fold(at(carriers[0]), |place, joint| place.then(at(*joint)));
-            let rotations = kept.iter().enumerate().map(|(k, joint)| wxyz(if k == 0 { root.turn } else { turn(*joint) }));
+            let rotations =
+                kept.iter().enumerate().map(|(k, joint)| wxyz(if k == 0 { root.turn } else { turn(*joint) }));
             Keyframe { root: root.pos.to_array(), rotations: rotations.collect() }
         })
         .collect();
@@ -206,7 +208,13 @@ fn tracks(
 }
 
 /// A channel, checked. Of cubic splines the values are kept and the tangents are not: at 60 keys per second they say nothing new.
-fn track<T: Copy>(path: &Path, place: &str, times: Vec<f64>, values: Vec<T>, kind: &str) -> Result<Track<T>, MotionError> {
+fn track<T: Copy>(
+    path: &Path,
+    place: &str,
+    times: Vec<f64>,
+    values: Vec<T>,
+    kind: &str,
+) -> Result<Track<T>, MotionError> {
     let cubic = kind == "CUBICSPLINE";
     let values: Vec<T> = if cubic { values.into_iter().skip(1).step_by(3).collect() } else { values };
     if times.is_empty() || times.len() != values.len() {
@@ -323,7 +331,8 @@ fn order(
         order.push((node, order.len().checked_sub(1)));
     }
     // depth first, in the order of the file
-    let mut open: Vec<(usize, usize)> = nodes[top].children.iter().rev().map(|child| (*child, order.len() - 1)).collect();
+    let mut open: Vec<(usize, usize)> =
+        nodes[top].children.iter().rev().map(|child| (*child, order.len() - 1)).collect();
     while let Some((node, parent)) = open.pop() {
         if needed[node] {
             order.push((node, Some(parent)));
@@ -356,7 +365,12 @@ fn local(path: &Path, node: &Node, index: usize) -> Result<(Local, f64), MotionE
     let scale = (size.x + size.y + size.z) / 3.0;
     if !(pos.is_finite() && turn.is_finite() && turn.length() > 0.1 && scale.is_finite()) {
         let found = "a place, turn or size that is none";
-        return Err(MotionError::value(path, &format!("nodes[{index}]"), found, "finite numbers, and a rotation of unit length"));
+        return Err(MotionError::value(
+            path,
+            &format!("nodes[{index}]"),
+            found,
+            "finite numbers, and a rotation of unit length",
+        ));
     }
     Ok((Local { pos, turn: turn.normalize() }, scale))
 }

@@ -19,7 +19,8 @@ pub(super) fn estimate(marks: &Landmarks, moments: &[Moment], stature: f64, dt: 
         marks.touching().map(|(joint, height)| pose.pos[joint].z - height * stature).fold(f64::INFINITY, f64::min)
     };
     let heights = moments.iter().map(|moment| (low(&moment.now), low(&moment.next)));
-    let mut contacts: Vec<f64> = heights.filter(|(now, next)| (next - now).abs() < SLOW * dt).map(|(now, _)| now).collect();
+    let mut contacts: Vec<f64> =
+        heights.filter(|(now, next)| (next - now).abs() < SLOW * dt).map(|(now, _)| now).collect();
     contacts.sort_by(f64::total_cmp);
     if seconds * contacts.len() as f64 / (moments.len() as f64) < SHORTEST.min(0.5 * seconds) {
         return 0.0;

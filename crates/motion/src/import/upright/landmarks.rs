@@ -39,10 +39,11 @@ impl Landmarks {
         let (shoulders, elbows) = (both("shoulder")?, both("elbow")?);
         let pelvis = fork(skeleton, hips[0], hips[1])?;
         let top = fork(skeleton, shoulders[0], shoulders[1])?;
-        let chest = joint("chest").filter(|chest| {
-            shoulders.iter().all(|shoulder| skeleton.hangs(*shoulder, *chest)) && *chest != pelvis
-        });
-        let below = |upper: [usize; 2], lower: [usize; 2]| (0..2).all(|i| upper[i] != lower[i] && skeleton.hangs(lower[i], upper[i]));
+        let chest = joint("chest")
+            .filter(|chest| shoulders.iter().all(|shoulder| skeleton.hangs(*shoulder, *chest)) && *chest != pelvis);
+        let below = |upper: [usize; 2], lower: [usize; 2]| {
+            (0..2).all(|i| upper[i] != lower[i] && skeleton.hangs(lower[i], upper[i]))
+        };
         let sound = below(hips, knees) && below(knees, ankles) && below(shoulders, elbows);
         let marks = Landmarks {
             pelvis,

@@ -45,15 +45,17 @@ pub(super) fn settle(path: &Path, mut raw: Raw, wraps: bool, reading: &Reading) 
     };
     if !(stature > 0.0 && stature < 1e9) {
         let found = format!("a skeleton {stature} tall");
-        return Err(MotionError::value(path, "skeleton", found, "joints of a figure, which do not all lie in one point"));
+        return Err(MotionError::value(
+            path,
+            "skeleton",
+            found,
+            "joints of a figure, which do not all lie in one point",
+        ));
     }
 
     let mut notes = std::mem::take(&mut raw.notes);
-    let conventional = if marks.is_none() && raw.trust_y < 0.5 && extent(DVec3::Z) > 1.2 * extent(DVec3::Y) {
-        Up::Z
-    } else {
-        Up::Y
-    };
+    let conventional =
+        if marks.is_none() && raw.trust_y < 0.5 && extent(DVec3::Z) > 1.2 * extent(DVec3::Y) { Up::Z } else { Up::Y };
     let up = match (&marks, reading.up) {
         (_, Some(up)) => up,
         (Some(marks), None) => {

@@ -29,8 +29,7 @@ pub(super) fn upward(marks: &Landmarks, pose: &SkeletonPose) -> Option<DVec3> {
     };
     let trunk = marks.trunk(pose).normalize_or_zero();
     let stands = (0..2).all(|side| {
-        let (thigh, shin) =
-            (way(marks.knees[side], marks.hips[side]), way(marks.ankles[side], marks.knees[side]));
+        let (thigh, shin) = (way(marks.knees[side], marks.hips[side]), way(marks.ankles[side], marks.knees[side]));
         within(thigh, trunk, BENT) && within(shin, thigh, BENT)
     });
     let across = |[left, right]: [usize; 2]| way(right, left);
@@ -125,7 +124,8 @@ impl Look<'_> {
     /// The turn of each landmark's joint in the pose.
     fn turns(&self, skeleton: &Skeleton) -> Option<Vec<(usize, DQuat)>> {
         let marks = self.marks;
-        let across = |pose: &SkeletonPose, [left, right]: [usize; 2]| (pose.pos[left] - pose.pos[right]).normalize_or_zero();
+        let across =
+            |pose: &SkeletonPose, [left, right]: [usize; 2]| (pose.pos[left] - pose.pos[right]).normalize_or_zero();
         let mut turns = Vec::new();
         let mut add = |joint: usize, own: [DVec3; 2], world: [DVec3; 2]| {
             let turn = Axes { own, world }.turn()?;
@@ -160,7 +160,11 @@ impl Look<'_> {
                     let front = self.mean(ankle, |pose| pose.pos[toe] - pose.pos[ankle]);
                     let flat = front - foot_up.normalize_or_zero() * front.dot(foot_up.normalize_or_zero());
                     let known = flat.length() > 0.3 * front.length() && flat.length() > 1e-3;
-                    if known { add(ankle, [foot_up, front], [up, DVec3::X])? } else { add(ankle, [foot_up, beside], [up, left])? }
+                    if known {
+                        add(ankle, [foot_up, front], [up, DVec3::X])?
+                    } else {
+                        add(ankle, [foot_up, beside], [up, left])?
+                    }
                 }
                 None => add(ankle, [foot_up, beside], [up, left])?,
             };
@@ -220,11 +224,13 @@ pub(super) fn standing(skeleton: &Skeleton, marks: &Landmarks, moments: &[Moment
 
 /// The mean turn of a joint in the frame of its parent.
 fn mean_turn(moments: &[Moment], joint: usize, parent: Option<usize>) -> Option<DQuat> {
-    let local = |pose: &SkeletonPose| parent.map_or(pose.quat[joint], |up| pose.quat[up].conjugate() * pose.quat[joint]);
+    let local =
+        |pose: &SkeletonPose| parent.map_or(pose.quat[joint], |up| pose.quat[up].conjugate() * pose.quat[joint]);
     let first = local(&moments.first()?.now);
-    let sum = moments.iter().map(|moment| local(&moment.now)).fold(first * 0.0, |sum, turn| {
-        if turn.dot(first) < 0.0 { sum - turn } else { sum + turn }
-    });
+    let sum = moments
+        .iter()
+        .map(|moment| local(&moment.now))
+        .fold(first * 0.0, |sum, turn| if turn.dot(first) < 0.0 { sum - turn } else { sum + turn });
     (sum.length() > 1e-3 * moments.len() as f64).then(|| sum.normalize())
 }
 

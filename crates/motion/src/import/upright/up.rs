@@ -96,7 +96,14 @@ const MOVING: f64 = 0.12;
 
 /// The axis along which the head is above the hips and the limbs that stand still are below the trunk. Lengths of the
 /// recording are compared with the stature.
-pub(super) fn estimate(marks: &Landmarks, moments: &[Moment], stature: f64, dt: f64, rest: Option<Up>, trust_y: f64) -> Up {
+pub(super) fn estimate(
+    marks: &Landmarks,
+    moments: &[Moment],
+    stature: f64,
+    dt: f64,
+    rest: Option<Up>,
+    trust_y: f64,
+) -> Up {
     let posture: DVec3 = moments.iter().map(|moment| posture(marks, &moment.now)).sum::<DVec3>() / moments.len() as f64;
     let mut supports: Vec<(&SkeletonPose, usize)> = Vec::new();
     for Moment { now, next } in moments {
