@@ -83,7 +83,15 @@ fn a_clip_with_a_foot_in_the_ground_fails_the_check() {
     let numbers: Vec<&str> = row.trim().trim_matches(['[', ']', ',']).split(", ").collect();
     let low = (numbers[1].parse::<f64>().unwrap() - 0.05).to_string();
     let bad = good.replacen(row, &row.replacen(numbers[1], &low, 1), 1);
-    std::fs::write(temp.path().join("bad.motion"), bad).unwrap();
+    std::fs::write(temp.path().join("edited.motion"), &bad).unwrap();
+    let text = fail(temp.path(), 1, &["motion", "check", "edited.motion"]);
+    assert!(text.contains("edited.motion: checksum: found ") && text.contains("remove this entry"), "{text}");
+    // whoever edits a clip on purpose has it sealed again
+    let bare: String = bad.lines().filter(|line| !line.contains("checksum")).map(|line| format!("{line}\n")).collect();
+    std::fs::write(temp.path().join("edited.motion"), bare).unwrap();
+    let text = fail(temp.path(), 1, &["motion", "check", "edited.motion"]);
+    assert!(text.contains("`marathon motion import edited.motion --out NEW.motion` writes one"), "{text}");
+    succeed(temp.path(), &["motion", "import", "edited.motion", "--out", "bad.motion"]);
     let output = run(temp.path(), &["--json", "motion", "check", "bad.motion"]);
     assert_eq!(output.status.code(), Some(1));
     let report = json(&String::from_utf8(output.stdout).unwrap());
@@ -122,4 +130,94 @@ fn errors_say_what_to_do() {
     let text = import("none.bvh", "humanoid", "a.motion", 1);
     assert!(text.contains("none.bvh"), "{text}");
     assert!(!temp.path().join("a.motion").exists());
+}
+
+#[test]
+fn a_clip_never_replaces_what_it_is_made_from() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::copy(shipped("humanoid/walk.motion"), temp.path().join("walk.motion")).unwrap();
+    let before = std::fs::read(temp.path().join("walk.motion")).unwrap();
+    for args in [
+        ["motion", "retarget", "walk.motion", "--model", "humanoid", "--out", "walk.motion"],
+        ["motion", "retarget", "walk.motion", "--model", "humanoid", "--out", "./walk.motion"],
+        ["motion", "import", "walk.motion", "--model", "humanoid", "--out", "walk.motion"],
+    ] {
+        let text = fail(temp.path(), 2, &args);
+        assert!(text.contains("walk.motion, which is read; expected another file"), "{text}");
+    }
+    assert_eq!(std::fs::read(temp.path().join("walk.motion")).unwrap(), before);
+}
+
+/// Two frames of DeepMimic's figure, and of a BVH figure.
+#[test]
+fn motions_too_short_to_loop_are_refused() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut document: serde_json::Value = serde_json::from_str(&recording()).unwrap();
+    document["Loop"] = "wrap".into();
+    document["Frames"].as_array_mut().unwrap().truncate(2);
+    std::fs::write(temp.path().join("two.txt"), document.to_string()).unwrap();
+    let text = fail(temp.path(), 1, &["motion", "import", "two.txt", "--model", "MarathonMan", "--out", "a.motion"]);
+    assert!(text.contains("two.txt: frames of a loop: found 2, expected three or more"), "{text}");
+    let text = fail(temp.path(), 1, &["train", "MarathonMan", "--option", "clip=two.txt", "--out", "run"]);
+    assert!(text.contains("two.txt: frames of a loop: found 2, expected three or more"), "{text}");
+    let bvh = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zrotation\nJOINT LeftUpLeg\n{\n\
+               OFFSET 0 -80 0\nCHANNELS 1 Xrotation\n}\n}\nMOTION\nFrames: 2\nFrame Time: 0.01\n0 90 0 0\n0 90 0 5\n";
+    std::fs::write(temp.path().join("two.bvh"), bvh).unwrap();
+    let import = ["motion", "import", "two.bvh", "--model", "MarathonMan", "--out", "a.motion"];
+    let text = fail(temp.path(), 1, &import);
+    assert!(text.contains("two.bvh: length: found 2 frames, 0.0100 s, expected two steps of 0.0167 s or more"), "{text}");
+    let text = fail(temp.path(), 1, &[&import[..], &["--loop", "wrap"]].concat());
+    assert!(text.contains("frames of a loop: found 2"), "{text}");
+    assert!(!temp.path().join("a.motion").exists() && !temp.path().join("run/run.json").exists());
+}
+
+#[test]
+fn a_loop_whose_ends_differ_is_refused() {
+    let temp = tempfile::tempdir().unwrap();
+    // the figure sinks by half a meter
+    let mut document: serde_json::Value = serde_json::from_str(&recording()).unwrap();
+    document["Loop"] = "none".into();
+    let frames = document["Frames"].as_array_mut().unwrap();
+    let count = frames.len() as f64;
+    for (i, frame) in frames.iter_mut().enumerate() {
+        frame[2] = (frame[2].as_f64().unwrap() - 0.5 * i as f64 / count).into();
+    }
+    std::fs::write(temp.path().join("sink.txt"), document.to_string()).unwrap();
+    let import = ["motion", "import", "sink.txt", "--model", "MarathonMan", "--out", "a.motion", "--floor", "0"];
+    let text = fail(temp.path(), 2, &[&import[..], &["--loop", "wrap"]].concat());
+    assert!(text.contains("sink.txt: its ends differ by 0.4") && text.contains("--trim FROM TO chooses them"), "{text}");
+    assert!(!temp.path().join("a.motion").exists());
+}
+
+#[test]
+fn the_file_beside_a_gltf_is_read_and_no_other() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::create_dir(temp.path().join("in")).unwrap();
+    std::fs::write(temp.path().join("secret.bin"), [0; 64]).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("../secret.bin", temp.path().join("in/link.bin")).unwrap();
+    let document = |uri: &str| {
+        serde_json::json!({
+            "asset": { "version": "2.0" }, "nodes": [{ "name": "Hips" }],
+            "buffers": [{ "uri": uri, "byteLength": 64 }],
+            "bufferViews": [{ "buffer": 0, "byteLength": 8 }, { "buffer": 0, "byteLength": 32 }],
+            "accessors": [
+                { "bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR" },
+                { "bufferView": 1, "componentType": 5126, "count": 2, "type": "VEC4" }],
+            "animations": [{ "samplers": [{ "input": 0, "output": 1 }],
+                "channels": [{ "sampler": 0, "target": { "node": 0, "path": "rotation" } }] }],
+        })
+        .to_string()
+    };
+    for (uri, found) in [
+        ("../secret.bin", "it is not in the folder of the recording"),
+        ("%2e%2e/secret.bin", "it is not in the folder of the recording"),
+        ("/etc/hostname", "it is not in the folder of the recording"),
+        ("link.bin", "it is not in the folder of the recording"),
+        ("none.bin", "No such file"),
+    ] {
+        std::fs::write(temp.path().join("in/m.gltf"), document(uri)).unwrap();
+        let text = fail(temp.path(), 1, &["motion", "import", "in/m.gltf", "--model", "MarathonMan", "--out", "a.motion"]);
+        assert!(text.contains(found), "{uri}: {text}");
+    }
 }

@@ -259,24 +259,22 @@ fn more_than_fits_is_refused_before_it_is_made() {
     data[4 * (FRAMES - 1)..4 * FRAMES].copy_from_slice(&3600f32.to_le_bytes());
     let bytes = chunks(&document, &data);
     let start = std::time::Instant::now();
-    assert_eq!(
-        import::any("m.glb".as_ref(), &bytes).unwrap_err().to_string(),
-        "m.glb: animations[0]: found 3600 s of 1015 joints, expected up to 66 s of so many; export a part of it"
-    );
+    let error = import::any("m.glb".as_ref(), &bytes).unwrap_err().to_string();
+    assert!(error.starts_with("m.glb: the motion asks for 21.1 GB; the limit 'memory' is 2 GB"), "{error}");
     assert!(start.elapsed().as_secs_f64() < 5.0);
 }
 
 #[test]
 fn what_is_no_animation_is_refused_by_name() {
     let error = |bytes: &[u8]| import::any("m.glb".as_ref(), bytes).unwrap_err().to_string();
-    assert!(error(b"glTF").starts_with("m.glb: glTF: found a length of 0"), "{}", error(b"glTF"));
+    assert!(error(b"glTF").starts_with("m.glb: glTF: found a length of 0 bytes, expected the file's, 4"), "{}", error(b"glTF"));
     // less than the header itself
     let mut short = glb();
     short[8..12].copy_from_slice(&4u32.to_le_bytes());
-    assert_eq!(error(&short), "m.glb: glTF: found a length of 4 bytes, expected the file's, in its third word");
+    assert!(error(&short).starts_with("m.glb: glTF: found a length of 4 bytes, expected the file's, "), "{}", error(&short));
     let text = r#"{"asset": {"version": "2.0"}}"#;
     assert_eq!(
         error(text.as_bytes()),
-        "m.glb: buffers: found buffers in other files, expected one .glb file with all data"
+        "m.glb: animations: found none, expected an animation; export the file with it"
     );
 }

@@ -26,7 +26,14 @@ pub struct Fit {
     pub bones: f64,
     /// Furthest distance, m.
     pub furthest: Worst,
+    /// Largest angle of a part whose orientation counts much, such as the trunk, the thighs and the feet, rad.
+    pub most_turned: Worst,
 }
+
+/// Weight of an orientation that counts much, 1/rad.
+const COUNTS: f64 = 0.3;
+/// Angle of such a part from which a limb or the trunk is another one's, rad.
+const CROSSED: f64 = 70.0 * std::f64::consts::PI / 180.0;
 
 /// Shorter bones point nowhere, m.
 const SHORT: f64 = 0.03;
@@ -40,7 +47,12 @@ impl Fit {
         let bones = bones.warning().map(|_| {
             format!("its bones point {:.0} degrees away from the recording's in the mean", self.bones.to_degrees())
         });
-        near.into_iter().chain(bones).map(|text| format!("{text}; {remedy}")).collect()
+        let worst = &self.most_turned;
+        let crossed = (worst.value > CROSSED).then(|| {
+            let degrees = worst.value.to_degrees();
+            format!("frame {}: {} is turned by {degrees:.0} degrees from the recording's", worst.frame, worst.name)
+        });
+        near.into_iter().chain(bones).chain(crossed).map(|text| format!("{text}; {remedy}")).collect()
     }
 
     /// What the clip's file keeps of it.
@@ -89,8 +101,12 @@ pub fn fit(
             places += 1.0;
             fit.furthest.meet(distance, i, || name(model, part.body));
             if part.rotation > 0.0 {
-                fit.rotation += log(target.quat[k] * pose.quat[part.body].conjugate()).length();
+                let angle = log(target.quat[k] * pose.quat[part.body].conjugate()).length();
+                fit.rotation += angle;
                 turns += 1.0;
+                if part.rotation >= COUNTS {
+                    fit.most_turned.meet(angle, i, || name(model, part.body));
+                }
             }
         }
     }
