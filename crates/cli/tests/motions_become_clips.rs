@@ -165,7 +165,10 @@ fn motions_too_short_to_loop_are_refused() {
     std::fs::write(temp.path().join("two.bvh"), bvh).unwrap();
     let import = ["motion", "import", "two.bvh", "--model", "MarathonMan", "--out", "a.motion"];
     let text = fail(temp.path(), 1, &import);
-    assert!(text.contains("two.bvh: length: found 2 frames, 0.0100 s, expected two steps of 0.0167 s or more"), "{text}");
+    assert!(
+        text.contains("two.bvh: length: found 2 frames, 0.0100 s, expected two steps of 0.0167 s or more"),
+        "{text}"
+    );
     let text = fail(temp.path(), 1, &[&import[..], &["--loop", "wrap"]].concat());
     assert!(text.contains("frames of a loop: found 2"), "{text}");
     assert!(!temp.path().join("a.motion").exists() && !temp.path().join("run/run.json").exists());
@@ -185,7 +188,10 @@ fn a_loop_whose_ends_differ_is_refused() {
     std::fs::write(temp.path().join("sink.txt"), document.to_string()).unwrap();
     let import = ["motion", "import", "sink.txt", "--model", "MarathonMan", "--out", "a.motion", "--floor", "0"];
     let text = fail(temp.path(), 2, &[&import[..], &["--loop", "wrap"]].concat());
-    assert!(text.contains("sink.txt: its ends differ by 0.4") && text.contains("--trim FROM TO chooses them"), "{text}");
+    assert!(
+        text.contains("sink.txt: its ends differ by 0.4") && text.contains("--trim FROM TO chooses them"),
+        "{text}"
+    );
     assert!(!temp.path().join("a.motion").exists());
 }
 
@@ -217,7 +223,8 @@ fn the_file_beside_a_gltf_is_read_and_no_other() {
         ("none.bin", "No such file"),
     ] {
         std::fs::write(temp.path().join("in/m.gltf"), document(uri)).unwrap();
-        let text = fail(temp.path(), 1, &["motion", "import", "in/m.gltf", "--model", "MarathonMan", "--out", "a.motion"]);
+        let text =
+            fail(temp.path(), 1, &["motion", "import", "in/m.gltf", "--model", "MarathonMan", "--out", "a.motion"]);
         assert!(text.contains(found), "{uri}: {text}");
     }
 }

@@ -267,14 +267,19 @@ fn more_than_fits_is_refused_before_it_is_made() {
 #[test]
 fn what_is_no_animation_is_refused_by_name() {
     let error = |bytes: &[u8]| import::any("m.glb".as_ref(), bytes).unwrap_err().to_string();
-    assert!(error(b"glTF").starts_with("m.glb: glTF: found a length of 0 bytes, expected the file's, 4"), "{}", error(b"glTF"));
+    assert!(
+        error(b"glTF").starts_with("m.glb: glTF: found a length of 0 bytes, expected the file's, 4"),
+        "{}",
+        error(b"glTF")
+    );
     // less than the header itself
     let mut short = glb();
     short[8..12].copy_from_slice(&4u32.to_le_bytes());
-    assert!(error(&short).starts_with("m.glb: glTF: found a length of 4 bytes, expected the file's, "), "{}", error(&short));
-    let text = r#"{"asset": {"version": "2.0"}}"#;
-    assert_eq!(
-        error(text.as_bytes()),
-        "m.glb: animations: found none, expected an animation; export the file with it"
+    assert!(
+        error(&short).starts_with("m.glb: glTF: found a length of 4 bytes, expected the file's, "),
+        "{}",
+        error(&short)
     );
+    let text = r#"{"asset": {"version": "2.0"}}"#;
+    assert_eq!(error(text.as_bytes()), "m.glb: animations: found none, expected an animation; export the file with it");
 }

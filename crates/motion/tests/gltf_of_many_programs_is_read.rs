@@ -92,7 +92,8 @@ fn plain(name: &str, bytes: &[u8]) -> Animation {
 
 /// The angle of the left knee in the last frame, rad.
 fn bent(animation: &Animation) -> f64 {
-    let knee = animation.skeleton().bones.iter().position(|bone| bone.name.contains("LowerLeg") || bone.name == "LeftLeg");
+    let knee =
+        animation.skeleton().bones.iter().position(|bone| bone.name.contains("LowerLeg") || bone.name == "LeftLeg");
     let last = animation.clip().frame(animation.clip().frames() - 1);
     2.0 * last[3 + 4 * knee.expect("a knee")].clamp(-1.0, 1.0).acos()
 }
@@ -115,8 +116,11 @@ fn what_does_not_move_the_skeleton_is_not_read() {
         // Blender writes scenes of nothing
         ("/scenes", json!([{ "name": "Face" }, { "nodes": [0] }])),
         ("/extensionsRequired", json!(["KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_texture_basisu"])),
-        ("/meshes", json!([{ "primitives": [{ "attributes": { "POSITION": 0 }, "extensions":
-            { "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } } }] }])),
+        (
+            "/meshes",
+            json!([{ "primitives": [{ "attributes": { "POSITION": 0 }, "extensions":
+            { "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } } }] }]),
+        ),
         ("/materials", json!([{ "extensions": { "KHR_materials_unlit": {} } }])),
         ("/cameras", json!([{ "type": "unknown" }])),
     ];
@@ -128,7 +132,8 @@ fn what_does_not_move_the_skeleton_is_not_read() {
     // channels of what is no joint's
     let mut changed = document.clone();
     let channels = changed["animations"][0]["channels"].as_array_mut().unwrap();
-    channels.push(json!({ "sampler": 0, "target": { "path": "pointer", "extensions": { "KHR_animation_pointer": {} } } }));
+    channels
+        .push(json!({ "sampler": 0, "target": { "path": "pointer", "extensions": { "KHR_animation_pointer": {} } } }));
     channels.push(json!({ "sampler": 7, "target": { "node": 3, "path": "weights" } }));
     assert_eq!(plain("m.glb", &glb(&changed, &bytes)), expected);
 }
@@ -146,7 +151,9 @@ fn data_lies_within_a_gltf_or_beside_it() {
     let folder = |name: &str| if name == "my data.bin" { Ok(bytes.clone()) } else { Err("no such file".to_string()) };
     let reading = Reading { beside: Some(&folder), ..Reading::default() };
     assert_eq!(read("m.gltf", beside.to_string().as_bytes(), &reading).unwrap().animation, expected);
-    let error = |document: &Value, reading: &Reading| read("m.gltf", document.to_string().as_bytes(), reading).unwrap_err().to_string();
+    let error = |document: &Value, reading: &Reading| {
+        read("m.gltf", document.to_string().as_bytes(), reading).unwrap_err().to_string()
+    };
     assert_eq!(
         error(&beside, &Reading::default()),
         "m.gltf: buffers[0]: found the file \"my data.bin\", expected data within this file; export as .glb"

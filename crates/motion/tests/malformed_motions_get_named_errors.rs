@@ -57,7 +57,8 @@ fn a_clip_without_its_checksum_or_with_another_number_is_refused() {
     assert_eq!(parse(good.as_bytes()).unwrap(), clip);
     // the spelling does not count
     let spelled: String = good.split_whitespace().collect::<Vec<_>>().join("").replace(",0,", ",0.0,");
-    let spaced = spelled.replace("DeepMimic(Pengetal.,2018),frompybullet3.2.7;retargetedbyMarathon", &clip.about().source);
+    let spaced =
+        spelled.replace("DeepMimic(Pengetal.,2018),frompybullet3.2.7;retargetedbyMarathon", &clip.about().source);
     assert_eq!(parse(spaced.as_bytes()).unwrap(), clip);
     let error = parse(bare(&clip).as_bytes()).unwrap_err().to_string();
     assert_eq!(
@@ -67,12 +68,16 @@ fn a_clip_without_its_checksum_or_with_another_number_is_refused() {
     );
     assert_eq!(Clip::parse_without_checksum("kick.motion".as_ref(), bare(&clip).as_bytes()).unwrap(), clip);
     // every digit counts, and every word
-    let changes = [("0.01", "0.02"), ("Zlib", "Zlip"), ("\"kick\"", "\"kack\""), ("right_knee", "right_knie"), ("4", "5")];
+    let changes =
+        [("0.01", "0.02"), ("Zlib", "Zlip"), ("\"kick\"", "\"kack\""), ("right_knee", "right_knie"), ("4", "5")];
     for (from, to) in changes {
         let bytes = changed(&good, from, to);
         for result in [parse(&bytes), Clip::parse_without_checksum("kick.motion".as_ref(), &bytes)] {
             let error = result.unwrap_err().to_string();
-            assert!(error.starts_with("kick.motion: checksum: found ") && error.contains("damaged or was edited"), "{error}");
+            assert!(
+                error.starts_with("kick.motion: checksum: found ") && error.contains("damaged or was edited"),
+                "{error}"
+            );
         }
     }
     let (mut bytes, mut refused) = (good.clone().into_bytes(), 0);
@@ -104,7 +109,10 @@ fn edits_beyond_what_a_clip_holds_are_refused() {
         Clip::new(path, still.about().clone(), still.layout().clone(), 0.1, None, &rows(travel, count)).unwrap()
     };
     let error = clip(1.0, 2).looped(path, 0.1).unwrap_err().to_string();
-    assert_eq!(error, "far.motion: frames of a loop: found 2, expected three or more, of which the last is the first again");
+    assert_eq!(
+        error,
+        "far.motion: frames of a loop: found 2, expected three or more, of which the last is the first again"
+    );
     assert_eq!(clip(1.0, 3).looped(path, 0.1).unwrap().frames(), 2);
     let far = clip(1.9e6, 20);
     let error = far.looped(path, 0.1).unwrap_err().to_string();
