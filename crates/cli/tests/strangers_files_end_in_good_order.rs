@@ -45,7 +45,6 @@ fn arguments_beyond_measure_are_refused_by_name() {
     for (agent, name, value, part) in [
         ("MarathonMan", "seconds", number(1e300), "option seconds"),
         ("MarathonManSteer", "seconds", number(1e300), "option seconds"),
-        ("MarathonManSteer", "relive", number(1e18), "option relive"),
         ("TerrainHopper", "difficulty", number(1e18), "option difficulty"),
         ("Hopper-v5", "frame_skip", number(1e15), "frame_skip"),
         ("Hopper-v5", "xml_file", "none.xml".into(), "none.xml"),
@@ -54,6 +53,9 @@ fn arguments_beyond_measure_are_refused_by_name() {
         let text = refusal(path);
         assert!(text.contains(part), "{agent} {name}: {text}");
     }
+    // arguments of learning, which nobody has who plays
+    let text = fail(path, 1, &["train", "MarathonManSteer", "--option", "relive=1e18"]);
+    assert!(text.contains("option relive") && text.contains("a number from 0 to 1"), "{text}");
     let names = vec!["walk"; 100_000].join(",");
     policy(path, "MarathonMan", &[("clip", names.as_str().into())], |_| {});
     let text = refusal(path);

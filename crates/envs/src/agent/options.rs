@@ -454,7 +454,9 @@ mod tests {
         ] {
             assert!(!x.put(name, &value), "{name} {value}");
         }
-        assert_eq!(x, Sample { count: 5, range: [1.0, 2.0], name: "ant.xml".into(), on: false, width: Scale(1.0) });
+        let (part, time) = (Share(1.0), Seconds(3600.0));
+        let expected = Sample { count: 5, range: [1.0, 2.0], on: false, part, time, ..Sample::default() };
+        assert_eq!(x, expected);
         assert_eq!(x.infos()[0].about, "A count of things.");
     }
 }
