@@ -321,13 +321,14 @@ fn a_steered_character_is_never_taken_back() {
         push(&mut app, pad, GamepadAxis::LeftStickY, 0.2);
         push(&mut app, pad, GamepadAxis::LeftStickY, stick);
         let mut query = app.world_mut().query_filtered::<(&Episode, &RagdollState), With<Actor>>();
-        let (mut last, mut longest) = (None, 0.0_f64);
+        let mut last: Option<(u64, f64)> = None;
+        let mut longest = 0.0_f64;
         for _ in 0..600 * 5 {
             app.update();
             let (episode, state) = query.single(app.world()).expect("one character");
             let at = app.world().resource::<Marathon>().state(state).map_or(0.0, |state| state.qpos[0]);
             if let Some((_, before)) = last.filter(|(number, _)| *number == episode.number) {
-                let moved: f64 = at - before;
+                let moved = at - before;
                 assert!(moved.abs() < 2.0, "{agent} jumps by {moved} m in an episode: {episode:?}");
             }
             (last, longest) = (Some((episode.number, at)), longest.max(episode.seconds));

@@ -27,7 +27,7 @@ fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
         let folder = tempfile::tempdir()?;
         std::env::set_current_dir(folder.path())?;
         let presses = ["0.3:record".to_string(), format!("1.2:{name}"), "2.5:record".into()];
-        let presses = presses.iter().flat_map(|press| ["--press", press]);
+        let presses = presses.iter().flat_map(|press| ["--press", press.as_str()]);
         let words: Vec<&str> = ["hopper", "--agents", "2", "--threads", "1"].into_iter().chain(presses).collect();
         let mut app = windowless::game(&words, Duration::from_millis(20), |_| ());
         frames(&mut app, 150);
