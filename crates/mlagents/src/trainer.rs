@@ -44,7 +44,8 @@ pub struct Trainer {
 
 impl Trainer {
     /// Finds the trainer on a port of this computer and greets it. One that is not there yet is waited for. Once it has
-    /// answered, it counts as gone after `silence` in which it does not even answer a ping; `None`: never.
+    /// answered, it counts as gone after `silence` in which it does not even answer a ping; `None`: never. Pings are at least 5
+    /// minutes apart.
     ///
     /// # Errors
     /// If no trainer listens and answers until `patience` is over, or another program does.
