@@ -315,7 +315,7 @@ def test_agents_can_differ_and_be_pushed() -> None:
         (lambda: env.push(4, 1, (1, 0, 0)), "agent is 4, expected less"),
         (lambda: env.push(0, 99, (1, 0, 0)), "body is 99, expected less"),
         (lambda: env.push(-1, 1, (1, 0, 0)), "agent is -1, expected a whole number"),
-        (lambda: env.set_ground(0, 0, [0.0]), "field is 0, expected less than the number of the model's height fields"),
+        (lambda: env.set_ground(0, 0, [0.0]), "field is 0, but the model has no height fields"),
     ]:
         with pytest.raises(ValueError, match=message):
             wrong()

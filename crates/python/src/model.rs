@@ -271,7 +271,10 @@ impl Model {
     /// Rows and columns of a height field's grid.
     pub(crate) fn grid(&self, field: usize) -> PyResult<[usize; 2]> {
         let fields = &self.inner.hfields;
-        let beyond = || error::value(format!("field is {field}, expected less than {}", fields.len()));
+        let beyond = || match fields.len() {
+            0 => error::value(format!("field is {field}, but the model has no height fields")),
+            n => error::value(format!("field is {field}, expected less than {n}")),
+        };
         fields.get(field).map(|h| [h.nrow, h.ncol]).ok_or_else(beyond)
     }
 
