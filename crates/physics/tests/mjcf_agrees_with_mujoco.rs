@@ -155,6 +155,8 @@ fn compare_but_looks(own: &[PathBuf], originals: &[PathBuf], unread: &[&str]) {
         let model = Model::from_xml_file(file).unwrap_or_else(|e| panic!("{e}"));
         let mut theirs = theirs.clone();
         forget_looks(&mut theirs);
+        // Gymnasium's humanoids name PGS, and every solver with an ordinary cap is Newton's method here
+        theirs["opt"]["solver"] = Value::Null;
         for field in unread {
             theirs[*field] = Value::Null;
         }
