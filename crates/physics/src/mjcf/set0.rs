@@ -86,7 +86,8 @@ impl MassMatrix {
             let (start, n, _) = &self.blocks[block];
             touched.entry(block).or_insert_with(|| vec![0.0; *n])[dof - start] += value;
         }
-        touched.into_iter().map(|(block, rhs)| self.blocks[block].2.inverse_form(rhs)).sum()
+        // from 0: a sum over nothing is -0
+        touched.into_iter().fold(0.0, |sum, (block, rhs)| sum + self.blocks[block].2.inverse_form(rhs))
     }
 }
 
