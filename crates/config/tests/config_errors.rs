@@ -59,7 +59,7 @@ fn bombs_are_refused() {
         deep += &format!("a{i}: &a{i} [*a{}]\n", i - 1);
     }
     refuse_with(&deep, "levels");
-    refuse_with(&format!("a: {}", "x".repeat(2 << 20)), "bytes");
+    refuse_with(&format!("a: {}", "x".repeat(2 << 20)), "the limit 'config_file' is 1 MB");
 }
 
 #[test]

@@ -108,5 +108,5 @@ fn aliases_do_not_multiply_text() {
     assert!(error.contains("found aliases that repeat more than 16777216 bytes of text"), "{error}");
     let file = format!("a: '{}'", "x".repeat(2_000_000));
     let error = parse(Path::new("f.yaml"), file.as_bytes(), "hopper").unwrap_err().to_string();
-    assert!(error.contains("f.yaml:1:1: the file asks for 2 MB; the limit 'config_file' is 1 MB"), "{error}");
+    assert!(error.contains("f.yaml:1:1: the file asks for 2.00 MB; the limit 'config_file' is 1 MB"), "{error}");
 }
