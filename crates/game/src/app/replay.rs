@@ -169,7 +169,7 @@ pub fn record(
     let Some(mut recorder) = recorder else { return };
     let mut all: Vec<_> = actors.iter().collect();
     all.sort_by_key(|(actor, ..)| actor.0);
-    let Recorder { recording, until } = &mut *recorder;
+    let Recorder { recording, until, .. } = &mut *recorder;
     if all.len() != recording.agents {
         return;
     }
