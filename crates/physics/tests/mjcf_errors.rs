@@ -458,7 +458,6 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
         "<general input='ff'/>",
         "<tendon springyield='1'/>",
         "<pair adhesion='1'/>",
-        "<site mesh='m'/>",
         "<default class='a'><joint springyield='1'/><geom adhesion='1' type='sdf'/><motor delay='1'/></default>",
     ] {
         Model::from_xml_str(&with(unused, "", ""), "unused.xml").unwrap_or_else(|e| panic!("{e}"));
