@@ -145,17 +145,22 @@ def site(m, i):
     }
 
 
+def tracking(mode, target):
+    """How a camera or light moves; without a target it stays where it is."""
+    return "Fixed" if MODES[mode].startswith("Target") and target < 0 else MODES[mode]
+
+
 def camera(m, i):
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_CAMERA, i), "body": m.cam_bodyid[i], "pos": m.cam_pos[i],
-        "quat": m.cam_quat[i], "mode": MODES[m.cam_mode[i]], "fovy": m.cam_fovy[i],
+        "quat": m.cam_quat[i], "mode": tracking(m.cam_mode[i], m.cam_targetbodyid[i]), "fovy": m.cam_fovy[i],
     }
 
 
 def light(m, i):
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_LIGHT, i), "body": m.light_bodyid[i], "pos": m.light_pos[i],
-        "dir": m.light_dir[i], "mode": MODES[m.light_mode[i]], "diffuse": m.light_diffuse[i],
+        "dir": m.light_dir[i], "mode": tracking(m.light_mode[i], m.light_targetbodyid[i]), "diffuse": m.light_diffuse[i],
         "directional": int(m.light_type[i]) == int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL),
     }
 
