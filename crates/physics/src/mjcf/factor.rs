@@ -56,9 +56,9 @@ impl Factor {
 fn branches(matrix: &[f64], parents: &[Option<usize>]) -> Option<Vec<Branch>> {
     let n = parents.len();
     let mut rows: Vec<Branch> = Vec::with_capacity(n);
-    for k in 0..n {
+    for (k, parent) in parents.iter().enumerate() {
         let mut entries = Vec::new();
-        let mut ancestor = parents[k];
+        let mut ancestor = *parent;
         while let Some(i) = ancestor {
             entries.push((i, matrix[k * n + i]));
             ancestor = parents[i];
