@@ -1,5 +1,7 @@
-//! A model file cannot make the reader work or allocate without end: whatever its numbers and names decide the size of is
-//! checked against the budget (`MARATHON_LIMITS`) before work starts, and no step takes quadratic time.
+//! A model file cannot make the reader work or allocate without end.
+//!
+//! Everything whose size a file decides is checked against the budget (`MARATHON_LIMITS`) before work starts. No step of the
+//! reader takes quadratic time.
 
 use marathon_physics::Model;
 use std::time::{Duration, Instant};

@@ -438,7 +438,7 @@ fn what_is_no_file_is_not_read() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// What a class sets and this engine does not have is refused where an element uses it, and only there.
+/// A default that is not supported is refused where an element uses it, and only there.
 #[test]
 fn unsupported_defaults_are_refused_where_they_are_used() {
     let with = |default: &str, body: &str, rest: &str| {

@@ -1,4 +1,4 @@
-//! What MuJoCo reads and saves, the loader reads as well: a model that loads still loads after MuJoCo has saved it.
+//! The loader reads what MuJoCo writes: a model that loads still loads after MuJoCo has saved it.
 //!
 //! MuJoCo's writer expands includes, classes and shortcuts in its own way. Every public model that the tests install (see
 //! `docs/models.md`) is saved by MuJoCo (`MjSpec.to_xml`, the writer of `mj_saveLastXML`). If the loader takes the original, it

@@ -5,8 +5,8 @@
 //! Where a displacement of 1e-7 would change which features touch, rounding decides, and the results may differ. Single
 //! precision agrees with double precision, and every vector width with one lane to the last bit.
 //!
-//! In degenerate poses (coinciding centers, centers on axes and in planes of symmetry, parallel and perpendicular axes, and
-//! all of these without rounding errors) the first contact's normal follows from MuJoCo's special cases, and agrees too.
+//! In degenerate poses MuJoCo's special cases decide, and the contacts agree too. There, centers coincide or lie on axes,
+//! faces, edges and corners, axes are parallel or perpendicular, and numbers have no rounding errors.
 
 #[path = "../../tests/common/mod.rs"]
 mod common;
@@ -299,7 +299,7 @@ fn numbers(v: &Value) -> Vec<f64> {
     v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
 }
 
-/// What MuJoCo says of a pair of shapes.
+/// Random states of a pair of shapes with MuJoCo's contacts, and their poses.
 fn oracle(shapes: [Shape; 2], degenerate: bool) -> (Vec<Value>, Vec<State>) {
     let job = json!([{
         "geoms": [shapes[0].to_json(), shapes[1].to_json()], "margin": MARGIN, "states": STATES, "seed": 7,

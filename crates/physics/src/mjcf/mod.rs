@@ -8,8 +8,9 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together, `set0` (with `factor`) and `statistics` compute what follows from the reference
-//! configuration. `room` counts the memory that all of them ask for.
+//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
+//! `set0` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
+//! that all of them ask for.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.
 

@@ -10,7 +10,7 @@ pub(crate) const ELEMENT: usize = 1000;
 /// A simulation keeps a copy of its model.
 const COPIES: f64 = 2.0;
 
-/// What a model takes of the memory that one file may ask for. Whatever a file's numbers decide the size of is counted here
+/// Memory that a model has taken so far of what one file may ask for. Everything whose size a file decides is counted here
 /// before it is made.
 #[derive(Default)]
 pub(crate) struct Room(Cell<f64>);

@@ -165,7 +165,7 @@ impl HeavyTendons {
         HeavyTendons(by_dof)
     }
 
-    /// Those that pull any of these dofs, in the model's order.
+    /// Tendons that pull any of these dofs, in the model's order.
     fn of(&self, dofs: std::ops::Range<usize>) -> BTreeSet<usize> {
         self.0.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
     }
