@@ -11,6 +11,7 @@ mod common;
 use common::compiled::differ;
 use common::{oracle, package, workspace};
 use marathon_physics::Model;
+use marathon_physics::mjcf::MjcfErrorKind;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -224,4 +225,81 @@ fn tensor(quat: &[f64], inertia: &[f64]) -> [f64; 9] {
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ];
     std::array::from_fn(|n| (0..3).map(|k| r[n / 3][k] * inertia[k] * r[n % 3][k]).sum())
+}
+
+/// An actuator keeps of the defaults of its classes what MuJoCo keeps, those of actuators that are not supported included.
+#[test]
+fn actuators_over_defaults_of_any_kind() {
+    const DEFAULTS: [&str; 21] = [
+        r#"<muscle timeconst=".1 .2" ctrlrange="0 1" force="5"/>"#,
+        r#"<adhesion gain="5" ctrlrange="0 1"/>"#,
+        r#"<dcmotor motorconst="1" resistance="2"/>"#,
+        r#"<pid kp="5" ki="1" kv="2"/>"#,
+        r#"<orientation kp="5"/>"#,
+        r#"<general input="pos vel" gaintype="pid" biastype="affine" ctrlrange="0 1"/>"#,
+        r#"<general dyntype="muscle" gaintype="muscle" biastype="muscle" gainprm="1 2 3 4 5"/>"#,
+        r#"<general input="ff"/>"#,
+        r#"<general gaintype="user" gainprm="7"/>"#,
+        r#"<general biastype="user" gainprm="7"/>"#,
+        r#"<general dyntype="user" gainprm="7"/>"#,
+        r#"<general biastype="muscle" gainprm="7" biasprm="1 -2 -3"/>"#,
+        r#"<general input="vel" gainprm="7" biasprm="1 -2 -3"/>"#,
+        r#"<general actlimited="true" actrange="-1 1" actearly="true" dyntype="muscle"/>"#,
+        r#"<muscle gear="3" forcerange="-2 2" damping="2" armature="1"/>"#,
+        r#"<position kp="9" kv="2"/>"#,
+        r#"<velocity kv="9"/>"#,
+        r#"<motor gear="3"/>"#,
+        r#"<damper kv="2" ctrlrange="0 1"/>"#,
+        r#"<cylinder area="2" timeconst=".3"/>"#,
+        r#"<intvelocity kp="3" actrange="-1 1"/>"#,
+    ];
+    const SECOND: [&str; 6] = [
+        "",
+        r#"<general gainprm="20"/>"#,
+        r#"<position kp="20"/>"#,
+        "<motor/>",
+        r#"<muscle force="3"/>"#,
+        r#"<velocity kv="8"/>"#,
+    ];
+    const ACTUATORS: [&str; 9] = [
+        "motor",
+        "position",
+        "velocity",
+        "general",
+        r#"intvelocity actrange="-1 1""#,
+        r#"damper ctrlrange="0 2""#,
+        "cylinder",
+        r#"general gaintype="fixed" biastype="none" dyntype="none" input="pos""#,
+        r#"position kp="4" kv="3""#,
+    ];
+    let body = r#"<worldbody><body><joint name="j" axis="0 1 0" range="-1 1"/><geom size=".1" pos=".3 0 0"/></body></worldbody>"#;
+    let mut texts = Vec::new();
+    for (default, second) in DEFAULTS.iter().flat_map(|d| SECOND.iter().map(move |s| (d, s))) {
+        for (outer, inner) in [(default, second), (second, default)] {
+            texts.extend(ACTUATORS.iter().map(|actuator| {
+                format!(
+                    r#"<mujoco><default>{outer}<default class="a">{inner}</default></default>{body}<actuator><{actuator} joint="j" class="a"/></actuator></mujoco>"#
+                )
+            }));
+        }
+    }
+    let answers = oracle("compiled_model.py", &json!({ "texts": texts }));
+    let (mut agree, mut report) = (0, Vec::new());
+    for (text, theirs) in texts.iter().zip(answers["texts"].as_array().expect("one answer per text")) {
+        let error = theirs.get("error");
+        match Model::from_xml_str(text, "text") {
+            Ok(_) if error.is_some() => report.push(format!("{text}: MuJoCo refuses it: {error:?}")),
+            Ok(model) => {
+                let mut differences = Vec::new();
+                differ("", &serde_json::to_value(&model).expect("a model is JSON"), theirs, &mut differences);
+                agree += usize::from(differences.is_empty());
+                report.extend(differences.iter().take(1).map(|d| format!("{text}: {d}")));
+            }
+            Err(e) if error.is_some() || matches!(e.kind, MjcfErrorKind::Unsupported { .. }) => {}
+            Err(e) => report.push(format!("{text}: refused: {e}")),
+        }
+    }
+    println!("{agree} of {} load and agree", texts.len());
+    assert!(agree > 1500, "{agree} of {} load and agree", texts.len());
+    assert!(report.is_empty(), "{} differ: {}", report.len(), report[..report.len().min(5)].join("\n"));
 }
