@@ -1,5 +1,5 @@
-//! Any bytes are a file of a run or an error that names it: policies, networks, configurations, demonstrations, tables, events
-//! and descriptions. What is read can be used.
+//! Any bytes are a file of a run, or give an error that names the file. The readers cover policies, networks,
+//! configurations, demonstrations, tables, events and descriptions. The target also uses what it has read.
 
 #![no_main]
 
@@ -21,7 +21,7 @@ fuzz_target!(|data: &[u8]| {
     read(chosen().unwrap_or(*kind) % READERS, bytes);
 });
 
-/// The reader that `FILE_READER` names by its number, to fuzz one alone.
+/// The reader whose number is in `FILE_READER`, to fuzz only that one.
 fn chosen() -> Option<u8> {
     static CHOSEN: OnceLock<Option<u8>> = OnceLock::new();
     *CHOSEN.get_or_init(|| std::env::var("FILE_READER").ok()?.parse().ok())
@@ -85,14 +85,14 @@ fn read(kind: u8, bytes: &[u8]) {
     }
 }
 
-/// Acts, and makes the policy's task if there is one.
+/// Acts with the policy, and creates its task if there is one.
 fn used(policy: &Policy) {
     let action = policy.act(&vec![0.5; policy.meta().obs]);
     assert_eq!(action.len(), policy.meta().act);
     let _ = Setting::of(policy.meta()).factory();
 }
 
-/// A folder of this process.
+/// A folder for this process.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {

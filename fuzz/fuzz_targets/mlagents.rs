@@ -24,7 +24,7 @@ fuzz_target!(|data: &[u8]| {
     // as a message, and as side channels
     look(data);
     listen(data);
-    // as a demonstration file, also behind the head of one
+    // as a demonstration file, and also after a valid header
     demonstrate(data);
     demonstrate(&[&HEAD[..], &[0; 30], data].concat());
 });

@@ -263,7 +263,7 @@ class AgentVecEnv:
         if command is None:
             self.commanded[chosen] = False
             return
-        # a copy: ends of ranges in single precision become the ends themselves
+        # a copy: ends of ranges in single precision become the exact ends
         numbers, expected = np.array(command, float), self.given.shape
         if numbers.shape != expected:
             raise ValueError(f"command has the shape {numbers.shape}, expected {expected}")

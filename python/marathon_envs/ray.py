@@ -90,7 +90,7 @@ class Workers:
         self._actors += [self._make(i, slices) for i in range(len(self._actors), slices)]
         shared = ray.put(orders)
         asked = time.monotonic()
-        # slice and time of each question, the oldest first, and slices whose actor has been late
+        # slice and time of each pending request, the oldest first; and slices whose actor was late
         pending = {self._actors[i].play.remote(shared, state): (i, asked) for i, state in enumerate(states)}
         late: set[int] = set()
         losses = 0

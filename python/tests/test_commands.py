@@ -199,7 +199,7 @@ def test_the_ends_of_ranges_may_be_in_single_precision() -> None:
         assert abs(float(command[0, turn])) > np.pi / 2
         man.set_command(command)
         man.step(np.zeros((1, man.spec.act_size)))
-        # the agents compute in single precision; what they are told can be told again
+        # the agents compute in single precision, so a commanded value can be passed again
         assert man.command[0, turn] == np.float32(sign * np.pi / 2)
         man.set_command(man.command)
         command[0, turn] = np.nextafter(command[0, turn], np.float32(sign * np.inf))
@@ -213,7 +213,7 @@ def test_the_ends_of_ranges_may_be_in_single_precision() -> None:
     carts.reset(seed=1)
     carts.set_command(np.full((N, 2), [np.pi / 2, 0.7], np.float32))
     carts.step(np.zeros((N, 1)))
-    # an end that the nearest number lies within is no end
+    # an end whose float32 number lies within the range stays that number
     assert carts.command.tolist() == [[np.pi / 2, float(np.float32(0.7))]] * N
     carts.set_command(np.full((N, 2), [-np.pi / 2, 0.1], np.float32))
     carts.step(np.zeros((N, 1)))

@@ -127,7 +127,7 @@ def pid(actor: Any) -> int:
 
 
 def test_a_worker_that_stops_answering_is_replaced(want: marathon_envs.TrainResult) -> None:
-    # a new process takes seconds until it plays, on a busy machine many
+    # a new process takes seconds to start, longer on a busy machine
     workers = Workers(2, answer_timeout=30)
     stopped = []
 
@@ -167,7 +167,7 @@ def test_a_run_whose_workers_do_not_answer_ends_with_an_error(tmp_path: Path) ->
     with pytest.raises(TimeoutError, match="worker 0 of 1 has not answered for 5 s, nor had the one before it"):
         train("hopper", workers=workers, callback=stop, out=out, **SMALL)
     workers.close()
-    # what was learned is there
+    # the trained policy is saved
     assert marathon_envs.train(resume=out).steps == SMALL["steps"]
     for wrong in (0, -1, float("inf"), float("nan")):
         with pytest.raises(ValueError, match="answer_timeout is"):

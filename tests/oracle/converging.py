@@ -2,7 +2,8 @@
 
 import mujoco
 
-# below this, MuJoCo may stop before it has converged, and where it stops is the answer (`Caps` of the physics)
+# below this cap, MuJoCo may stop before it converges, and the point where it stops is the answer (`Caps` in the
+# physics)
 LEAST_ORDINARY_CAP = 50
 
 

@@ -18,8 +18,7 @@ import numpy as np
 
 import dynamics
 
-# by how much the warm start and the velocities are changed to see whether rounding decides, and by how much the answer may
-# change then
+# size of the random change of the warm start and the velocities, and the largest amplification of it that counts as stable
 NUDGE, AMPLIFICATION = 1e-9, 1e3
 
 

@@ -28,7 +28,7 @@ class Generator:
 
     def __init__(self, seed):
         self.rng = np.random.default_rng([2026, seed])
-        # the solver's caps are drawn apart from the rest: low ones came later
+        # the solver's caps use a separate random stream, because low caps were added later
         self.caps = np.random.default_rng([2029, seed])
         self.count = {}
         self.joints, self.bodies, self.geoms, self.sites, self.tendons, self.actuators = [], [], [], [], [], []

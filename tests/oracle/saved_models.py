@@ -27,7 +27,7 @@ def run(path):
     try:
         return {"saved": saved, "model": compiled_model.dump(model)}
     except (KeyError, IndexError):
-        # it uses what Marathon refuses
+        # it uses a feature that Marathon refuses
         return {"saved": saved, "model": None}
 
 

@@ -11,8 +11,8 @@ use std::sync::Mutex;
 /// Why something is missing on stdout, the first time.
 static LOST: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// Prints text for the user, or a command's result, on stdout. Texts of files may be among it: they do not reach the terminal
-/// as commands.
+/// Prints text for the user, or a command's result, on stdout. The text may contain parts of files. Control characters
+/// in it are escaped, so that the terminal does not run them.
 pub fn say(text: impl AsRef<str>) {
     put(&printable(text.as_ref()));
 }

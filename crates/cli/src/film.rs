@@ -81,10 +81,10 @@ impl Shot {
         self.frames.div_ceil(self.frames.div_ceil(8))
     }
 
-    /// Checks before anything is played that the picture is not too large.
+    /// Checks before the run starts that the picture is not too large.
     ///
     /// # Errors
-    /// If it is.
+    /// If the picture is too large.
     pub fn check(&self) -> Result<(), CliError> {
         if self.format == Format::Png {
             strip_size([self.width, self.height], self.frames, self.columns())?;

@@ -1,5 +1,5 @@
-//! A picture or film that cannot be written whole is an error, and the older file of that name stays. The disk is full here
-//! because the system lets no file of the process grow beyond a limit.
+//! A picture or film that cannot be written completely is an error, and the older file of that name stays. The test
+//! imitates a full disk: the system limits the size of every file that the process writes.
 
 #![cfg(target_os = "linux")]
 
@@ -17,7 +17,7 @@ fn a_film_that_finds_no_room_is_an_error() {
         ("x.png", "--frames 2"),
         ("x.gif", "--seconds 0.2"),
         ("x.gif", "--seconds 2"),
-        // the first fits into the encoder's buffers and fails at its end
+        // the first frame fits into the encoder's buffers and fails at the end
         ("x.mp4", "--seconds 0.1"),
         ("x.mp4", "--seconds 2"),
     ] {
@@ -26,7 +26,7 @@ fn a_film_that_finds_no_room_is_an_error() {
             continue;
         }
         std::fs::write(temp.path().join(name), "older").unwrap();
-        // in blocks of 512 bytes
+        // unit: blocks of 512 bytes
         let script = format!(
             "trap '' XFSZ; ulimit -f 4; exec \"$0\" render '{policy}' --out {name} --width 320 --height 180 {words}"
         );
@@ -37,7 +37,7 @@ fn a_film_that_finds_no_room_is_an_error() {
         assert!(text.contains(name) && text.contains("File too large"), "{name} {words}: {text}");
         assert_eq!(std::fs::read(temp.path().join(name)).unwrap(), b"older", "{name} {words}");
         assert_no_leftovers(temp.path());
-        // with room, it is replaced
+        // without the limit, the file is replaced
         succeed(
             temp.path(),
             &[&["render", &policy, "--out", name, "--width", "64"], &words.split(' ').collect::<Vec<_>>()[..]].concat(),

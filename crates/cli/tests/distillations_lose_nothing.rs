@@ -1,5 +1,5 @@
-//! `marathon distill` refuses what it could not keep before it begins, and what it has begun goes on after an interruption, with
-//! the bits of one that was never interrupted.
+//! `marathon distill` checks its output before it starts. After an interruption it resumes and writes the same bits as
+//! a distillation that was never interrupted.
 
 mod common;
 
@@ -7,7 +7,7 @@ use common::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The words of a distillation that would take an hour.
+/// The arguments of a distillation that would take an hour.
 fn long<'a>(teacher: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&["distill", "hopper", "--teacher", teacher, "--out", out, "--steps", "1G"], more].concat()
 }
@@ -51,7 +51,8 @@ fn what_cannot_be_kept_is_refused_before_the_first_step() {
     assert_no_leftovers(path);
 }
 
-/// A learning rate beyond all measure ends it as soon as numbers are lost, and leaves no file that could not be used.
+/// A learning rate that is far too large stops the distillation at the first number that is not finite. No unusable
+/// file is left.
 #[test]
 fn a_rate_that_is_too_large_leaves_no_policy() {
     let temp = tempfile::tempdir().unwrap();
@@ -84,7 +85,7 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
         .stderr(std::process::Stdio::piped());
     let mut child = child.spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
-    // a third of the way
+    // after a third of the rounds
     assert!(lines.any(|line| line.contains(" of 3,000,000 decisions")));
     let sent = std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
     assert!(sent.success());
@@ -93,10 +94,10 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
     assert!(rest.iter().any(|line| line.contains("the same command goes on")), "{rest:?}");
     let notes = path.join("parts.safetensors.unfinished");
     assert!(notes.exists());
-    // what is there can be used
+    // the policy written so far is usable
     succeed(path, &["eval", "parts.safetensors", "--episodes", "2"]);
 
-    // another distillation does not go on from there, nor does a damaged file
+    // a different distillation cannot resume from this state, and a damaged file is refused
     let error = stderr(&finish(words("parts.safetensors", "4")));
     assert!(error.contains("parts.safetensors.unfinished: seed: found 3, expected 4"), "{error}");
     let whole_notes = std::fs::read(&notes).unwrap();

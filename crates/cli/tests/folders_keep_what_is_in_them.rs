@@ -80,7 +80,7 @@ fn a_failed_start_leaves_nothing() {
     succeed(path, &train("mine"));
 }
 
-/// A start that was killed before it could say what it is leaves files under temporary names; they block nobody.
+/// A start killed before it wrote its description leaves temporary files, which do not block a new run.
 #[test]
 fn a_start_that_was_killed_early_does_not_block_the_same_command() {
     let temp = tempfile::tempdir().unwrap();
@@ -91,7 +91,7 @@ fn a_start_that_was_killed_early_does_not_block_the_same_command() {
     }
     succeed(temp.path(), &train("a"));
     assert_no_leftovers(&run);
-    // names that are almost like that are somebody's
+    // similar names belong to the user
     for name in [".precious.tmp", ".1.tmp", ".x.1a.tmp", "x.1.tmp", ".x..tmp"] {
         let folder = temp.path().join("b");
         std::fs::create_dir_all(&folder).unwrap();

@@ -337,7 +337,7 @@ fn a_kill_loses_no_policy_on_the_way() {
     assert_eq!(kept(&run).len(), 3);
 }
 
-/// A policy on the way that could not be written comes with the iteration that is done again.
+/// If an intermediate policy could not be written, repeating the iteration writes it.
 #[test]
 fn a_policy_on_the_way_that_failed_is_written_again() {
     let temp = tempfile::tempdir().unwrap();
@@ -354,7 +354,7 @@ fn a_policy_on_the_way_that_failed_is_written_again() {
         succeed(temp.path(), &["train", "hopper", "--config", "tiny.yaml", "--steps", "2560", "--out", run]);
     }
     succeed(temp.path(), &["train", "--resume", "whole", "--steps", "9000"]);
-    // a folder stands in the way
+    // a folder has the name of the policy file
     let in_the_way = temp.path().join("a/policies/policy-5120.safetensors");
     std::fs::create_dir(&in_the_way).unwrap();
     let text = fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "9000"]);

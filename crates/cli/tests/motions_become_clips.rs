@@ -86,7 +86,7 @@ fn a_clip_with_a_foot_in_the_ground_fails_the_check() {
     std::fs::write(temp.path().join("edited.motion"), &bad).unwrap();
     let text = fail(temp.path(), 1, &["motion", "check", "edited.motion"]);
     assert!(text.contains("edited.motion: checksum: found ") && text.contains("remove this entry"), "{text}");
-    // whoever edits a clip on purpose has it sealed again
+    // after an intended edit, `import` adds a new checksum
     let bare: String = bad.lines().filter(|line| !line.contains("checksum")).map(|line| format!("{line}\n")).collect();
     std::fs::write(temp.path().join("edited.motion"), bare).unwrap();
     let text = fail(temp.path(), 1, &["motion", "check", "edited.motion"]);
@@ -177,7 +177,7 @@ fn motions_too_short_to_loop_are_refused() {
 #[test]
 fn a_loop_whose_ends_differ_is_refused() {
     let temp = tempfile::tempdir().unwrap();
-    // the figure sinks by half a meter
+    // the hips sink by half a meter
     let mut document: serde_json::Value = serde_json::from_str(&recording()).unwrap();
     document["Loop"] = "none".into();
     let frames = document["Frames"].as_array_mut().unwrap();

@@ -1,4 +1,5 @@
-//! A file that could not be written is refused before the work for it begins: by its ending, its folder, or because it is read.
+//! A command checks its output file before it starts: the ending, the folder, and that the file is not one of its
+//! inputs.
 
 mod common;
 
@@ -16,7 +17,7 @@ fn every_command_looks_at_its_output_first() {
         std::fs::create_dir(path.join(folder)).unwrap();
     }
     std::fs::write(path.join("file"), "").unwrap();
-    // work that takes hours, but for the last four
+    // all but the last four commands would run for hours
     let commands: [(&[&str], &str); 7] = [
         (&["record-demo", "p.safetensors", "--episodes", "100000"], "demo"),
         (&["render", "p.safetensors", "--seconds", "3600", "--agents", "64"], "png"),
@@ -53,7 +54,7 @@ fn every_command_looks_at_its_output_first() {
     assert_eq!(files(path).len(), 3, "{:?}", files(path));
 }
 
-/// `import` writes the checksum that a policy lacks, and keeps its numbers.
+/// `import` adds the checksum that a policy lacks and keeps its numbers.
 #[test]
 fn a_policy_without_a_checksum_is_imported() {
     let temp = tempfile::tempdir().unwrap();
@@ -78,7 +79,7 @@ fn a_policy_without_a_checksum_is_imported() {
     assert_eq!(new, own);
 }
 
-/// Episodes reach the file as they end: many take no more memory than few.
+/// The file receives each episode when it ends, so memory does not grow with the number of episodes.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_long_demonstration_takes_little_memory() {
@@ -95,7 +96,7 @@ fn a_long_demonstration_takes_little_memory() {
     let report = limited("600");
     assert_eq!(report["episodes"], 600);
     let bytes = std::fs::metadata(temp.path().join("a.demo")).unwrap().len();
-    // with a copy or two it would not have fitted
+    // an extra copy or two would exceed the limit
     assert!(bytes > 90_000_000, "{bytes} bytes");
     assert_no_leftovers(temp.path());
 }

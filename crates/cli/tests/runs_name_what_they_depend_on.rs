@@ -1,5 +1,5 @@
-//! A run knows the files elsewhere that it depends on: it goes on from any folder, and not with other bits. What `run.json`
-//! says of the task counts, whatever the command says beside it.
+//! A run lists the outside files that it depends on. It resumes from any folder, and refuses files that have changed.
+//! The task in `run.json` takes precedence over the command line.
 
 mod common;
 
@@ -22,7 +22,7 @@ fn asset(path: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").join(path)).unwrap()
 }
 
-/// The folders `here`, with what a run needs, and `elsewhere`.
+/// The folders `here`, which has the run's files, and `elsewhere`.
 fn folders(temp: &Path) -> [std::path::PathBuf; 2] {
     let folders = ["here", "elsewhere"].map(|name| temp.join(name));
     folders.iter().for_each(|folder| std::fs::create_dir(folder).unwrap());
@@ -30,7 +30,7 @@ fn folders(temp: &Path) -> [std::path::PathBuf; 2] {
     folders
 }
 
-/// What a start has left that was killed before its first iteration.
+/// Creates the files of a start that was killed before its first iteration.
 fn forget_iterations(run: &Path) {
     std::fs::remove_dir_all(run.join("checkpoint")).unwrap();
     let _ = std::fs::remove_dir_all(run.join("policies"));
@@ -43,7 +43,7 @@ fn forget_iterations(run: &Path) {
 fn a_model_is_found_from_anywhere_and_may_not_change() {
     let temp = tempfile::tempdir().unwrap();
     let [here, elsewhere] = folders(temp.path());
-    // its model in two files
+    // the model consists of two files
     let model = asset("gymnasium/hopper.xml");
     let (head, rest) = model.split_once("<worldbody>").unwrap();
     let (world, tail) = rest.split_once("</worldbody>").unwrap();
@@ -58,7 +58,7 @@ fn a_model_is_found_from_anywhere_and_may_not_change() {
     succeed(&elsewhere, &["train", "--resume", "../here/run", "--steps", "2048"]);
     let policy = |run: &str| tensors(&here.join(run).join("policy.safetensors"));
     assert_eq!(policy("run"), policy("whole"));
-    // a policy knows where its model is, too
+    // a policy stores the path of its model, too
     succeed(&elsewhere, &["eval", "../here/run", "--episodes", "2"]);
 
     for name in ["my.xml", "parts/world.xml"] {
@@ -119,12 +119,12 @@ fn the_policy_that_a_run_starts_from_may_not_change_before_the_first_checkpoint(
     std::fs::copy(here.join("one.safetensors"), here.join("start.safetensors")).unwrap();
     succeed(&elsewhere, &["train", "--resume", "../here/run"]);
     assert_eq!(tensors(&here.join("run/policy.safetensors")), whole);
-    // a run with a checkpoint does not need it any more
+    // a run with a checkpoint no longer needs the policy
     std::fs::remove_file(here.join("start.safetensors")).unwrap();
     succeed(&elsewhere, &["train", "--resume", "../here/run", "--steps", "2048"]);
 }
 
-/// The name of the agent beside `--resume` says nothing of its arguments: those of the run stay.
+/// The agent's name beside `--resume` does not set any arguments: the run keeps its own.
 #[test]
 fn a_named_agent_goes_on_with_the_arguments_of_the_run() {
     let temp = tempfile::tempdir().unwrap();
@@ -139,7 +139,7 @@ fn a_named_agent_goes_on_with_the_arguments_of_the_run() {
     assert_eq!(a, b);
 }
 
-/// Killed between its description and its clip, a run goes on all the same; killed before, it stands in nobody's way.
+/// A run killed between writing its description and its clip can resume. Killed earlier, it does not block a new run.
 #[test]
 fn a_run_that_was_killed_before_its_clip_was_in_place_goes_on() {
     let temp = tempfile::tempdir().unwrap();
@@ -163,7 +163,7 @@ fn a_run_that_was_killed_before_its_clip_was_in_place_goes_on() {
     assert_eq!(std::fs::read_to_string(run.join("my.motion")).unwrap(), clip);
     assert_no_leftovers(&run);
 
-    // before the description was in place
+    // before the description has its final name
     let run = path.join("early");
     std::fs::create_dir(&run).unwrap();
     std::fs::write(run.join(".lock"), "").unwrap();

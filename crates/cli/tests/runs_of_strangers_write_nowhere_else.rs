@@ -1,5 +1,5 @@
-//! A run's folder may come from a stranger: links in it lead nowhere, so that nothing outside the folder is written, emptied or
-//! deleted.
+//! A run's folder may come from another person. The program does not follow links in it, so nothing outside the folder
+//! is written, emptied or deleted.
 
 #![cfg(unix)]
 
@@ -13,7 +13,7 @@ fn train(folder: &Path, out: &str) {
     succeed(folder, &[&SMALL[..], &["1", "--steps", "8k", "--out", out]].concat());
 }
 
-/// What is outside the run's folder.
+/// The files outside the run's folder.
 fn outside(temp: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut all = Vec::new();
     for name in ["victim.txt", "victims"] {
@@ -31,7 +31,7 @@ fn links_in_a_folder_are_refused_by_name() {
     let path = temp.path();
     train(path, "mine");
     std::fs::write(path.join("victim.txt"), "precious").unwrap();
-    // names that the program removes in folders of its own
+    // names that the program deletes in its own folders
     std::fs::create_dir(path.join("victims")).unwrap();
     for name in ["policy-999999999.safetensors", "state-1-12345678.safetensors", ".x.1.tmp"] {
         std::fs::write(path.join("victims").join(name), "precious").unwrap();
@@ -75,13 +75,13 @@ fn links_in_a_folder_are_refused_by_name() {
         assert_eq!(outside(path), before, "{name}");
         assert!(!path.join("nowhere").exists());
     }
-    // a new run does not write through the lock either
+    // a new run does not write through a linked lock file
     std::fs::create_dir(path.join("new")).unwrap();
     symlink(path.join("victim.txt"), path.join("new/.lock")).unwrap();
     let error = fail(path, 1, &[&SMALL[..], &["1", "--steps", "8k", "--out", "new"]].concat());
     assert!(error.contains("new/.lock: kind: found a link, expected a file of the run's own"), "{error}");
     assert_eq!(outside(path), before);
-    // pipes would keep it waiting
+    // reading a pipe would block
     let made = std::process::Command::new("mkfifo").arg(path.join("mine/.lock.pipe")).status().unwrap();
     assert!(made.success());
     std::fs::rename(path.join("mine/.lock.pipe"), path.join("mine/.lock")).unwrap();
@@ -89,7 +89,7 @@ fn links_in_a_folder_are_refused_by_name() {
     assert!(error.contains(".lock: kind: found a device, pipe or socket"), "{error}");
 }
 
-/// A copy of a run by hard links, as backups make them, stays what it is when the run goes on.
+/// Resuming a run does not change a copy of it that consists of hard links, as backup tools make them.
 #[test]
 fn a_copy_by_hard_links_does_not_change() {
     let temp = tempfile::tempdir().unwrap();
@@ -108,7 +108,7 @@ fn a_copy_by_hard_links_does_not_change() {
     assert_eq!(of("copy"), before);
 }
 
-/// A lock has no content to lose, but what lies there keeps it.
+/// A linked lock file keeps its content.
 #[test]
 fn a_refused_resume_changes_nothing() {
     let temp = tempfile::tempdir().unwrap();

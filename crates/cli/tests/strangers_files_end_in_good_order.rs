@@ -1,5 +1,5 @@
-//! A file from a stranger may say anything: the program uses it, or names what is wrong with it, within bounds of time and
-//! memory; and nothing that it says reaches the terminal as a command.
+//! Files from another person may contain anything. The program uses them or reports the problem, within limits on time
+//! and memory. No text from a file reaches the terminal as a command.
 
 mod common;
 
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// A policy for a task with arguments that it does not have to take.
+/// A policy for a task whose arguments it may or may not accept.
 fn policy(folder: &Path, agent: &str, options: &[(&str, Value)], change: impl Fn(&mut PolicyMeta)) {
     let spec = Setting::named(agent).unwrap().factory().unwrap().spec().clone();
     let mut meta = PolicyMeta::of(&spec, vec![4], marathon_learn::Activation::Tanh);
@@ -24,7 +24,7 @@ fn policy(folder: &Path, agent: &str, options: &[(&str, Value)], change: impl Fn
     policy.save(&folder.join("p.safetensors")).unwrap();
 }
 
-/// What `eval` says of the policy, with 2 GB of memory and within seconds.
+/// The output of `eval` for the policy, limited to 2 GB of memory and a few seconds.
 #[track_caller]
 fn refusal(folder: &Path) -> String {
     let begun = Instant::now();
@@ -53,7 +53,7 @@ fn arguments_beyond_measure_are_refused_by_name() {
         let text = refusal(path);
         assert!(text.contains(part), "{agent} {name}: {text}");
     }
-    // arguments of learning, which nobody has who plays
+    // training arguments, which playing does not need
     let text = fail(path, 1, &["train", "MarathonManSteer", "--option", "relive=1e18"]);
     assert!(text.contains("option relive") && text.contains("a number from 0 to 1"), "{text}");
     let names = vec!["walk"; 100_000].join(",");
@@ -91,7 +91,7 @@ fn models_that_never_end_are_refused() {
     }
 }
 
-/// Escape sequences, carriage returns and their relatives are shown, not sent.
+/// Control characters such as escape sequences and carriage returns are printed in escaped form.
 #[test]
 fn no_text_of_a_file_commands_the_terminal() {
     let temp = tempfile::tempdir().unwrap();
@@ -113,11 +113,11 @@ fn no_text_of_a_file_commands_the_terminal() {
     assert!(json(&text)["error"].as_str().unwrap().contains(evil), "JSON says the same: {text}");
     policy(path, "Hopper-v5", &[(evil, 1.0.into())], |_| {});
     harmless(&run(path, &["eval", "p.safetensors"]).stderr);
-    // a configuration
+    // a configuration file
     std::fs::write(path.join("evil.yaml"), format!("behaviors:\n  Hopper:\n    \"a\\e[2J\\x9b\": 1\n")).unwrap();
     let text = harmless(&run(path, &["train", "hopper", "--config", "evil.yaml"]).stderr);
     assert!(text.contains("unknown key") || text.contains("expected"), "{text}");
-    // what a command says of its success: names of tasks that are printed on stdout
+    // success messages: names of tasks on stdout
     policy(path, "Hopper-v0", &[], |_| {});
     let name = "p\u{1b}[2J.safetensors";
     std::fs::copy(path.join("p.safetensors"), path.join(name)).unwrap();
@@ -129,7 +129,7 @@ fn no_text_of_a_file_commands_the_terminal() {
     harmless(&output.stdout);
 }
 
-/// Tables that no run has written, and numbers that no run has.
+/// Tables and numbers that no run writes.
 #[test]
 fn a_table_of_any_numbers_is_drawn_or_refused() {
     let temp = tempfile::tempdir().unwrap();
@@ -155,7 +155,7 @@ fn a_table_of_any_numbers_is_drawn_or_refused() {
         assert!(output.status.success(), "{value}: {}", stderr(&output));
         assert!(path.join("a/curve.png").is_file() && begun.elapsed() < Duration::from_secs(30), "{value}");
     }
-    // a pipe in place of the events or the table
+    // a pipe named like the events file or the table
     #[cfg(unix)]
     for name in ["progress.csv", "events.out.tfevents.1.marathon.0001", "summary.json"] {
         let file = path.join("a").join(name);

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Most values of a file, repetitions by aliases included.
 const MOST_NODES: usize = 100_000;
-/// Most bytes of all texts of a file, repetitions by aliases included.
+/// Limit on the bytes of all texts in a file, including texts repeated by aliases.
 const MOST_TEXT: usize = 1 << 24;
 /// Most levels of nesting.
 const MOST_LEVELS: usize = 32;
@@ -82,7 +82,7 @@ impl Node {
             Value::Map(map) => map.entries.iter().map(|field| field.node.size()).sum(),
         }
     }
-    /// Bytes of all texts in it.
+    /// Bytes of all texts in the document.
     fn text(&self) -> usize {
         match &self.value {
             Value::Scalar { text, .. } => text.len(),
@@ -148,7 +148,7 @@ struct Builder<'a> {
     open: Vec<Open>,
     anchors: BTreeMap<usize, Node>,
     nodes: usize,
-    /// Bytes of texts that aliases have repeated.
+    /// Bytes of texts repeated by aliases.
     repeated: usize,
     root: Option<Node>,
 }

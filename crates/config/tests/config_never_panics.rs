@@ -100,7 +100,7 @@ proptest! {
     }
 }
 
-/// A long text that aliases repeat would be a file of fifty gigabytes.
+/// Expanding the aliases of this long text would take 50 GB.
 #[test]
 fn aliases_do_not_multiply_text() {
     let file = format!("a: &a '{}'\nb: [{}]\n", "x".repeat(400_000), "*a,".repeat(90_000));

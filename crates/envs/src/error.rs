@@ -119,7 +119,7 @@ pub enum EnvError {
         /// What is allowed.
         expected: &'static str,
     },
-    /// More agents than the budget has memory for.
+    /// The memory budget is too small for this number of agents.
     #[error("agents is {agents}, which {source}")]
     Memory {
         /// Number of agents.

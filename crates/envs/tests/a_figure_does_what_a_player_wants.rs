@@ -77,7 +77,7 @@ fn who_creeps_lifts_his_feet() {
     }
 }
 
-/// He has learned to turn over from commands to stand alone, so that is what he observes of a command beside the button.
+/// The policy was trained on backflip commands without speed or turn, so a backflip hides all other commands.
 #[test]
 fn a_backflip_goes_before_all_other_commands() {
     let story = |command: [f64; COMMAND]| {
@@ -94,7 +94,7 @@ fn a_backflip_goes_before_all_other_commands() {
     let (alone, command, buttons, obs) = story([0.0, 0.0, 0.0, 0.0, 1.0]);
     let (beside, ..) = story([2.5, 0.8, -FRAC_PI_2, 1.0, 1.0]);
     assert_eq!(alone, beside);
-    // without the button, he observes what he is told
+    // without the button, the observation shows the commanded values
     let (without, ..) = story([2.5, 0.8, -FRAC_PI_2, 1.0, 0.0]);
     for (seen, expected) in [(&beside, [0.0, 0.0, 0.0, 0.0, 1.0]), (&without, [2.5, 0.8, -FRAC_PI_2, 1.0, 0.0])] {
         for row in seen.last().unwrap().0.chunks_exact(obs) {

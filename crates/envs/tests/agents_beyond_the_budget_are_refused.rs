@@ -1,5 +1,5 @@
-//! More agents than the budget has memory for are refused before any are made, and what an agent is said to take is what it
-//! takes, at the most.
+//! Too many agents for the memory budget are refused before any is created. The estimated memory per agent is an upper
+//! bound on the memory that it takes.
 
 use marathon_envs::{EnvError, VecEnv, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
@@ -31,7 +31,7 @@ fn memory() -> usize {
     1024 * line.split_whitespace().nth(1).unwrap().parse::<usize>().unwrap()
 }
 
-/// One test alone looks at the process's memory: others would change it meanwhile.
+/// Only one test measures the process's memory, because parallel tests would change it.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_agent_takes_no_more_than_it_is_said_to() {
@@ -43,7 +43,7 @@ fn an_agent_takes_no_more_than_it_is_said_to() {
         ("Swimmer-v5", 16_000),
     ] {
         let said = registry::factory(id, Isa::best()).unwrap().agent_bytes();
-        // what is made once is there already
+        // shared data is already allocated
         let play = |agents: usize| {
             let mut env = VecEnv::new(id, &VecEnvOptions { agents, threads: 1, ..Default::default() }).unwrap();
             let mut step = env.buffers();
@@ -56,9 +56,9 @@ fn an_agent_takes_no_more_than_it_is_said_to() {
         let each = memory().saturating_sub(before) / agents;
         println!("{id}: {each} bytes, {said} said");
         assert!(each <= said, "{id}: an agent takes {each} bytes, {said} were said");
-        // nor is the estimate so high that it refuses what fits
+        // the estimate is not so high that it refuses agents that fit
         assert!(said < 12 * each.max(500), "{id}: an agent takes {each} bytes, {said} were said");
-        // freed memory would be used again, unseen
+        // reused memory would hide an allocation
         std::mem::forget(kept);
     }
 }

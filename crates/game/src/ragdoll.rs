@@ -123,8 +123,8 @@ pub struct Physique(pub Variation);
 pub struct Restart {
     /// Seconds that it lies limp after a fall; infinity: for good. 0 is what training and evaluation do.
     pub after_fall: f64,
-    /// Whether it also starts anew when the task's time is up; otherwise it runs on. Once off, it stays off to the end of the
-    /// episode.
+    /// Whether the episode also restarts at the task's time limit. If not, it continues. Once off, it stays off to the
+    /// end of the episode.
     pub on_time_up: bool,
 }
 
@@ -163,7 +163,8 @@ pub struct Episode {
     pub farthest: f64,
     /// Speed along the track in the last decision, m/s.
     pub speed: f32,
-    /// Velocity of the free body along its own forward axis and to its left in the last decision, m/s; 0 for a figure in a plane.
+    /// Velocity of the free body along its forward axis and to its left in the last decision, m/s; 0 for planar
+    /// characters.
     pub own_velocity: [f32; 2],
     /// Actions of the last decision.
     pub action: Vec<f32>,
@@ -173,7 +174,7 @@ pub struct Episode {
     pub feet: u32,
     /// It has fallen and lies limp, see [`Restart`].
     pub down: bool,
-    /// It has no time limit: [`Restart::on_time_up`] has been off in one of its decisions.
+    /// The episode has no time limit, because [`Restart::on_time_up`] was off in one of its decisions.
     pub untimed: bool,
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn parts(commands: &mut Commands, model: &Model, ragdoll: Entity) -> 
         .collect()
 }
 
-/// Angle along the ground of the forward axis of a model's free body, rad; 0 for a figure in a plane.
+/// Heading of a model's free body: angle of its forward axis along the ground, rad; 0 for planar characters.
 pub fn heading(model: &Model, qpos: &[f64]) -> f64 {
     let free = model.joints.iter().find(|joint| joint.kind == JointType::Free);
     let turn = free.and_then(|free| qpos.get(free.qpos_adr + 3..free.qpos_adr + 7));
@@ -45,8 +45,8 @@ pub fn heading(model: &Model, qpos: &[f64]) -> f64 {
     (2.0 * (x * y + w * z)).atan2(1.0 - 2.0 * (y * y + z * z))
 }
 
-/// Velocity of a model's free body along its own forward axis and to its left on the way from one configuration to another, m/s. `None`
-/// for a figure in a plane.
+/// Velocity of a model's free body between two configurations, along its forward axis and to its left, m/s. `None` for
+/// planar characters.
 pub(crate) fn own_velocity(model: &Model, from: &[f64], to: &[f64], seconds: f64) -> Option<[f32; 2]> {
     let free = model.joints.iter().find(|joint| joint.kind == JointType::Free)?;
     let way = [0, 1].map(|i| (to[free.qpos_adr + i] - from[free.qpos_adr + i]) / seconds);
@@ -84,7 +84,7 @@ mod tests {
         let model = Model::from_xml_str(text, "ball")?;
         let turned = |x: f64, y: f64, angle: f64| [x, y, 3.0, (0.5 * angle).cos(), 0.0, 0.0, (0.5 * angle).sin()];
         assert!((heading(&model, &turned(1.0, 2.0, 1.2)) - 1.2).abs() < 1e-12);
-        // it runs along -x, the way it faces: ahead is positive
+        // the character runs along -x and faces -x, so its forward speed is positive
         let around = std::f64::consts::PI;
         let ahead = own_velocity(&model, &turned(0.0, 0.0, around), &turned(-0.1, 0.0, around), 0.05);
         let [ahead, left] = ahead.ok_or("it has a free body")?;

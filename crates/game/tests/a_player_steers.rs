@@ -302,15 +302,16 @@ fn marathon_man_goes_as_the_stick_says() {
     }
 }
 
-/// How episodes have ended.
+/// The ends of the episodes so far.
 #[derive(Resource, Default)]
 struct Ends(Vec<End>);
 
-/// Ten minutes of each: whoever is steered has no time limit, and its episode says so. Once let go, it runs on.
+/// Steers each agent for ten minutes. A steered character has no time limit, its episode says so, and it continues
+/// after release.
 #[test]
 fn a_steered_character_is_never_taken_back() {
     for (agent, stick) in [("MarathonManController", 0.3), ("WalkerController", 0.0), ("AntController", 0.3)] {
-        // frames as long as the game allows
+        // the longest frames that the game allows
         let mut app = windowless::game(&[agent, "--seed", "5"], Duration::from_millis(200), |app| {
             app.init_resource::<Ends>();
             app.add_systems(Update, |mut ends: ResMut<Ends>, mut ended: MessageReader<EpisodeEnded>| {
@@ -345,7 +346,7 @@ fn a_steered_character_is_never_taken_back() {
     }
 }
 
-/// Its own schedule has the task's time limit.
+/// A character that is not steered keeps the task's time limit.
 #[test]
 fn who_is_not_steered_begins_anew_when_its_time_is_up() {
     let mut app = windowless::game(&["AntController", "--seed", "5"], Duration::from_millis(200), |_| ());

@@ -1,4 +1,4 @@
-//! What R records is kept whatever else happens: other keys, other characters, the end of the game.
+//! A recording made with R is kept, whatever happens: other keys, other characters, the end of the game.
 #![cfg(feature = "render")]
 
 #[path = "common/windowless.rs"]
@@ -18,7 +18,7 @@ fn recordings(folder: &Path) -> Result<Vec<Recording>, Box<dyn Error>> {
     Ok(replays.map(|path| Recording::load(&path)).collect::<Result<_, _>>()?)
 }
 
-/// Recordings go to the present folder, which a process has one of: one test goes through all keys.
+/// The game saves recordings in the current folder. A process has only one, so a single test tries all keys.
 #[test]
 fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
     let home = std::env::current_dir()?;
@@ -31,11 +31,11 @@ fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
         let words: Vec<&str> = ["hopper", "--agents", "2", "--threads", "1"].into_iter().chain(presses).collect();
         let mut app = windowless::game(&words, Duration::from_millis(20), |_| ());
         frames(&mut app, 150);
-        // a trainer that nobody needs ends
+        // ends the trainer
         app.world_mut().remove_resource::<Lesson>();
         let all = recordings(folder.path()).map_err(|error| format!("{name}: {error}"))?;
         assert!(all.iter().all(|recording| recording.frames() > 1), "{name}");
-        // the first one lasts from its start to the key at least, time that is stopped or fast aside
+        // the first recording lasts at least from its start to the key, apart from paused or fast time
         let first = all.iter().find(|recording| recording.setting.agent == "Hopper-v0" && recording.agents == 2);
         let seconds = first.ok_or_else(|| format!("{name}: it is lost"))?.seconds();
         assert!(seconds > 0.8, "{name}: {seconds} s");

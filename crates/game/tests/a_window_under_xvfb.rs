@@ -142,7 +142,7 @@ fn it_is_played() -> Result<(), Box<dyn Error>> {
     key("Escape")?;
     std::thread::sleep(Duration::from_secs(5));
     shot("window-4-menu.png")?;
-    // it has learned since it was saved, so that the first asks
+    // training has continued since the save, so the first press asks
     key("q")?;
     std::thread::sleep(Duration::from_secs(2));
     shot("window-5-question.png")?;
@@ -201,7 +201,7 @@ fn an_environment_is_shown_in_its_time() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A signal to end ends it cleanly, and what is recorded is kept. A film tells that it is not written.
+/// SIGTERM ends the game cleanly, and recordings are saved. A film reports that it is not written.
 #[test]
 fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     let (_screen, display) = screen()?;

@@ -1,4 +1,5 @@
-//! A key that would lose something asks first: the same key says yes, S saves, Esc says no. And keys are bound anew without accidents.
+//! A key that would lose something asks first: the same key means yes, S saves, Esc means no. Binding a key has no side
+//! effects.
 #![cfg(feature = "render")]
 
 #[path = "common/devices.rs"]
@@ -48,7 +49,8 @@ fn quitting_does_not_ask_when_nothing_is_lost() {
     assert!(app.should_exit().is_some_and(|exit| exit.is_success()));
 }
 
-/// Policies and recordings go to the present folder, which a process has one of: one test has all that save something.
+/// The game saves policies and recordings in the current folder. A process has only one, so a single test saves
+/// everything.
 #[test]
 fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Error>> {
     let (home, folder) = (std::env::current_dir()?, tempfile::tempdir()?);
@@ -72,20 +74,20 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
         assert!(asked(&app).is_none() && app.world().get_resource::<Lesson>().is_some(), "{key:?}");
         assert!(!app.world().resource::<Menu>().open, "{key:?}: Esc answers");
     }
-    // yes, after it has been saved
+    // yes, after saving
     press(&mut app, KeyCode::KeyL);
     press(&mut app, KeyCode::KeyS);
     frames(&mut app, 2);
     assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
     assert!(file("hopper-live-1.safetensors").exists());
-    // yes, without
+    // yes, without saving
     let mut app = learning();
     press(&mut app, KeyCode::KeyL);
     press(&mut app, KeyCode::KeyL);
     frames(&mut app, 2);
     assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
     assert!(!file("hopper-live-2.safetensors").exists());
-    // what ends a lesson in another way saves it
+    // ending a lesson in another way saves it
     let mut app = learning();
     let mut show = app.world_mut().resource_mut::<Show>();
     show.mode = Mode::Watch;
@@ -115,7 +117,7 @@ fn esc_leaves_a_binding_as_it_is_and_a_closed_menu_mutes_no_key() {
     press(&mut app, KeyCode::Escape);
     assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
     assert!(app.world().resource::<Rebinding>().0.is_none() && app.world().resource::<Menu>().open);
-    // the menu is closed by its button while a key is waited for
+    // the menu's button closes it while it waits for a key
     app.world_mut().resource_mut::<Rebinding>().0 = Some(Deed::Push);
     app.world_mut().resource_mut::<Menu>().open = false;
     frames(&mut app, 2);

@@ -137,7 +137,7 @@ fn a_ghost_errors_and_a_skin_are_drawn() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Sliders and cards go with the rest.
+/// Without the rest of the screen, sliders and cards are hidden too.
 #[test]
 fn without_text_and_bars_nothing_is_over_the_picture() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
@@ -149,7 +149,7 @@ fn without_text_and_bars_nothing_is_over_the_picture() -> Result<(), Box<dyn Err
     let replay = ["--replay", "hopper-1.replay", "--press", "0:pause"];
     let shown = draw(folder.path(), "replay.png", &replay)?;
     let bare = draw(folder.path(), "bare-replay.png", &[&replay[..], &["--no-hud"]].concat())?;
-    // the time line is below the middle
+    // the time line is in the lower half
     let line = |image: &Image| mean(image, [0.35, 0.65], [0.78, 0.84]);
     let (shown, bare) = (line(&shown), line(&bare));
     assert!(bare[0] > shown[0] + 20.0, "the card of the time line is dark: {shown:?}, without it {bare:?}");
@@ -224,7 +224,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A file of glTF that has its JSON alone.
+/// A glTF file that consists only of its JSON.
 fn glb(json: &str) -> Vec<u8> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -232,7 +232,7 @@ fn glb(json: &str) -> Vec<u8> {
     [b"glTF", &length(2)[..], &length(20 + json.len()), &length(json.len()), b"JSON", &json].concat()
 }
 
-/// A skeleton whose names nobody knows is worn by a mapping that names them.
+/// A mapping names the bones of a skeleton whose names are not known.
 #[test]
 fn a_skin_of_unknown_names_is_worn_by_a_mapping() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;

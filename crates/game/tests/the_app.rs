@@ -195,7 +195,7 @@ fn learning_begins_from_random_weights_and_ends() {
     let waiting = app.world().resource::<Lesson>().progress();
     std::thread::sleep(Duration::from_secs(1));
     assert_eq!(app.world().resource::<Lesson>().progress().curve, waiting.curve, "the trainer waits");
-    // it asks whether the policy may go
+    // it asks whether to discard the policy
     press(&mut app, Deed::Learn);
     assert!(app.world().get_resource::<Lesson>().is_some());
     press(&mut app, Deed::Learn);

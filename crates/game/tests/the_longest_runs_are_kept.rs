@@ -136,7 +136,7 @@ fn a_table_from_elsewhere_takes_no_other_files_away() -> Result<(), Box<dyn Erro
     Ok(())
 }
 
-/// A table from elsewhere names no files but its own replays, tells the terminal nothing, and runs nothing.
+/// An untrusted table can only name replays in its own folder, cannot send commands to the terminal, and runs no code.
 #[test]
 fn a_strangers_table_does_no_harm() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;

@@ -3,7 +3,7 @@
 use marathon_physics::budget::OverBudget;
 use std::path::{Path, PathBuf};
 
-/// Most characters of a file's contents in a message.
+/// Limit on the characters of a file's contents in a message.
 const MOST_SHOWN: usize = 300;
 
 /// An error of the trainer; the text says where, what was found and what was expected.
@@ -75,14 +75,14 @@ pub enum Error {
         /// What should be there.
         expected: String,
     },
-    /// What a file contains asks for more than a limit allows.
+    /// A file's contents exceed a limit.
     #[error("{}: {place} {error}", path.display())]
     Budget {
         /// The file.
         path: PathBuf,
-        /// What asks, in the file.
+        /// The part of the file that exceeds the limit.
         place: String,
-        /// How much, and the limit.
+        /// The amount and the limit.
         error: OverBudget,
     },
     /// A policy or checkpoint belongs to something else.
@@ -122,13 +122,13 @@ impl Error {
         let expected = expected.to_string();
         Error::File { path: path.into(), place: short(place.to_string()), found: short(found.to_string()), expected }
     }
-    /// A file whose contents ask for too much.
+    /// Creates the error for file contents that exceed a limit.
     pub(crate) fn budget(path: &Path, place: &str, error: OverBudget) -> Self {
         Error::Budget { path: path.into(), place: place.into(), error }
     }
 }
 
-/// A text as a message shows it: a file may hold any amount.
+/// Shortens a text from a file for a message.
 fn short(text: String) -> String {
     match text.char_indices().nth(MOST_SHOWN) {
         Some((end, _)) => format!("{}...", &text[..end]),

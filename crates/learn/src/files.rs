@@ -17,17 +17,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const KEY: &str = "marathon";
 /// Key of a document's checksum.
 const CHECKSUM: &str = "checksum";
-/// What stands for the checksum of a sealed file while it is computed.
+/// Placeholder for the checksum of a sealed file while the checksum is computed.
 const BLANK: &str = "0000000000000000";
-/// Memory that a JSON document takes, in its own lengths: `0,` becomes 32 bytes, beside the text and what is made of it.
+/// Memory for parsing a JSON document, as a multiple of its length. `0,` becomes 32 bytes; the text and the parsed
+/// document come on top.
 const JSON_MEMORY: f64 = 64.0;
 
-/// A file being written: under a temporary name until [`AtomicFile::commit`], so that a reader never sees half of it. Without
-/// that, nothing of it is left and the old file is whole.
+/// A file that is written under a temporary name until [`AtomicFile::commit`], so that readers never see a partial
+/// file. Without a commit, the temporary file is deleted and the old file stays.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    /// None once the file is in its place.
+    /// `None` after the commit.
     temporary: Option<PathBuf>,
     file: File,
 }
@@ -36,19 +37,19 @@ pub struct AtomicFile {
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 impl AtomicFile {
-    /// Starts a file that is to be at `path`.
+    /// Creates the temporary file for `path`.
     ///
     /// # Errors
-    /// If a file cannot be made in that folder.
+    /// If no file can be created in that folder.
     pub fn create(path: &Path) -> Result<Self, Error> {
-        // a name of its own length: that of the file may be as long as names can be
+        // a short name of fixed length: the file's own name may have the maximum length
         let name = checksum(path.file_name().unwrap_or_default().as_encoded_bytes());
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let temporary = path.with_file_name(format!(".{name}-{number}.{}.tmp", std::process::id()));
-        // never through a link that somebody has put there
+        // never write through an existing link
         let new = || File::options().write(true).create_new(true).open(&temporary);
         let file = new().or_else(|error| match error.kind() {
-            // left by a process with the same number that was killed
+            // a killed process with the same number left the file
             ErrorKind::AlreadyExists => std::fs::remove_file(&temporary).and_then(|()| new()),
             _ => Err(error),
         });
@@ -56,10 +57,10 @@ impl AtomicFile {
         Ok(Self { path: path.into(), temporary: Some(temporary), file })
     }
 
-    /// Puts the file into its place.
+    /// Gives the file its final name.
     ///
     /// # Errors
-    /// If the disk does not take it.
+    /// If writing the data or renaming fails, as on a full disk.
     pub fn commit(mut self) -> Result<(), Error> {
         let Some(temporary) = &self.temporary else { return Ok(()) };
         let moved = self.file.sync_all().and_then(|()| std::fs::rename(temporary, &self.path));
@@ -151,7 +152,7 @@ impl TensorWriter {
     pub fn bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
         self.with_document(serde_json::to_string(document).expect("documents are plain data"))
     }
-    /// The same with a checksum of all these bytes at the end of the document.
+    /// Like [`TensorWriter::bytes`], with a checksum of all these bytes at the end of the document.
     pub fn sealed_bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
         let json = serde_json::to_string(document).expect("documents are plain data");
         let open = json.strip_suffix('}').expect("a document has keys");
@@ -194,14 +195,15 @@ impl<'a> TensorReader<'a> {
     /// The JSON document.
     pub fn document<D: DeserializeOwned>(&self, format: &str, version: u32) -> Result<D, Error> {
         let mut value = json(self.path, &self.document, format)?;
-        // of all bytes: see `seal`
+        // the checksum covers all bytes: see `seal`
         value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM));
         known(self.path, value, format, version, None)
     }
-    /// The checksum of all `bytes`, those that this was made of; none if the document has none.
+    /// Checks and returns the checksum of `bytes`, which this reader was created from. `None` if the document has no
+    /// checksum.
     ///
     /// # Errors
-    /// If the bytes have changed since it was computed.
+    /// If the bytes have changed since the checksum was computed.
     pub fn seal(&self, bytes: &[u8]) -> Result<Option<String>, Error> {
         let document: Value = serde_json::from_str(&self.document).unwrap_or_default();
         let Some(found) = document.get(CHECKSUM) else { return Ok(None) };
@@ -258,8 +260,8 @@ impl<'a> TensorReader<'a> {
 /// Makes a document of an earlier version into one of this version; or says where it is none, and what is found there.
 pub type Upgrade = fn(u64, Value) -> Result<Value, (String, String)>;
 
-/// Where the digits of a sealed file's checksum are: in the header, behind the last such key of the document, which is a
-/// JSON text in JSON.
+/// Position of the checksum's digits in a sealed file: in the header, after the last checksum key of the document. The
+/// document is JSON text within JSON.
 fn seal_place(bytes: &[u8]) -> Option<usize> {
     let key = format!("\\\"{CHECKSUM}\\\":\\\"");
     let length = u64::from_le_bytes(*bytes.first_chunk()?);
@@ -277,7 +279,7 @@ fn json(path: &Path, text: &str, format: &str) -> Result<Value, Error> {
     serde_json::from_str(text).map_err(|e| Error::file(path, "JSON", format!("'{e}'"), format!("a {format} document")))
 }
 
-/// What a JSON document says that names its format and version; one of an earlier version, if there is a way to upgrade it.
+/// Reads a JSON document that states its format and version. Upgrades an earlier version if there is an upgrade.
 fn known<D: DeserializeOwned>(
     path: &Path,
     mut value: Value,
@@ -377,7 +379,7 @@ fn checksum_of(document: &Value) -> String {
     checksum(&bytes)
 }
 
-/// Checksum (FNV-1a) that tells damaged files: another byte at one place is always another checksum.
+/// Checksum (FNV-1a) that detects damaged files. A change of a single byte always changes the checksum.
 pub fn checksum(bytes: &[u8]) -> String {
     checksum_of_parts(&[bytes])
 }

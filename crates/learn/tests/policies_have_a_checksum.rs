@@ -1,5 +1,5 @@
-//! A policy file knows its own checksum: a byte that has changed anywhere is refused by name, and so is a file without a
-//! checksum. The shipped files have theirs.
+//! A policy file contains its own checksum. A file with a changed byte or without a checksum is refused with an error
+//! that names the checksum. The policies that ship have checksums.
 
 mod common;
 
@@ -41,7 +41,7 @@ fn a_changed_byte_anywhere_is_refused_by_name() {
             }
         }
     }
-    // bytes may not come or go either
+    // adding or removing bytes is an error too
     for bytes in [&bytes[..bytes.len() - 1], &[&bytes[..], &[0]].concat()] {
         assert!(refusal(bytes).starts_with("puck.safetensors: "), "{}", refusal(bytes));
     }
@@ -69,7 +69,7 @@ fn a_file_without_a_checksum_is_refused_with_the_command_that_writes_one() {
     let path = folder.path().join("puck.safetensors");
     std::fs::write(&path, &bytes).unwrap();
     assert_eq!(Policy::load_unsealed(&path).unwrap(), policy);
-    // one that is there counts
+    // an existing checksum is checked
     let mut changed = policy.to_bytes();
     *changed.last_mut().unwrap() ^= 1;
     std::fs::write(&path, &changed).unwrap();
@@ -85,7 +85,7 @@ fn shipped_policies_have_theirs() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|end| end == "safetensors") {
             let policy = Policy::load(&path).unwrap_or_else(|error| panic!("{error}"));
-            // written again, it is the same policy
+            // after rewriting, it is the same policy
             assert!(Policy::from_bytes(&path, &policy.to_bytes()).unwrap() == policy, "{}", path.display());
             count += 1;
         }
@@ -93,7 +93,7 @@ fn shipped_policies_have_theirs() {
     assert!(count >= 15, "{count} policies");
 }
 
-/// Numbers that no policy has are refused whatever the checksum says.
+/// Invalid numbers are refused even if the checksum is correct.
 #[test]
 fn numbers_that_are_not_finite_are_refused() {
     let policy = small();

@@ -40,20 +40,20 @@ impl Default for BehaviorOptions {
     }
 }
 
-/// How much room the agents of a behavior take in a message.
+/// Message size of a behavior's agents.
 pub(crate) struct Sizes {
-    /// The behavior's name for the trainer.
+    /// The behavior's name in messages to the trainer.
     pub name: String,
-    /// Bytes without agents, and of each agent.
+    /// Bytes without agents, and bytes per agent.
     frame: usize,
     each: usize,
 }
 
 impl Sizes {
-    /// Those of a behavior that is yet to be made.
+    /// The sizes for a behavior that does not exist yet.
     ///
     /// # Errors
-    /// If there is no such agent, or it does not take its arguments.
+    /// If there is no such agent, or the agent does not take the arguments.
     pub fn of(options: &BehaviorOptions) -> Result<Self, PlayerError> {
         let agent = registry::global().agent_with(&options.env, &options.options)?;
         let shards = agent.shards(Isa::best())?;
@@ -67,12 +67,12 @@ impl Sizes {
         Sizes { name, frame: sum(Face::frame_bytes), each: sum(Face::bytes_per_agent) }
     }
 
-    /// Bytes of the longest message part that so many agents can need.
+    /// Size of the longest message part for a number of agents, bytes.
     pub fn largest(&self, agents: usize) -> usize {
         agents.saturating_mul(self.each).saturating_add(self.frame)
     }
 
-    /// How many agents there may be if a message may have so many bytes.
+    /// Largest number of agents whose messages fit into this many bytes.
     pub fn most_agents(&self, bytes: usize) -> usize {
         bytes.saturating_sub(self.frame) / self.each.max(1)
     }

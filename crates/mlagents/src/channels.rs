@@ -23,7 +23,7 @@ const fn id(a: u32, b: u16, c: u16, d: u64) -> ChannelId {
     [a[0], a[1], a[2], a[3], b[0], b[1], c[0], c[1], d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]]
 }
 
-/// Most intervals of a sampler. All of them are looked at for every draw.
+/// Limit on the intervals of a sampler. Every draw searches all of them.
 const INTERVALS: usize = 1024;
 
 /// What a trainer says beside its actions.

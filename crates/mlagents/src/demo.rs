@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 const HEAD: usize = 33;
 /// Version of the format.
 const API_VERSION: i32 = 1;
-/// Longest entry, bytes: those of its numbers, and room for names and for fields that are not read. The messages of a longer
-/// one, empty ones say, could take much memory.
+/// Limit on the length of an entry, bytes. It allows for the entry's numbers, names and unused fields. A longer entry
+/// could take much memory, for example with empty messages.
 const ENTRY: usize = 1 << 16;
 const ENTRY_NUMBER: usize = 16;
 
@@ -99,20 +99,20 @@ impl Demonstration {
         self.total / self.episodes.max(1) as f64
     }
 
-    /// The file, if nothing has been [taken](Self::take) yet.
+    /// The whole file, if no bytes have been [taken](Self::take) yet.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = self.front();
         bytes.extend(&self.pairs);
         bytes
     }
 
-    /// Takes the bytes of the episodes that were added since the last time. A file that is written as it is played has them
-    /// after [`Demonstration::front`], which is known at the end.
+    /// Takes the bytes of the episodes added since the last call. When a file is written during play, these bytes
+    /// follow [`Demonstration::front`], whose content is complete at the end.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.pairs)
     }
 
-    /// What a file begins with. It says how many episodes there are, but its length stays the same.
+    /// The start of the file. It contains the number of episodes, but its length does not change.
     pub fn front(&self) -> Vec<u8> {
         let mut meta = DemonstrationMeta {
             api_version: API_VERSION,
@@ -285,7 +285,7 @@ mod tests {
         }
         let error = read_demonstrations(path, b"behaviors:", &spec).unwrap_err().to_string();
         assert!(error.starts_with("hop.demo: head: found") && error.ends_with("expected a demonstration file (.demo)"));
-        // an entry of nothing but empty messages
+        // an entry that consists of empty messages
         let info = AgentInfo { observations: vec![Observation::default(); 1 << 18], ..AgentInfo::default() };
         let pair = AgentInfoActionPair { agent_info: Some(info), action_info: None };
         let long = [&bytes[..HEAD], &[0], &pair.encode_length_delimited_to_vec()[..]].concat();

@@ -33,7 +33,7 @@ pub enum PlayerError {
         /// Why.
         source: std::io::Error,
     },
-    /// A program listens, but says nothing.
+    /// A program listens on the port but does not answer.
     #[error(
         "the program that listens on port {port} of this computer has not answered within {seconds} s (--connect-timeout); \
          is it mlagents-learn?"
@@ -41,10 +41,10 @@ pub enum PlayerError {
     NoAnswer {
         /// The port.
         port: u16,
-        /// How long it was waited for, s.
+        /// The waiting time, s.
         seconds: u64,
     },
-    /// A program listens, but closes the connection.
+    /// A program listens on the port but closes the connection.
     #[error(
         "the program that listens on port {port} of this computer closed the connection before it answered ({source}); is it \
          mlagents-learn?"
@@ -52,7 +52,7 @@ pub enum PlayerError {
     Closed {
         /// The port.
         port: u16,
-        /// How.
+        /// How the connection ended.
         source: RpcError,
     },
     /// The trainer is gone or refuses.

@@ -7,10 +7,10 @@ use std::io::{Write, stderr};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Longest part of a foreign text that is shown, characters.
+/// Limit on the length of an external text in the log, characters.
 const SHOWN: usize = 100;
 
-/// A text that came from elsewhere, fit for a terminal: without control characters, and not too long.
+/// An external text made safe for a terminal: without control characters, and shortened.
 pub(crate) fn shown(text: &str) -> String {
     let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
     if text.chars().nth(SHOWN).is_some() {

@@ -71,7 +71,7 @@ impl Names {
         self.known.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Whether there is such a parameter.
+    /// Whether the parameter exists.
     pub fn contains(&self, name: &str) -> bool {
         self.find(name).is_some()
     }
@@ -140,7 +140,7 @@ impl Parameters {
         for (name, sampler) in &self.samplers {
             let Some(Target::Command(i)) = names.find(name) else { continue };
             let x = draw(sampler, name, agent, episode);
-            // what is out of range is refused where it is set
+            // the setter refuses values out of range
             let x = f64::from(x);
             let x = ranges[*i].fit(x).unwrap_or(x);
             told.get_or_insert_with(|| ranges.iter().map(CommandRange::rest).collect())[*i] = x;

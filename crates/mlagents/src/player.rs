@@ -16,7 +16,8 @@ use std::time::Duration;
 /// Bytes of a message that are neither infos nor statistics: headers, names, behaviors.
 const ALLOWANCE: usize = 4096;
 
-/// Most remarks that are made once each. A trainer may name any number of things that do not exist.
+/// Limit on the number of different remarks, each of which is logged once. A trainer may name any number of unknown
+/// things.
 const REMARKS: usize = 1000;
 
 /// What a player is made of.
@@ -24,9 +25,9 @@ const REMARKS: usize = 1000;
 pub struct PlayerOptions {
     /// Port on which the trainer listens.
     pub port: u16,
-    /// How long to wait for a trainer that is not there yet, and for its first answer.
+    /// Time to wait for a trainer to start and to send its first answer.
     pub patience: Duration,
-    /// Silence, without even an answer to a ping, after which a trainer counts as gone; `None`: never.
+    /// Silence after which a trainer counts as gone, if it does not answer a ping either; `None` disables the check.
     pub silence: Option<Duration>,
     /// Its behaviors.
     pub behaviors: Vec<BehaviorOptions>,
@@ -256,7 +257,7 @@ impl Player {
         for message in messages {
             match message {
                 channels::Message::Engine(engine) => self.set_engine(engine),
-                // one that no behavior knows does nothing, and is not kept
+                // a parameter that no behavior has is ignored and not stored
                 channels::Message::Parameter(name, _) if !self.is_known(&name) => self.warn_of_unknown(&name),
                 channels::Message::Parameter(name, sampler) => {
                     self.log.line(format_args!("environment parameter {name}: {sampler:?}"));
@@ -293,12 +294,12 @@ impl Player {
         }
     }
 
-    /// Whether a parameter means anything to a behavior.
+    /// Whether any behavior has the parameter.
     fn is_known(&self, name: &str) -> bool {
         self.behaviors.iter().any(|b| b.parameter_names().contains(name))
     }
 
-    /// The author of a parameter that does nothing would like to know.
+    /// Logs a warning about a parameter that has no effect.
     fn warn_of_unknown(&mut self, name: &str) {
         let name = shown(name);
         if first(&mut self.told, &format!("parameter {name}")) {
@@ -309,7 +310,7 @@ impl Player {
     }
 }
 
-/// Whether a remark has not been made before and there is room for it.
+/// Whether a remark is new and the limit on remarks is not reached.
 fn first(told: &mut BTreeSet<String>, remark: &str) -> bool {
     told.len() < REMARKS && told.insert(remark.to_owned())
 }
@@ -334,7 +335,7 @@ fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), P
     Ok((behaviors, next_id))
 }
 
-/// Refuses more agents than fit into a message, before any are made.
+/// Refuses more agents than fit into a message, before any agent is created.
 fn check(options: &PlayerOptions, areas: usize) -> Result<(), PlayerError> {
     let sizes = options.behaviors.iter().map(Sizes::of).collect::<Result<Vec<_>, _>>()?;
     let agents = |i: usize| options.behaviors[i].agents.saturating_mul(areas);

@@ -24,9 +24,10 @@ const WINDOW: u32 = 0x7fff_ffff;
 const FIRST_WINDOW: u32 = 65535;
 /// Bytes after which the connection's window is filled up again.
 const REFILL: u32 = 1 << 30;
-/// Memory that a byte of a reply may take once it is read: a list of empty messages has two bytes for each.
+/// Memory per byte of a decoded reply. A list of empty messages uses two bytes for each message.
 const MEMORY_PER_BYTE: f64 = 128.0;
-/// Least time between two pings in one wait. gRPC's server ends the connection of a client that asks more often.
+/// Minimum time between two pings during one wait. A gRPC server closes the connection of a client that pings more
+/// often.
 const PING_PAUSE: Duration = Duration::from_secs(300);
 /// In front of a message: one byte that says whether it is compressed, and its length.
 const MESSAGE_HEAD: usize = 5;
@@ -88,10 +89,10 @@ pub enum RpcError {
     /// The peer answered without a message.
     #[error("the trainer refused a message of {0} bytes; it takes at most 4 MiB (4194304)")]
     Refused(usize),
-    /// The peer has not answered in time.
+    /// The peer did not answer in time.
     #[error("the trainer has not answered in time")]
     Late,
-    /// The peer is there no more, though the connection is.
+    /// The connection is open, but the peer no longer responds.
     #[error(
         "the trainer has sent nothing for {} s and does not answer a ping: it has stopped or hangs (--answer-timeout)",
         .0.as_secs()
@@ -140,22 +141,22 @@ pub struct Channel<S> {
     wait: Wait,
 }
 
-/// How long a peer is waited for. All of this takes a stream whose reads and writes time out now and then.
+/// Limits on the wait for a peer. They need a stream with timeouts for reads and writes.
 #[derive(Default)]
 struct Wait {
-    /// The present reply must be there by then.
+    /// Deadline of the current reply.
     deadline: Option<Instant>,
-    /// Longest silence.
+    /// Maximum silence.
     silence: Option<Duration>,
-    /// Begin of the present silence; `None`: something has come or gone since a read or write last timed out.
+    /// Start of the current silence; `None` if data has arrived or been sent since the last timeout.
     since: Option<Instant>,
-    /// The ping that is not answered yet.
+    /// Time of a ping without an answer so far.
     pinged: Option<Instant>,
     last_ping: Option<Instant>,
 }
 
 impl Wait {
-    /// A read or write has timed out. Returns whether the peer is to be asked whether it is there.
+    /// Handles a timeout of a read or write. Returns whether to ping the peer.
     fn go_on(&mut self) -> Result<bool, RpcError> {
         let now = Instant::now();
         if self.deadline.is_some_and(|deadline| now >= deadline) {
@@ -169,7 +170,7 @@ impl Wait {
         Ok(silent >= most / 2 && self.last_ping.is_none_or(|last| now - last >= PING_PAUSE))
     }
 
-    /// A write has timed out, in the midst of which no ping can be sent.
+    /// Handles a timeout within a write, when a ping cannot be sent.
     fn go_on_writing(&mut self) -> Result<(), RpcError> {
         self.go_on()?;
         let silent = self.since.map_or(Duration::ZERO, |since| since.elapsed());
@@ -215,18 +216,18 @@ impl<S: Read + Write> Channel<S> {
         Ok(channel)
     }
 
-    /// Sets the time by which a reply must be there, from now on. The stream's reads and writes must time out now and then.
+    /// Sets the time limit for each reply, starting now. The stream's reads and writes need timeouts.
     pub fn set_deadline(&mut self, deadline: Option<Instant>) {
         self.wait.deadline = deadline;
     }
 
-    /// Sets the longest silence of the peer. It may take any time for a reply as long as it answers pings; gRPC's servers do
-    /// while their program is busy. The stream's reads and writes must time out now and then.
+    /// Sets the maximum silence of the peer. A reply may take any time as long as the peer answers pings, which gRPC
+    /// servers do even while their program is busy. The stream's reads and writes need timeouts.
     pub fn set_longest_silence(&mut self, silence: Option<Duration>) {
         self.wait.silence = silence;
     }
 
-    /// Sends bytes, however long the peer takes for them.
+    /// Sends bytes, however long the peer takes to receive them.
     fn send(&mut self, mut bytes: &[u8]) -> Result<(), RpcError> {
         while !bytes.is_empty() {
             match self.stream.write(bytes) {
@@ -243,7 +244,7 @@ impl<S: Read + Write> Channel<S> {
         Ok(())
     }
 
-    /// Asks the peer whether it is there.
+    /// Sends a ping.
     fn ping(&mut self) -> Result<(), RpcError> {
         let mut ping = Vec::new();
         put_frame(&mut ping, frame::PING, 0, 0, b"marathon");
@@ -384,7 +385,7 @@ impl<S: Read + Write> Channel<S> {
                 Ok(read) => {
                     self.end += read;
                     self.wait.heard();
-                    // a peer that sends a byte now and then never lets a read time out
+                    // a peer that sends single bytes slowly never causes a read timeout
                     if self.wait.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
                         return Err(RpcError::Late);
                     }
@@ -402,12 +403,12 @@ impl<S: Read + Write> Channel<S> {
     }
 }
 
-/// Whether a read or write has come to nothing within the stream's own time.
+/// Whether a read or write has timed out.
 fn timed_out(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }
 
-/// Length of a reply as its head says, once that is there.
+/// Length of a reply, from its header; 0 until the header has arrived.
 fn declared(reply: &[u8]) -> usize {
     match reply {
         [_, a, b, c, d, ..] => MESSAGE_HEAD + u32::from_be_bytes([*a, *b, *c, *d]) as usize,

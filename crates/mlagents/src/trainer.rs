@@ -19,9 +19,9 @@ pub const COMMUNICATION_VERSION: &str = "1.5.0";
 const PACKAGE_VERSION: &str = "3.0.0";
 /// Longest message that a trainer takes: gRPC's default, which Python does not change.
 pub const MESSAGE_LIMIT: usize = 4 << 20;
-/// Time between two attempts to reach a trainer, and between two looks at the clock while one is waited for.
+/// Interval between attempts to connect, and between checks of the time during a wait.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Least time that a trainer has for its first answer.
+/// Minimum waiting time for a trainer's first answer.
 const FIRST_ANSWER: Duration = Duration::from_secs(2);
 
 /// What the trainer asked for at the beginning.
@@ -43,12 +43,12 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// Finds the trainer on a port of this computer and greets it. One that is not there yet is waited for. Once it has
-    /// answered, it counts as gone after `silence` in which it does not even answer a ping; `None`: never. Pings are at least 5
-    /// minutes apart.
+    /// Connects to the trainer on a port of this computer, waiting until it has started, and greets it. After its first
+    /// answer, the trainer counts as gone if it sends nothing for `silence` and does not answer a ping; `None` disables
+    /// this check. Pings are at least 5 minutes apart.
     ///
     /// # Errors
-    /// If no trainer listens and answers until `patience` is over, or another program does.
+    /// If no trainer answers within `patience`, or another program listens on the port.
     pub fn connect(port: u16, patience: Duration, silence: Option<Duration>) -> Result<(Self, Setup), PlayerError> {
         let begun = Instant::now();
         let stream = reach(port, patience).map_err(|source| PlayerError::Connect { port, source })?;
@@ -96,7 +96,7 @@ impl Trainer {
         Ok((trainer, setup))
     }
 
-    /// Waits for the first thing to do, as long as the trainer is there. `None`: the trainer has closed.
+    /// Waits for the first command, as long as the trainer responds. `None` if the trainer has closed the connection.
     ///
     /// # Errors
     /// If the trainer is gone.
@@ -140,7 +140,7 @@ fn reach(port: u16, patience: Duration) -> std::io::Result<TcpStream> {
     loop {
         let mut failure = std::io::ErrorKind::NotFound.into();
         for address in &addresses {
-            // a listener with a full queue lets one wait
+            // a listener with a full queue delays the connection
             let left = patience.saturating_sub(begun.elapsed()).max(FIRST_ANSWER);
             match TcpStream::connect_timeout(address, left) {
                 Ok(stream) => {

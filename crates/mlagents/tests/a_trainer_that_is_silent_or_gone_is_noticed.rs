@@ -1,6 +1,6 @@
-//! No wait of the player lasts for ever: a program that accepts the connection and says nothing, one that closes it, and a
-//! trainer that stops are errors that say what happened, and the program `marathon-player` then ends with an exit code other
-//! than 0. A trainer that is only busy is waited for. What a trainer asks for is checked before anything is made.
+//! The player never waits forever. If the other program does not answer, closes the connection or stops, the error
+//! describes what happened. `marathon-player` then exits with a code other than 0. The player waits for a busy trainer.
+//! Requests of a trainer are checked before anything is created.
 
 mod common;
 
@@ -12,10 +12,10 @@ use std::process::{Command, Output};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A frame that asks for an answer: PING.
+/// A PING frame, which requires an answer.
 const PING: [u8; 17] = [0, 0, 8, 6, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8];
 
-/// Runs the program against a listener that treats its connection like this.
+/// Runs the program against a listener that handles its connection with this function.
 fn against(seconds: u64, listener: impl FnOnce(TcpStream) + Send + 'static) -> (Output, Duration) {
     let socket = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let port = socket.local_addr().unwrap().port();
@@ -40,7 +40,7 @@ fn assert_fails(output: &Output, expected: &str) {
 #[test]
 fn a_listener_that_says_nothing_ends_the_player_in_time() {
     let (output, took) = against(3, |mut stream| {
-        // reads on until the player gives up
+        // reads until the player gives up
         let _ = stream.read_to_end(&mut Vec::new());
     });
     assert_fails(&output, "has not answered within 3 s (--connect-timeout); is it mlagents-learn?");
@@ -66,7 +66,7 @@ fn a_listener_that_closes_ends_the_player_with_an_error() {
     assert_fails(&output, "error: ");
 }
 
-/// Lets a trainer talk with a player of one hopper that takes it for gone after such a silence.
+/// Connects a trainer to a player of one hopper, which treats the trainer as gone after this silence.
 fn converse(silence: Duration, trainer: impl FnOnce(FakeTrainer) + Send + 'static) -> Result<(), PlayerError> {
     let (port, accept) = listen();
     let trainer = thread::spawn(move || trainer(accept()));
@@ -80,7 +80,7 @@ fn converse(silence: Duration, trainer: impl FnOnce(FakeTrainer) + Send + 'stati
 #[test]
 fn a_trainer_that_stops_is_noticed_and_one_that_is_busy_is_waited_for() {
     let silence = Duration::from_millis(600);
-    // it does not answer a ping before the first order, nor amid the training
+    // the trainer does not answer a ping, first before the first command, then during training
     for orders in [0, 1] {
         let result = converse(silence, move |mut trainer| {
             trainer.greet(1, 1);
@@ -97,7 +97,7 @@ fn a_trainer_that_stops_is_noticed_and_one_that_is_busy_is_waited_for() {
         trainer.greet(1, 1);
         trainer.answer(&reset(Vec::new()));
         trainer.receive().expect("observations");
-        // three times as long as the silence that it may keep
+        // three times the allowed silence
         assert!(trainer.answer_pings_for(Duration::from_millis(1800)) > 0);
         trainer.answer(&close());
     });

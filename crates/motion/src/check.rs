@@ -37,7 +37,7 @@ pub struct Report {
     pub slide_speed: f64,
     /// Share of the frames in which a sole stands.
     pub standing: f64,
-    /// How near the clip is to its recording, as its file says.
+    /// The clip's distance from its recording, as its file states it.
     pub fit: Option<Nearness>,
     /// What the clip takes of motors and ground; none for models whose inverse dynamics is not known.
     pub efforts: Option<Efforts>,

@@ -49,12 +49,12 @@ pub enum MotionError {
         /// What differs.
         problem: String,
     },
-    /// The file asks for more than it may.
+    /// The file exceeds a limit.
     #[error("{}: {problem}", path.display())]
     Budget {
         /// The file.
         path: PathBuf,
-        /// What asks for how much, the limit, and how to raise it.
+        /// The part of the file, the amount, the limit, and how to raise it.
         problem: String,
     },
     /// The file has something that is not supported.

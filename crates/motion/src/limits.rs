@@ -1,4 +1,4 @@
-//! What a file may ask for, checked before work starts.
+//! Limits on the contents of files, checked before work starts.
 
 use crate::error::MotionError;
 use marathon_physics::budget::{MEMORY, OverBudget, RECORDING_SECONDS};
@@ -8,22 +8,23 @@ fn over(path: &Path, what: &str) -> impl FnOnce(OverBudget) -> MotionError {
     move |error| MotionError::Budget { path: path.into(), problem: format!("{what} {error}") }
 }
 
-/// Whether a motion may be so long, s.
+/// Checks the length of a motion, s.
 pub(crate) fn check_seconds(path: &Path, seconds: f64) -> Result<(), MotionError> {
     RECORDING_SECONDS.check(seconds).map_err(over(path, "the motion"))
 }
 
-/// Whether there may be so many frames of so many numbers; edits hold about three copies.
+/// Checks the number of frames, with `numbers` numbers each. Edits keep about three copies.
 pub(crate) fn check_frames(path: &Path, frames: f64, numbers: usize) -> Result<(), MotionError> {
     check_memory(path, frames * numbers as f64 * 24.0)
 }
 
-/// Whether a motion may take so many bytes of memory.
+/// Checks the memory of a motion, bytes.
 pub(crate) fn check_memory(path: &Path, bytes: f64) -> Result<(), MotionError> {
     MEMORY.check(bytes).map_err(over(path, "the motion"))
 }
 
-/// Whether a JSON document of rows of numbers may be read: a bracket can ask for a row, a comma for a number.
+/// Checks the memory for a JSON document of rows of numbers. Each bracket may start a row, and each comma may add a
+/// number.
 pub(crate) fn check_json(path: &Path, bytes: &[u8]) -> Result<(), MotionError> {
     let (rows, numbers) = bytes.iter().fold((0usize, 0usize), |(rows, numbers), byte| match byte {
         b'[' => (rows + 1, numbers),

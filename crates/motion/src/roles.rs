@@ -40,7 +40,7 @@ const ROLES: [(&str, &[&str]); 11] = [
     ("head", &["head", "spine006"]),
 ];
 
-/// What stands before all names of a skeleton: those of 3ds Max's Biped, Rigify's deforming bones and VRoid's.
+/// Prefixes of all names in a skeleton: 3ds Max's Biped, Rigify's deforming bones and VRoid.
 const PREFIXES: [&str; 7] = ["bip001", "bip01", "def-", "def_", "org-", "j_bip_c_", "j_bip_"];
 
 /// Left or right of a figure.
@@ -63,7 +63,7 @@ fn exact(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     skeleton.bones.iter().position(|bone| bone.name == wanted)
 }
 
-/// The joint that the thighs hang from, by its name. Some skeletons call the joint that they stand on the root.
+/// The joint above both thighs, found by its name. In some skeletons, "root" is a joint on the ground instead.
 fn pelvis(skeleton: &Skeleton) -> Option<usize> {
     let named = exact(skeleton, "root").or_else(|| by_role(skeleton, "root"));
     let thighs = ["left_hip", "right_hip"].map(|name| exact(skeleton, name).or_else(|| by_role(skeleton, name)));
@@ -76,7 +76,8 @@ fn pelvis(skeleton: &Skeleton) -> Option<usize> {
     }
 }
 
-/// The joint that carries a figure: the lowest one that legs and arms hang from; none if names do not tell it.
+/// The joint that carries the skeleton: the lowest one above both legs and arms. `None` if the names do not identify
+/// it.
 pub(crate) fn carrier(skeleton: &Skeleton) -> Option<usize> {
     let joint = |role: &str| find(skeleton, role);
     let legs = fork(skeleton, joint("left_hip")?, joint("right_hip")?)?;
@@ -84,7 +85,7 @@ pub(crate) fn carrier(skeleton: &Skeleton) -> Option<usize> {
     if skeleton.hangs(arms, legs) { Some(legs) } else { fork(skeleton, arms, legs) }
 }
 
-/// The lowest joint that two others hang from.
+/// The lowest common ancestor of two joints.
 pub(crate) fn fork(skeleton: &Skeleton, a: usize, b: usize) -> Option<usize> {
     let mut at = skeleton.bones[a].parent;
     while let Some(joint) = at.filter(|joint| !skeleton.hangs(b, *joint)) {
@@ -98,19 +99,19 @@ fn by_role(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     let (_, names) = ROLES.iter().find(|(name, _)| *name == role)?;
     let prefix = common_prefix(skeleton);
     let bare = |name: &str| name.get(prefix.len()..).filter(|_| name.starts_with(&*prefix)).unwrap_or(name).to_string();
-    // names as they are, then without what a program has put before or behind all of them
+    // try the names as they are, then without common prefixes and suffixes
     let mut readings: [&dyn Fn(&str) -> String; 4] =
         [&|name| name.to_string(), &|name| bare(name), &|name| without_number(name).to_string(), &|name| {
             without_number(&bare(name)).to_string()
         }];
-    // Sketchfab numbers all joints: its Spine_2 is no second spine
+    // Sketchfab numbers all joints: Spine_2 is not a second spine joint
     let numbered = skeleton.bones.iter().filter(|bone| without_number(&bone.name) != bone.name).count();
     if 5 * numbered >= 3 * skeleton.bones.len() {
         readings.rotate_left(2);
     }
     readings.iter().find_map(|reading| {
         let joints: Vec<_> = skeleton.bones.iter().map(|bone| split(&reading(&bone.name))).collect();
-        // where a clavicle is called a shoulder, the arm is called an arm
+        // if the clavicle is called a shoulder, the upper arm is called an arm
         let upper_arm = joints.iter().any(|(_, name)| name == "arm" || name == "upperarm");
         let fits = |name: &str| !(upper_arm && role == "shoulder" && name == "shoulder");
         (names.iter().filter(|name| fits(name)))
@@ -118,7 +119,7 @@ fn by_role(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     })
 }
 
-/// What stands before the pelvis's name and those of most joints, such as `mixamorig1` or `Character1_`.
+/// The prefix of the pelvis's name that most other joints share, such as `mixamorig1` or `Character1_`.
 fn common_prefix(skeleton: &Skeleton) -> String {
     let most = |prefix: &str| {
         let with = skeleton.bones.iter().filter(|bone| bone.name.starts_with(prefix)).count();
@@ -133,7 +134,7 @@ fn common_prefix(skeleton: &Skeleton) -> String {
     prefixes.filter(|prefix| !prefix.is_empty()).find(|prefix| most(prefix)).unwrap_or_default()
 }
 
-/// A name without the number that tells copies apart: Blender's `Hips.001`, Sketchfab's `Hips_8`.
+/// Removes the number that distinguishes copies: `Hips.001` in Blender, `Hips_8` in Sketchfab.
 fn without_number(name: &str) -> &str {
     let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
     match stem.strip_suffix(['.', '_']) {
@@ -260,7 +261,7 @@ mod tests {
                 assert_eq!(find(&skeleton, wanted), Some(i), "{wanted} among {names:?}");
             }
         }
-        // a number can be a part of the name: Rigify's spine.003 is the chest
+        // a number can belong to the name: Rigify's spine.003 is the chest
         let rigify = skeleton(&["spine", "spine.001", "spine.002", "spine.003", "thigh.L", "thigh.R"]);
         assert_eq!(find(&rigify, "chest"), Some(3));
         assert_eq!(find(&rigify, "root"), Some(0));

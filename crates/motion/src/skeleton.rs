@@ -55,24 +55,24 @@ pub struct Keyframe {
     pub rotations: Vec<[f64; 4]>,
 }
 
-/// How far the last pose of a motion is from its first.
+/// Difference between the last pose of a motion and the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seam {
-    /// How much higher the root is, m.
+    /// Height of the last root above the first, m.
     pub height: f64,
-    /// By how much the root is tilted; a turn about the vertical does not count, rad.
+    /// Tilt between the two roots, without rotation about the vertical, rad.
     pub tilt: f64,
     /// Mean difference of the joints, rad.
     pub joints: f64,
 }
 
 impl Seam {
-    /// Whether a loop would show it.
+    /// Whether the seam would be visible in a loop.
     pub fn shows(&self) -> bool {
         self.height.abs() > 0.1 || self.tilt > 0.35 || self.joints > 0.35
     }
 
-    /// Whether the two poses have nothing in common: a loop would float, sink or tumble.
+    /// Whether the two poses are too different for a loop, which would float, sink or tumble.
     pub fn gapes(&self) -> bool {
         self.height.abs() > 0.25 || self.tilt > 1.0 || self.joints > 1.0
     }
@@ -88,7 +88,7 @@ impl Keyframe {
 }
 
 impl Skeleton {
-    /// Whether a joint hangs from another, or is it.
+    /// Whether a joint is another joint or its descendant.
     pub(crate) fn hangs(&self, mut joint: usize, from: usize) -> bool {
         while joint != from {
             match self.bones[joint].parent {
@@ -224,7 +224,7 @@ impl Animation {
         Ok(self.with_clip(self.clip.looped(path, self.clip.duration())?))
     }
 
-    /// How far the last pose is from the first.
+    /// The difference between the last pose and the first.
     pub fn seam(&self) -> Seam {
         let (first, last) = (self.clip.frame(0), self.clip.frame(self.clip.frames() - 1));
         let up = |frame: &[f64]| quat(&frame[3..]) * (quat(&first[3..]).conjugate() * DVec3::Z);

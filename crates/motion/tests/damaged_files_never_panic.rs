@@ -44,7 +44,7 @@ fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
 #[test]
 fn damaged_files_are_read_or_refused_by_name() {
     let walk = String::from_utf8(shipped("walker2d", "run").to_bytes()).unwrap();
-    // with it, no change would get past the checksum
+    // with the checksum, every change would be refused early
     let walk: String = walk.lines().filter(|line| !line.contains("checksum")).map(|line| format!("{line}\n")).collect();
     let walk = walk.into_bytes();
     let bvh =

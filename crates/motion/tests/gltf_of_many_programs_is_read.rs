@@ -1,5 +1,5 @@
-//! glTF as Blender, gltfpack, VRM's tools and the Khronos samples write it: scenes without nodes, integers for rotations, data
-//! beside the file, compressed meshes, several animations.
+//! Reads glTF as Blender, gltfpack, VRM tools and the Khronos samples write it: scenes without nodes, integer
+//! rotations, external data, compressed meshes, several animations.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,7 +12,7 @@ const PARENTS: [Option<usize>; 6] = [None, Some(0), Some(0), Some(2), Some(0), S
 const OFFSETS: [[f64; 3]; 6] =
     [[0.0, 0.9, 0.0], [0.0, 0.5, 0.0], [0.1, 0.0, 0.0], [0.0, -0.4, 0.0], [-0.1, 0.0, 0.0], [0.0, -0.4, 0.0]];
 
-/// Numbers of rotations in a file.
+/// Encodings of rotations in a file.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Float,
@@ -113,7 +113,7 @@ fn what_does_not_move_the_skeleton_is_not_read() {
     let (document, bytes) = parts(Kind::Float, &[1.2]);
     let expected = plain("m.glb", &glb(&document, &bytes));
     let changes = [
-        // Blender writes scenes of nothing
+        // Blender writes scenes without nodes
         ("/scenes", json!([{ "name": "Face" }, { "nodes": [0] }])),
         ("/extensionsRequired", json!(["KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_texture_basisu"])),
         (
@@ -129,7 +129,7 @@ fn what_does_not_move_the_skeleton_is_not_read() {
         changed[&key[1..]] = value;
         assert_eq!(plain("m.glb", &glb(&changed, &bytes)), expected, "{key}");
     }
-    // channels of what is no joint's
+    // channels of a node that is not a joint
     let mut changed = document.clone();
     let channels = changed["animations"][0]["channels"].as_array_mut().unwrap();
     channels

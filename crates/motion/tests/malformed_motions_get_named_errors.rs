@@ -55,7 +55,7 @@ fn a_clip_without_its_checksum_or_with_another_number_is_refused() {
     let parse = |bytes: &[u8]| Clip::parse("kick.motion".as_ref(), bytes);
     let good = String::from_utf8(clip.to_bytes()).unwrap();
     assert_eq!(parse(good.as_bytes()).unwrap(), clip);
-    // the spelling does not count
+    // formatting does not change the checksum
     let spelled: String = good.split_whitespace().collect::<Vec<_>>().join("").replace(",0,", ",0.0,");
     let spaced =
         spelled.replace("DeepMimic(Pengetal.,2018),frompybullet3.2.7;retargetedbyMarathon", &clip.about().source);
@@ -67,7 +67,7 @@ fn a_clip_without_its_checksum_or_with_another_number_is_refused() {
          `marathon motion import kick.motion --out NEW.motion` writes one"
     );
     assert_eq!(Clip::parse_without_checksum("kick.motion".as_ref(), bare(&clip).as_bytes()).unwrap(), clip);
-    // every digit counts, and every word
+    // every digit and every word counts
     let changes =
         [("0.01", "0.02"), ("Zlib", "Zlip"), ("\"kick\"", "\"kack\""), ("right_knee", "right_knie"), ("4", "5")];
     for (from, to) in changes {
@@ -216,13 +216,13 @@ fn bvh_as_programs_write_it_is_read() {
         assert_ne!(text, good);
         assert_eq!(read(&text).animation, expected, "{from:?} -> {to:?}");
     }
-    // more rows than the file says
+    // more rows than the file declares
     let more = read(&format!("{good}0 90 0 6\n"));
     assert_eq!(more.animation.clip().frames(), 3);
     assert_eq!(more.notes, ["the file says 2 frames and has more; all are read"]);
 }
 
-/// A few bytes must not ask for hours of motion or gigabytes of memory.
+/// A small file must not cause hours of motion or gigabytes of memory.
 #[test]
 fn motions_beyond_the_budget_are_refused_before_they_are_made() {
     let start = std::time::Instant::now();
@@ -244,7 +244,7 @@ fn motions_beyond_the_budget_are_refused_before_they_are_made() {
     let frames = vec![frame(10.0); 400].join(",");
     let deepmimic = format!("{{\"Frames\": [{frames}]}}");
     assert!(error("m.txt", &deepmimic).starts_with("m.txt: the motion asks for 3990 s"));
-    // hours of frames of one motion
+    // a motion of several hours
     let man = model("marathon_man");
     let still = shipped("marathon_man", "stand");
     let rows = vec![still.frame(0).to_vec(); 60];

@@ -1,4 +1,4 @@
-//! Whichever way a skeleton rests, wherever the floor is and whichever axis points up: the same motion comes out.
+//! Recordings with different rest poses, floors and up axes give the same motion.
 
 mod common;
 
@@ -9,7 +9,7 @@ use marathon_motion::import::{Reading, Up};
 use marathon_motion::{Animation, Mapping, fit, import, retarget};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Positions of the joints of an animation in a frame, and their turns from the rest pose.
+/// Positions of an animation's joints in a frame, and their rotations from the rest pose.
 fn shown(animation: &Animation, frame: usize) -> (Vec<DVec3>, Vec<DQuat>) {
     let quat = |q: &[f64]| DQuat::from_xyzw(q[1], q[2], q[3], q[0]);
     let qpos = animation.clip().frame(frame);
@@ -33,8 +33,8 @@ fn shown(animation: &Animation, frame: usize) -> (Vec<DVec3>, Vec<DQuat>) {
     (places, turned)
 }
 
-/// Mean distance of the joints from the truth, m, and the mean angle by which trunk and legs have turned otherwise, degrees, but for
-/// where the figure looks and starts. Arms may rest elsewhere: their directions are compared when they are retargeted.
+/// Mean position error of the joints, m, and mean rotation error of trunk and legs, degrees, apart from heading and
+/// start position. Arms may have another rest pose: retargeting compares their directions.
 fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     // the model's reference pose faces +x
     let hips = |places: &[DVec3]| (places[HIPS[0]] - places[HIPS[1]]).with_z(0.0).normalize();
@@ -60,7 +60,7 @@ fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     let world = DQuat::from_rotation_z(yaw);
     let start = truth.places(&truth.pose(0))[0] - world * ordered(0).0[0];
     let shift = start.with_z(0.0);
-    // turns are as seen from the rest pose, whose heading is its own
+    // rotations are relative to the rest pose, which has its own heading
     let (_, there) = ordered(level);
     let here = truth.turns(&truth.pose(level));
     let face = |turn: DQuat| heading((turn * DVec3::X).with_z(0.0));
@@ -82,7 +82,7 @@ fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     (way / count, angle / turned)
 }
 
-/// Layouts of files, each with what is special about it.
+/// Layouts of files, each with a description.
 fn layouts() -> Vec<(&'static str, Layout)> {
     let z_up = DQuat::IDENTITY;
     vec![

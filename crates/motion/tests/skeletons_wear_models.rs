@@ -138,7 +138,8 @@ fn limbs_of_another_figure_are_parallel_to_the_models() {
     }
 }
 
-/// A figure with legs of a third of their length is as large as the model, not three times as large, and stands on the ground.
+/// A character with legs of a third of the usual length is as large as the model, not three times as large. It stands
+/// on the ground.
 #[test]
 fn a_figure_with_short_legs_is_no_giant() {
     let model = model("marathon_man");

@@ -1,8 +1,9 @@
-//! The budget: how much memory and time a file or a message may ask for.
+//! The budget limits the memory and time that a file or a message can use.
 //!
-//! Every reader of something that a stranger may have made asks here before it starts work: [`read`] for the bytes of a
-//! file, [`Limit::check`] for what those bytes ask for. [`ALL`] lists the limits; `docs/limits.md` explains them. The
-//! environment variable `MARATHON_LIMITS` raises them: `MARATHON_LIMITS=memory=8GB,recording_seconds=7200`.
+//! Readers of untrusted files and messages check the budget before they start work. [`read`] limits the bytes of a
+//! file, and [`Limit::check`] limits the work that those bytes cause. [`ALL`] lists the limits, and `docs/limits.md`
+//! explains them. The environment variable `MARATHON_LIMITS` raises them:
+//! `MARATHON_LIMITS=memory=8GB,recording_seconds=7200`.
 
 use std::fmt;
 use std::io::{self, Read};
@@ -14,27 +15,27 @@ use crate::hint;
 /// The environment variable that raises limits.
 pub const VARIABLE: &str = "MARATHON_LIMITS";
 
-/// What a limit counts.
+/// The unit of a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Bytes of a file or of memory.
     Bytes,
     /// Seconds of motion, film or waiting.
     Seconds,
-    /// Things; the word is their plural.
+    /// Number of things, with their plural noun.
     Count(&'static str),
 }
 
-/// The most of one thing that a file or a message may ask for.
+/// A limit on one property of a file or a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// Its name in [`VARIABLE`] and in errors.
     pub name: &'static str,
-    /// What it bounds, for the documentation.
+    /// Description for the documentation.
     pub what: &'static str,
-    /// What `default` counts.
+    /// Unit of `default`.
     pub unit: Unit,
-    /// The most that is allowed unless [`VARIABLE`] says otherwise.
+    /// The limit unless [`VARIABLE`] sets another.
     pub default: u64,
 }
 
@@ -49,11 +50,11 @@ const fn seconds(name: &'static str, default: u64, what: &'static str) -> Limit 
 const MB: u64 = 1_000_000;
 const GB: u64 = 1_000_000_000;
 
-/// Memory that one file or message may ask for.
+/// Memory for one file or message.
 pub const MEMORY: Limit = bytes("memory", 2 * GB, "Memory that one file or message may ask for");
-/// Memory of all agents of a batch or environment.
+/// Memory for all agents of a batch or environment.
 pub const AGENTS_MEMORY: Limit = bytes("agents_memory", 16 * GB, "Memory of all agents of a batch or environment");
-/// A model file, each of the files that it includes, each mesh, texture and height field.
+/// A model file, and each file that it includes or uses as a mesh, texture or height field.
 pub const MODEL_FILE: Limit = bytes("model_file", 64 * MB, "Size of a model file and of each file that it names");
 /// A policy or checkpoint file.
 pub const POLICY_FILE: Limit = bytes("policy_file", GB, "Size of a policy or checkpoint file");
@@ -94,7 +95,7 @@ pub const ALL: &[Limit] = &[
     FILM_SECONDS,
 ];
 
-/// A request beyond a limit, or a value of [`VARIABLE`] that means nothing.
+/// An amount above a limit, or an invalid value of [`VARIABLE`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OverBudget(String);
 
@@ -118,10 +119,10 @@ impl Limit {
         self.unit.text(self.default as f64)
     }
 
-    /// The most that is allowed: the default, or what [`VARIABLE`] says.
+    /// The limit: the default, or the value in [`VARIABLE`].
     ///
     /// # Errors
-    /// If [`VARIABLE`] is set to something that cannot be read.
+    /// If [`VARIABLE`] is invalid.
     pub fn most(&self) -> Result<u64, OverBudget> {
         static RAISED: OnceLock<Result<Vec<(String, u64)>, OverBudget>> = OnceLock::new();
         let raised = RAISED.get_or_init(|| parse(&std::env::var(VARIABLE).unwrap_or_default()));
@@ -129,10 +130,11 @@ impl Limit {
         Ok(raised.iter().rev().find(|(name, _)| name == self.name).map_or(self.default, |(_, most)| *most))
     }
 
-    /// Whether `asked` is allowed. Not a number is never allowed.
+    /// Checks an amount against the limit. NaN is above every limit.
     ///
     /// # Errors
-    /// If it is not. The text follows the name of what asked: "asks for 64 GB; the limit 'memory' is 2 GB ...".
+    /// If the amount is above the limit. The error text continues a sentence about the file or element: "asks for 64
+    /// GB; the limit 'memory' is 2 GB ...".
     pub fn check(&self, asked: f64) -> Result<(), OverBudget> {
         let most = self.most()?;
         if asked <= most as f64 {
@@ -172,7 +174,7 @@ impl Unit {
     }
 }
 
-/// Three significant digits, or all digits of a whole number below a million.
+/// Formats three significant digits, or all digits of a whole number below a million.
 fn short(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e6 {
         format!("{x}")
@@ -184,11 +186,10 @@ fn short(x: f64) -> String {
     }
 }
 
-/// The bytes of a file, if it is a regular file within the limit. Devices and pipes have no size and may never end, so they
-/// are refused.
+/// Reads a regular file within the limit. Devices and pipes are refused, because they have no size and may never end.
 ///
 /// # Errors
-/// If the file is larger, is no regular file, or cannot be read.
+/// If the file is too large, is not a regular file, or cannot be read.
 pub fn read(path: &Path, limit: &Limit) -> io::Result<Vec<u8>> {
     let facts = std::fs::metadata(path)?;
     if !facts.is_file() {
@@ -205,10 +206,10 @@ pub fn read(path: &Path, limit: &Limit) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a file, as [`read`] reads it.
+/// Reads a text file like [`read`].
 ///
 /// # Errors
-/// Those of [`read`], and bytes that are not UTF-8.
+/// Like [`read`], and if the bytes are not UTF-8.
 pub fn read_to_string(path: &Path, limit: &Limit) -> io::Result<String> {
     String::from_utf8(read(path, limit)?).map_err(|e| {
         let place = e.utf8_error().valid_up_to();
@@ -216,7 +217,7 @@ pub fn read_to_string(path: &Path, limit: &Limit) -> io::Result<String> {
     })
 }
 
-/// Name and value of every limit that a value of [`VARIABLE`] raises.
+/// Name and value of every limit that the text of [`VARIABLE`] sets.
 fn parse(text: &str) -> Result<Vec<(String, u64)>, OverBudget> {
     let bad = |found: &str, expected: String| OverBudget(format!("{VARIABLE}: found '{found}', expected {expected}"));
     let mut raised = Vec::new();

@@ -6,7 +6,7 @@
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
 //! * [`hint`] finds the name that an error about an unknown one may suggest.
-//! * [`budget`] has the limits of what a file or a message may ask for.
+//! * [`budget`] limits the memory and time that a file or a message can use.
 //!
 //! Each folder imports only from folders above it in this list:
 //!

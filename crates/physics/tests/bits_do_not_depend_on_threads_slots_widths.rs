@@ -79,7 +79,7 @@ fn models() -> Vec<Model> {
     let capped = ["capped/quadruped", "capped/company", "full/pile", "full/elliptic"]
         .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
     let load = |p: &PathBuf| Model::from_xml_file(p).unwrap_or_else(|e| panic!("{e}"));
-    // with a low cap another solver runs, in which every agent and island has its own line search
+    // a low cap selects another solver, in which every agent and island has its own line search
     let low = capped.iter().enumerate().map(|(i, p)| {
         let mut model = load(p);
         (model.opt.iterations, model.opt.ls_iterations) = (4, 8);

@@ -5,9 +5,10 @@
 //! included, the acceleration, the constraint forces, the number of contacts, the sensors and the next state equal
 //! MuJoCo's to 1e-8 in double precision. A refusal names the file or the model, and the element or the feature.
 //!
-//! Every model runs under its own settings of the solver. Where they end MuJoCo's iteration before it has converged, all of
-//! that holds for the point where it ends. Where they let it converge, its answer is only as exact as the file's
-//! tolerance. There the accelerations agree within that tolerance, and everything agrees to 1e-8 when both sides solve to the end.
+//! Every model runs under its own solver settings. If they stop MuJoCo's iteration before it converges, the test
+//! compares with the point where it stops. If they let it converge, its answer is only as exact as the file's
+//! tolerance. The accelerations then agree within that tolerance, and everything agrees to 1e-8 when both sides solve
+//! to the end.
 //!
 //! `MARATHON_MODELS=FOLDER` tries the models of a folder instead. `docs/models.md` lists what became of each file. The test fails if the list is out of date; run it with
 //! `MARATHON_BLESS=1` to write it anew.
@@ -66,7 +67,7 @@ struct State {
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
     next_act: Vec<f64>,
-    /// Acceleration under the file's own settings, and the solver's iterations then.
+    /// Acceleration under the file's own settings, and the solver's number of iterations.
     own: Vec<f64>,
     iterations: usize,
 }
@@ -85,7 +86,7 @@ enum Outcome {
     Refused(Refusal),
 }
 
-/// A model under its own settings, and to be solved to the end if they let the solver converge.
+/// A model under its own settings. It is solved to the end if they let the solver converge.
 struct Loaded {
     own: Sim<f64>,
     to_the_end: Option<Sim<f64>>,
@@ -108,7 +109,7 @@ struct Agreement {
     errors: BTreeMap<String, f64>,
     /// States with another number of contacts.
     contacts: usize,
-    /// Largest difference under the file's own settings in units of what its tolerance allows.
+    /// Largest difference under the file's own settings, relative to the difference that its tolerance allows.
     in_tolerances: f64,
 }
 
@@ -172,13 +173,13 @@ fn mjcf_refusal(path: &Path, e: &MjcfError) -> Refusal {
     Refusal { why, vague, faulty: !matches!(e.kind, MjcfErrorKind::Unsupported { .. }) }
 }
 
-/// Whether a file's settings let MuJoCo's solver converge. It never takes more than 25 iterations on these models.
+/// Whether a file's settings let MuJoCo's solver converge. On these models, it needs at most 25 iterations.
 fn converges(model: &Model) -> bool {
     model.opt.iterations >= 50
 }
 
-/// Compares the acceleration under the file's own settings with MuJoCo's, in units of what the tolerance allows. Both are
-/// within it of the least cost. The cost rises with the square of the distance, measured by the mass matrix.
+/// Compares the acceleration under the file's own settings with MuJoCo's, relative to the tolerance. Both are within
+/// the tolerance of the minimum cost. The cost rises with the square of the distance, measured by the mass matrix.
 fn in_tolerances(sim: &Sim<f64>, states: &[State]) -> f64 {
     let (model, mut work) = (sim.model(), Work::new(sim));
     let errors = states.iter().map(|state| {
@@ -415,7 +416,7 @@ fn seed(id: &str) -> u32 {
     id.bytes().fold(0x811c_9dc5, |h, b| (h ^ u32::from(b)).wrapping_mul(0x0100_0193))
 }
 
-/// How a model agrees: under which cap, and whether MuJoCo's own solver is one that stops short of the minimum.
+/// How a model agrees: under which cap, and whether MuJoCo's solver stops before the minimum.
 fn agrees(model: &Model) -> String {
     let name = match model.opt.solver {
         Solver::Newton => "",
@@ -437,7 +438,7 @@ fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
         wrong.push(format!("contacts differ in {} states", a.contacts));
     }
     wrong.extend(a.errors.iter().filter(|(_, e)| **e > BOUND).map(|(what, e)| format!("{what} {e:.0e}")));
-    // the other solvers converge slowly: their caps end them within a few tolerances
+    // the other solvers converge slowly: their caps stop them within a few tolerances
     let allowed = if model.opt.solver == Solver::Newton { 1.0 } else { 10.0 };
     if !(a.in_tolerances <= allowed) {
         wrong.push(format!("under its own settings {:.0e} tolerances", a.in_tolerances));

@@ -1,10 +1,10 @@
-//! Contract: a model whose `iterations` end MuJoCo's solver before it has converged moves as in MuJoCo, under its own
-//! settings.
+//! Contract: if a model's `iterations` stop MuJoCo's solver before it converges, the model moves as in MuJoCo.
 //!
-//! Fast versions of legged robots allow the solver one to five iterations with a line search of four to eight evaluations.
-//! MuJoCo's answer is then not the minimum, and the robot was tuned with that answer. In double precision the acceleration,
-//! the constraint forces and the next state equal MuJoCo's along trajectories from random states. That holds for every cap,
-//! both friction cones and both impedance ratios that such files use. On every lane width, robots stand as they do in MuJoCo.
+//! Fast versions of legged robots allow the solver one to five iterations, with four to eight evaluations per line
+//! search. MuJoCo's answer is then not the minimum, and the robot was tuned with that answer. In double precision, the
+//! acceleration, the constraint forces and the next state equal MuJoCo's along trajectories from random states. That
+//! holds for every cap, both friction cones and both impedance ratios that such files use. Robots stand as in MuJoCo,
+//! for every lane width.
 
 mod common;
 
@@ -19,15 +19,15 @@ use std::collections::BTreeMap;
 const CAPS: [(usize, usize); 7] = [(1, 4), (1, 5), (2, 4), (3, 5), (4, 8), (5, 8), (8, 10)];
 const CONES: [&str; 2] = ["pyramidal", "elliptic"];
 const IMPEDANCES: [usize; 2] = [1, 100];
-/// Trajectories from random states, and steps of each.
+/// Number of trajectories from random states, and steps of each.
 const TRAJECTORIES: usize = 3;
 const STEPS: usize = 25;
 /// Largest relative error in double precision.
 const BOUND: f64 = 1e-8;
-/// Steps of 4 ms in which a robot stands.
+/// Number of steps of 4 ms in which a robot stands.
 const STAND: usize = 375;
 
-/// A state and what MuJoCo makes of it.
+/// A state, and MuJoCo's results for it.
 #[derive(Deserialize)]
 struct State {
     qpos: Vec<f64>,
@@ -40,7 +40,7 @@ struct State {
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
     iterations: usize,
-    /// MuJoCo's answer does not depend on rounding.
+    /// Whether MuJoCo's answer is independent of rounding.
     settled: bool,
 }
 
@@ -69,7 +69,7 @@ fn combinations() -> Vec<String> {
     out
 }
 
-/// The group with a state in its first lane.
+/// A group with a state in its first lane.
 fn at<T: Real>(sim: &Sim<T>, state: &State) -> Group<T> {
     let mut group = Group::new(sim);
     group.reset_lane(sim, 0, &state.qpos, &state.qvel);
@@ -113,7 +113,8 @@ fn compare(models: &[&str], settings: &[String]) {
     compare_jobs(jobs, &names, 0.1);
 }
 
-/// The same for given jobs, in which MuJoCo's answer may depend on rounding in this share of the states: those are left out.
+/// Like the test above, for given jobs. In this share of the states, MuJoCo's answer may depend on rounding; these
+/// states are left out.
 fn compare_jobs(jobs: Vec<Value>, names: &[String], most_unsettled: f64) {
     let answers = common::oracle("low_caps.py", &Value::Array(jobs.clone()));
     let (mut wrong, mut worst, mut single_worst) = (Vec::new(), 0.0_f64, Vec::new());
@@ -202,13 +203,13 @@ fn conjugate_gradients_agree() {
 fn switched_off_islands_and_warm_starts_agree() {
     let mut settings = Vec::new();
     for flag in ["island", "warmstart"] {
-        // the rest of the element is the element's own end
+        // the rest of the element is its own end tag
         settings.push(format!("iterations='2' ls_iterations='6'><flag {flag}='disable'/></option><option"));
     }
     compare(&["company"], &settings);
 }
 
-/// Along the whole of MuJoCo's stand, whether or not rounding decides how it ends.
+/// Compares the whole of MuJoCo's stand, even where rounding decides the end.
 #[test]
 fn every_step_of_a_stand_agrees() {
     let (mut jobs, mut names) = (Vec::new(), Vec::new());
@@ -222,7 +223,7 @@ fn every_step_of_a_stand_agrees() {
     compare_jobs(jobs, &names, 0.3);
 }
 
-/// Height, trunk and joints at the end of a stand, of every lane width.
+/// Height, trunk and joints at the end of a stand, for every lane width.
 #[test]
 fn robots_stand_as_in_mujoco() {
     let mut jobs = Vec::new();
@@ -246,7 +247,7 @@ fn robots_stand_as_in_mujoco() {
             let got = stand(&model, isa);
             let error = apart(&got, &want);
             line += &format!("; {} {}", isa.name(), shown(&error));
-            // nothing can be promised where MuJoCo's own answer hangs on the sixth digit of a mass
+            // no agreement is possible if MuJoCo's own answer depends on the sixth digit of a mass
             let definite = spread[0] < 1e-4 && spread[2] < 1e-3;
             held += usize::from(definite);
             if definite && !(error[0] < 1e-3 && error[1] < 0.01 && error[2] < 0.01) {
@@ -259,7 +260,7 @@ fn robots_stand_as_in_mujoco() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Where an agent stands in the end; all lanes are the same.
+/// Final pose of an agent. All lanes are the same.
 fn stand(model: &Model, isa: Isa) -> Vec<f64> {
     let options = BatchOptions { agents: isa.lanes(), threads: 1, isa, ..Default::default() };
     let mut batch = Batch::new(model, &options).expect("it is supported");

@@ -195,7 +195,7 @@ struct Report {
     states: usize,
     skipped: usize,
     contacts: usize,
-    /// Models whose cap ends the solver early.
+    /// Models whose cap stops the solver early.
     capped: usize,
     /// States in which rounding decides what constraints do in MuJoCo.
     weightless: usize,
@@ -231,7 +231,7 @@ impl Report {
             self.fail(seed, format!("compiled: {}", compiled[..compiled.len().min(3)].join("; ")));
         }
         let mut exact = model.clone();
-        // a low cap is followed to the letter; other models are solved to the end on both sides
+        // a low cap is followed exactly; other models are solved to the end on both sides
         self.capped += usize::from(model.opt.iterations < 50);
         if model.opt.iterations >= 50 {
             exact.opt.tolerance = 1e-14;

@@ -1,7 +1,7 @@
 //! Models that run into a special case move as MuJoCo moves them.
 //!
-//! Each is stepped from its reference configuration under its own settings, in double precision on both sides, and compared
-//! every ten steps.
+//! Each model is stepped from its reference configuration under its own settings, in double precision on both sides.
+//! The states are compared every ten steps.
 
 mod common;
 
@@ -10,7 +10,7 @@ use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model};
 use serde_json::{Value, json};
 
-/// A model, the velocities that it starts with (zeros if there are none), and the number of steps.
+/// A model, its initial velocities (zeros if there are none), and the number of steps.
 const CASES: &[(&str, &[f64], usize)] = &[
     // the centers of two shapes coincide at the pivot: the normal is perpendicular to both z axes
     (
@@ -40,7 +40,7 @@ const CASES: &[(&str, &[f64], usize)] = &[
         &[],
         100,
     ),
-    // a slider at its limit, on a static body that is no child of the world
+    // a slider at its limit, on a static body that is not a child of the world
     (
         r#"<mujoco model="a slider three bodies deep"><worldbody><body><body><body>
         <joint type="slide" axis="0 0 1" armature="0.01" limited="true" range="-0.1 0.1"/>
@@ -68,7 +68,7 @@ const CASES: &[(&str, &[f64], usize)] = &[
         &[2.0],
         200,
     ),
-    // nothing uses the muscle, and the motor keeps the range of its class
+    // no element uses the muscle, and the motor keeps its class's range
     (
         r#"<mujoco model="an unused muscle"><default><muscle ctrlrange="0 1" force="5" gear="3"/></default><worldbody><body>
         <joint name="hinge" axis="0 1 0" armature="0.01"/><geom size="0.1" pos="0.3 0 0"/>

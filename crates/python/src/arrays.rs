@@ -231,7 +231,7 @@ where
     }
 }
 
-/// Elevations of a height field's grid: as rows, or one row after another.
+/// Elevations of a height field's grid, as a 2D array or one row after another.
 pub fn elevations(value: &Bound<'_, PyAny>, [rows, columns]: [usize; 2]) -> PyResult<Vec<f32>> {
     let shape: Vec<usize> = value.py().import("numpy")?.call_method1("shape", (value,))?.extract()?;
     let fits = shape == [rows, columns] || shape == [rows * columns];

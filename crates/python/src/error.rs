@@ -8,8 +8,7 @@ use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyRuntimeE
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// `TypeError` for an argument that there is not, `MemoryError` for too many agents, `ValueError` for all else: it comes from an
-/// argument's value.
+/// `TypeError` for an unknown argument, `MemoryError` for too many agents, `ValueError` for an invalid value.
 pub fn env(error: EnvError) -> PyErr {
     match &error {
         // Python's own words: there are libraries that look for them
@@ -21,8 +20,8 @@ pub fn env(error: EnvError) -> PyErr {
     }
 }
 
-/// `OSError` for files that cannot be read or written, `MemoryError` for a run that does not fit, `ValueError` for all else of
-/// the trainer.
+/// `OSError` for files that cannot be read or written, `MemoryError` for a run that does not fit, `ValueError` for all
+/// other errors of the trainer.
 pub fn learn(error: Error) -> PyErr {
     let text = error.to_string();
     match &error {

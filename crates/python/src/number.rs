@@ -49,12 +49,12 @@ macro_rules! arguments {
 
 arguments!(agent, body, field, seed, max_episode_steps, steps, substeps);
 
-/// A number of things of which each takes memory or time.
+/// A number of things, each of which takes memory or time.
 pub trait Count: Sized {
     fn check(self, name: &str) -> PyResult<Self>;
 }
 
-/// Largest number of things; what fits into memory is checked where they are made.
+/// Upper limit. The constructors check the memory.
 const MOST: usize = u32::MAX as usize;
 
 impl Count for usize {
@@ -69,7 +69,7 @@ impl<N: Count> Count for Option<N> {
     }
 }
 
-/// The same for numbers of things.
+/// Converters for numbers of things, with their limit.
 macro_rules! counts {
     ($($name:ident),*) => {
         $(pub fn $name<N: Whole + Count>(value: &Bound<'_, PyAny>) -> PyResult<N> {

@@ -19,7 +19,7 @@ const MOST_THREADS: usize = 1024;
 /// Agents per thread that are worth a thread.
 const AGENTS_PER_THREAD: usize = 64;
 
-/// Bytes of an agent's allocations.
+/// Size of an agent's allocations, bytes.
 const OVERHEAD: usize = 500;
 
 /// What is read together, because it all comes from the frames of the bodies.
@@ -170,8 +170,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)` or
-    /// row after row, the first of which has the smallest y. It lasts over resets, until changed, and belongs to snapshots.
+    /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`. They are `(nrow,
+    /// ncol)`, or row after row; the first row has the smallest y. The ground lasts over resets, until changed, and
+    /// belongs to snapshots.
     fn set_ground(
         &mut self,
         #[pyo3(from_py_with = number::agent)] agent: usize,
@@ -323,7 +324,7 @@ impl Simulation {
     }
 }
 
-/// Memory that an agent takes with all its readings, bytes, at the most.
+/// Upper bound on the memory of an agent with all its readings, bytes.
 fn agent_bytes(model: &marathon_physics::Model) -> f64 {
     let state = model.nq + 3 * model.nv + 2 * model.nu + model.na + 6 * model.bodies.len();
     let frames = 18 * model.bodies.len() + 6 * model.geoms.len();

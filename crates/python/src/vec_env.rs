@@ -387,8 +387,8 @@ impl VecEnv {
         self.env().push(agent, body, force, torque).map_err(error::env)
     }
 
-    /// An agent's ground: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)`, the first row of
-    /// which has the smallest y; a new array.
+    /// An agent's ground: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)`, a new
+    /// array. The first row has the smallest y.
     #[pyo3(signature = (agent, field = 0))]
     fn ground<'py>(
         &mut self,
@@ -400,9 +400,9 @@ impl VecEnv {
         PyArray1::from_vec(py, ground).reshape(self.grid(py, field)?)
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)` or
-    /// row after row, the first of which has the smallest y. It lasts over resets, until changed, but not in tasks that draw the
-    /// ground of every episode, such as `TerrainWalker2d-v0`: there it lasts until the episode ends.
+    /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`. They are `(nrow,
+    /// ncol)`, or row after row; the first row has the smallest y. The ground lasts over resets, until changed. In
+    /// tasks that draw the ground of every episode, such as `TerrainWalker2d-v0`, it lasts until the episode ends.
     fn set_ground(
         &mut self,
         py: Python<'_>,

@@ -41,7 +41,7 @@ impl Pending {
         &self.temporary
     }
 
-    /// Gives the finished file its final name, replacing an older one. Writes that the system has put off must succeed first.
+    /// Gives the finished file its final name and replaces an older file. Pending writes must succeed first.
     pub fn commit(&mut self) -> Result<(), RenderError> {
         let synced = OpenOptions::new().write(true).open(&self.temporary).and_then(|file| file.sync_all());
         synced.map_err(RenderError::io(&self.path, "cannot write"))?;

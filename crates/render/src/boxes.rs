@@ -1,14 +1,14 @@
-//! Whether an MP4 file is whole. Encoders may report success after the disk has filled up.
+//! Checks that an MP4 file is complete. Encoders may report success after the disk has filled up.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Boxes that lead from the file to the table of the frames.
+/// Path of boxes from the file to the table of the frames.
 const TABLE: [&[u8; 4]; 6] = [b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stsz"];
 
-/// Checks that a file's boxes fill it exactly, that the film's data is among them, and that it has `frames` frames.
+/// Checks that the boxes of a file fill it exactly, that it contains the film's data, and that it has `frames` frames.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidData`] with what is missing, or the error of the file.
+/// [`io::ErrorKind::InvalidData`] with the missing part, or the file's I/O error.
 pub(crate) fn check(file: &mut (impl Read + Seek), frames: usize) -> io::Result<()> {
     let length = file.seek(SeekFrom::End(0))?;
     let top = boxes(file, 0..length)?;
@@ -45,7 +45,7 @@ fn boxes(file: &mut (impl Read + Seek), range: std::ops::Range<u64>) -> io::Resu
         file.read_exact(&mut head[..8]).map_err(|_| cut())?;
         let [a, b, c, d, kind @ ..] = *head.first_chunk::<8>().unwrap_or(&[0; 8]);
         let (size, begins) = match u32::from_be_bytes([a, b, c, d]) {
-            // a longer size follows
+            // a 64-bit size follows
             1 => {
                 file.read_exact(&mut head[8..]).map_err(|_| cut())?;
                 (u64::from_be_bytes(*head.last_chunk().unwrap_or(&[0; 8])), 16)
@@ -81,7 +81,7 @@ mod tests {
         for kind in TABLE.iter().rev().skip(1) {
             table = [one(b"free", b"x"), one(kind, &table)].concat();
         }
-        // a box with a long size, as those of films above 4 GB
+        // a box with a 64-bit size, as in films above 4 GB
         let long = [&1u32.to_be_bytes()[..], b"mdat", &20u64.to_be_bytes(), b"data"].concat();
         [one(b"ftyp", b"isom"), table, long].concat()
     }

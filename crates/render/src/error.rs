@@ -77,12 +77,12 @@ pub enum RenderError {
         /// Highest rate.
         max: f64,
     },
-    /// A film that needs more memory or time than the budget allows.
+    /// A film that exceeds the memory or time budget.
     #[error("{}: {what} {source}", path.display())]
     Budget {
-        /// File to be written.
+        /// The output file.
         path: PathBuf,
-        /// What needs it.
+        /// The part that exceeds the limit.
         what: &'static str,
         /// The limit.
         source: OverBudget,

@@ -214,10 +214,10 @@ pub fn strip(frames: &[Image], columns: usize) -> Result<Image, RenderError> {
     Ok(out)
 }
 
-/// Width and height of a [`strip`] of so many frames, pixels.
+/// Width and height of a [`strip`] with this number of frames, pixels.
 ///
 /// # Errors
-/// [`RenderError::Size`] when it would be too large.
+/// [`RenderError::Size`] if it would be too large.
 pub fn strip_size([width, height]: [usize; 2], frames: usize, columns: usize) -> Result<[usize; 2], RenderError> {
     check_size(width, height)?;
     let (columns, gap) = (columns.clamp(1, frames.max(1)), gap(height));

@@ -86,7 +86,7 @@ impl Mp4Writer {
         }
     }
 
-    /// Waits for the encoder, checks that the film is whole and gives the file its name.
+    /// Waits for the encoder, checks that the film is complete and gives the file its final name.
     ///
     /// # Errors
     /// [`RenderError::NoFrames`], [`RenderError::Ffmpeg`], [`RenderError::Io`].
@@ -98,7 +98,7 @@ impl Mp4Writer {
         let whole = File::open(self.pending.temporary()).and_then(|mut file| boxes::check(&mut file, self.count));
         match whole {
             Ok(()) => self.pending.commit(),
-            // on a full disk ffmpeg may end with success, and only its words tell
+            // on a full disk, ffmpeg may exit with success and report the error only on stderr
             Err(problem) => Err(self.failed(format!("the film is not whole: {problem}"), words)),
         }
     }
@@ -111,7 +111,7 @@ impl Mp4Writer {
 
         let [width, height] = self.size;
         let mut child = Command::new(&self.program)
-            // the first error ends it: it would go on after a failed write
+            // stop at the first error; by default ffmpeg continues after a failed write
             .args(["-hide_banner", "-loglevel", "error", "-xerror", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"])
             .arg(format!("{width}x{height}"))
             .args(["-r", &self.fps.to_string(), "-i", "-", "-c:v"])
@@ -130,7 +130,7 @@ impl Mp4Writer {
         Ok(Running { child, words: std::thread::spawn(move || last_words(stderr)) })
     }
 
-    /// Closes the pipe and waits for the process to end well. Returns what it wrote to stderr.
+    /// Closes the pipe and waits for a successful exit. Returns the process's stderr.
     fn wait(&mut self) -> Result<String, RenderError> {
         let Some(mut running) = self.running.take() else {
             return Err(self.failed("it had already ended".into(), String::new()));

@@ -1,5 +1,5 @@
-//! A film that could not be written whole is an error, and the film of that name from before stays. The cause may be an
-//! encoder that reports success, or a full disk.
+//! A film that cannot be written completely is an error, and the older film of that name stays. Causes are a full disk,
+//! or an encoder that reports success but writes no valid film.
 
 mod common;
 
@@ -9,7 +9,7 @@ use std::process::Command;
 use common::Folder;
 use marathon_render::{Image, Mp4Writer, Recorder, RenderError};
 
-/// A frame that no encoder makes small.
+/// A frame that encoders cannot compress well.
 fn noise(seed: usize) -> Image {
     let mut state = 0x9e37_79b9_u32 ^ seed as u32;
     let rgb = (0..3 * 160 * 120).map(|_| {
@@ -27,7 +27,7 @@ fn record(path: &Path, frames: usize) -> Result<(), RenderError> {
     recorder.finish()
 }
 
-/// Stands in for ffmpeg: it reads all frames, runs `body` with the output file as `$last`, and reports success.
+/// A replacement for ffmpeg. It reads all frames, runs `body` with the output file as `$last`, and reports success.
 #[cfg(unix)]
 fn stand_in(folder: &Folder, body: &str) -> String {
     use std::os::unix::fs::PermissionsExt;
@@ -36,7 +36,7 @@ fn stand_in(folder: &Folder, body: &str) -> String {
     let text = format!("#!/bin/sh\n{listing}\nfor last; do :; done\ncat > /dev/null\n{body}\nexit 0\n");
     std::fs::write(&path, text).unwrap();
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
-    // the file may still count as open for writing in a process that another test forks just now
+    // another test's fork may briefly keep the file open for writing
     std::thread::sleep(std::time::Duration::from_millis(50));
     path.display().to_string()
 }
@@ -61,11 +61,11 @@ fn an_encoder_that_reports_success_is_not_believed() {
     }
 }
 
-/// A file system of its own in memory.
+/// A separate file system in memory.
 struct Disk(PathBuf);
 
 impl Disk {
-    /// One of so many kilobytes, or why there is none.
+    /// A disk of this size, or the reason why it cannot be mounted.
     fn new(folder: &Folder, kilobytes: usize) -> Result<Disk, String> {
         let path = folder.path("disk");
         std::fs::create_dir(&path).unwrap();
@@ -85,11 +85,11 @@ impl Drop for Disk {
     }
 }
 
-/// Needs the right to mount a file system, which CI has.
+/// The test needs permission to mount a file system, which CI has.
 #[test]
 fn a_full_disk_is_an_error_and_keeps_the_older_file() {
     let folder = Folder::new("full-disk");
-    // films smaller than the encoder's buffers fail at their end only
+    // films smaller than the encoder's buffers fail only at the end
     let disk = match Disk::new(&folder, 64) {
         Ok(disk) => disk,
         Err(reason) => return println!("skipped: no file system can be mounted here: {reason}"),
@@ -101,7 +101,7 @@ fn a_full_disk_is_an_error_and_keeps_the_older_file() {
             continue;
         }
         let path = disk.0.join(name);
-        // all but 8 kB are taken
+        // only 8 kB are free
         std::fs::write(&path, "older film").unwrap();
         std::fs::write(disk.0.join("others"), vec![1; 52 * 1024]).unwrap();
         let error = record(&path, frames).unwrap_err().to_string();
@@ -110,7 +110,7 @@ fn a_full_disk_is_an_error_and_keeps_the_older_file() {
         let names: Vec<_> = std::fs::read_dir(&disk.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names.len(), 2, "{name}, {frames} frames: {names:?}");
 
-        // with room, the same film is written
+        // with free space, the same film is written
         std::fs::remove_file(disk.0.join("others")).unwrap();
         std::fs::remove_file(&path).unwrap();
         record(&folder.path(name), frames).unwrap();

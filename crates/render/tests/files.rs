@@ -158,7 +158,7 @@ fn stand_in(folder: &Folder, body: &str) -> String {
 #[test]
 fn mp4_feeds_the_encoder_every_byte() {
     let folder = Folder::new("mp4");
-    // boxes of a film around the frames, with a table that counts them
+    // put the frames into the boxes of a film, with a table that counts them
     let count = 3_u8;
     let frames = film(count.into());
     let mut table = vec![0, 0, 0, 20, b's', b't', b's', b'z', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, count];

@@ -11,7 +11,7 @@ use marathon_physics::hint::did_you_mean;
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
 
-/// Distance, m, and angle, rad, from a recording beyond which nobody wants to train on what was made of it.
+/// Distance, m, and angle, rad, from a recording above which a clip is unsuitable for training.
 const LOST: f64 = 0.15;
 const ASTRAY: f64 = 0.6;
 
@@ -120,7 +120,7 @@ fn of_recording(path: &Path, bytes: &[u8], model: &Model) -> Result<Clip, Motion
     let clip = retarget(path, &animation, model, &mapping)?;
     let fit = fit(path, &animation, model, &mapping, &clip)?;
     if fit.position > LOST || fit.bones > ASTRAY {
-        // nobody would see a warning before the training is over
+        // the user would see a warning only after training
         let problem = fit.warnings().join("; ");
         return Err(MotionError::Model { path: path.into(), model: model.name.clone(), problem });
     }
@@ -135,10 +135,10 @@ fn of_recording(path: &Path, bytes: &[u8], model: &Model) -> Result<Clip, Motion
     clip.with_about(about).rounded(path)
 }
 
-/// The bytes of a file that a recording names, which has to be in the recording's folder or below.
+/// Reads a file that a recording names, in the recording's folder or below.
 ///
 /// # Errors
-/// If it is elsewhere, or cannot be read.
+/// If the file is elsewhere, or cannot be read.
 pub fn beside(recording: &Path, name: &str) -> Result<Vec<u8>, String> {
     let elsewhere = || "it is not in the folder of the recording".to_string();
     let name = Path::new(name);
@@ -148,7 +148,7 @@ pub fn beside(recording: &Path, name: &str) -> Result<Vec<u8>, String> {
     let text = |error: std::io::Error| error.to_string();
     let folder = recording.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (folder, file) = (folder.canonicalize().map_err(text)?, folder.join(name).canonicalize().map_err(text)?);
-    // a link may lead out
+    // a link may lead out of the folder
     if !file.starts_with(&folder) {
         return Err(elsewhere());
     }

@@ -4,7 +4,7 @@
 //! teacher's agents follow that. Teachers may observe less than the student, never more: the named parts of a teacher's
 //! observation are looked up in the student's.
 //!
-//! [`resumable`] notes on its way all that it needs to go on with the same bits.
+//! [`resumable`] saves its state regularly, so that it can resume with the same bits.
 
 use crate::error::RunError;
 #[cfg(feature = "clap")]
@@ -34,9 +34,9 @@ const KEPT: usize = 16;
 const ROWS: usize = 2048;
 /// How often a row is learned from, on average.
 const PASSES: usize = 4;
-/// Time between two notes of how far it is.
+/// Time between two saves of the state.
 const NOTED: Duration = Duration::from_secs(60);
-/// What environments and the rest take for every byte of the lessons, at the most seen.
+/// Memory of environments and the rest, relative to the lessons. This is the largest ratio measured.
 const REST: f64 = 1.0;
 
 /// How to learn from others.
@@ -92,7 +92,7 @@ pub struct Distilled {
 }
 
 impl DistillOptions {
-    /// Refuses options with which nothing can be learned.
+    /// Refuses options that make learning impossible.
     ///
     /// # Errors
     /// Names the option, its value and what was expected.
@@ -116,7 +116,7 @@ impl DistillOptions {
         Ok(())
     }
 
-    /// Refuses what does not fit into memory.
+    /// Refuses a student or lessons that do not fit into memory.
     fn check_memory(&self, teachers: usize, meta: &PolicyMeta) -> Result<(), RunError> {
         let refused = |name, problem: String| Err(RunError::option(name, problem));
         let student = Distiller::memory(meta);
@@ -151,8 +151,9 @@ struct Class {
 /// Learns from the policies in files; returns the student's. `watch` is told of each round and may end it all.
 ///
 /// # Errors
-/// If there is no teacher, an option makes no sense, a file is no policy, a teacher observes what the student does not, decides
-/// otherwise, or the task cannot be made; or if the learning rate is so large that numbers do not stay finite.
+/// If there is no teacher, an option is invalid, or a file is no policy. If a teacher has observations that the student
+/// lacks, or differs in actions or decision interval. If the task cannot be created, or the learning rate is so large
+/// that numbers become infinite.
 pub fn distill(
     task: Setting,
     teachers: &[PathBuf],
@@ -162,11 +163,12 @@ pub fn distill(
     resumable(task, teachers, options, None, watch)
 }
 
-/// The same with a file, `notes`, that tells how far it is: written every minute and when `watch` ends it. If the file is there,
-/// it goes on from there, with the bits of one that was never interrupted. Whoever has saved the policy removes the file.
+/// Like [`distill`], with a file `notes` for the state. It is saved every minute and when `watch` ends the
+/// distillation. If the file exists, the distillation resumes from it, with the same bits as without an interruption.
+/// The caller removes the file after saving the policy.
 ///
 /// # Errors
-/// The same, and if the file cannot be written, is damaged, or is of another distillation.
+/// Like [`distill`], and if the file cannot be written, is damaged, or belongs to another distillation.
 pub fn resumable(
     task: Setting,
     teachers: &[PathBuf],
@@ -241,7 +243,7 @@ struct School {
     classes: Vec<Class>,
     student: Distiller,
     lessons: Lessons,
-    /// All that the result depends on, by names.
+    /// Everything that the result depends on, by name.
     about: BTreeMap<String, String>,
 }
 
@@ -256,10 +258,10 @@ impl School {
         for (_, teacher) in &teachers {
             lessons_of.push(clips_of(&task, teacher)?);
         }
-        // what the student is for: all that its teachers do
+        // the student's task: all clips of its teachers
         let mut all: Vec<&str> = Vec::new();
         for clip in lessons_of.iter().flatten().flat_map(|clips| clips.split(',')) {
-            // a teacher may be named twice, so that it counts for more
+            // a teacher may be listed twice to give it more weight
             if !all.contains(&clip) {
                 all.push(clip);
             }
@@ -298,7 +300,7 @@ impl School {
     }
 }
 
-/// All that the result of a distillation depends on, by names.
+/// Everything that the result of a distillation depends on, by name.
 fn about(
     task: &Setting,
     teachers: &[(&PathBuf, Policy)],

@@ -33,7 +33,7 @@ const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
 pub const EVENTS: &str = "events.out.tfevents";
 
-/// Files elsewhere with their checksums.
+/// Files outside the run's folder, with their checksums.
 pub type Inputs = BTreeMap<PathBuf, String>;
 
 /// What a run is: everything that a resumed run must agree on.
@@ -52,13 +52,13 @@ pub struct RunFile {
     /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clips: BTreeMap<String, String>,
-    /// Files elsewhere that the run depends on, with their checksums.
+    /// Files outside the run's folder that the run depends on, with their checksums.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub files: Inputs,
     /// Policy that the run starts from, if not from random weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initialize_from: Option<PathBuf>,
-    /// Its checksum. Nothing depends on it any more once there is a checkpoint.
+    /// Checksum of that policy. It no longer matters once there is a checkpoint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initialize_from_checksum: Option<String>,
     /// Steps between progress lines where there is no terminal.
@@ -122,8 +122,8 @@ impl RunFile {
     }
 }
 
-/// The first place where two runs differ, and what is there in each; but for threads and the places of files elsewhere, which
-/// change no result.
+/// The first difference between two runs, with both values. Threads and the paths of outside files do not count,
+/// because they change no result.
 pub fn difference_of_runs(found: &RunFile, expected: &RunFile) -> Option<(String, Value, Value)> {
     let keys = |run: &RunFile| {
         let mut run = run.clone();
@@ -195,7 +195,7 @@ impl RunFolder {
     /// Opens the folder of a run to go on with it.
     ///
     /// # Errors
-    /// If it holds no run or links to other places, or another process is writing to it.
+    /// If it holds no run or contains links, or another process is writing to it.
     pub fn open(path: &Path) -> Result<(Self, RunFile), RunError> {
         let file = path.join(RUN);
         if !file.is_file() {
@@ -218,7 +218,7 @@ impl RunFolder {
         #[cfg(unix)]
         {
             use std::os::unix::fs::OpenOptionsExt;
-            // a link put there a moment ago, or a pipe that nobody reads
+            // a link created a moment ago, or a pipe without a reader
             options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
         }
         let lock = options.open(&name).map_err(RunError::io(&path, "write to folder"))?;
@@ -328,14 +328,14 @@ impl RunFolder {
         Ok(files)
     }
 
-    /// Writes what a new run is: `run.json`, and the clips that do not come with Marathon. Killed on the way, it has left a run
-    /// that goes on, or nothing that stands in the way of the same command.
+    /// Writes the files of a new run: `run.json`, and the clips that do not come with Marathon. If the process is
+    /// killed here, the folder has a run that can resume, or only files that do not block a new run.
     ///
     /// # Errors
     /// If that fails.
     pub fn begin(&self, run: &RunFile, clips: &Clips) -> Result<(), RunError> {
         for (i, (name, text)) in clips.iter().enumerate() {
-            // under temporary names until `run.json` says what they are
+            // temporary names until `run.json` lists the clips
             let path = self.path.join(format!(".clip-{i}.{}.tmp", std::process::id()));
             let _ = fs::remove_file(&path);
             let write = || {
@@ -357,7 +357,7 @@ impl RunFolder {
         Ok(write_description(&self.path.join(RUN), run)?)
     }
 
-    /// Gives the clips of a run that lie under temporary names their own.
+    /// Gives a run's clips their final names, if they still have temporary ones.
     fn place_clips(&self, run: &RunFile) -> Result<(), RunError> {
         let missing = run.clips.iter().filter(|(name, _)| !self.path.join(name).exists());
         for (name, sum) in missing {
@@ -430,7 +430,7 @@ fn refuse(out: &Path) -> Result<(), RunError> {
     Err(RunError::option("out", problem))
 }
 
-/// Whether the program writes an entry of this name into a run's folder, and whether that is a folder.
+/// Whether the program writes an entry of this name into a run's folder, and whether the entry is a folder.
 fn kind_of_entry(name: &OsStr) -> Option<bool> {
     let name = name.to_str()?;
     let files = [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png"];
@@ -442,8 +442,8 @@ fn kind_of_entry(name: &OsStr) -> Option<bool> {
     }
 }
 
-/// Refuses links among the entries of a run's folder that the program writes: somebody else may have made the folder, and what
-/// is written would end up elsewhere.
+/// Refuses links among the entries that the program writes to a run's folder. The folder may come from another person,
+/// and writing would change files outside it.
 fn refuse_links(folder: &Path) -> Result<(), RunError> {
     for entry in fs::read_dir(folder).map_err(RunError::io(folder, "read folder"))? {
         let entry = entry.map_err(RunError::io(folder, "read folder"))?;
@@ -452,7 +452,7 @@ fn refuse_links(folder: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Refuses an entry of a run's folder that is not the file or folder that it should be.
+/// Refuses an entry of a run's folder that is not the expected file or folder.
 fn refuse_link(path: &Path) -> Result<(), RunError> {
     let Some(is_folder) = path.file_name().and_then(kind_of_entry) else { return Ok(()) };
     let kind = match fs::symlink_metadata(path) {
@@ -471,8 +471,8 @@ fn refuse_link(path: &Path) -> Result<(), RunError> {
     Err(RunError::file(path, "kind", found, expected))
 }
 
-/// Whether a folder has nothing to lose: it is not there, or empty, or holds a run that has not made an iteration, or what a
-/// start has left that was killed.
+/// Whether a folder has nothing to lose. It may be missing or empty, hold a run without a finished iteration, or hold
+/// only the files of a killed start.
 fn is_blank(folder: &Path) -> bool {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
@@ -500,7 +500,7 @@ fn is_blank(folder: &Path) -> bool {
     names.iter().all(ours) && run.is_ok() && rows() == 0
 }
 
-/// Whether a file has a temporary name: `.<name>.<number of a process>.tmp`.
+/// Whether a file has a temporary name: `.<name>.<process ID>.tmp`.
 fn is_leftover(name: &OsStr) -> bool {
     let name = name.as_encoded_bytes();
     let inner = name.strip_prefix(b".").and_then(|name| name.strip_suffix(b".tmp"));

@@ -1,6 +1,6 @@
-//! Files outside a run's folder that the run depends on: the model of its task, demonstrations, the policy that it starts from.
-//! `run.json` names them by their whole paths, so that a run goes on from any folder, with their checksums, so that it goes on
-//! with the same bits.
+//! Files outside a run's folder that the run depends on: the task's model, demonstrations, and the initial policy.
+//! `run.json` lists their absolute paths, so that a run resumes from any folder, and their checksums, so that it
+//! resumes with the same bits.
 
 use crate::error::RunError;
 use crate::folder::{Inputs, policy_path};
@@ -13,7 +13,7 @@ use marathon_physics::budget::{self, Limit};
 use std::cell::RefCell;
 use std::path::Path;
 
-/// Names the demonstrations of a configuration by their whole paths.
+/// Makes the paths of a configuration's demonstrations absolute.
 pub fn name_wholly(config: &mut TrainConfig) {
     let roles = config.roles.values_mut().flat_map(|role| &mut role.rewards);
     for reward in config.rewards.iter_mut().chain(roles) {
@@ -24,10 +24,10 @@ pub fn name_wholly(config: &mut TrainConfig) {
     }
 }
 
-/// The files that a task and its configuration name, as they are now.
+/// The files that a task and its configuration name, with their current checksums.
 ///
 /// # Errors
-/// If one cannot be read.
+/// If a file cannot be read.
 pub fn of(setting: &Setting, config: &TrainConfig) -> Result<Inputs, RunError> {
     let mut inputs = Inputs::new();
     if let Some(ModelSource::File(path)) = setting.model() {
@@ -45,7 +45,7 @@ pub fn demonstrations(config: &TrainConfig) -> impl Iterator<Item = &str> {
     rewards.filter_map(|reward| reward.kind.imitation()?.demonstrations.as_deref())
 }
 
-/// A model's file, and all that it names.
+/// A model file and all files that it names.
 fn of_model(path: &Path) -> Result<Inputs, RunError> {
     let bytes = budget::read(path, &budget::MODEL_FILE).map_err(RunError::io(path, "read"))?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -56,15 +56,15 @@ fn of_model(path: &Path) -> Result<Inputs, RunError> {
         inputs.borrow_mut().insert(file, checksum(&bytes));
         Ok(bytes)
     };
-    // what is wrong with it is told when the task is made
+    // creating the task reports errors in the model
     let _ = Model::from_xml_str_with(&String::from_utf8_lossy(&bytes), &path.display().to_string(), &read);
     Ok(inputs.into_inner())
 }
 
-/// The checksum of the policy that a run starts from: a file or the folder of a run.
+/// The checksum of the initial policy, which is a file or the folder of a run.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no policy.
 pub fn of_start(policy: &Path) -> Result<String, RunError> {
     sum(&policy_path(policy)?, &budget::POLICY_FILE)
 }
@@ -72,15 +72,15 @@ pub fn of_start(policy: &Path) -> Result<String, RunError> {
 /// Refuses files that have changed since the run began.
 ///
 /// # Errors
-/// If one has, or cannot be read.
+/// If a file has changed or cannot be read.
 pub fn check(inputs: &Inputs) -> Result<(), RunError> {
     inputs.iter().try_for_each(|(path, expected)| agree(path, &sum(path, &budget::DEMONSTRATION_FILE)?, expected))
 }
 
-/// Refuses a policy to start from that has changed since the run began.
+/// Refuses an initial policy that has changed since the run began.
 ///
 /// # Errors
-/// If it has, or is gone.
+/// If the policy has changed or is gone.
 pub fn check_start(policy: &Path, expected: &str) -> Result<(), RunError> {
     agree(policy, &of_start(policy)?, expected)
 }

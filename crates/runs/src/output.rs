@@ -1,4 +1,4 @@
-//! The file that a command is to write, looked at before its work begins: work that cannot be kept is not worth doing.
+//! Checks the output file of a command before the command starts, so that no work is lost at the end.
 
 use crate::error::RunError;
 use crate::folder::policy_path;
@@ -6,11 +6,12 @@ use crate::text::path_word;
 use marathon_learn::AtomicFile;
 use std::path::Path;
 
-/// Refuses a file that cannot be written: one with another ending, in no folder, in one that takes no files, a folder itself,
-/// or one of the `inputs` (files, or folders of runs, whose policies are kept).
+/// Refuses an output file that cannot be written. Reasons are another ending, a missing or read-only folder, a folder
+/// of that name, or a file that is also one of the `inputs`. Inputs are files, or folders of runs, which stand for
+/// their policies.
 ///
 /// # Errors
-/// Names the option `out`, what it is and what was expected.
+/// Names the option `out`, its value and what was expected.
 pub fn check<P: AsRef<Path>>(out: &Path, endings: &[&str], inputs: &[P]) -> Result<(), RunError> {
     let wrong = |problem: String| Err(RunError::option("out", format!("is {}, {problem}", path_word(out))));
     let ending = out.extension().unwrap_or_default();
@@ -31,7 +32,7 @@ pub fn check<P: AsRef<Path>>(out: &Path, endings: &[&str], inputs: &[P]) -> Resu
     if !folder.is_dir() {
         return wrong(format!("but there is no folder {}; make it, or choose another", path_word(folder)));
     }
-    // a folder may refuse files, and a disk may be full
+    // the folder may be read-only, or the disk full
     AtomicFile::create(out)?;
     Ok(())
 }

@@ -24,15 +24,15 @@ pub fn load(
     load_with(given, agent, options, Policy::load)
 }
 
-/// The same for a file that may lack a checksum.
+/// Like [`load`], for a file that may lack a checksum.
 ///
 /// # Errors
-/// The same.
+/// Like [`load`].
 pub fn load_unsealed(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<Policy, RunError> {
     Ok(load_with(given, agent, options, Policy::load_unsealed)?.0)
 }
 
-/// How a file of Marathon's own is read.
+/// A function that reads a policy file of Marathon.
 type Load = fn(&Path) -> Result<Policy, Error>;
 
 fn load_with(
@@ -166,7 +166,7 @@ pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, 
     Ok(sees)
 }
 
-/// Endings of the files that [`save`] writes.
+/// File endings that [`save`] supports.
 pub const ENDINGS: [&str; 2] = ["safetensors", "onnx"];
 
 /// Writes a policy in the format that the file's name ends with.

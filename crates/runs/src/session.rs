@@ -68,10 +68,10 @@ fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkp
 }
 
 impl Session {
-    /// A new run, or the run in the folder that `resume` names, from its last checkpoint. A new run has the configuration
-    /// `loaded`, or the one of the options' file, or the agent's own fast one, and a folder of its own unless `dry`. A run that
-    /// goes on knows its task and its arguments; only one that a front end has made is to be given again. Returns what the user should know of
-    /// the configuration, too.
+    /// Starts a new run, or resumes the run in the folder that `resume` names from its last checkpoint. A new run uses
+    /// the configuration `loaded`, the one in the options' file, or the agent's own fast one. It has its own folder
+    /// unless `dry`. A resumed run has its task and arguments from `run.json`; pass the task only if a front end
+    /// created it. Also returns notes on the configuration for the user.
     ///
     /// # Errors
     /// If the options or the configuration are not usable, the task or the folder cannot be made, or there is no such run, or

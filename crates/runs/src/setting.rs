@@ -20,10 +20,10 @@ pub(crate) const CLIP: &str = "clip";
 pub(crate) const START: &str = "start";
 pub(crate) const FIRST: &str = "first";
 
-/// The argument that names the file of a model, in place of the one that comes with Marathon.
+/// The argument that names a model file, which replaces the one that comes with Marathon.
 const XML: &str = "xml_file";
 
-/// Most clips that one task has: looking for a name looks at all of them.
+/// Limit on the clips of a task, because finding a name searches all of them.
 const MOST_CLIPS: usize = 1000;
 
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
@@ -119,7 +119,8 @@ impl Setting {
         Ok(self)
     }
 
-    /// Where its model comes from; none if it does not take its arguments, which is told when its environments are made.
+    /// The source of the task's model. `None` if the task does not take its arguments; creating its environments
+    /// reports that error.
     pub fn model(&self) -> Option<ModelSource> {
         Some(registry::global().agent_with(&self.agent, &self.options).ok()?.facts().model)
     }
@@ -175,7 +176,7 @@ impl Setting {
             let problem = format!("has {} clips, expected at most {MOST_CLIPS}", self.clips.len());
             return Err(RunError::option("option", problem).into());
         }
-        // a policy of a stranger may name a device or a pipe, which never end
+        // an untrusted policy may name a device or a pipe, which never end
         if let Some(ModelSource::File(path)) = self.model()
             && std::fs::metadata(&path).is_ok_and(|facts| !facts.is_file())
         {

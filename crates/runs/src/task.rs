@@ -33,7 +33,7 @@ impl<'a> Task<'a> {
         Task { setting: Setting { agent: id, ..Setting::default() }, make: Some(Box::new(make)) }
     }
 
-    /// Whether a front end makes it.
+    /// Whether a front end creates the task.
     pub fn is_made(&self) -> bool {
         self.make.is_some()
     }

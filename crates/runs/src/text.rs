@@ -69,20 +69,20 @@ pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
 }
 
-/// Whether a character may tell a terminal to do something: control characters but for tabs and ends of lines, and marks that
-/// turn the direction of the text around.
+/// Whether a character can control a terminal: control characters except tabs and line ends, and marks that change the
+/// text direction.
 fn commands_terminals(c: char) -> bool {
     let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     turns || (c.is_control() && !matches!(c, '\n' | '\t'))
 }
 
-/// A text as a terminal may have it, whatever file it is from: what would command the terminal is shown in place of that, as
+/// Makes a text from a file safe for a terminal: escapes characters that can control the terminal, for example as
 /// `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c.escape_unicode().to_string())
 }
 
-/// JSON as a terminal may have it: what would command the terminal is escaped, and means the same.
+/// Makes JSON safe for a terminal: escapes characters that can control the terminal, which does not change its meaning.
 pub fn printable_json(json: &str) -> Cow<'_, str> {
     replaced(json, |c| format!("\\u{:04x}", u32::from(c)))
 }
@@ -99,8 +99,7 @@ pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::
     serializer.serialize_str(&path.to_string_lossy())
 }
 
-/// The whole path of a file that a user may have named from the present folder. One that is not UTF-8 stays as it is: no
-/// description could hold it.
+/// Makes a path absolute. A path that is not UTF-8 stays as it is, because `run.json` cannot store it.
 pub fn whole(path: &Path) -> PathBuf {
     std::path::absolute(path).ok().filter(|whole| whole.to_str().is_some()).unwrap_or_else(|| path.into())
 }

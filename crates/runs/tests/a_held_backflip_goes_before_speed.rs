@@ -1,5 +1,5 @@
-//! A player holds the button for a backflip while the stick is still pushed: Marathon Man stops and turns over, with the
-//! policy that is shipped, whatever speed, step aside, turn or jump is commanded beside it.
+//! A player holds the backflip button while still pushing the stick. With the shipped policy, Marathon Man stops and
+//! does the backflip, whatever speed, sidestep, turn or jump is commanded.
 
 use marathon_envs::VecEnvOptions;
 use marathon_learn::Policy;
@@ -8,16 +8,17 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 const AGENTS: usize = 50;
-/// Of the 50, these are enough.
+/// Number of agents, of 50, that must succeed.
 const MOST: usize = 45;
-/// Decisions in 2 s of running up, and in 6 s with the button.
+/// Number of decisions in 2 s of running up, and in 6 s with the button.
 const RUN_UP: usize = 80;
 const HELD: usize = 240;
-/// Number of the skill among what the task reports, and the backflip's.
+/// Index of the skill among the task's metrics, and the backflip's number.
 const SKILL: usize = 2;
 const BACKFLIP: f32 = 2.0;
 
-/// How many of the agents have begun a backflip within 6 s of the button, and how many of these landed on their feet.
+/// The number of agents that began a backflip within 6 s of the button, and the number of those that landed on their
+/// feet.
 fn flips(policy: &Policy, going: [f64; 3], jump: f64) -> [usize; 2] {
     let options = VecEnvOptions { agents: AGENTS, seed: 3, threads: 0, ..Default::default() };
     let setting = Setting::of(policy.meta());
@@ -34,7 +35,7 @@ fn flips(policy: &Policy, going: [f64; 3], jump: f64) -> [usize; 2] {
         for agent in 0..AGENTS {
             let skill = step.info[agent * info + SKILL];
             if begun[agent] && !over[agent] && skill != BACKFLIP {
-                // a fall is followed by getting up
+                // after a fall, the next skill is getting up
                 (over[agent], landed[agent]) = (true, skill < BACKFLIP);
             }
             begun[agent] |= held && skill == BACKFLIP;

@@ -25,7 +25,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Turns an ONNX file into a policy, or a policy into one that is for other options or has a checksum.
+/// Converts an ONNX file to a policy, or rewrites a policy for other options or with a checksum.
 ///
 /// # Errors
 /// If the file is not of a network that a policy of the agent can be, or the policy cannot be written.

@@ -29,8 +29,8 @@ struct Report {
     failures: f64,
 }
 
-/// Learns from teachers and writes the policy. What it needs to go on after an interruption is in a file beside the policy,
-/// which goes when the policy is whole.
+/// Distills the teachers into one policy and writes it. A file beside the policy stores the state that a resumed
+/// distillation needs. It is deleted when the policy is complete.
 ///
 /// # Errors
 /// If a file is no policy, a teacher does not fit the task, or the policy cannot be written; [`CliError::Interrupted`] after
@@ -82,7 +82,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
         let advice = format!("{out} holds the policy as it is, and the same command goes on");
         return Err(CliError::Interrupted(format!("{done} decisions are done; {advice}")));
     }
-    // the policy is whole
+    // the policy is complete
     let _ = std::fs::remove_file(&notes);
     if !json {
         let out = text::path_word(&args.out);
@@ -92,7 +92,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The file that tells how far it is, beside the policy.
+/// The file beside the policy that stores the progress.
 fn notes(out: &Path) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_os_string();
     name.push(".unfinished");

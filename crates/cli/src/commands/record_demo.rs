@@ -25,12 +25,12 @@ struct Report {
     return_mean: f64,
 }
 
-/// Plays whole episodes with the policy's best actions and writes them down as they end.
+/// Plays whole episodes with the policy's best actions and writes each to the file when it ends.
 ///
 /// # Errors
 /// If there is no such policy, or the file has another ending or cannot be written.
 pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
-    // ML-Agents looks for this ending
+    // ML-Agents requires this ending
     output::check(&args.out, &["demo"], &[&args.source.policy])?;
     let (policy, factory) = args.source.load()?;
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy();

@@ -8,7 +8,7 @@ use marathon_physics::budget::MEMORY;
 use marathon_render::Format;
 use marathon_runs::output;
 
-/// Bytes of a pixel while it is drawn.
+/// Memory per pixel while a frame is drawn, bytes.
 const PIXEL: f64 = 4.0;
 /// Most agents side by side.
 const MAX_AGENTS: usize = 64;
@@ -60,7 +60,7 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
             usage("--frames is for .png; a film has --seconds and --fps".into())
         }
         _ => {
-            // pixels of all frames that are held at once, and of the picture that they make
+            // pixels of all frames held at once, and of the picture made of them
             let pixels = width as f64 * height as f64 * if format == Format::Png { 2.0 * frames as f64 } else { 2.0 };
             let asked = MEMORY.check(PIXEL * pixels);
             asked.map_err(|error| CliError::Usage(format!("--width and --height: the picture {error}")))?;

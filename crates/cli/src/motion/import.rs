@@ -41,7 +41,7 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     write(path, animation, &model, &args.edits, notes, json)
 }
 
-/// A clip without a checksum, or with other words about it, as a clip with a checksum.
+/// Rewrites a clip with a checksum, or with new descriptive texts.
 fn again(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     let (path, edits) = (&args.recording, &args.edits);
     let bytes = budget::read(path, &CLIP_FILE).map_err(CliError::io(path, "read"))?;
@@ -90,12 +90,12 @@ pub fn retarget(args: &RetargetArgs, json: bool) -> Result<(), CliError> {
     write(&args.clip, animation, &model::load(&args.model)?, &args.edits, Vec::new(), json)
 }
 
-/// The bytes of a mapping.
+/// Reads a mapping file.
 fn mapping(file: &Path) -> Result<Vec<u8>, CliError> {
     budget::read(file, &CONFIG_FILE).map_err(CliError::io(file, "read"))
 }
 
-/// Whether the clip would replace what it is made from.
+/// Refuses an output that would overwrite the input.
 fn check_out(input: &Path, out: &Path) -> Result<(), CliError> {
     let same = input.canonicalize().ok().zip(out.canonicalize().ok()).is_some_and(|(input, out)| input == out);
     if input == out || same {
@@ -201,7 +201,7 @@ fn write(
     write_atomic(&edits.out, &clip.to_bytes())?;
 
     let mut report = marathon_motion::check(&edits.out, &clip, model, mapping.soles())?;
-    // the fit says it with more words
+    // the warning of the fit has more detail
     report.fit = None;
     let mut warnings = fit.warnings();
     warnings.extend(report.warnings());

@@ -145,7 +145,7 @@ impl Peers {
 }
 
 impl What {
-    /// What all studies have.
+    /// The options of all studies.
     fn options(&self) -> &Options {
         match self {
             What::Table1 { options, .. } | What::Table3 { options, .. } => options,
@@ -156,9 +156,9 @@ impl What {
     }
 }
 
-/// Refuses a folder that cannot be made or takes no files, before hours of work for them.
+/// Refuses a folder that cannot be created or written to, before the study spends hours on it.
 fn check_out(options: &Options) -> Result<(), CliError> {
-    // what is made is made at the end: a study that fails leaves nothing
+    // the study creates its folder at the end: a study that fails leaves nothing
     let mut there = options.out.ancestors().filter(|folder| folder.exists());
     let there = there.next().unwrap_or(Path::new("."));
     if !there.is_dir() {

@@ -58,7 +58,7 @@ pub(crate) struct Motor<C> {
     pub velocity_scale: C,
 }
 
-/// Most physics steps of a decision.
+/// Limit on the physics steps per decision.
 const MOST_FRAME_SKIP: usize = 1000;
 
 /// The indices that [`Senses`](crate::Senses) work with.

@@ -40,15 +40,15 @@ impl CommandRange {
         self.unit.is_empty() && self.low == 0.0 && self.high == 1.0
     }
 
-    /// `x` if it is in the range. The ends of a range may not be numbers of single precision, in which callers have theirs: one
-    /// that is an end in single precision counts as that end.
+    /// Returns `x` if it is in the range. Callers may use single precision, which cannot represent every end of a
+    /// range. A value that equals an end in single precision counts as that end.
     pub fn fit(&self, x: f64) -> Option<f64> {
         let is_end = |end: f64| x.is_finite() && x as f32 == end as f32;
         match x {
             x if (self.low..=self.high).contains(&x) => Some(x),
             x if x < self.low && is_end(self.low) => Some(self.low),
             x if x > self.high && is_end(self.high) => Some(self.high),
-            // not a number is in no range
+            // NaN is in no range
             _ => None,
         }
     }

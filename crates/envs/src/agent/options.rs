@@ -234,7 +234,7 @@ impl OptionValue for Scale {
     }
 }
 
-/// A share of something, or what grows from nothing to all there is.
+/// A fraction from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share(pub f64);
 
@@ -251,7 +251,7 @@ impl OptionValue for Share {
     }
 }
 
-/// A time that somebody waits for, s.
+/// A duration, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seconds(pub f64);
 
@@ -421,9 +421,9 @@ mod tests {
             on: bool = true,
             /// A width.
             width: Scale = Scale(1.0),
-            /// A part.
+            /// A fraction.
             part: Share = Share(0.5),
-            /// A time.
+            /// A duration.
             time: Seconds = Seconds(20.0),
         }
     }

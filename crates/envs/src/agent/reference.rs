@@ -99,7 +99,7 @@ impl Timeline {
     }
 }
 
-/// How many rows a clip has, and of how many cycles if it loops.
+/// The number of rows of a clip, and the number of cycles if it loops.
 fn rows_of(clip: &Clip, dt: f64) -> (usize, usize) {
     let decisions = clip.duration() / dt;
     match clip.cycle() {
@@ -182,7 +182,7 @@ impl<T: Real> Reference<T> {
             clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
         }
         let columns = Columns::new(model, bindings);
-        // each row is in the timeline and in the table, and once more while it is made
+        // each row is in the timeline and in the table, and exists once more during the conversion
         let rows: f64 = clips.iter().map(|clip| rows_of(clip, dt).0 as f64).sum();
         let numbers = model.nq + model.nv + 2 * columns.width;
         let asked = budget::MEMORY.check(size_of::<f64>() as f64 * rows * numbers as f64);

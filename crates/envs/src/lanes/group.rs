@@ -13,7 +13,8 @@ use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
 pub(crate) const LARGEST: f64 = 1e6;
-/// Observations and rewards may be of any size that the arrays hold: an action far out of range has a price to match.
+/// Limit on observations and rewards: the largest number that the arrays hold. An action far out of range has a large
+/// cost.
 const STORABLE: f64 = f32::MAX as f64;
 
 /// State of `T::LANES` agents and the results of their last decision.
@@ -299,7 +300,7 @@ fn store_lanes<T: Real>(values: &[T], lanes: u32, first: usize, rows: &mut [f32]
     }
 }
 
-/// Lanes in which all values are smaller than `limit`, and thus finite.
+/// Lanes in which all values are below `limit`, and therefore finite.
 #[inline(always)]
 fn below<T: Real>(values: &[T], limit: f64) -> T::Mask {
     // a NaN compares false

@@ -33,9 +33,9 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
     fn agent_bytes(&self) -> usize {
         let Task { spec, facts, blueprint, .. } = &*self.task;
         let model = &blueprint.model;
-        // pushes are six numbers for each body; a start that took physics is kept with its memory
+        // pushes: six numbers per body; a start state that took physics steps is stored with its memory
         let own = 2 * model.nu + model.na + 6 * model.bodies.len() + 3 * facts.memory + model.nq + model.nv;
-        // ground of its own: in the lanes' precision, and once more where starts draw it
+        // own ground: once in the lanes' precision, and once more if starts draw it
         let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
         spec.agent_bytes() + NUMBER * own + 2 * size_of::<f32>() * ground
     }

@@ -86,10 +86,10 @@ pub trait Shard: Send {
     fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError>;
 }
 
-/// Checks before agents are made that they fit the budget: memory that cannot be had ends the process.
+/// Checks before any agent is created that all agents fit the memory budget. A failed allocation would end the process.
 ///
 /// # Errors
-/// [`EnvError::Memory`] if they do not.
+/// [`EnvError::Memory`] if the agents do not fit.
 pub fn check_memory(factory: &dyn ShardFactory, agents: usize) -> Result<(), EnvError> {
     let bytes = agents as f64 * factory.agent_bytes() as f64;
     AGENTS_MEMORY.check(bytes).map_err(|source| EnvError::Memory { agents, source })
@@ -106,7 +106,7 @@ pub trait ShardFactory: Send + Sync {
     fn lockstep(&self) -> Option<usize> {
         None
     }
-    /// Memory that one agent takes, bytes, at the most; see [`check_memory`].
+    /// Upper bound on the memory of one agent, bytes. See [`check_memory`].
     fn agent_bytes(&self) -> usize {
         self.spec().agent_bytes()
     }

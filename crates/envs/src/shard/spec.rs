@@ -5,9 +5,9 @@ use std::ops::Range;
 use super::Role;
 use crate::agent::{CommandRange, Options};
 
-/// Bytes of a number in double precision.
+/// Size of a double-precision number, bytes.
 pub(crate) const NUMBER: usize = 8;
-/// Bytes of an agent's allocations, counters and flags.
+/// Size of an agent's allocations, counters and flags, bytes.
 const OVERHEAD: usize = 1200;
 
 /// Constant facts of a task.
@@ -58,10 +58,11 @@ pub struct Spec {
 }
 
 impl Spec {
-    /// Memory that an agent takes for what these facts tell, in the environment and in the arrays that a caller reads, bytes.
+    /// Memory per agent that follows from this description, in the environment and in the arrays that a caller reads,
+    /// bytes.
     pub(crate) fn agent_bytes(&self) -> usize {
         let state = self.nq + 3 * self.nv;
-        // in the environment; in up to three sets of arrays, the observations of each twice and in double precision
+        // first the environment; then up to three sets of arrays, with the observations twice and in double precision
         let told = self.act + self.reward_terms.len() + self.info.len() + 4 * self.command.len();
         let observed = self.obs * 7;
         NUMBER * (state + 4 * told + observed) + OVERHEAD

@@ -15,7 +15,7 @@ use crate::error::EnvError;
 use crate::registry::{self, Registry};
 use crate::shard::{AgentContext, AgentState, BLOCK, Spec, check_memory};
 
-/// Most threads. Each has working memory of its own.
+/// Limit on the number of threads. Each has its own working memory.
 const MOST_THREADS: usize = 1024;
 
 /// What happens to an agent whose episode ended.
@@ -38,7 +38,7 @@ pub struct VecEnvOptions {
     pub agents: usize,
     /// Seed until [`VecEnv::reset`] gives another.
     pub seed: u64,
-    /// Number of threads, at most 1024; 0 means one per processor core. There are never more than blocks.
+    /// Number of threads, at most 1024. 0 means one per processor core. The number of blocks is another upper bound.
     pub threads: usize,
     /// Instruction set; `None` means the widest that the processor has.
     pub isa: Option<Isa>,
@@ -83,8 +83,8 @@ impl VecEnv {
     /// first step.
     ///
     /// # Errors
-    /// If there is no such agent, an option makes no sense, the agents do not fit the budget's memory, or the pool of threads
-    /// cannot be started.
+    /// If there is no such agent, an option is invalid, the agents exceed the memory budget, or the thread pool cannot
+    /// be started.
     pub fn new(agent: &str, options: &VecEnvOptions) -> Result<VecEnv, EnvError> {
         Self::from_registry(&registry::global(), agent, options)
     }

@@ -13,12 +13,12 @@ use bevy::window::WindowCloseRequested;
 use bevy_egui::EguiContexts;
 use bevy_egui::egui::{self, Align2, Button, Window};
 
-/// What waits for an answer.
+/// An action that needs a confirmation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// What a key does.
+    /// The action of a key.
     Deed(Deed),
-    /// The menu's choice comes on stage.
+    /// Start the selection in the menu.
     Start,
 }
 
@@ -26,7 +26,7 @@ pub enum Asked {
 #[derive(Resource, Default)]
 pub struct Question(pub Option<(Asked, String)>);
 
-/// What can be lost.
+/// The results that an action could lose.
 #[derive(SystemParam)]
 pub struct Stakes<'w> {
     lesson: Option<Res<'w, Lesson>>,
@@ -35,13 +35,13 @@ pub struct Stakes<'w> {
 }
 
 impl Stakes<'_> {
-    /// The policy that is being learned and is not saved, in words.
+    /// Describes an unsaved policy that is being trained.
     fn unsaved(&self) -> Option<String> {
         let seconds = self.lesson.as_ref()?.unsaved()?;
         Some(format!("The policy has learned for {seconds:.0} s and is not saved."))
     }
 
-    /// What the end of the game would interrupt, in words; `None` if nothing.
+    /// Describes the results that quitting would interrupt; `None` if there are none.
     pub fn at_the_end(&self) -> Option<String> {
         let recorded = self.recorder.as_ref().map(|recorder| {
             let seconds = recorder.seconds();
@@ -51,12 +51,12 @@ impl Stakes<'_> {
         (!lines.is_empty()).then(|| lines.join("\n"))
     }
 
-    /// What the menu's choice would throw away.
+    /// Describes the results that the menu's selection would discard.
     pub fn at_a_start(&self) -> Option<String> {
         self.unsaved()
     }
 
-    /// What a deed would throw away.
+    /// Describes the results that an action would discard.
     fn of(&self, deed: Deed, menu: bool) -> Option<String> {
         let learns = self.show.as_ref().is_some_and(|show| show.mode == Mode::Learn);
         match deed {
@@ -66,7 +66,7 @@ impl Stakes<'_> {
         }
     }
 
-    /// What is not saved may go.
+    /// Allows unsaved results to be discarded.
     fn discard(&self) {
         if let Some(lesson) = &self.lesson {
             lesson.settle();
@@ -74,14 +74,15 @@ impl Stakes<'_> {
     }
 }
 
-/// What an answer is.
+/// An answer to the question.
 enum Answer {
     Yes,
     Save,
     Back,
 }
 
-/// Lets deeds through that lose nothing, and asks about the others. The same key again says yes, the menu's says no.
+/// Passes on actions that lose nothing, and asks about the others. Pressing the same key again means yes, and the menu
+/// key means no.
 pub fn gate(
     mut pressed: MessageReader<Pressed>,
     mut deeds: MessageWriter<Do>,
@@ -149,7 +150,7 @@ pub fn draw(
     mut menu: ResMut<Menu>,
 ) -> Result {
     let Some((asked, words)) = question.0.clone() else { return Ok(()) };
-    // what was at stake may have been saved meanwhile
+    // the results may have been saved since the question appeared
     let savable = stakes.unsaved().is_some();
     let (title, does) = match asked {
         Asked::Deed(Deed::Quit) => ("Quit?", "Quit"),
@@ -191,7 +192,7 @@ pub fn draw(
     Ok(())
 }
 
-/// The window's own button for closing is the key that ends the game; pressed again, it ends it, and what can be saved is.
+/// The window's close button acts like the quit key. A second click quits and saves everything that can be saved.
 pub fn close(
     mut requests: MessageReader<WindowCloseRequested>,
     mut question: ResMut<Question>,

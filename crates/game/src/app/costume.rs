@@ -24,7 +24,7 @@ const MAGIC: &[u8] = b"glTF";
 pub struct File {
     path: PathBuf,
     bytes: Vec<u8>,
-    /// Text of a mapping file, if the command line names one.
+    /// Text of the mapping file, if the command line sets one.
     mapping: Option<Mapping>,
 }
 
@@ -58,10 +58,10 @@ pub enum Fitting {
 }
 
 impl File {
-    /// Reads a skin, and a mapping that tells which of its bones follows which body.
+    /// Reads a skin, and optionally a mapping from its bones to bodies.
     ///
     /// # Errors
-    /// If there is no such file, it is no .glb, or it needs an extension of glTF that is not supported.
+    /// If the file does not exist, is no .glb file, or needs an unsupported glTF extension.
     pub fn read(path: &Path, mapping: Option<&Path>) -> Result<Self, GameError> {
         let wrong = |path: &Path, problem: String| GameError::System(format!("{}: {problem}", path.display()));
         let read = |file: &Path| -> Result<Mapping, GameError> {
@@ -88,7 +88,7 @@ impl File {
     }
 }
 
-/// What a .glb file needs that is not supported, with the remedy.
+/// Names an unsupported extension that a .glb file needs, with a remedy.
 fn needs(bytes: &[u8]) -> Option<String> {
     // a header of 12 bytes, then the length and the kind of the first chunk, which is JSON
     let length = bytes.get(12..16).and_then(|four| Some(u32::from_le_bytes(four.try_into().ok()?) as usize))?;
@@ -98,7 +98,7 @@ fn needs(bytes: &[u8]) -> Option<String> {
     Some(format!("it needs the extension {name}, which is not supported; {remedy}"))
 }
 
-/// What makes a file usable that needs an extension of glTF; `None` if it is usable as it is.
+/// Returns a remedy for a file that needs this glTF extension; `None` if the game supports the extension.
 fn remedy(extension: &str) -> Option<&'static str> {
     match extension {
         "KHR_lights_punctual"

@@ -50,7 +50,7 @@ pub enum GameError {
     /// What comes through the standard input is not what an environment sends.
     #[error("the standard input: {0}; the Python package writes it, see render_mode=\"human\"")]
     Stream(String),
-    /// Ctrl-C or a signal to end.
+    /// Ctrl-C or SIGTERM ended the game.
     #[error("interrupted{}", .0.as_ref().map(|path| format!(": {} is not written", path.display())).unwrap_or_default())]
     Interrupted(Option<PathBuf>),
     /// The other program is gone, or says what makes no sense.
@@ -82,14 +82,13 @@ pub enum GameError {
     },
 }
 
-/// A text with nothing in it that a terminal would obey: control characters, as names and words from files may have them, are spelled
-/// out. Lines stay lines.
+/// Escapes the control characters of a text, which names from files may contain, and keeps its line breaks.
 pub fn plain(text: &str) -> String {
     let spelled = |c: char| if c.is_control() && c != '\n' { c.escape_debug().collect() } else { String::from(c) };
     text.chars().map(spelled).collect()
 }
 
-/// The same on one line.
+/// Escapes the control characters of a text and its line breaks.
 pub fn plain_line(text: &str) -> String {
     plain(text).replace('\n', "\\n")
 }

@@ -109,7 +109,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
     .init_resource::<Reel>()
     .insert_resource(Filmed)
     .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-    // a second of a film is a second of its run, at any rate of frames
+    // film time equals simulated time at any frame rate
     let longest = app.world().resource::<Time<Virtual>>().max_delta().max(frame);
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(longest);
     while app.plugins_state() == PluginsState::Adding {
@@ -192,7 +192,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
         if drawn < frames {
             pace(&mut app, if drawn == 0 { Duration::ZERO } else { frame });
             drawn += 1;
-            // a film ends with its game
+            // a film ends when its game ends
             if over || app.should_exit().is_some() {
                 frames = drawn;
             }

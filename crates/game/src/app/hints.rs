@@ -1,5 +1,5 @@
-//! The keys on the screen: the most useful ones in a line, or all that do something now. Where keys and buttons steer, they are named
-//! by what they steer.
+//! The key hints on the screen: a line with the most useful keys, or a list of all keys that work now. Keys that steer
+//! are labeled with the command that they set.
 
 use crate::app::args::Mode;
 use crate::app::course::builds;
@@ -11,26 +11,26 @@ use bevy_egui::egui::text::LayoutJob;
 use bevy_egui::egui::{self, Align2, Area, CornerRadius, FontId, Frame, Id, Label, Margin, TextFormat, Vec2};
 use std::ops::Range;
 
-/// Width below which the line has little beside what steers: it must not cover the figure, points.
+/// Window width below which the line shows only the steering keys, so that it does not cover the character, points.
 const NARROW: f32 = 900.0;
 
-/// Distance between two hints, and what stays free beside the line, points.
+/// Distance between two hints, and free space beside the line, points.
 const GAP: f32 = 12.0;
 const BESIDE: f32 = 48.0;
 
-/// What the keys do now.
+/// The current use of the keys.
 pub struct Hints<'a> {
-    /// Which key does what.
+    /// The key of each action.
     pub bindings: &'a Bindings,
-    /// What of the devices steers.
+    /// The devices that steer.
     pub steering: Steering,
-    /// What that does.
+    /// The controls that steer.
     pub controls: Vec<Control>,
-    /// There is a gamepad.
+    /// Whether a gamepad is connected.
     pub pads: bool,
 }
 
-/// Whether a deed does something in a show.
+/// Whether an action has an effect in this mode.
 fn works(deed: Deed, show: &Show, steering: Steering) -> bool {
     let mode = show.mode;
     let simulated = !matches!(mode, Mode::Replay | Mode::Outside);
@@ -47,7 +47,7 @@ fn works(deed: Deed, show: &Show, steering: Steering) -> bool {
     }
 }
 
-/// What a deed is called in a show.
+/// The name of an action in this mode.
 fn name_in(show: &Show, deed: Deed, name: &'static str) -> &'static str {
     match (deed, show.mode) {
         (Deed::NextAgent, Mode::Imitate) => "next clip",
@@ -58,7 +58,7 @@ fn name_in(show: &Show, deed: Deed, name: &'static str) -> &'static str {
     }
 }
 
-/// The deeds that are most useful in a show.
+/// The most useful actions in this mode.
 fn useful(show: &Show) -> &'static [Deed] {
     match show.mode {
         Mode::Watch => {
@@ -84,11 +84,11 @@ fn useful(show: &Show) -> &'static [Deed] {
     }
 }
 
-/// A row of the list of all keys: key, button, what they do.
+/// A row of the list of all keys: key, button, action.
 type Row = (String, String, String);
 
 impl Hints<'_> {
-    /// Draws the line, and the list if it is wanted.
+    /// Draws the line, and the list if `all` is set.
     pub fn draw(&self, ctx: &egui::Context, show: &Show, all: bool, room: Vec2) {
         if all {
             self.list(ctx, show);
@@ -111,7 +111,7 @@ impl Hints<'_> {
         });
     }
 
-    /// Keys of the line in a picture of some width, and what they do: those that steer first.
+    /// The keys in a line of the given width, with their actions. Steering keys come first.
     fn line(&self, show: &Show, width: f32) -> Vec<(String, String)> {
         let steers = |control: &Control| match self.pads {
             true => format!("{} | pad {}", control.keys, control.pad),
@@ -128,14 +128,14 @@ impl Hints<'_> {
             _ => useful.contains(&deed) && works(deed, show, self.steering),
         };
         for (deed, name, key, button) in self.bindings.free_rows(self.steering).filter(|row| shown(row.0)) {
-            // a key that steers leaves its deed to the gamepad, if there is one
+            // a key that steers does no other action: show the gamepad's button if one is connected
             let key = key.map(String::from).or(button.filter(|_| self.pads).map(|button| format!("pad {button}")));
             line.extend(key.map(|key| (key, name_in(show, deed, name).to_string())));
         }
         line
     }
 
-    /// All keys and buttons that do something.
+    /// All keys and buttons that work now.
     fn rows(&self, show: &Show) -> Vec<Row> {
         let steers = self.controls.iter().map(|c| (c.keys.to_string(), c.pad.to_string(), c.does.clone()));
         let free = self.bindings.free_rows(self.steering).filter(|row| works(row.0, show, self.steering));
@@ -150,7 +150,7 @@ impl Hints<'_> {
     fn list(&self, ctx: &egui::Context, show: &Show) {
         Area::new(Id::new("help")).anchor(Align2::LEFT_BOTTOM, [14.0, -58.0]).interactable(false).show(ctx, |ui| {
             card().show(ui, |ui| {
-                // in two halves side by side: a small window is lower than all of them
+                // two columns, because a small window is lower than the whole list
                 let rows = self.rows(show);
                 let half = rows.len().div_ceil(2);
                 egui::Grid::new("all keys").num_columns(6).spacing([18.0, 3.0]).show(ui, |ui| {
@@ -173,7 +173,7 @@ impl Hints<'_> {
     }
 }
 
-/// A key and what it does.
+/// A key and its action.
 fn hint(key: &str, does: &str) -> LayoutJob {
     let mut words = LayoutJob::default();
     for (color, part) in [(ACCENT, format!("{key} ")), (TEXT, does.to_string())] {
@@ -182,7 +182,7 @@ fn hint(key: &str, does: &str) -> LayoutJob {
     words
 }
 
-/// Breaks a line of things with these widths into rows of a width; a thing that is wider has a row of its own.
+/// Breaks items with these widths into rows. An item wider than a row gets its own row.
 fn broken(widths: &[f32], room: f32) -> Vec<Range<usize>> {
     let (mut rows, mut first, mut filled) = (Vec::new(), 0, 0.0);
     for (i, width) in widths.iter().enumerate() {
@@ -204,7 +204,7 @@ mod tests {
     use clap::Parser;
     use marathon_runs::Setting;
 
-    /// The hints of a command line: the line and the list.
+    /// The hints for a command line: the line and the list.
     fn hints(words: &[&str], pads: bool) -> Result<(Vec<(String, String)>, Vec<Row>), Box<dyn std::error::Error>> {
         let show = Show::of(&Args::parse_from([&["marathon-game"], words].concat()))?;
         let ranges = Setting::named(&show.agent)?.factory()?.spec().command.clone();
@@ -222,14 +222,14 @@ mod tests {
         {
             assert!(line.iter().any(|(k, d)| (k.as_str(), d.as_str()) == (key, does)), "{key} {does}: {line:?}");
         }
-        // what the keys did before they steered is not said of them
+        // the hints omit the keys' usual actions while they steer
         for taken in ["Up", "Down"] {
             assert!(rows.iter().all(|(key, ..)| key != taken), "{rows:?}");
         }
         let of =
             |name: &str| rows.iter().find(|(.., does)| does == name).map(|(key, pad, _)| (key.as_str(), pad.as_str()));
         assert_eq!([of("jump"), of("backflip")], [Some(("W", "A")), Some(("V", "B"))]);
-        // the pad's A and B push and throw elsewhere; the arrow keys' deeds are left to the D-pad
+        // the gamepad's A and B usually push and throw; the D-pad takes over the actions of the arrow keys
         assert_eq!([of("push"), of("faster")], [Some(("P", "")), Some(("", "D-pad up"))]);
         let (line, _) = hints(&["MarathonManController"], true)?;
         assert!(line.contains(&("W | pad A".into(), "jump".into())), "{line:?}");

@@ -31,9 +31,9 @@ pub(super) const TEXT: Color32 = Color32::from_rgb(236, 240, 244);
 pub(super) const FAINT: Color32 = Color32::from_rgb(158, 170, 182);
 pub(super) const ACCENT: Color32 = Color32::from_rgb(255, 158, 64);
 pub(super) const BAD: Color32 = Color32::from_rgb(255, 106, 96);
-/// Share by which the measured pace of time may be off before the screen tells so.
+/// Relative error of the measured time factor above which the screen shows it.
 const OFF_PACE: f32 = 0.1;
-/// Commanded speed from which on the speed in its direction is told, m/s.
+/// Commanded speed above which the screen shows the speed in the command's direction, m/s.
 const TOLD: f64 = 0.1;
 /// Colors of the reward's terms.
 const TERMS: [Color32; 8] = [
@@ -51,8 +51,8 @@ const TERMS: [Color32; 8] = [
 const FULL: [f32; 2] = [1000.0, 600.0];
 /// Smallest scale at which they can be read.
 const SMALLEST: f32 = 0.66;
-/// Width below which the line of keys, and width and height below which the reward's bars are left out: they would cover the figure,
-/// points.
+/// Widths below which the key hints and the reward bars are hidden, and height below which the bars are hidden, so that
+/// they do not cover the character, points.
 const ROOM: [f32; 3] = [640.0, 900.0, 320.0];
 /// Height of the reward's bars with what is below them, and of each, points.
 const REWARDS: [f32; 2] = [120.0, 20.0];
@@ -84,23 +84,23 @@ pub struct Monitor {
     pace: Pace,
 }
 
-/// How fast the game's time passes beside the real one.
+/// The measured time factor: game time over real time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pace {
-    /// The factor that was asked for when the measurement began; 0 while paused.
+    /// The time factor set when the measurement began; 0 while paused.
     wanted: f32,
-    /// Real and game seconds since then.
+    /// Real and game seconds since the measurement began.
     seconds: [f64; 2],
-    /// The factor that was measured last, if it was under the same conditions.
+    /// The last measured factor, if it was measured at the same setting.
     measured: Option<f32>,
 }
 
 impl Pace {
-    /// Takes in a frame: the factor that is asked for, and the real and the game seconds that it took.
+    /// Adds a frame: the time factor that is set, and the frame's real and game seconds.
     fn take_in(&mut self, wanted: f32, real: f64, game: f64) {
         if wanted != self.wanted {
             *self = Pace { wanted, ..default() };
-            // the frame in which it changes belongs to neither
+            // a frame that changes the factor counts for neither setting
             return;
         }
         self.seconds[0] += real;
@@ -110,7 +110,7 @@ impl Pace {
         }
     }
 
-    /// What it is, for the screen: what was asked for, unless the frames are too slow for it.
+    /// The factor for the screen: the one that is set, or the measured one if the frames are too slow.
     fn told(&self, wanted: f32) -> String {
         match self.measured.filter(|measured| self.wanted == wanted && (measured / wanted - 1.0).abs() > OFF_PACE) {
             Some(measured) => format!("time x{measured:.2} (slow frames, x{wanted} asked)"),
@@ -140,7 +140,7 @@ pub fn watch(focus: Res<Focus>, mut monitor: ResMut<Monitor>, actors: Query<(Ent
     }
 }
 
-/// Measures how many decisions everybody makes per second, and how fast time passes.
+/// Measures the decisions per second of all characters, and the time factor.
 pub fn clock(
     (time, game): (Res<Time<Real>>, Res<Time<Virtual>>),
     marathon: Res<Marathon>,
@@ -188,8 +188,9 @@ fn spaced(x: f32) -> String {
     format!("{x:+.2}").replace('-', "\u{2212}")
 }
 
-/// The speed that the screen shows: of who turns, in the direction of its command, or else where it faces; of others, along the
-/// track. It is negative where the command is, and for who goes back.
+/// The speed that the screen shows. For characters that turn it is the speed in the command's direction, or without a
+/// command along the heading. For others it is the speed along the track. Motion backward, or along a
+/// backward command, is negative.
 fn shown_speed(spec: &Spec, episode: &Episode) -> f32 {
     if !spec.command.iter().any(CommandRange::is_turn) {
         return episode.speed;
@@ -221,7 +222,7 @@ pub fn draw(
     actors: Query<(&Actor, &Anatomy, &Episode, Option<&AgentCommand>)>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?.clone();
-    // errors in a film are told where it was started
+    // the console shows the errors of a film
     if hud.on || filmed.is_none() {
         say(&ctx, &notes, hud.on);
     }
@@ -483,9 +484,9 @@ mod tests {
             pace.told(wanted)
         };
         assert_eq!(frames(&mut pace, 1.0, 0.2, 0.2), "time x1");
-        // a frame of half a second has a quarter of a second of the game
+        // a real frame of 0.5 s advances the game by 0.25 s
         assert_eq!(frames(&mut pace, 1.0, 0.5, 0.25), "time x0.50 (slow frames, x1 asked)");
-        // what was measured before a change says nothing of what comes after it
+        // a measurement before a change does not apply after it
         assert_eq!(pace.told(2.0), "time x2");
         pace.take_in(2.0, 0.2, 0.4);
         assert_eq!(pace.told(2.0), "time x2");
@@ -503,7 +504,7 @@ mod tests {
             let mut number =
                 |range: &CommandRange| if range.is_speed() { speeds.next().unwrap_or_default() } else { 0.0 };
             let command = spec.command.iter().map(&mut number).collect();
-            // along the track it goes the other way
+            // along the track, the character moves backward
             let episode = Episode { command, own_velocity: own, speed: -7.0, ..default() };
             shown_speed(&spec, &episode)
         };

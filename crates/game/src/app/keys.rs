@@ -211,15 +211,15 @@ impl Default for Bindings {
 #[derive(Resource, Default)]
 pub struct Rebinding(pub Option<Deed>);
 
-/// What keys and buttons ask for. It becomes a [`Do`], with a [`Question`] before it if something would be lost.
+/// An action requested with a key or button. It becomes a [`Do`], after a [`Question`] if something would be lost.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pressed(pub Deed);
 
-/// What is done in this frame.
+/// An action to run in this frame.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Do(pub Deed);
 
-/// Turns keys and buttons into [`Do`] messages, with a question before something is lost.
+/// Turns keys and buttons into [`Do`] messages. If something would be lost, a question comes first.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct KeysPlugin;
 
@@ -241,7 +241,7 @@ impl Bindings {
         self.rows.iter().map(|(deed, name, key, button)| (*deed, *name, key_name(*key), button.map(button_name)))
     }
 
-    /// The same with the names of those keys and buttons alone that do it while others steer.
+    /// Like [`Bindings::rows`], but without the names of keys and buttons that steer.
     pub fn free_rows(
         &self,
         steering: Steering,
@@ -360,8 +360,7 @@ pub(super) fn read(
     }
 }
 
-/// Binds the next key that is pressed, if one is asked for, and keeps the bindings. Esc, or a menu that closes, leaves them as they
-/// are.
+/// Binds the next pressed key if a binding was requested, and saves the bindings. Esc or closing the menu cancels.
 fn rebind(
     keys: Res<ButtonInput<KeyCode>>,
     mut bindings: ResMut<Bindings>,
@@ -379,7 +378,7 @@ fn rebind(
     keep(&bindings);
 }
 
-/// Keeps the bindings for later games.
+/// Saves the bindings for later games.
 pub(super) fn keep(bindings: &Bindings) {
     if let Some(path) = Bindings::path() {
         let kept = path.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|e| e.to_string());

@@ -58,7 +58,7 @@ pub(crate) struct Filmed;
 struct Board {
     progress: Progress,
     newest: Option<Arc<Policy>>,
-    /// The policy that was saved last, or that may go unsaved, and the seconds of learning then.
+    /// The last policy that was saved or may be discarded, and its training time in seconds.
     settled: (Option<Arc<Policy>>, f64),
     stop: bool,
 }
@@ -134,7 +134,7 @@ impl Lesson {
         board(&self.shared).newest.clone()
     }
 
-    /// Seconds of learning whose result is not saved; `None` if there is nothing to save.
+    /// Seconds of training since the last save; `None` if there is nothing to save.
     pub fn unsaved(&self) -> Option<f64> {
         let board = board(&self.shared);
         let (settled, at) = &board.settled;
@@ -144,14 +144,14 @@ impl Lesson {
         (!same).then_some(now - at)
     }
 
-    /// The newest policy is saved, or may go.
+    /// Marks the newest policy as saved or as one that may be discarded.
     pub fn settle(&self) {
         let mut board = board(&self.shared);
         let now = board.progress.curve.last().map_or(0.0, |point| point.seconds);
         board.settled = (board.newest.clone(), now);
     }
 
-    /// Saves the newest policy, and tells so.
+    /// Saves the newest policy and shows a note.
     fn save(&self, why: &str, notes: &mut Notes) {
         let Some(policy) = self.newest() else {
             notes.say(format!("{why}there is nothing to save yet"));
@@ -166,7 +166,7 @@ impl Lesson {
         }
     }
 
-    /// Saves what nobody has saved or given up, before the lesson ends.
+    /// Saves an unsaved policy before the lesson ends, unless the user has discarded it.
     fn leave(&self, notes: &mut Notes) {
         if self.unsaved().is_some() {
             self.save("the policy that was learning is ", notes);
@@ -318,7 +318,7 @@ pub fn obey(
     }
 }
 
-/// Saves what has been learned when the game ends, unless it may go.
+/// Saves the trained policy when the game ends, unless the user has discarded it.
 pub fn keep_at_exit(exit: MessageReader<AppExit>, lesson: Option<Res<Lesson>>, mut notes: ResMut<Notes>) {
     if let Some(lesson) = lesson.filter(|_| !exit.is_empty()) {
         lesson.leave(&mut notes);

@@ -21,7 +21,7 @@ use std::path::PathBuf;
 
 /// Title of the menu's window.
 const TITLE: &str = "Marathon";
-/// Width of the menu, and what stays free of the window beside and above it, points.
+/// Width of the menu, and the free space beside and above it, points.
 const WIDTH: f32 = 560.0;
 const MARGIN: f32 = 70.0;
 
@@ -30,7 +30,7 @@ const MARGIN: f32 = 70.0;
 pub struct Menu {
     /// It is open.
     pub open: bool,
-    /// Its choice comes on stage although something is lost.
+    /// Starts the selection even if something is lost.
     pub(super) agreed: bool,
     choice: Option<Show>,
     /// Policies of runs in the present folder: file, and what it is called.
@@ -107,11 +107,11 @@ pub fn draw(
     Ok(())
 }
 
-/// What has been clicked in the menu.
+/// The menu items that were clicked.
 struct Picked {
     start: bool,
     quit: bool,
-    /// All keys are to be as they come.
+    /// Reset all keys to their defaults.
     reset: bool,
     open: bool,
 }
@@ -248,9 +248,9 @@ fn choose(ui: &mut Ui, choice: &mut Show, runs: &[(PathBuf, String)]) {
     });
 }
 
-/// The keys, to be changed by a click. Returns whether all are to be as they come.
+/// Shows the keys, which a click changes. Returns whether to reset all keys.
 fn keys(ui: &mut Ui, bindings: &Bindings, rebinding: &mut Rebinding) -> bool {
-    // in two halves side by side, so that all of them fit a window
+    // two columns, so that all keys fit a window
     let rows: Vec<_> = bindings.rows().collect();
     let half = rows.len().div_ceil(2);
     egui::Grid::new("bindings").num_columns(6).spacing([14.0, 4.0]).show(ui, |ui| {
@@ -382,13 +382,13 @@ mod tests {
     use crate::app::args::Args;
     use clap::Parser;
 
-    /// Where the menu with all keys is in a window of some points, on each of whose modes.
+    /// The menu's position with all keys, in a window of the given size, for each mode.
     fn places(width: f32, height: f32) -> Result<Vec<(Mode, egui::Rect)>, Box<dyn std::error::Error>> {
         let show = Show::of(&Args::parse_from(["marathon-game"]))?;
         let mut places = Vec::new();
         for mode in [Mode::Watch, Mode::Imitate, Mode::Course, Mode::Testbed] {
             let (ctx, mut choice) = (egui::Context::default(), Show { mode, ..show.clone() });
-            // sizes settle in some frames
+            // sizes settle after a few frames
             for _ in 0..6 {
                 let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
                 ctx.begin_pass(egui::RawInput { screen_rect: Some(screen), ..Default::default() });
@@ -402,7 +402,7 @@ mod tests {
         Ok(places)
     }
 
-    /// Title, tabs and last row are on the screen; a small window scrolls.
+    /// Title, tabs and last row are visible; in a small window the list scrolls.
     #[test]
     fn the_menu_with_its_keys_fits_the_window() -> Result<(), Box<dyn std::error::Error>> {
         for (width, height) in [(1280.0, 720.0), (1000.0, 600.0), (727.0, 409.0)] {

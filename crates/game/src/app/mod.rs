@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     };
     interrupt::listen();
     let mut app = App::new();
-    // a window that is closed may ask first
+    // closing the window may ask first
     let windows = WindowPlugin { primary_window: Some(window), close_when_requested: false, ..default() };
     app.add_plugins(DefaultPlugins.set(windows).disable::<TerminalCtrlCHandlerPlugin>()).add_plugins(game);
     app.add_systems(Update, (ask::close, interrupt::obey));

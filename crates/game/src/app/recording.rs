@@ -41,7 +41,7 @@ pub struct Recording {
     actions: Vec<f32>,
     /// Commands, `[frames][agents][numbers]`.
     commands: Vec<f64>,
-    /// 1 in episodes without a time limit, `[frames][agents]`; files of earlier versions have none.
+    /// 1 in episodes without a time limit, `[frames][agents]`. Empty in files of earlier versions.
     untimed: Vec<f32>,
     /// Grounds, in the order of their frames.
     grounds: Vec<Lie>,
@@ -69,7 +69,7 @@ pub struct Row<'a> {
     pub command: &'a [f64],
     /// Elevations of its height fields.
     pub grounds: &'a Arc<Vec<Vec<f32>>>,
-    /// Whether its episode has no time limit, as when a player steers.
+    /// Whether the episode has no time limit, as when a player steers.
     pub untimed: bool,
 }
 
@@ -139,12 +139,12 @@ impl Recording {
         self.row(&self.commands, frame, agent)
     }
 
-    /// Whether an agent's episode has no time limit in a frame; false in recordings of earlier versions.
+    /// Whether an agent's episode in a frame has no time limit; false in recordings of earlier versions.
     pub fn untimed(&self, frame: usize, agent: usize) -> bool {
         self.row(&self.untimed, frame, agent).first().is_some_and(|untimed| *untimed > 0.5)
     }
 
-    /// Memory that it takes, bytes, but for its grounds.
+    /// Memory of the recording without its grounds, bytes.
     pub fn bytes(&self) -> usize {
         let singles = self.numbers.len() + self.terms.len() + self.actions.len() + self.untimed.len();
         4 * singles + 8 * (self.qpos.len() + self.commands.len())
@@ -234,7 +234,7 @@ impl Recording {
         (lies, elevations)
     }
 
-    /// What is wrong with grounds that the agent's model has no height fields for.
+    /// Describes grounds that the agent's model has no height fields for.
     fn wrong_ground(&self) -> Result<Option<String>, GameError> {
         if self.grounds.is_empty() {
             return Ok(None);
@@ -327,11 +327,11 @@ impl Recording {
     }
 }
 
-/// Most agents of a recording: as many as the command line allows.
+/// Limit on the agents of a recording, the same as on the command line.
 const MOST_AGENTS: usize = 256;
-/// Longest time between two frames, s.
+/// Limit on the time between two frames, s.
 const LONGEST_FRAME: f64 = 10.0;
-/// Largest coordinate, m or rad.
+/// Limit on coordinates, m or rad.
 const FARTHEST: f64 = 1e9;
 /// Numbers of a height field in a file: frame, agent, field, runs of equal elevations.
 const LIE: usize = 4;
@@ -518,7 +518,7 @@ mod tests {
         Ok(())
     }
 
-    /// A file of some kilobytes whose grounds have 16 billion points asks for 64 GB.
+    /// A file of a few kilobytes whose grounds declare 16 billion points would need 64 GB.
     #[test]
     fn a_small_file_that_asks_for_much_is_refused() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
@@ -545,7 +545,7 @@ mod tests {
         let error =
             changed(&[("lies", vec![4000, LIE], double(&lies)), ("elevations", vec![4000, 2], single(&elevations))])?;
         assert!(error.contains("c.replay: asks for 64 GB; the limit 'memory' is 2 GB"), "{error}");
-        // grounds of another size than those of the model
+        // grounds of another size than the model's
         let error = changed(&[
             ("lies", vec![1, LIE], double(&[0.0, 0.0, 0.0, 1.0])),
             ("elevations", vec![1, 2], single(&[0.0, 7.0])),
@@ -555,7 +555,7 @@ mod tests {
         let far = [&1e12_f64.to_le_bytes()[..], &poses.data()[8..]].concat();
         let error = changed(&[("qpos", poses.shape().to_vec(), far)])?;
         assert!(error.contains("tensor 'qpos', number 0 is 1000000000000"), "{error}");
-        // more characters than any command line allows
+        // more characters than the command line allows
         let nothing = |name: &str, columns: usize| {
             let size = read.tensor(name).map_or(0, |tensor| if tensor.dtype() == Dtype::F64 { 8 } else { 4 });
             let shape = if name == "places" { vec![300, columns] } else { vec![1, 300, columns] };

@@ -26,7 +26,7 @@ use std::time::Duration;
 const LEAP: f64 = 0.5;
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
-/// Share of the largest replay that states and actions may take; the rest is for grounds.
+/// Share of the largest replay for states and actions. The rest is for grounds.
 const FILLED: f64 = 0.75;
 
 /// A recording that is being made.
@@ -35,7 +35,7 @@ pub struct Recorder {
     recording: Recording,
     /// Time of the newest frame.
     until: Duration,
-    /// The stage that is recorded, by the version of its show.
+    /// The recorded stage, by the version of its show.
     stage: u64,
 }
 
@@ -45,7 +45,7 @@ impl Recorder {
         self.recording.seconds()
     }
 
-    /// Whether it is as long as a replay may be.
+    /// Whether the replay has reached its maximum length.
     fn is_full(&self) -> bool {
         let most = budget::REPLAY_FILE.most().unwrap_or(0) as f64;
         self.recording.frames() >= LONGEST || self.recording.bytes() as f64 > FILLED * most
@@ -111,7 +111,7 @@ pub fn obey(
     }
 }
 
-/// Ends a recording when other characters come on stage, or when it has become as long as a replay may be.
+/// Ends a recording when the characters change or the replay reaches its maximum length.
 pub fn close(mut commands: Commands, show: Res<Show>, recorder: Option<Res<Recorder>>, mut notes: ResMut<Notes>) {
     let Some(recorder) = recorder else { return };
     let why = match () {
@@ -123,7 +123,7 @@ pub fn close(mut commands: Commands, show: Res<Show>, recorder: Option<Res<Recor
     finish(&recorder, why, &mut notes);
 }
 
-/// Saves the recording that is still being made when the game ends.
+/// Saves an unfinished recording when the game ends.
 pub fn keep_at_exit(world: &mut World) {
     if world.resource::<Messages<AppExit>>().is_empty() {
         return;
@@ -131,14 +131,14 @@ pub fn keep_at_exit(world: &mut World) {
     save_running(world);
 }
 
-/// Ends the recording that is being made, if there is one, and saves it.
+/// Ends the current recording, if there is one, and saves it.
 pub fn save_running(world: &mut World) {
     if let Some(recorder) = world.remove_resource::<Recorder>() {
         world.resource_scope(|_, mut notes: Mut<Notes>| finish(&recorder, "", &mut notes));
     }
 }
 
-/// Saves a recording and tells so.
+/// Saves a recording and shows a note.
 fn finish(recorder: &Recorder, why: &str, notes: &mut Notes) {
     if recorder.recording.frames() == 0 {
         notes.say(format!("{why}nothing was recorded"));

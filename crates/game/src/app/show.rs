@@ -88,7 +88,7 @@ pub struct Script {
     pub ground: Ground,
     /// The policies of the task's roles, by file and checksum.
     pub names: [Option<String>; 2],
-    /// The version of the show that is on stage.
+    /// The version of the current show.
     pub(super) version: u64,
     written: Option<SystemTime>,
     looked: f32,

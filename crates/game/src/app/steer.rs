@@ -52,12 +52,12 @@ pub struct Mappings {
 }
 
 impl Steering {
-    /// Whether a key steers, and does nothing else meanwhile.
+    /// Whether a key steers and has no other action.
     pub fn takes_key(&self, key: KeyCode) -> bool {
         self.on && KEYS.contains(&key) || self.buttons && BUTTON_KEYS.contains(&key)
     }
 
-    /// Whether a button of a gamepad steers, and does nothing else meanwhile.
+    /// Whether a gamepad button steers and has no other action.
     pub fn takes_button(&self, button: GamepadButton) -> bool {
         self.buttons && BUTTONS.contains(&button)
     }
@@ -132,18 +132,18 @@ pub struct Steering {
     pub buttons: bool,
 }
 
-/// What a control that steers does, in words.
+/// Describes a control that steers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Control {
-    /// Keys.
+    /// The keys.
     pub keys: &'static str,
-    /// The same on a gamepad.
+    /// The gamepad's controls.
     pub pad: &'static str,
-    /// The number of the command that it sets.
+    /// The name of the command value that the control sets.
     pub does: String,
 }
 
-/// The controls that steer an agent with such a command, as [`told`] reads them.
+/// The controls for a command with these ranges, in the order that [`told`] reads them.
 pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
     let control = |keys, pad, i: usize| Control { keys, pad, does: ranges[i].name.replace('_', " ") };
     let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
@@ -169,9 +169,9 @@ pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
     }
 }
 
-/// Tells the character in focus what the first gamepad and the keys say, and those behind it what the other gamepads say. Once a
-/// character has been told something, it stays under command until [`Deed::Release`], or until it is nobody's. Nobody who is
-/// steered is taken back to the start when the task's time is up; on a course, runs end by their rules.
+/// Sends the command of the first gamepad and the keys to the character in focus, and those of other gamepads to the
+/// characters behind it. A character keeps its command until [`Deed::Release`], or until no player controls it. While a
+/// character is steered, the task's time limit does not apply. On a course, runs end by the course's rules.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 pub fn steer(
     mut commands: Commands,

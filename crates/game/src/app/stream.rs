@@ -16,9 +16,9 @@ use std::io::{BufRead, Read, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest time between two frames, s.
+/// Limit on the time between two frames, s.
 const LONGEST_FRAME: f64 = 10.0;
-/// Largest coordinate that is shown, m or rad.
+/// Limit on coordinates, m or rad.
 const FARTHEST: f64 = 1e9;
 
 /// Reads the first line, and the frames on a thread of their own.
@@ -28,7 +28,7 @@ const FARTHEST: f64 = 1e9;
 pub fn watch(mut input: impl BufRead + Send + 'static, output: impl Write + Send + 'static) -> Result<Feed, GameError> {
     let bad = |problem: String| GameError::Stream(problem);
     let mut line = String::new();
-    // it may have a whole model in it
+    // the message may contain a whole model
     let most = budget::MODEL_FILE.most().map_err(|e| bad(e.to_string()))?;
     input.by_ref().take(most.saturating_add(1)).read_line(&mut line).map_err(|e| bad(e.to_string()))?;
     budget::MODEL_FILE.check(line.len() as f64).map_err(|e| bad(format!("its first line {e}")))?;
@@ -85,7 +85,7 @@ fn frames(
         if begins > 0.5 {
             *episode = crate::ragdoll::Episode { number: episode.number + 1, ..Default::default() };
         } else {
-            // a model that cannot move has no coordinates
+            // a model without joints has no coordinates
             let now = numbers.get(2).copied().unwrap_or_default();
             let moved = now - sight.qpos.first().copied().unwrap_or(now);
             episode.decisions += 1;

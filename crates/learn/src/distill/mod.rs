@@ -44,7 +44,7 @@ impl Lessons {
     pub fn new(room: usize, obs_len: usize, act_len: usize) -> Self {
         Self { obs_len, act_len, room: room.max(1), obs: Vec::new(), actions: Vec::new(), next: 0 }
     }
-    /// Memory that so many rows take, bytes.
+    /// Memory for a number of rows, bytes.
     pub fn memory(rows: f64, obs_len: usize, act_len: usize) -> f64 {
         rows * (obs_len + act_len) as f64 * size_of::<f32>() as f64
     }
@@ -110,7 +110,7 @@ impl Distiller {
     /// A policy that knows nothing yet. `log_std`: logarithms of the standard deviations of its actions, which it keeps.
     ///
     /// # Errors
-    /// If no policy has such widths.
+    /// If a width is not allowed for a policy.
     pub fn new(mut meta: PolicyMeta, log_std: Vec<f32>, seed: u64, isa: Isa) -> Result<Self, Error> {
         meta.observation_clip = OBSERVATION_CLIP;
         check_widths(&meta)?;
@@ -237,17 +237,17 @@ impl Distiller {
         noise.iter_mut().for_each(|x| *x = normal(&mut self.noise) as f32);
     }
 
-    /// Numbers of the network that are not finite.
+    /// Number of the network's parameters that are not finite.
     pub fn lost(&self) -> usize {
         self.params.iter().filter(|x| !x.is_finite()).count()
     }
 
-    /// Memory that a student with such a policy takes while it learns, bytes.
+    /// Memory for training a student with this policy, bytes.
     pub fn memory(meta: &PolicyMeta) -> f64 {
         let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
         let params: f64 = sizes.windows(2).map(|pair| (pair[0] as f64 + 1.0) * pair[1] as f64).sum();
         let activations: f64 = sizes.iter().map(|size| (2 * CHUNK * BLOCK) as f64 * *size as f64).sum();
-        // parameters, two moments, two gradients, and the policy that plays
+        // parameters, two moments, two gradients, and the policy in use
         (6.0 * params + activations) * size_of::<f32>() as f64
     }
 

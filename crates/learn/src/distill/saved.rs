@@ -1,4 +1,4 @@
-//! A distillation on its way, as one file: what it needs to go on with the same bits.
+//! An unfinished distillation as one file. It holds all the state that resuming with the same bits needs.
 
 use super::{Distiller, Lessons};
 use crate::error::Error;
@@ -13,14 +13,14 @@ use std::path::Path;
 const FORMAT: &str = "marathon-distillation";
 const VERSION: u32 = 1;
 
-/// What there is beside the student and its lessons.
+/// The saved state besides the student and its lessons.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Halfway {
-    /// Rounds done.
+    /// Number of finished rounds.
     pub rounds: u64,
-    /// What the distillation is, by names: one that goes on must agree on all of it.
+    /// Description of the distillation by name. A resumed distillation must agree on every entry.
     pub about: BTreeMap<String, String>,
-    /// Of each teacher's agents: a snapshot of their environment, and what they observe.
+    /// One entry per teacher: a snapshot of its agents' environment, and their observations.
     pub classes: Vec<(Vec<u8>, Vec<f32>)>,
 }
 
@@ -35,10 +35,10 @@ struct Document {
 }
 
 impl Distiller {
-    /// Writes a file from which the distillation can go on.
+    /// Writes a file from which the distillation can resume.
     ///
     /// # Errors
-    /// If it cannot be written; the old one is whole then.
+    /// If the file cannot be written. The older file then stays.
     pub fn save(&self, path: &Path, halfway: &Halfway, lessons: &Lessons) -> Result<(), Error> {
         let mut file = TensorWriter::default();
         file.list("params", &self.params);
@@ -66,10 +66,10 @@ impl Distiller {
         write_atomic(path, &file.sealed_bytes(&document))
     }
 
-    /// Goes on from such a file, if it is of the same distillation: the student and its lessons are as they were.
+    /// Resumes from a file of the same distillation: restores the student and its lessons.
     ///
     /// # Errors
-    /// If the file cannot be read, has changed since it was written, or is of another distillation.
+    /// If the file cannot be read, has changed since it was written, or belongs to another distillation.
     pub fn resume(
         &mut self,
         path: &Path,

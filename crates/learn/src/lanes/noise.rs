@@ -47,7 +47,7 @@ impl SplitMix {
         let mut mix = SplitMix(seed ^ 0x6c65_6172_6e65_7221);
         SplitMix(mix.word() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
     }
-    /// Where the stream is, as saved.
+    /// The position in the stream, for saving.
     pub fn state(&self) -> u64 {
         self.0
     }

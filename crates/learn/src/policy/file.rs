@@ -33,7 +33,7 @@ impl Policy {
     /// Reads a policy.
     ///
     /// # Errors
-    /// If the file cannot be read, has changed since it was written, or is not a whole and finite policy.
+    /// If the file cannot be read, has changed since it was written, is incomplete, or has numbers that are not finite.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Self::from_bytes(path, &read(path)?)
     }
@@ -41,11 +41,11 @@ impl Policy {
     /// Reads a policy from the bytes of a file. `path` stands for it in messages.
     ///
     /// # Errors
-    /// If the bytes have no checksum, have changed since it was computed, or are not a whole and finite policy.
+    /// If the bytes have no checksum or the wrong one, are incomplete, or have numbers that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
         let file = TensorReader::new(path, bytes)?;
         if file.seal(bytes)?.is_none() {
-            // a file of another kind is told as one
+            // first report a file of another kind as such
             Self::of_file(path, &file)?;
             let expected = format!("one; `marathon import {} --out NEW.safetensors` writes it", path.display());
             return Err(Error::file(path, "checksum", "none", expected));
@@ -53,10 +53,10 @@ impl Policy {
         Self::of_file(path, &file)
     }
 
-    /// Reads a policy that another program may have written, without a checksum. One that is there is checked.
+    /// Reads a policy that another program may have written without a checksum. An existing checksum is checked.
     ///
     /// # Errors
-    /// As [`Policy::load`], but for a missing checksum.
+    /// As [`Policy::load`], except for a missing checksum.
     pub fn load_unsealed(path: &Path) -> Result<Self, Error> {
         let bytes = read(path)?;
         let file = TensorReader::new(path, &bytes)?;

@@ -12,7 +12,8 @@
 //! with `[low, high]` from `action_range`. The action is in the units of the environment ([`Spec::action_low`]), so that
 //! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
 //!
-//! The last key of the document, `checksum`, is the FNV-1a hash of all bytes of the file, with sixteen zeros in its own place.
+//! The last key of the document, `checksum`, is the FNV-1a hash of all bytes of the file, computed with sixteen zeros
+//! in its place.
 
 mod block;
 mod cast;
@@ -40,7 +41,7 @@ use std::collections::BTreeMap;
 const FORMAT: &str = "marathon-policy";
 const VERSION: u32 = 1;
 
-/// Largest width of a layer, most hidden layers, and most parameters.
+/// Limits: width of a layer, number of hidden layers, and number of parameters.
 const MOST_WIDTH: usize = 1 << 16;
 const MOST_HIDDEN: usize = 64;
 const MOST_PARAMETERS: u64 = 1 << 28;
@@ -251,7 +252,7 @@ impl Policy {
 /// Number of parameters of a policy's network.
 ///
 /// # Errors
-/// If no policy has such widths.
+/// If a width is not allowed for a policy.
 pub(crate) fn check_widths(meta: &PolicyMeta) -> Result<u64, Error> {
     let sizes = [&[meta.obs], &meta.hidden[..], &[meta.act]].concat();
     let pairs = sizes.windows(2).map(|p| (p[0] as u64).saturating_add(1).saturating_mul(p[1] as u64));

@@ -67,7 +67,7 @@ impl RewardKind {
             _ => None,
         }
     }
-    /// The same, to be changed.
+    /// Mutable access to the imitation settings, if this reward is imitation.
     pub fn imitation_mut(&mut self) -> Option<&mut Imitation> {
         match self {
             RewardKind::Imitation(settings) => Some(settings),

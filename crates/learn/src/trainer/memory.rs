@@ -23,7 +23,7 @@ pub fn check(roles: &[RoleParts], isa: Isa, config: &TrainConfig) -> Result<(), 
     }
 }
 
-/// Whether so many bytes of memory can be had at once.
+/// Whether one allocation of this many bytes succeeds.
 pub fn can_be_had(bytes: u64) -> bool {
     let mut probe: Vec<u8> = Vec::new();
     let fits = usize::try_from(bytes).is_ok_and(|bytes| probe.try_reserve_exact(bytes).is_ok());

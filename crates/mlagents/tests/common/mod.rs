@@ -111,12 +111,12 @@ impl FakeTrainer {
         self.answer(&input(UnityInput { rl: None, initialization: Some(initialization) }));
     }
 
-    /// Reads, and says nothing, until the player is gone.
+    /// Reads without answering until the player closes the connection.
     pub fn ignore_until_closed(&mut self) {
         let _ = self.reader.read_to_end(&mut Vec::new());
     }
 
-    /// Answers nothing but pings for a while. Returns how many came.
+    /// Answers only pings for a while. Returns the number of pings.
     pub fn answer_pings_for(&mut self, time: Duration) -> usize {
         let (begun, mut pings) = (Instant::now(), 0);
         self.reader.get_ref().set_read_timeout(Some(Duration::from_millis(20))).expect("a socket");

@@ -33,8 +33,8 @@ impl Clip {
     /// straight ahead do not end exactly as they began.
     ///
     /// # Errors
-    /// If there are fewer than three frames, of which the last is the first again, or the travel is beyond what a clip may
-    /// hold.
+    /// If there are fewer than three frames, of which the last repeats the first, or the travel exceeds the limits of a
+    /// clip.
     pub fn looped(&self, path: &Path, blend: f64) -> Result<Self, MotionError> {
         if self.frames() < 3 {
             let expected = "three or more, of which the last is the first again";
@@ -81,7 +81,7 @@ impl Clip {
     /// its step is the nearest that divides it.
     ///
     /// # Errors
-    /// If the step is not a number from 0.0001 to half of the clip, or the result would be beyond the limit of memory.
+    /// If the step is not a number from 0.0001 to half of the clip, or the result would exceed the memory limit.
     pub fn resample(&self, path: &Path, dt: f64) -> Result<Self, MotionError> {
         let duration = self.duration();
         let steps = libm::round(duration / dt);
@@ -138,7 +138,7 @@ impl Clip {
     /// where they are.
     ///
     /// # Errors
-    /// If a loop's neighboring cycles are beyond what a clip may hold.
+    /// If a loop's neighboring cycles exceed the limits of a clip.
     pub fn smooth(&self, path: &Path, seconds: f64) -> Result<Self, MotionError> {
         let sigma = seconds / self.dt;
         if !(sigma > 1e-3) {
@@ -211,7 +211,7 @@ impl Clip {
     /// A first joint that slides begins at 0.
     ///
     /// # Errors
-    /// If the motion then gets beyond what a clip may hold.
+    /// If the moved motion exceeds the limits of a clip.
     pub fn at_origin(&self, path: &Path) -> Result<Self, MotionError> {
         let first = self.frame(0);
         let (turn, start) = match self.layout.joints.first().map(|joint| joint.kind) {
@@ -263,7 +263,7 @@ impl Clip {
     /// The clip with its numbers rounded to six decimals, as files should have them: a micrometer, a microradian.
     ///
     /// # Errors
-    /// If rounding led beyond what a clip may hold.
+    /// If rounding takes a value past the limits of a clip.
     pub fn rounded(&self, path: &Path) -> Result<Self, MotionError> {
         // adding zero makes -0 a 0
         let round = |value: f64| libm::round(value * 1e6) / 1e6 + 0.0;

@@ -9,8 +9,8 @@
 //! | `dt` | seconds between frames |
 //! | `joints` | name and kind of each joint in the order of `qpos`: `free`, `ball`, `slide` or `hinge` |
 //! | `frames` | `qpos` of each frame |
-//! | `fit` | distance from the recording, if it is known: mean distance of the parts, m, and mean angle, rad |
-//! | `checksum` | of all other values, whatever their spelling |
+//! | `fit` | distance from the recording, if known: mean distance of the parts, m, and mean angle, rad |
+//! | `checksum` | checksum of all other values, independent of formatting |
 
 use super::{About, Clip, Cycle, Nearness};
 use crate::error::MotionError;
@@ -55,13 +55,13 @@ impl Clip {
     /// Reads the bytes of a `.motion` file; the path is for messages.
     ///
     /// # Errors
-    /// If the file is malformed, or its checksum is missing or another one: the message names the line, the entry or the
+    /// If the file is malformed, or its checksum is missing or wrong. The message names the line, the entry or the
     /// frame.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, MotionError> {
         Self::read(path, bytes, true)
     }
 
-    /// Reads the bytes of a `.motion` file whose checksum may be missing. One that is there must be right.
+    /// Reads the bytes of a `.motion` file without requiring a checksum. An existing checksum must be correct.
     ///
     /// # Errors
     /// As [`Clip::parse`].
@@ -154,7 +154,7 @@ impl Document {
 }
 
 impl Clip {
-    /// The checksum of the file that [`Clip::to_bytes`] writes.
+    /// The checksum in the file that [`Clip::to_bytes`] writes.
     fn sum(&self) -> String {
         let About { name, model, source, license, fit } = &self.about;
         let mut sum = Checksum::default();
@@ -169,7 +169,8 @@ impl Clip {
     }
 }
 
-/// FNV-1a of values. Each is preceded by its length, so that no two documents have the same bytes.
+/// FNV-1a hash of values. The length of each value is hashed before it, so that different documents hash different
+/// bytes.
 struct Checksum(u64);
 
 impl Default for Checksum {

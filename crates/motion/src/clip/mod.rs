@@ -26,11 +26,11 @@ pub struct About {
     pub source: String,
     /// License under which it may be used.
     pub license: String,
-    /// How near the clip is to the recording that it was made of, if that is known.
+    /// The clip's distance from its source recording, if known.
     pub fit: Option<Nearness>,
 }
 
-/// How near a clip is to its recording, as [`fit`](crate::fit) measures it.
+/// Distance of a clip from its recording, as [`fit`](crate::fit) measures it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Nearness {
     /// Mean distance of the parts, m.
@@ -39,12 +39,12 @@ pub struct Nearness {
     pub rotation: f64,
 }
 
-/// Distance, m, and angle, rad, beyond which a clip is not the recording's motion any more.
+/// Distance, m, and angle, rad, above which a clip no longer shows the recording's motion.
 const FAR: f64 = 0.05;
 const TURNED: f64 = 15.0 * std::f64::consts::PI / 180.0;
 
 impl Nearness {
-    /// What to say of a clip that is too far from its recording.
+    /// A warning if the clip is too far from its recording.
     pub fn warning(&self) -> Option<String> {
         let (distance, degrees) = (1e2 * self.position, self.rotation.to_degrees());
         let far = self.position > FAR || self.rotation > TURNED;
@@ -201,10 +201,10 @@ impl Clip {
         self.frames.chunks(self.layout.nq()).map(<[f64]>::to_vec).collect()
     }
 
-    /// A clip of other frames.
+    /// A clip with other frames.
     ///
     /// # Errors
-    /// If an edit has led to fewer than two frames, or beyond what a clip may hold.
+    /// If there are fewer than two frames, or the frames exceed the limits of a clip.
     fn rebuilt(&self, path: &Path, dt: f64, cycle: Option<Cycle>, rows: &[Vec<f64>]) -> Result<Self, MotionError> {
         Clip::new(path, self.about.clone(), self.layout.clone(), dt, cycle, rows)
     }

@@ -1,7 +1,7 @@
 //! Biovision's BVH: a hierarchy of joints with Euler angles.
 //!
-//! A file does not tell its unit, nor which way is up: both are found from the motion. Positions of joints below the pelvis are
-//! read and dropped: bones keep their length.
+//! A file states neither its unit nor its up axis. The reader finds both from the motion. It drops the positions of
+//! joints below the pelvis, because bones have a constant length.
 
 use super::raw::{Local, Raw, chain, cut};
 use super::{Reading, Recording, upright};
@@ -33,16 +33,16 @@ struct Node {
     channels: Vec<Channel>,
 }
 
-/// Words of the text with their lines and columns, one after another.
+/// Splits the text into words and tracks their lines and columns.
 struct Words<'a> {
     path: &'a Path,
     text: &'a str,
-    /// Where the next word begins, in bytes.
+    /// Position of the next word, bytes.
     at: usize,
     line: usize,
-    /// Where the line begins, in bytes.
+    /// Start of the line, bytes.
     start: usize,
-    /// Line and column of the last word that was taken.
+    /// Line and column of the last word read.
     last: (usize, usize),
 }
 
@@ -59,7 +59,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
         let line = 1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
         MotionError::Syntax { path: path.into(), line, column: 1, problem: "found bytes that are not UTF-8".into() }
     })?;
-    // some editors put a byte order mark before the first word
+    // some editors write a byte order mark before the first word
     let mut words = Words::new(path, text.strip_prefix('\u{feff}').unwrap_or(text));
     let nodes = hierarchy(&mut words)?;
 
@@ -98,7 +98,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     let (skeleton, kept) = cut(&whole, root(&nodes, &whole));
     let carriers = chain(&whole, kept[0]);
     limits::check_seconds(path, count * dt)?;
-    // keyframes, the rows of the clip and its frames
+    // the keyframes, the file's motion rows and the clip's frames
     limits::check_frames(path, count, 4 * nodes.len() + 7)?;
 
     let width: usize = nodes.iter().map(|node| node.channels.len()).sum();
@@ -131,7 +131,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     upright::settle(path, raw, false, reading)
 }
 
-/// The joint that carries the figure: the pelvis, or else the first joint below which the figure branches or does not travel.
+/// The root joint of the skeleton: the pelvis. If there is none, the first joint below which the skeleton branches or
+/// does not travel.
 fn root(nodes: &[Node], whole: &Skeleton) -> usize {
     if let Some(pelvis) = roles::carrier(whole) {
         return pelvis;
@@ -177,7 +178,7 @@ fn hierarchy(words: &mut Words) -> Result<Vec<Node>, MotionError> {
             }
             ("End", Some(_)) => {
                 words.expect("Site")?;
-                // some programs name the ends
+                // some programs name the end sites
                 while words.word()? != "{" {}
                 open.push(None);
             }
@@ -248,7 +249,7 @@ fn rest(nodes: &[Node]) -> Vec<DVec3> {
     pos
 }
 
-/// The turns of the joints that are kept, below what carries the first of them.
+/// The rotations of the kept joints. The carriers above the first of them are folded into it.
 fn keyframe(nodes: &[Node], row: &[f64], kept: &[usize], carriers: &[usize]) -> Keyframe {
     let mut numbers = row.iter();
     let locals: Vec<Local> = nodes
@@ -281,7 +282,7 @@ impl<'a> Words<'a> {
         words
     }
 
-    /// Goes to the next word.
+    /// Moves to the next word.
     fn skip(&mut self) {
         for (i, letter) in self.text[self.at..].char_indices() {
             if !letter.is_whitespace() {
@@ -302,7 +303,7 @@ impl<'a> Words<'a> {
         self.at < self.text.len()
     }
 
-    /// The next word; its line is the present one from then on.
+    /// Returns the next word and makes its line the current one.
     fn word(&mut self) -> Result<&'a str, MotionError> {
         if !self.is_more() {
             let line = self.text.lines().count().max(1);
@@ -322,7 +323,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A label with its colon, with or without spaces within it and after it.
+    /// Reads a label with its colon. Spaces within it and after it are optional.
     fn label(&mut self, label: &str) -> Result<(), MotionError> {
         let mut first = None;
         for letter in label.chars().filter(|letter| !letter.is_whitespace()) {
@@ -352,7 +353,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// An error at the last word that was taken, or else in this line.
+    /// An error at the last word read, if it is in this line, or else at the start of the line.
     fn wrong(&self, line: usize, problem: String) -> MotionError {
         let column = if self.last.0 == line { self.last.1 } else { 1 };
         MotionError::Syntax { path: self.path.into(), line, column, problem }

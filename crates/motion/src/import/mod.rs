@@ -18,40 +18,40 @@ use std::path::Path;
 
 /// Meters of the units in use: meter, centimeter, inch, and CMU's unit, an inch over 0.45.
 const UNITS: [f64; 4] = [1.0, 0.01, 0.0254, 0.0254 / 0.45];
-/// A figure from the ankles to the head's joint, m. The head's top is no joint in all files.
+/// Height of a person from the ankles to the head's joint, m. Not all files have a joint at the top of the head.
 const HEIGHT: f64 = 1.65;
 
-/// The bytes of a file beside the recording, by its name.
+/// Reads a file next to the recording by its name.
 pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;
 
-/// How a recording is read.
+/// Settings for reading a recording.
 #[derive(Clone, Default)]
 pub struct Reading<'a> {
-    /// The file's axis that points up; none: it is found from the motion.
+    /// The file's axis that points up. With `None`, it is found from the motion.
     pub up: Option<Up>,
-    /// Height of the floor in the file, m; none: it is found from the contacts.
+    /// Height of the floor in the file, m. With `None`, it is found from the contacts.
     pub floor: Option<f64>,
-    /// Name or index of the animation; none: the first one.
+    /// Name or index of the animation. With `None`, the first one is read.
     pub animation: Option<String>,
-    /// Other names of the file's joints by which [`Mapping`](crate::Mapping)'s general names find them.
+    /// Maps the file's joint names to names that [`Mapping`](crate::Mapping)'s general names recognize.
     pub known_as: BTreeMap<String, String>,
-    /// Reads the files beside a `.gltf`; none: they are refused.
+    /// Reads the files next to a `.gltf` file. With `None`, such files are refused.
     pub beside: Option<Beside<'a>>,
 }
 
-/// A recording as it was read.
+/// The result of reading a recording.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// The motion.
     pub animation: Animation,
-    /// What was found that the file does not say, and what was left out, one sentence each.
+    /// Notes on properties found from the motion and on ignored parts, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Endings of the names of files that [`any`] reads.
+/// File endings that [`any`] reads.
 pub const ENDINGS: [&str; 7] = ["bvh", "glb", "gltf", "vrm", "vrma", "txt", "json"];
 
-/// Reads a file of any known format as [`read`] does, with nothing said about it.
+/// Reads a file of any supported format with the default settings.
 ///
 /// # Errors
 /// As [`read`].
@@ -59,11 +59,11 @@ pub fn any(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     Ok(read(path, bytes, &Reading::default())?.animation)
 }
 
-/// Reads a file of any known format, by the ending of its name: `.bvh` is Biovision's, `.glb`, `.gltf`, `.vrm` and `.vrma` are
-/// glTF's, `.txt` and `.json` are DeepMimic's.
+/// Reads a file of any supported format. The ending selects the format: `.bvh` for Biovision, `.glb`, `.gltf`, `.vrm`
+/// and `.vrma` for glTF, `.txt` and `.json` for DeepMimic.
 ///
 /// # Errors
-/// If the ending is another one, the file is malformed, or it has no such animation.
+/// If the ending is unknown, the file is malformed, or it has no such animation.
 pub fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if let Some(floor) = reading.floor.filter(|floor| !(floor.abs() <= 1e4)) {

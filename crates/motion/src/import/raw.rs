@@ -1,4 +1,4 @@
-//! A recording as its file has it: in the file's axes and unit.
+//! A recording in the axes and unit of its file.
 
 use crate::clip::About;
 use crate::rotation::{quat, wxyz};
@@ -11,13 +11,13 @@ pub(super) struct Raw {
     pub skeleton: Skeleton,
     pub dt: f64,
     pub keyframes: Vec<Keyframe>,
-    /// How surely the format's y points up: what motion has to say against it, 0 to 1.
+    /// Prior trust that y points up, 0 to 1. The motion has to outweigh it.
     pub trust_y: f64,
-    /// What the reader has left out.
+    /// Notes on parts that the reader ignored.
     pub notes: Vec<String>,
 }
 
-/// A joint's place in the frame of its parent.
+/// Position and rotation of a joint in its parent's frame.
 #[derive(Clone, Copy)]
 pub(super) struct Local {
     pub pos: DVec3,
@@ -25,13 +25,14 @@ pub(super) struct Local {
 }
 
 impl Local {
-    /// A frame within this one.
+    /// Composes this frame with a frame inside it.
     pub fn then(self, inner: Local) -> Local {
         Local { pos: self.pos + self.turn * inner.pos, turn: self.turn * inner.turn }
     }
 }
 
-/// Cuts off what is above a joint: it is the root of the skeleton that is returned, with the old index of each joint. What is above carries it.
+/// Removes the joints above `root`. Returns the skeleton that starts there, and the old index of each joint. The
+/// removed joints' rest rotations are folded into the new root.
 pub(super) fn cut(skeleton: &Skeleton, root: usize) -> (Skeleton, Vec<usize>) {
     let kept: Vec<usize> = (0..skeleton.bones.len()).filter(|joint| skeleton.hangs(*joint, root)).collect();
     let mut rest = Local { pos: DVec3::ZERO, turn: DQuat::IDENTITY };

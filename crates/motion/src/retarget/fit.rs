@@ -21,25 +21,25 @@ pub struct Fit {
     pub position: f64,
     /// Mean angle of their orientations, rad; parts without a weight of their orientation do not count.
     pub rotation: f64,
-    /// Mean angle of the trunk and of the bones from one part to the next, seen from where they lie in the recording, rad. It
-    /// does not depend on what the skeleton's rest pose says.
+    /// Mean angle between the clip and the recording, for the trunk and the bones between parts, rad. It does not
+    /// depend on the skeleton's rest pose.
     pub bones: f64,
     /// Furthest distance, m.
     pub furthest: Worst,
-    /// Largest angle of a part whose orientation counts much, such as the trunk, the thighs and the feet, rad.
+    /// Largest angle of a part whose orientation has a large weight, such as the trunk, the thighs and the feet, rad.
     pub most_turned: Worst,
 }
 
-/// Weight of an orientation that counts much, 1/rad.
+/// Weight above which an orientation counts for [`Fit::most_turned`], 1/rad.
 const COUNTS: f64 = 0.3;
-/// Angle of such a part from which a limb or the trunk is another one's, rad.
+/// Angle of such a part above which a limb or the trunk is probably mapped wrongly, rad.
 const CROSSED: f64 = 70.0 * std::f64::consts::PI / 180.0;
 
-/// Shorter bones point nowhere, m.
+/// Length below which a bone has no clear direction, m.
 const SHORT: f64 = 0.03;
 
 impl Fit {
-    /// What a person should know, one sentence each; none if the clip is near its recording.
+    /// Warnings for the user, one sentence each. There are none if the clip is close to its recording.
     pub fn warnings(&self) -> Vec<String> {
         let remedy = "look at the picture; if the figure lies, sinks or faces aside, pass --up or --floor";
         let bones = Nearness { position: 0.0, rotation: self.bones };
@@ -55,7 +55,7 @@ impl Fit {
         near.into_iter().chain(bones).chain(crossed).map(|text| format!("{text}; {remedy}")).collect()
     }
 
-    /// What the clip's file keeps of it.
+    /// The part of the fit that the clip's file stores.
     pub fn nearness(&self) -> Nearness {
         let round = |value: f64| libm::round(value * 1e4) / 1e4;
         Nearness { position: round(self.position), rotation: round(self.rotation.max(self.bones)) }

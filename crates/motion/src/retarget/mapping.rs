@@ -140,8 +140,8 @@ impl Mapping {
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
-    /// The joints that a mapping's bodies follow, each with the name of the first body that follows it: what a skeleton with
-    /// names of its own means by them. The path is for messages.
+    /// The joints that a mapping's bodies follow, each with the name of the first body that follows it. This identifies
+    /// the joints of a skeleton whose names are not known. The path is used in messages.
     ///
     /// # Errors
     /// If the text is malformed.

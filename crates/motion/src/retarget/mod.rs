@@ -60,7 +60,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     // a cycle's last frame is the first of the next
     let count = clip.frames() + usize::from(cycle.is_some());
     let margin = if cycle.is_some() { libm::ceil(MARGIN / dt) as usize } else { 0 };
-    // the normal matrix and its two copies are what takes most
+    // the normal matrix and its two copies need most of the memory
     let band = 3.0 * 8.0 * (3 * model.nv * model.nv) as f64;
     limits::check_memory(path, band * (count + 2 * margin) as f64)?;
     let all: Vec<Target> = (0..count + 2 * margin).map(|i| targets.at(i as i64 - margin as i64)).collect();

@@ -99,8 +99,8 @@ impl<'a> Targets<'a> {
         Target { quat: quats, pos, hips, root: (bodies.0[first] + shift, bodies.1[first]) }
     }
 
-    /// The bones of which both the model and the skeleton know where they are: the ends of each by part. The trunk, from the
-    /// point between the hips to another part of the trunk, has none for its first end.
+    /// The bones whose position both the model and the skeleton have, as the parts at their two ends. The trunk leads
+    /// from the midpoint of the hips to another part of the trunk, so its first end is `None`.
     pub fn bones(&self) -> Vec<(Option<usize>, usize)> {
         let parts = &self.mapping.parts;
         let limbs = self.fits.next.iter().enumerate().filter_map(|(i, next)| Some((Some(i), (*next)?)));
@@ -115,7 +115,7 @@ impl<'a> Targets<'a> {
         limbs.chain(trunk.map(|trunk| (None, trunk))).collect()
     }
 
-    /// Of each of these bones: how it lies in the model's pose, and how in a frame of the recording.
+    /// The direction of each of these bones in the model's pose, and in a frame of the recording.
     pub fn directions(&self, bones: &[(Option<usize>, usize)], frame: i64, pose: &Pose) -> Vec<(DVec3, DVec3)> {
         let source = self.animation.pose(frame);
         let parts = &self.mapping.parts;

@@ -18,11 +18,12 @@ pub struct Wear {
     /// Of each hip: the body, the place in it where the thigh turns, and the joint of the skeleton.
     hips: [(usize, DVec3, usize); 2],
     scale: f64,
-    /// Where the skeleton's hips are beside the model's, in the frame of the body that the thighs hang from.
+    /// Offset of the skeleton's hips from the model's, in the frame of the body that carries the thighs.
     shift: (usize, DVec3),
 }
 
-/// Share by which a figure may be larger or smaller beside the model than its legs are before the figure decides its size.
+/// Largest relative difference between the scale of the legs and the scale of the whole skeleton. Above it, the whole
+/// skeleton sets the scale.
 const OUT_OF_PROPORTION: f64 = 0.3;
 
 /// What turns a bone.
@@ -74,8 +75,8 @@ impl Wear {
         Wear { skeleton: skeleton.clone(), rest, follows, hips, scale, shift: (pelvis, down) }
     }
 
-    /// Factor on the skeleton's lengths with which its legs are as long as the model's; of a figure with much longer or shorter
-    /// legs than the model has for its size, the factor with which trunk, arms and legs together are.
+    /// Scale of the skeleton's lengths. It makes the legs as long as the model's. If the legs are unusually long or
+    /// short for the skeleton, it instead fits trunk, arms and legs together.
     pub fn scale(&self) -> f64 {
         self.scale
     }
@@ -121,7 +122,8 @@ impl Wear {
     }
 }
 
-/// The lengths between a model's parts and those above them over the same lengths of a skeleton; none without such lengths.
+/// Ratio of the model's lengths to the skeleton's, summed over parts and the parts above them; `None` without such
+/// lengths.
 fn figure(model: &Model, mapping: &Mapping, rest: &Pose, source: &SkeletonPose) -> Option<f64> {
     let parts = || mapping.parts.iter().filter(|part| part.whole && part.toward.is_none());
     let (mut ours, mut theirs) = (0.0, 0.0);

@@ -1,5 +1,5 @@
-//! Recordings of known motions: the shipped clips of Marathon Man as BVH files of skeletons that rest, stand and lie in many
-//! ways.
+//! Recordings of known motions: the shipped clips of Marathon Man as BVH files, with various rest poses, axes and
+//! floors.
 
 use super::{model, shipped};
 use glam::{DMat3, DQuat, DVec3};
@@ -7,7 +7,7 @@ use marathon_motion::Clip;
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 
-/// Joints by name, parent, and the body that they turn with, in the order of a file.
+/// Joints by name, parent, and the body whose rotation they have, in file order.
 pub const JOINTS: [(&str, Option<usize>, &str); 19] = [
     ("Hips", None, "butt"),
     ("Spine", Some(0), "lower_waist"),
@@ -35,14 +35,14 @@ pub const HIPS: [usize; 2] = [11, 15];
 /// The joints of the arms.
 pub const ARMS: std::ops::Range<usize> = 5..11;
 
-/// How a file shows the motion.
+/// The rest pose of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
-    /// Every joint's axes are the world's while the figure stands.
+    /// Every joint's axes equal the world's in the standing pose.
     Standing,
-    /// Every bone lies along this axis of its own.
+    /// Every bone lies along this axis of its own frame.
     Along(DVec3),
-    /// Only the pelvis has been turned about the vertical, by so many degrees.
+    /// The pelvis is turned about the vertical by this angle, degrees.
     Twisted(f64),
 }
 
@@ -50,13 +50,13 @@ pub enum Rest {
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     pub rest: Rest,
-    /// Turns the model's axes, z up, to the file's.
+    /// Rotation from the model's axes, z up, to the file's.
     pub world: DQuat,
-    /// Whether the rest pose is turned, too.
+    /// Whether the rest pose is rotated, too.
     pub rest_turned: bool,
     /// Height of the floor, m.
     pub floor: f64,
-    /// Meters of the file's unit.
+    /// Meters per unit of the file.
     pub unit: f64,
 }
 
@@ -70,7 +70,7 @@ pub fn y_up() -> DQuat {
     DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)
 }
 
-/// Where the joints are in the model, and how its bodies turn from the reference pose.
+/// The true positions of the joints, and the true rotations of the bodies from the reference pose.
 pub struct Truth {
     model: Model,
     pub clip: Clip,
@@ -81,7 +81,7 @@ impl Truth {
         Truth { model: model("marathon_man"), clip: shipped("marathon_man", name) }
     }
 
-    /// A body, or that of the hand, which is a part of the forearm.
+    /// A body by name. The hand is a part of the forearm.
     fn body(&self, name: &str) -> usize {
         let name = name.replace("hand", "larm");
         self.model.bodies.iter().position(|body| body.name == name).expect("a body")
@@ -103,7 +103,7 @@ impl Truth {
             .iter()
             .map(|(name, _, body)| match *name {
                 "Hips" => 0.5 * (anchor("left_thigh") + anchor("right_thigh")),
-                // a joint is where its body hangs from the other one
+                // a joint is at the anchor of its body
                 "Spine" => anchor("butt"),
                 "Spine1" => anchor("lower_waist"),
                 "Neck" => of("torso", [0.0, 0.0, 0.1]),
@@ -116,7 +116,7 @@ impl Truth {
             .collect()
     }
 
-    /// Turn of each joint from the reference pose.
+    /// Rotation of each joint from the reference pose.
     pub fn turns(&self, pose: &Pose) -> Vec<DQuat> {
         let rest = self.rest();
         JOINTS.iter().map(|(_, _, body)| pose.quat[self.body(body)] * rest.quat[self.body(body)].conjugate()).collect()
@@ -134,7 +134,7 @@ impl Truth {
     pub fn bvh(&self, layout: &Layout) -> String {
         let rest = self.places(&self.rest());
         let ends = |i: usize| JOINTS.iter().position(|(_, parent, _)| *parent == Some(i));
-        // the axes of each joint in the model's axes, while the figure stands
+        // the axes of each joint in the model's axes, in the standing pose
         let own: Vec<DQuat> = (0..JOINTS.len())
             .map(|i| {
                 let base = if layout.rest_turned { layout.world.conjugate() } else { DQuat::IDENTITY };
@@ -191,7 +191,7 @@ impl Truth {
     }
 }
 
-/// Axes of which `axis` points along a way, turned about it by an angle.
+/// A frame whose `axis` points along `way`, rotated about it by an angle.
 fn frame(axis: DVec3, way: DVec3, angle: f64) -> DQuat {
     let side = |v: DVec3| v.any_orthonormal_vector();
     let basis = |a: DVec3| DMat3::from_cols(a, side(a), a.cross(side(a)));

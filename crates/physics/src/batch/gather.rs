@@ -149,7 +149,7 @@ impl<T: Real> LaneBatch<T> {
         let shares = groups.chunks(share).zip(felt.chunks(share)).zip(works);
         let read = &read;
         helpers.run(shares.map(|((groups, felt), work)| {
-            // every thread gets the rows of its own agents
+            // each thread gets the rows of its own agents
             let mut own = Vec::new();
             for part in &mut rest {
                 let rows = std::mem::take(&mut part.rows);

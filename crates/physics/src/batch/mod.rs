@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub struct BatchOptions {
     /// Number of agents, at least 1.
     pub agents: usize,
-    /// Number of threads that step them, at least 1. They start with the first step and sleep between steps.
+    /// Number of threads for stepping, at least 1. They start with the first step and sleep between steps.
     pub threads: usize,
     /// Instruction set; the best of this processor by default. A single agent takes one lane of it.
     pub isa: Isa,

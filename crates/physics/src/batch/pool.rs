@@ -2,11 +2,11 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Threads that help the calling one. They start at the first use and sleep between uses.
+/// Threads that help the calling thread. They start at first use and sleep between uses.
 pub(super) struct Helpers {
     count: usize,
-    /// The threads, and the process that they belong to. A process that was forked off has the memory of its parent's pool,
-    /// but none of its threads.
+    /// The threads, and the process that started them. A forked process inherits the memory of its parent's pool but
+    /// none of its threads.
     pool: Option<(u32, ThreadPool)>,
 }
 
@@ -15,7 +15,8 @@ impl Helpers {
         Helpers { count, pool: None }
     }
 
-    /// Runs all jobs and returns when they have ended: the first on the calling thread, the others on threads of their own.
+    /// Runs all jobs and returns when they have finished. The first job runs on the calling thread, the others on
+    /// helper threads.
     pub fn run<'a, J: FnOnce() + Send + 'a>(&mut self, mut jobs: impl Iterator<Item = J>) {
         let Some(pool) = self.pool() else { return jobs.for_each(|job| job()) };
         pool.in_place_scope(|scope| {
@@ -27,7 +28,7 @@ impl Helpers {
         });
     }
 
-    /// The pool of the present process; none if a single thread does all, or the system starts no more.
+    /// The current process's pool; `None` if one thread does everything, or if the system cannot start more threads.
     fn pool(&mut self) -> Option<&ThreadPool> {
         if self.count == 0 {
             return None;
@@ -44,7 +45,7 @@ impl Helpers {
         self.pool.as_ref().map(|(_, pool)| pool)
     }
 
-    /// Leaves a pool alone whose threads belong to another process: it would wait for them.
+    /// Drops a pool of another process without waiting for its threads.
     fn forget(&mut self) {
         std::mem::forget(self.pool.take());
     }
@@ -65,7 +66,7 @@ mod tests {
     use std::sync::Mutex;
     use std::thread::{self, ThreadId};
 
-    /// The threads that ran some jobs.
+    /// The threads that ran the jobs.
     fn threads(helpers: &mut Helpers, jobs: usize) -> BTreeSet<String> {
         let seen: Mutex<Vec<ThreadId>> = Mutex::new(Vec::new());
         let barrier = std::sync::Barrier::new(jobs);
@@ -78,7 +79,7 @@ mod tests {
         seen.into_inner().expect("all jobs").iter().map(|id| format!("{id:?}")).collect()
     }
 
-    /// No thread is started for a step.
+    /// Steps do not start threads.
     #[test]
     fn the_same_threads_work_again_and_again() {
         let mut helpers = Helpers::new(3);

@@ -106,7 +106,7 @@ pub(crate) struct Plane<T: Real> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere<T: Real> {
     pub center: V3<T>,
-    /// Its z axis, a unit vector, which matters where centers coincide.
+    /// The z axis, a unit vector. It is used if the centers coincide.
     pub axis: V3<T>,
     pub radius: T,
 }

@@ -2,14 +2,13 @@
 
 use super::*;
 
-/// Distance up to which two points are the same: axes that cross (as those of a planar model do) are apart by no more than
-/// rounding.
+/// Distance below which two points count as the same. Rounding separates axes that cross exactly, as in a planar model.
 #[inline(always)]
 fn tiny<T: Real>() -> f64 {
     TINY.max(4.0 * T::EPSILON)
 }
 
-/// Contact of two balls; `axes` are the z axes of their shapes, which decide where the centers coincide.
+/// Contact of two balls. `axes` are the z axes of their shapes, which set the normal if the centers coincide.
 #[inline(always)]
 fn balls<T: Real>(p1: &V3<T>, r1: T, p2: &V3<T>, r2: T, margin: T, axes: [&V3<T>; 2]) -> Touch<T> {
     let d = sub3(p2, p1);
@@ -26,7 +25,7 @@ fn balls<T: Real>(p1: &V3<T>, r1: T, p2: &V3<T>, r2: T, margin: T, axes: [&V3<T>
     Touch::new(dist, pos, normal, margin)
 }
 
-/// MuJoCo's normal of shapes whose centers coincide: perpendicular to the z axes of both; the x axis if they are parallel.
+/// MuJoCo's normal for coinciding centers: perpendicular to both z axes, or the x axis if they are parallel.
 #[inline(always)]
 fn across<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     let n = cross(a, b);
@@ -37,13 +36,13 @@ fn across<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     select3::<T>(turned, &scale3(&n, inv), &x_axis)
 }
 
-/// The opposite direction.
+/// The opposite vector.
 #[inline(always)]
 fn against<T: Real>(a: &V3<T>) -> V3<T> {
     [-a[0], -a[1], -a[2]]
 }
 
-/// One contact.
+/// The contact of two spheres.
 #[inline(always)]
 pub(crate) fn sphere_sphere<T: Real>(a: &Sphere<T>, b: &Sphere<T>, margin: T) -> Touch<T> {
     balls(&a.center, a.radius, &b.center, b.radius, margin, [&a.axis, &b.axis])
@@ -147,8 +146,8 @@ pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Cuboid<T>, margin: T) -> To
     let mut normal = scale3(&to, len.max(T::lit(TINY)).recip());
     let mut dist = len;
     if !T::all(outside) {
-        // inward normal of the nearest face, the lower one of each axis first; on the surface, rounding may give a depth
-        // a sign
+        // inward normal of the nearest face, the lower one of each axis first; on the surface, rounding may give the
+        // depth a sign
         let mut depth = (b.half[0] + c[0]).abs();
         let mut inward = [one, zero, zero];
         for i in 0..3 {

@@ -19,7 +19,7 @@ use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
 use std::collections::BTreeMap;
 
-/// Compiles the document; `file` reads the files that it refers to, `room` counts the memory that it asks for.
+/// Compiles the document. `file` reads the files that it names, and `room` counts the memory that it needs.
 pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Model, MjcfError> {
     schema::check(root)?;
     let opt = settings::options(root)?;

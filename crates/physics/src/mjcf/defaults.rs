@@ -46,15 +46,15 @@ struct Class<'a> {
 }
 
 impl Class<'_> {
-    /// Bytes of a copy.
+    /// Size of a copy, bytes.
     fn size(&self) -> usize {
         300 + self.layers.values().map(|elements| 100 + 8 * elements.len()).sum::<usize>()
     }
 }
 
-/// Classes may be nested this deep: every element reads its attributes through all of them.
+/// Limit on the nesting of classes. Every element reads its attributes through all of them.
 const MAX_CLASSES: usize = 50;
-/// Elements of one kind that may set the defaults of a class, those of the classes around it included.
+/// Limit on the elements of one kind that set a class's defaults, including those of the enclosing classes.
 const MAX_LAYERS: usize = 200;
 
 /// All default classes of a model.
@@ -110,7 +110,7 @@ impl<'a> Defaults<'a> {
             if class.actuator_ends.len() >= MAX_CLASSES {
                 return Err(nested.invalid(format!("default classes are nested more than {MAX_CLASSES} deep")));
             }
-            // one for the class, one while it is read
+            // one copy for the class, one while it is read
             self.room.take_for(nested, 2, class.size())?;
             let mut inner = class.clone();
             inner.actuator_ends.push(actuators);
@@ -143,7 +143,7 @@ impl<'a> Defaults<'a> {
         let class = self.named(element, "class")?.or(childclass).unwrap_or(MAIN);
         let layers = self.classes.get(class).and_then(|c| c.layers.get(kind(&element.name)));
         let attrs = Attrs { element, defaults: layers.map_or(&[], Vec::as_slice) };
-        // reading through many layers takes time, which counts as if each were kept
+        // reading many layers takes time, so each layer counts as if it took memory
         self.room.take_for(element, attrs.defaults.len().saturating_sub(10), 100)?;
         check_inherited(&attrs)?;
         Ok(attrs)

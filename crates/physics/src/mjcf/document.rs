@@ -11,7 +11,7 @@ use std::rc::Rc;
 const MAX_DEPTH: usize = 200;
 /// Elements, text pieces and comments per file; keeps memory in proportion.
 const MAX_NODES: u32 = 4_000_000;
-/// Attributes of an element; the parser compares each with all others.
+/// Limit on the attributes of an element. The parser compares each with all others.
 const MAX_ATTRIBUTES: usize = 500;
 
 /// Where something stands: file and line.
@@ -121,7 +121,7 @@ fn without_dashes_in_comments(text: &str) -> Cow<'_, str> {
     out
 }
 
-/// Line of the first start tag with too many attributes, if there is one.
+/// Line of the first start tag with too many attributes, if any.
 fn crowded_tag(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let find = |from: usize, end: &str| text[from..].find(end).map_or(bytes.len(), |i| from + i + end.len());

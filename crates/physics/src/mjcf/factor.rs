@@ -2,14 +2,14 @@
 
 use super::math::MIN_VAL;
 
-/// Trees with more degrees of freedom are factored along their branches, which takes less time and other roundings.
+/// Larger trees are factored along their branches, which is faster and rounds differently.
 const LARGE: usize = 128;
 
 /// A factored mass matrix.
 pub(crate) enum Factor {
-    /// Lower triangle `L` by rows, `M = L L'`.
+    /// Lower triangle `L` by rows, with `M = L L'`.
     Dense { n: usize, lower: Vec<f64> },
-    /// `M = L' D L`, where a row of `L` has entries for the ancestors of its dof only.
+    /// `M = L' D L`. A row of `L` has entries only for the ancestors of its dof.
     Branches(Vec<Branch>),
 }
 
@@ -22,8 +22,8 @@ pub(crate) struct Branch {
 }
 
 impl Factor {
-    /// Factors a matrix, given as its lower triangle by rows, with each dof's next one towards the root. `None` if it is
-    /// not positive definite.
+    /// Factors a matrix from the rows of its lower triangle. `parents` has each dof's next dof towards the root. `None`
+    /// if the matrix is not positive definite.
     pub fn new(matrix: Vec<f64>, parents: &[Option<usize>]) -> Option<Self> {
         let n = parents.len();
         if n <= LARGE {
@@ -52,7 +52,7 @@ impl Factor {
     }
 }
 
-/// From the leaves to the root, each dof is taken out of its ancestors, as in MuJoCo's `mj_factorM`.
+/// Eliminates each dof from its ancestors, from the leaves to the root, as in MuJoCo's `mj_factorM`.
 fn branches(matrix: &[f64], parents: &[Option<usize>]) -> Option<Vec<Branch>> {
     let n = parents.len();
     let mut rows: Vec<Branch> = Vec::with_capacity(n);
@@ -74,7 +74,7 @@ fn branches(matrix: &[f64], parents: &[Option<usize>]) -> Option<Vec<Branch>> {
         for (m, (i, entry)) in row.entries.iter().enumerate() {
             let part = entry / row.diagonal;
             above[*i].diagonal -= part * entry;
-            // the ancestors of an ancestor are the rest of the list
+            // an ancestor's own ancestors are the rest of the list
             for ((_, to), (_, from)) in above[*i].entries.iter_mut().zip(&row.entries[m + 1..]) {
                 *to -= part * from;
             }
@@ -84,7 +84,7 @@ fn branches(matrix: &[f64], parents: &[Option<usize>]) -> Option<Vec<Branch>> {
     Some(rows)
 }
 
-/// Lower factor of a symmetric positive definite matrix, `None` if it is not one.
+/// Lower factor of a symmetric positive definite matrix; `None` for other matrices.
 fn cholesky(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
     for j in 0..n {
         for i in j..n {
@@ -116,7 +116,7 @@ fn solve_lower(factor: &[f64], n: usize, mut x: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Both ways give the same numbers.
+    /// Both methods give the same numbers.
     #[test]
     fn branches_agree_with_the_dense_factor() {
         let n = 40;

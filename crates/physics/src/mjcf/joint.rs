@@ -138,7 +138,7 @@ impl JointSpec<'_> {
         }
         if self.kind == JointType::Ball {
             check_switch(attrs, "limited", "range", self.range, settings)?;
-            // without a second number the largest angle is 0, as in MuJoCo
+            // without a second number, the largest angle is 0, as in MuJoCo
             if self.limited && self.range[0] != 0.0 {
                 return Err(self.element.invalid("the range of a ball joint must start with 0"));
             }
@@ -160,7 +160,7 @@ pub(crate) fn is_limited(attrs: &Attrs, switch: &str, range: [f64; 2]) -> Result
     })
 }
 
-/// Checks that a range has its switch, if the compiler does not infer it.
+/// Checks that a range has its flag, if the compiler does not infer the flag.
 fn check_switch(
     attrs: &Attrs,
     switch: &str,
@@ -176,7 +176,8 @@ fn check_switch(
     Ok(())
 }
 
-/// Checks a range and its switch in an element of the model; those of a class may still be completed.
+/// Checks a range and its flag in an element of the model. A class may have an incomplete range, which an element
+/// completes.
 pub(crate) fn check_limit(
     attrs: &Attrs,
     switch: &str,

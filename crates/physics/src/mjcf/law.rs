@@ -30,11 +30,11 @@ pub(crate) struct Law<'a> {
     time_constant: f64,
     /// Part of the range of the joint or tendon that a position servo takes over; 0: none.
     pub inherited_range: f64,
-    /// What is not supported, by the part that may still replace it.
+    /// Unsupported settings, by the part of the law that may still replace them.
     refused: [Option<Refused<'a>>; PARTS],
 }
 
-/// An attribute or, without one, an element that is not supported, and why.
+/// An unsupported attribute, or an unsupported element if there is no attribute, with the reason.
 #[derive(Clone, Copy)]
 struct Refused<'a> {
     element: &'a Element,
@@ -42,10 +42,10 @@ struct Refused<'a> {
     reason: &'static str,
 }
 
-/// Parts of a law that can be refused: the element, then the attributes of `<general>`, the kind of gain first.
+/// Parts of a law that can be unsupported: the element, then the attributes of `<general>`, the kind of gain first.
 const PARTS: usize = 1 + ATTRIBUTES.len();
 const ATTRIBUTES: [&str; 6] = ["gaintype", "biastype", "dyntype", "gainprm", "biasprm", "input"];
-/// Why other laws are refused.
+/// The reason for refusing other laws.
 const LAWS: &str = "only constant and affine laws are supported";
 
 impl<'a> Law<'a> {
@@ -108,7 +108,7 @@ impl<'a> Law<'a> {
         self.element == shortcut || (self.element == "general" && !self.gain_affine && self.refused[1].is_none())
     }
 
-    /// Replaces what is refused of an attribute.
+    /// Replaces an unsupported attribute.
     fn set_part(&mut self, attribute: &'static str, element: &'a Element, reason: Option<&'static str>) {
         if let Some(at) = ATTRIBUTES.iter().position(|a| *a == attribute) {
             self.refused[1 + at] = reason.map(|reason| Refused { element, attribute: Some(attribute), reason });
@@ -132,7 +132,8 @@ impl<'a> Law<'a> {
         if self.element != name && !known {
             (self.activation, self.time_constant) = (Activation::None, Law::GENERAL.time_constant);
         }
-        // the shortcut sets all parts itself, but what it keeps of a refused element is unknown; adhesion has a constant gain
+        // the shortcut sets all parts itself, but keeps unknown parts of an unsupported element; adhesion has a
+        // constant gain
         let unknown = self.refused[0].filter(|_| self.element == "general").filter(|of| of.element.name != "adhesion");
         self.refused = [None; PARTS];
         self.refused[0] = unknown;
@@ -162,7 +163,7 @@ impl<'a> Law<'a> {
                 self.activation = Activation::Filter;
             }
             "motor" => *self = Law::GENERAL,
-            // those of a class, which the element may replace
+            // the class's settings, which the element may replace
             _ => {
                 *self = Law::GENERAL;
                 let refused = Some(Refused { element, attribute: None, reason: NO_ACTUATOR });
@@ -295,8 +296,8 @@ impl<'a> Law<'a> {
     }
 }
 
-/// Why the inputs that `<general>` names are refused, if they are. A law with one control has one input, and its name
-/// changes nothing.
+/// The reason for refusing the inputs in `<general>`, if they are not supported. A law with one control has one input,
+/// and the input's name changes nothing.
 fn input(element: &Element, attr: &Attr) -> Result<Option<&'static str>, MjcfError> {
     const INPUTS: [&str; 8] = ["pos", "vel", "ff", "voltage", "pressure", "none", "expmap", "quat"];
     let words: Vec<&str> = attr.value.split_ascii_whitespace().collect();

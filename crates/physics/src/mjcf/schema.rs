@@ -107,7 +107,7 @@ const TOP: &[Rule] = &[
     rule("statistic", "center extent meaninertia meanmass meansize", "", ""),
     section("visual", "", VISUAL),
     section("default", "class", &[]),
-    // a plugin acts only through an instance or where an element uses it
+    // a plugin has an effect only through an instance or an element that uses it
     section("extension", "", &[section("plugin", "plugin", &[refused("instance", "plugins are not supported")])]),
     section("asset", "", ASSET),
     section("worldbody", "", BODY),
@@ -287,7 +287,7 @@ macro_rules! actuator_reads {
         "name class joint jointinparent tendon gear ctrllimited ctrlrange forcelimited forcerange damping armature"
     };
 }
-/// Why other actuators are refused.
+/// The reason for refusing other actuators.
 pub(crate) const NO_ACTUATOR: &str =
     "only the actuators motor, position, velocity, intvelocity, damper, cylinder and general are supported";
 const ACTUATOR: &[Rule] = &[
@@ -297,7 +297,7 @@ const ACTUATOR: &[Rule] = &[
             actuator_reads!(),
             " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input"
         ),
-        // the two ranges are those of inputs that only the refused laws have
+        // only unsupported laws use the inputs that these two ranges limit
         concat!(actuator_ignores!(), " ffrange velrange"),
         concat!(actuator_refuses!(), " body"),
     ),
@@ -421,20 +421,20 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 const NOT_IN_CLASSES: &str =
     "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body";
 
-/// Elements that set defaults, beside those of actuators and the ones with rules of their own.
+/// Elements that set defaults, apart from actuators and elements with their own rules.
 const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];
 const DEFAULT: Rule = section("default", "class", &[]);
 const EQUALITY_DEFAULT: Rule = rule("equality", "active solref solimp", "", "");
-/// Actuators that are refused still set what all actuators have.
+/// Defaults of an unsupported actuator still set the attributes that all actuators share.
 const ACTUATOR_DEFAULT: Rule = rule("actuator", "", "", actuator_refuses!());
 
-/// The rule of an element that sets defaults.
+/// The rule for an element that sets defaults.
 fn rule_of_default(name: &str) -> Option<&'static Rule> {
     match name {
         "default" => return Some(&DEFAULT),
         "equality" => return Some(&EQUALITY_DEFAULT),
         "tendon" => return TENDON.first(),
-        // of no consequence unless it is used, which is refused
+        // it has no effect unless an element uses it, which is refused
         "mesh" => return ASSET.iter().find(|r| r.name == name),
         _ => {}
     }
@@ -442,9 +442,9 @@ fn rule_of_default(name: &str) -> Option<&'static Rule> {
     tables.filter(|r| DEFAULTS.contains(&r.name)).chain(ACTUATOR).find(|r| r.name == name)
 }
 
-/// An element of a `<default>` class: an element of the model without what is its own.
+/// Checks an element in a `<default>` class, which has the attributes of a model element except its own identity.
 ///
-/// What is not supported is refused only where an element uses it, see [`check_inherited`].
+/// An unsupported setting is refused only where an element uses it, see [`check_inherited`].
 fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
     let Some(rule) = rule_of_default(&child.name) else {
         let names = ACTUATOR.iter().map(|r| r.name).chain(DEFAULTS).chain(["default", "mesh", "equality", "tendon"]);
@@ -463,7 +463,7 @@ fn default(child: &Element, parent: &Element) -> Result<(), MjcfError> {
     }
 }
 
-/// Lets pass what is not supported in a class: no element may use it.
+/// Accepts unsupported settings in a class, because elements may not use them.
 pub(crate) fn tolerate<T>(outcome: Result<T, MjcfError>) -> Result<(), MjcfError> {
     match outcome {
         Err(error) if !matches!(error.kind, MjcfErrorKind::Unsupported { .. }) => Err(error),
@@ -471,7 +471,7 @@ pub(crate) fn tolerate<T>(outcome: Result<T, MjcfError>) -> Result<(), MjcfError
     }
 }
 
-/// Refuses what an element of the model inherits from its classes and does not replace.
+/// Refuses unsupported settings that an element of the model inherits from its classes and does not replace.
 pub(crate) fn check_inherited(attrs: &Attrs) -> Result<(), MjcfError> {
     for (i, layer) in attrs.defaults.iter().enumerate() {
         let Some(rule) = rule_of_default(&layer.name) else { continue };
@@ -479,7 +479,7 @@ pub(crate) fn check_inherited(attrs: &Attrs) -> Result<(), MjcfError> {
         let words = |attr: &Attr| attr.value.split_ascii_whitespace().count();
         for (name, neutral) in refuses(rule) {
             let Some(attr) = layer.attr(name).filter(|attr| !is_neutral(attr, neutral)) else { continue };
-            // a shorter list would replace a part of the numbers only
+            // a shorter list would replace only some of the numbers
             let later = attrs.chain().skip(i + 1).filter_map(|e| e.attr(name));
             if !later.into_iter().any(|own| words(own) >= words(attr)) {
                 return Err(not_supported(layer, attr, neutral));
@@ -492,7 +492,7 @@ pub(crate) fn check_inherited(attrs: &Attrs) -> Result<(), MjcfError> {
     Ok(())
 }
 
-/// Names of the attributes that a rule refuses, each with the values that are no different from its absence.
+/// Names of the attributes that a rule refuses, each with the values that equal the default.
 fn refuses(rule: &Rule) -> impl Iterator<Item = (&'static str, &'static str)> + use<> {
     rule.refuses.split_ascii_whitespace().map(|r| r.split_once('=').unwrap_or((r, "")))
 }

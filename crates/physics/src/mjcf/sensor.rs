@@ -114,7 +114,7 @@ pub(crate) fn compile(root: &Element, names: &Registry, model: &Model, room: &Ro
     let mut adr = 0;
     for element in entries(root, "sensor") {
         let sensor = sensor(element, names, model, adr)?;
-        // agents keep the values in vectors of up to 16 numbers
+        // agents store the values in vectors of up to 16 numbers
         room.take_for(element, sensor.dim, 16 * size_of::<f64>())?;
         adr += sensor.dim;
         sensors.push(sensor);

@@ -94,7 +94,7 @@ pub(crate) fn read<'a>(
 }
 
 impl<'a> BodySpec<'a> {
-    /// `own` is the frame that the body's attributes give, `frame` the same in the parent's frame.
+    /// `own` is the frame from the body's attributes. `frame` is the same frame relative to the parent.
     fn new(element: &'a Element, parent: usize, own: Frame, frame: Frame) -> Self {
         BodySpec {
             element,
@@ -110,7 +110,7 @@ impl<'a> BodySpec<'a> {
             cameras: Vec::new(),
             lights: Vec::new(),
             mass: 0.0,
-            // MuJoCo leaves a body without mass with its own frame here, without those of enclosing `<frame>` elements
+            // MuJoCo gives a body without mass its own frame here, without the enclosing `<frame>` elements
             iframe: own,
             inertia: [0.0; 3],
         }
@@ -286,18 +286,18 @@ impl CameraSpec<'_> {
     }
 }
 
-/// What the field of view follows from: an angle, or a sensor behind a lens.
+/// Source of the field of view: an angle, or a sensor behind a lens.
 pub(crate) struct Lens {
     fovy: f64,
     /// Width and height of the sensor, m; 0 without one.
     sensor: [f64; 2],
-    /// The same in pixels.
+    /// Width and height of the sensor, pixels.
     resolution: [f64; 2],
-    /// Focal lengths, m; the second counts for the vertical angle.
+    /// Focal lengths, m. The second one sets the vertical angle.
     focal: [f64; 2],
-    /// Focal lengths in pixels; where it is not 0 it counts instead.
+    /// Focal lengths, pixels. Nonzero values replace the lengths in meters.
     focal_pixel: [f64; 2],
-    /// Whether the principal point is elsewhere than in the middle; the angle is that of one in the middle.
+    /// Whether the principal point is off center. The angle then is that of a centered one.
     off_center: bool,
 }
 
@@ -318,8 +318,8 @@ impl Lens {
         })
     }
 
-    /// The vertical field of view in degrees, for a principal point in the middle; in single precision, as MuJoCo computes
-    /// that of a sensor.
+    /// The vertical field of view for a centered principal point, degrees. For a sensor it is computed in single
+    /// precision, as in MuJoCo.
     fn fovy(&self, element: &Element) -> Result<f64, MjcfError> {
         let fovy = self.fovy;
         if !(fovy > 0.0 && fovy < 180.0) {

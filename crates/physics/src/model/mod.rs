@@ -107,7 +107,7 @@ pub struct Options {
     pub tolerance: f64,
     /// Tolerance of the line search, as a fraction of the solver's.
     pub ls_tolerance: f64,
-    /// Solver that the file names.
+    /// Solver set in the file.
     pub solver: Solver,
     /// Parameters that replace those of every contact (`<flag override="enable"/>`), if any.
     pub contact_override: Option<ContactOverride>,
@@ -115,8 +115,8 @@ pub struct Options {
     pub flags: Flags,
 }
 
-/// Algorithm of the constraint solver, as the file names it. All of them find the same minimum; they differ where a low cap
-/// ends them before it.
+/// The constraint solver set in the file. All algorithms find the same minimum. Their results differ if a low cap stops
+/// them early.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Solver {
     /// Projected Gauss-Seidel.
@@ -172,7 +172,7 @@ pub struct Flags {
     pub eulerdamp: bool,
     /// Parents and children are excluded from colliding with each other.
     pub filterparent: bool,
-    /// Trees that no constraint ties together are solved on their own.
+    /// Trees that no constraint connects are solved separately.
     pub island: bool,
 }
 

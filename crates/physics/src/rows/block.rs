@@ -360,7 +360,7 @@ impl<T: Real> Row<T> for Block<T> {
 }
 
 impl<T: Real> Block<T> {
-    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    /// First and second derivative of the cost at the fraction `alpha` of the step `du`.
     #[inline(always)]
     pub(super) fn slope_along(&self, du: &RowValues<T>, alpha: T) -> [T; 2] {
         let z = T::zero();

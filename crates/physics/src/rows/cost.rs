@@ -1,5 +1,5 @@
-//! The cost of rows, and by how much it rises along a segment. Differences are taken zone by zone, as MuJoCo does: so they
-//! keep their digits where two costs are nearly equal.
+//! The cost of rows, and its increase along a segment. Differences are computed per zone, as in MuJoCo, so that they
+//! stay accurate if two costs are nearly equal.
 
 use super::block::{Block, RowValues};
 use super::cone::ConePoint;
@@ -8,16 +8,16 @@ use super::joint::{DryRow, LimitRow};
 use crate::lanes::Real;
 use crate::sim::Cost;
 
-/// The cost of a constraint, at the present point and along a way from there. The way is kept in the place of the Newton
-/// point: the difference of two points would lose the digits of a short one.
+/// The cost of a constraint at the current point and along a step from there. The step is stored instead of the Newton
+/// point, because the difference of two close points would lose digits.
 pub(crate) trait RowCost<T: Real> {
-    /// Cost at the present point.
+    /// Cost at the current point.
     fn cost(&self) -> T;
-    /// Cost at a fraction of the way less that of the present point, and its first and second derivative there.
+    /// Cost at a fraction of the step minus the cost at its start, and the first and second derivative there.
     fn along(&self, alpha: T) -> [T; 3];
 }
 
-/// Twice the cost of a row of unit stiffness that pushes below zero, from `x` on by `by`, minus that at `x`.
+/// Twice the increase in cost from `x` to `x + by`, for a row of unit stiffness that pushes below zero.
 #[inline(always)]
 fn push_rise<T: Real>(x: T, by: T) -> T {
     let zero = T::zero();
@@ -108,7 +108,7 @@ impl<T: Real> RowCost<T> for DryRow<T> {
 }
 
 impl<T: Real> Block<T> {
-    /// Cost of sticking in full, twice, at `u`.
+    /// Twice the cost of full sticking, at `u`.
     #[inline(always)]
     fn flat_cost(&self, u: &RowValues<T>) -> T {
         let mut sum = T::zero();
@@ -118,7 +118,7 @@ impl<T: Real> Block<T> {
         sum
     }
 
-    /// The same further on by `by`, minus that at `u`.
+    /// The increase of [`Block::flat_cost`] from `u` to `u + by`.
     #[inline(always)]
     fn flat_rise(&self, u: &RowValues<T>, by: &RowValues<T>) -> T {
         let mut sum = T::zero();
@@ -142,7 +142,7 @@ impl<T: Real> Block<T> {
             u[k] += by[k];
         }
         let (from, to) = (ConePoint::at(self, &self.u), ConePoint::at(self, &u));
-        // on the curved part, by the difference of the squares of the sliding speeds
+        // on the curved part, use the difference of the squared sliding speeds
         let mut squares = T::zero();
         for k in 1..self.dim {
             let m = self.mu[k - 1];

@@ -166,7 +166,7 @@ impl<T: Real> FloorRow<T> {
 }
 
 impl<T: Real> FloorRow<T> {
-    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    /// First and second derivative of the cost at the fraction `alpha` of the step `du`.
     #[inline(always)]
     pub(super) fn slope_along(&self, du: &V3<T>, alpha: T) -> [T; 2] {
         let u = [du[0].mul_add(alpha, self.u[0]), du[1].mul_add(alpha, self.u[1]), du[2].mul_add(alpha, self.u[2])];

@@ -78,7 +78,7 @@ impl<T: Real> LimitRow<T> {
 }
 
 impl<T: Real> LimitRow<T> {
-    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    /// First and second derivative of the cost at the fraction `alpha` of the step `du`.
     #[inline(always)]
     pub(super) fn slope_along(&self, du: T, alpha: T) -> [T; 2] {
         let u = du.mul_add(alpha, self.u);
@@ -150,7 +150,7 @@ impl<T: Real> DryRow<T> {
 }
 
 impl<T: Real> DryRow<T> {
-    /// First and second derivative of the cost at the fraction `alpha` of the way `du`.
+    /// First and second derivative of the cost at the fraction `alpha` of the step `du`.
     #[inline(always)]
     pub(super) fn slope_along(&self, du: T, alpha: T) -> [T; 2] {
         let u = du.mul_add(alpha, self.u);

@@ -85,7 +85,7 @@ pub struct Sim<T: Real> {
     /// Contacts have elliptic cones.
     pub(crate) elliptic: bool,
     pub(crate) warmstart: bool,
-    /// The solver's settings in models whose cap ends it before it has converged.
+    /// Solver settings of models whose iteration cap stops the solver before it converges.
     pub(crate) capped: Option<Caps>,
     pub(crate) max_newton: usize,
     /// Rows between moving bodies beyond which an agent is factorized on its own.

@@ -27,8 +27,8 @@ pub struct SimOptions {
     /// Simulate contacts with the static world alone even if the model's moving geoms could collide with each other (by
     /// their contype and conaffinity).
     pub ground_contacts_only: bool,
-    /// Overrides the model's cap on the solver's iterations. Below 50, the solver follows MuJoCo's iteration step by step and
-    /// stops where MuJoCo stops.
+    /// Overrides the model's cap on the solver's iterations. Below 50, the solver follows MuJoCo's iteration step by
+    /// step and stops where MuJoCo stops.
     pub max_newton: Option<usize>,
     /// Overrides the number of rows between moving bodies beyond which an agent is solved as a crowd (24). It changes
     /// the time of a step, and its results to rounding.

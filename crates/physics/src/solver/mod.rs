@@ -19,8 +19,8 @@
 //! each other's decisions: a lane that is done is frozen. On the curved side of an elliptic cone no point is exact; there
 //! a lane is done when the predicted improvement falls below MuJoCo's tolerance, or below rounding.
 //!
-//! All this is for models whose solver converges. Where the model's cap ends the iteration before that, the result depends
-//! on the way, and the way is MuJoCo's ([`capped`]).
+//! All this applies to models whose solver converges. If the model's cap stops the iteration earlier, the result
+//! depends on the path, and the solver takes MuJoCo's path ([`capped`]).
 
 mod blocks;
 mod capped;

@@ -67,11 +67,11 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
     }
 }
 
-/// Solves the present system: the Newton point, into `solution` and `link_acc`. Of agents in crowds, only those in `live`
-/// matter.
+/// Solves the current system: the Newton point, into `solution` and `link_acc`. For agents in crowds, only lanes in
+/// `live` matter.
 #[inline(always)]
 pub(super) fn solve_system<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, live: T::Mask, any_coupled: bool) {
-    // lanes whose tree is corrected for its coupled blocks, and those beside them
+    // lanes whose tree is corrected for its coupled blocks, and other lanes
     let (crowd, trees) = (T::any(work.solver.crowded), !T::all(work.solver.crowded));
     if crowd {
         crowd::factorize(sim, work, T::and(work.solver.crowded, live));

@@ -78,7 +78,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// The same by MuJoCo's own iteration, for models whose cap ends it early.
+    /// Forward dynamics with MuJoCo's own iteration, for models with a low cap.
     fn capped_fwd_constraint<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         solve_capped::<T, Full>(sim, group, work);
     }

@@ -52,7 +52,7 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     work.solver.stale.fill(true);
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
-    // where the solver has not converged, the forces are not what the accelerations need
+    // if the solver has not converged, the forces do not match the accelerations
     if sim.hard && sim.capped.is_none() {
         damp::<T, S>(sim, work);
     }

@@ -56,7 +56,7 @@ impl<T: Real> Kernel<T> for RkStage<'_, T> {
         for (s, rate) in rk.act_dot_sum.iter_mut().zip(act_dot) {
             *s = if first { *rate * w } else { rate.mul_add(w, *s) };
         }
-        // where the way of the solver matters, all stages start from the acceleration of the last step, as in MuJoCo
+        // if the solver's path matters, all stages start from the last step's acceleration, as in MuJoCo
         if sim.capped.is_none() || reach == 0.0 {
             group.qacc_warmstart.copy_from_slice(qacc);
         }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// First column, which orders the rows.
 const ITERATION: &str = "iteration";
-/// Memory of a table's cells per byte of its file: an empty cell is a comma.
+/// Memory of a table's cells per byte of its file. A single comma can be an empty cell.
 const CELL_MEMORY: f64 = 16.0;
 
 /// Appends rows, each of which reaches the file at once.
@@ -152,7 +152,7 @@ fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError
         }
         kept.push_str(line);
     }
-    // rows are appended in place, which would change every other name of the file, too
+    // appending in place would also change hard-linked copies of the file
     if kept.len() < text.len() || has_other_names(path) {
         write_atomic(path, kept.as_bytes())?
     }
@@ -161,7 +161,7 @@ fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError
     Ok(head.zip(lines.next_back()).map(|(head, last)| (head.into(), last.into())))
 }
 
-/// Whether a file has other names, as copies by hard links have.
+/// Whether a file has other names, such as hard-linked copies.
 fn has_other_names(path: &Path) -> bool {
     #[cfg(unix)]
     {

@@ -14,7 +14,7 @@ use plotters::style::FontStyle;
 /// Most points of a line; longer runs are averaged in bins.
 const POINTS: usize = 400;
 
-/// Largest number that is drawn.
+/// Largest number that can be drawn.
 const LARGEST: f64 = 1e15;
 
 const RETURN: RGBColor = RGBColor(32, 99, 178);
@@ -117,7 +117,7 @@ fn panel_of(area: &Area<'_>, label: &str, color: RGBColor, series: &Series) -> R
 impl Series {
     fn new(steps: &[Option<f64>], values: &[Option<f64>]) -> Self {
         let known: Vec<(f64, f64)> = steps.iter().zip(values).filter_map(|(x, y)| Some(((*x)?, (*y)?))).collect();
-        // no axis has other numbers; a table may
+        // an axis cannot show other numbers, but a table may contain them
         let known: Vec<_> = known.into_iter().filter(|(x, y)| x.abs() <= LARGEST && y.abs() <= LARGEST).collect();
         let bin = known.len().div_ceil(POINTS).max(1);
         let raw: Vec<(f64, f64)> = known

@@ -37,7 +37,7 @@ pub struct Reporter<'a> {
     last: (u64, f64),
     /// Why the run was ended, if by an error.
     pub error: Option<RunError>,
-    /// Whether all iterations have their rows and events, and a policy in `policies/` where one was due.
+    /// Whether all iterations have their rows and events, and each policy that was due is in `policies/`.
     pub told: bool,
 }
 
@@ -100,7 +100,7 @@ impl<'a> Reporter<'a> {
         } else {
             let mut output = snapshot.output();
             note_clips(&mut output, &self.clips);
-            // a run that is killed or stopped in between comes by here again
+            // after an interruption in between, the resumed run executes this again
             self.keep(&output.policy)?;
             self.told = true;
             self.plan(stats.steps);

@@ -90,7 +90,7 @@ impl EventLog {
         let seconds = now() as u64;
         let path = |n: usize| folder.path().join(format!("{EVENTS}.{seconds:010}.marathon.{n:04}"));
         let path = (older.len()..).map(path).find(|path| !older.contains(path)).unwrap_or_default();
-        // never through a link that somebody has put there
+        // never write through an existing link
         let file = OpenOptions::new().create_new(true).append(true).open(&path);
         let file = file.map_err(RunError::io(&path, "create"))?;
         let mut log = Self { path, file };

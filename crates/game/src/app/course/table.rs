@@ -114,7 +114,7 @@ pub fn default_path() -> Result<PathBuf, GameError> {
     Ok(folder.join("marathon/runs.sqlite"))
 }
 
-/// A replay in the folder of a table's; none if its name leads elsewhere, as one in a stranger's table may.
+/// Path of a replay in the table's folder. `None` if the name leads to another folder, as it may in an untrusted table.
 fn within(folder: &Path, name: &str) -> Option<PathBuf> {
     (Path::new(name).file_name() == Some(name.as_ref())).then(|| folder.join(name))
 }
@@ -187,7 +187,7 @@ impl Table {
                 ));
             }
         }
-        // a stranger's view may never end, and its triggers do what they like
+        // a view in an untrusted table may never end, and a trigger may change data
         let programs = "SELECT count(*) FROM sqlite_schema WHERE type IN ('view', 'trigger')";
         let programs: i64 = connection.query_row(programs, [], |row| row.get(0)).map_err(wrong)?;
         if programs > 0 {

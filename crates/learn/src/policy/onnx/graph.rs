@@ -21,7 +21,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// How many numbers it holds itself.
+    /// Number of numbers stored in the value itself.
     pub fn numbers(&self) -> usize {
         match self {
             Value::Constant(array) => array.data.len(),

@@ -16,7 +16,7 @@ use std::rc::Rc;
 
 /// Most operations of a graph: a policy has dozens.
 const MOST_NODES: usize = 4096;
-/// Memory that a file takes, in its own lengths: two bytes are an operation without inputs.
+/// Memory for decoding a file, as a multiple of its length. Two bytes can encode an operation without inputs.
 const DECODED: f64 = 64.0;
 /// Most numbers of an observation or an action.
 const LARGEST: usize = 1 << 16;
@@ -38,7 +38,7 @@ pub fn meta(bytes: &[u8]) -> Option<PolicyMeta> {
     noted(&model(Path::new(""), bytes).ok()?)
 }
 
-/// Decodes the bytes of a file.
+/// Decodes a file.
 fn model(path: &Path, bytes: &[u8]) -> Result<Model, Error> {
     budget::MEMORY.check(DECODED * bytes.len() as f64).map_err(|e| Error::budget(path, "file", e))?;
     Model::decode(bytes).map_err(|e| Error::file(path, "file", format!("'{e}'"), "an ONNX model"))
@@ -278,7 +278,7 @@ mod tests {
         vec![ValueInfo { name: "obs_0".into(), kind: Some(Type { tensor_type }) }]
     }
 
-    /// A file of a few megabytes that asks for a hundred gigabytes: the same matrix turned around again and again.
+    /// A file of a few megabytes that would need 100 GB: it transposes the same matrix many times.
     #[test]
     fn operations_may_not_multiply_memory() {
         let numbers = 1 << 18;
@@ -301,7 +301,7 @@ mod tests {
         assert!(text.contains("the limit 'memory' is 2 GB"), "{text}");
     }
 
-    /// The same numbers of a file beside the model's, named again and again.
+    /// Many tensors refer to the same numbers in an external file.
     #[test]
     fn neighbors_may_not_multiply_memory() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Constants of a graph, and the memory that they take.
+//! Constants of a graph, and their memory.
 
 use super::proto::{DOUBLE, FLOAT, INT64, Tensor};
 use marathon_physics::budget::{self, OverBudget};
@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
-/// Copies of a number that a network takes on its way to a policy.
+/// Number of copies of each number while a network becomes a policy.
 const COPIES: f64 = 6.0;
 
-/// Files beside the model's that hold the numbers of large tensors (PyTorch writes `model.onnx.data`), and how many numbers
-/// have been read and computed: a small file can name the same large one many times.
+/// The external files with the numbers of large tensors (PyTorch writes `model.onnx.data`). It counts all numbers that
+/// are read and computed, because a small file can refer to the same large tensor many times.
 pub struct Neighbors {
     folder: PathBuf,
     read: RefCell<BTreeMap<String, Rc<Vec<u8>>>>,
@@ -26,10 +26,10 @@ impl Neighbors {
         Neighbors { folder, read: RefCell::default(), numbers: Cell::new(0.0) }
     }
 
-    /// Counts numbers that are about to be made, or have been.
+    /// Counts numbers before or after they are allocated.
     ///
     /// # Errors
-    /// If all of them need too much memory.
+    /// If all counted numbers together exceed the memory limit.
     pub fn count(&self, numbers: usize) -> Result<(), OverBudget> {
         self.numbers.set(self.numbers.get() + numbers as f64);
         budget::MEMORY.check(COPIES * size_of::<f64>() as f64 * self.numbers.get())

@@ -1,4 +1,4 @@
-//! Numbers of a glTF file: accessors over views of buffers.
+//! Numbers in a glTF file: accessors into views of buffers.
 
 use super::super::Beside;
 use super::document::Document;
@@ -10,21 +10,21 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Types of components by glTF's numbers.
+/// Component types by their glTF numbers.
 const BYTE: u32 = 5120;
 const UNSIGNED_BYTE: u32 = 5121;
 const SHORT: u32 = 5122;
 const UNSIGNED_SHORT: u32 = 5123;
 const FLOAT: u32 = 5126;
 
-/// The buffers of a file, read as they are asked for.
+/// The buffers of a file, which are read on first use.
 pub(super) struct Buffers<'a> {
     pub path: &'a Path,
     pub document: &'a Document,
     pub blob: Option<&'a [u8]>,
     pub beside: Option<Beside<'a>>,
     read: BTreeMap<usize, Cow<'a, [u8]>>,
-    /// Bytes of all rows so far: many channels can name one accessor.
+    /// Bytes of all rows read so far. Many channels can refer to one accessor.
     asked: f64,
 }
 
@@ -33,7 +33,7 @@ impl<'a> Buffers<'a> {
         Buffers { path, document, blob, beside, read: BTreeMap::new(), asked: 0.0 }
     }
 
-    /// The rows of an accessor, `width` numbers each. `whole`: also integers that stand for numbers from -1 to 1.
+    /// The rows of an accessor, `width` numbers each. `whole` also allows integers that encode numbers from -1 to 1.
     pub fn rows(&mut self, place: &str, index: usize, width: usize, whole: bool) -> Result<Vec<f64>, MotionError> {
         let path = self.path;
         let wrong = |key: &str, found: String, expected: &str| Err(MotionError::value(path, key, found, expected));
@@ -76,7 +76,7 @@ impl<'a> Buffers<'a> {
             .and_then(|bytes| bytes.checked_add(accessor.byte_offset))
             .is_some_and(|bytes| bytes <= view.byte_length);
         let (begin, length) = (view.byte_offset, view.byte_length);
-        // rows that overlap would make many numbers of few bytes
+        // overlapping rows would expand a few bytes to many numbers
         if !within || stride < row {
             return wrong(&key, "data beyond the end".into(), "data within its view");
         }
@@ -148,7 +148,7 @@ fn number(kind: u32, bytes: &[u8]) -> f64 {
     }
 }
 
-/// A name whose spaces and the like are written as `%20`.
+/// Decodes a name in which spaces and similar characters are written as `%20`.
 fn unescaped(uri: &str) -> String {
     let (mut out, mut rest) = (Vec::new(), uri.as_bytes());
     while let Some((first, behind)) = rest.split_first() {

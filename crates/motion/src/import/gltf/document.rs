@@ -1,7 +1,7 @@
-//! The parts of a glTF file that move a skeleton, and the container of `.glb`.
+//! The parts of a glTF file that move a skeleton, and the `.glb` container.
 //!
-//! Meshes, materials and scenes are not read, so that nothing in them is refused: a scene without nodes, meshes with
-//! quantized or compressed vertices.
+//! The reader ignores meshes, materials and scenes, so nothing in them can be refused. Examples are a scene without
+//! nodes, or meshes with quantized or compressed vertices.
 
 use crate::error::MotionError;
 use crate::limits;
@@ -113,7 +113,7 @@ pub(super) struct Buffer {
     pub uri: Option<String>,
 }
 
-/// What VRM says of its bones.
+/// VRM's description of its bones.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Extensions {
@@ -163,7 +163,7 @@ struct Bone1 {
 }
 
 impl Extensions {
-    /// VRM's name of each node that has one.
+    /// The VRM names of nodes.
     pub fn bones(&self) -> BTreeMap<usize, String> {
         let old = self.vrm0.iter().flat_map(|vrm| &vrm.humanoid.human_bones);
         let old = old.filter_map(|bone| Some((bone.node?, bone.bone.clone())));
@@ -172,7 +172,7 @@ impl Extensions {
     }
 }
 
-/// Bytes of the header of a `.glb` file, and of that of a chunk.
+/// Size of the header of a `.glb` file, and of the header of a chunk, bytes.
 const HEADER: usize = 12;
 const CHUNK: usize = 8;
 

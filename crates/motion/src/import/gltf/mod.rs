@@ -1,8 +1,9 @@
-//! glTF animations in `.glb`, `.gltf`, `.vrm` and `.vrma` files, as Mixamo's characters have them after a pass through Blender,
-//! and Blender's own.
+//! glTF animations in `.glb`, `.gltf`, `.vrm` and `.vrma` files. Examples are Blender's own, and Mixamo's characters
+//! after conversion with Blender.
 //!
-//! The skeleton is the joints of the skin that the animation moves, or else the nodes that move and what hangs from them. Read are
-//! rotations of all joints, and the translations of the pelvis and of what carries it. Scales are read where they stand still.
+//! The skeleton consists of the joints of the skin that the animation moves. Without a skin, it consists of the moving
+//! nodes and their descendants. The reader takes the rotations of all joints, and the translations of the pelvis and
+//! the nodes above it. Scales must be constant.
 
 mod data;
 mod document;
@@ -22,13 +23,13 @@ use marathon_physics::hint::{did_you_mean, nearest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Keyframes are read at this step, s.
+/// Time between keyframes, s.
 const DT: f64 = 1.0 / 60.0;
-/// Deeper hierarchies are not of a figure.
+/// Limit on the depth of the hierarchy.
 const DEEPEST: usize = 200;
-/// glTF says that y points up; the motion has to say much against it.
+/// The glTF standard says that y points up, so the motion needs strong evidence for another axis.
 const TRUST_Y: f64 = 0.4;
-/// Most animations that a message names.
+/// Limit on the animations that a message lists.
 const NAMED: usize = 30;
 
 /// Values of a channel at its times.
@@ -45,7 +46,7 @@ struct Tracks {
     translation: Option<Track<DVec3>>,
 }
 
-/// Reads a `.glb` file; the path is for messages and names the motion.
+/// Reads a `.glb` file. The path is used in messages and to name the motion.
 ///
 /// # Errors
 /// If the file is not glTF, or has no animated skeleton.
@@ -72,7 +73,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     let order = order(path, nodes, &joints, &parents)?;
     let locals: Vec<(Local, f64)> =
         order.iter().map(|(node, _)| local(path, &nodes[*node], *node)).collect::<Result<_, _>>()?;
-    // lengths below a node grow by its scale and those of all above it
+    // the scales of a node and of all nodes above it multiply the lengths below it
     let mut scales: Vec<f64> = Vec::with_capacity(order.len());
     for ((_, parent), (_, own)) in order.iter().zip(&locals) {
         scales.push(own * parent.map_or(1.0, |parent| scales[parent]));
@@ -132,7 +133,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     upright::settle(path, Raw { about, skeleton, dt: DT, keyframes, trust_y: TRUST_Y, notes }, false, reading)
 }
 
-/// The animation of a name or index, or the first one; a note if there are others.
+/// Finds an animation by name or index. The default is the first one, with a note if there are others.
 fn choose(path: &Path, document: &Document, asked: Option<&str>) -> Result<(usize, Vec<String>), MotionError> {
     let name = |i: usize| document.animations[i].name.clone().unwrap_or_default();
     let count = document.animations.len();
@@ -158,7 +159,7 @@ fn choose(path: &Path, document: &Document, asked: Option<&str>) -> Result<(usiz
     }
 }
 
-/// The rotations and translations of an animation, by node. Other channels are not read.
+/// The rotations and translations of an animation, by node. Other channels are ignored.
 fn tracks(
     path: &Path,
     document: &Document,
@@ -207,7 +208,7 @@ fn tracks(
     Ok(tracks)
 }
 
-/// A channel, checked. Of cubic splines the values are kept and the tangents are not: at 60 keys per second they say nothing new.
+/// Checks a channel. Cubic splines keep their values but not their tangents, which matter little at 60 keys per second.
 fn track<T: Copy>(
     path: &Path,
     place: &str,
@@ -228,7 +229,7 @@ fn track<T: Copy>(
 }
 
 impl<T: Copy> Track<T> {
-    /// The value at a time, by interpolation between the values around it.
+    /// Interpolates between the values around a time.
     fn at(&self, time: f64, between: impl Fn(T, T, f64) -> T) -> T {
         let after = self.times.partition_point(|t| *t <= time);
         if after == 0 || after == self.times.len() || self.steps {
@@ -239,7 +240,7 @@ impl<T: Copy> Track<T> {
     }
 }
 
-/// The joints of the skin that turns most, or else the nodes that move and what hangs from them.
+/// The joints of the skin with the most rotating joints. Without a skin, the moving nodes and their descendants.
 fn joints(
     path: &Path,
     document: &Document,
@@ -294,8 +295,8 @@ fn parents(path: &Path, nodes: &[Node]) -> Result<Vec<Option<usize>>, MotionErro
     Ok(parents)
 }
 
-/// The nodes that carry the joint from which most joints hang, from the top down, and the joints; each with the place of its
-/// parent in the list. Nodes between joints are kept.
+/// Lists the nodes above the common root of most joints, from the top down, and then the joints. Each entry has its
+/// parent's position in the list. Nodes between joints are kept.
 fn order(
     path: &Path,
     nodes: &[Node],
@@ -330,7 +331,7 @@ fn order(
     for node in carriers.into_iter().rev() {
         order.push((node, order.len().checked_sub(1)));
     }
-    // depth first, in the order of the file
+    // depth first, in file order
     let mut open: Vec<(usize, usize)> =
         nodes[top].children.iter().rev().map(|child| (*child, order.len() - 1)).collect();
     while let Some((node, parent)) = open.pop() {
@@ -343,7 +344,7 @@ fn order(
     Ok(order)
 }
 
-/// The joint that carries the figure: the pelvis, or else the first joint below which the skeleton branches.
+/// The root joint of the skeleton: the pelvis. If there is none, the first joint below which the skeleton branches.
 fn root(whole: &Skeleton, order: &[(usize, Option<usize>)], joints: &BTreeSet<usize>) -> usize {
     let top = order.iter().position(|(node, _)| joints.contains(node)).unwrap_or(0);
     match roles::carrier(whole) {

@@ -1,19 +1,21 @@
-//! The height of the floor, found from the contacts of the feet.
+//! Finds the height of the floor from the contacts of the feet.
 
 use super::landmarks::Landmarks;
 use super::up::Moment;
 use crate::skeleton::SkeletonPose;
 
-/// Fastest fall or rise of the lowest joint that counts as a contact, m/s.
+/// Largest vertical speed of the lowest joint in a contact, m/s.
 const SLOW: f64 = 0.2;
-/// Share of the contacts that may be lower than the floor: noise.
+/// Share of contacts that may be below the floor, because of noise.
 const LOWEST: f64 = 0.1;
-/// Shortest time of contacts that tells of a floor, s: at the top of a jump, too, nothing falls or rises.
+/// Shortest total contact time that is enough to find a floor, s. A joint also stands still at the top of a jump.
 const SHORTEST: f64 = 0.1;
-/// The file's own floor counts if the contacts are nearer to it than this, m: nobody knows the soles better.
+/// Distance of the contacts from the file's own floor up to which that floor counts, m. The exact height of the soles
+/// is unknown.
 const TRUSTED: f64 = 0.08;
 
-/// Height of the floor of an upright recording, m; 0 if the contacts do not contradict it. The recording lasts `seconds`.
+/// Height of the floor of an upright recording that lasts `seconds`, m. The height is 0 if the contacts do not
+/// contradict that.
 pub(super) fn estimate(marks: &Landmarks, moments: &[Moment], stature: f64, dt: f64, seconds: f64) -> f64 {
     let low = |pose: &SkeletonPose| {
         marks.touching().map(|(joint, height)| pose.pos[joint].z - height * stature).fold(f64::INFINITY, f64::min)

@@ -1,18 +1,18 @@
-//! The joints that tell how a figure stands, found by their names.
+//! The joints that show a character's posture, found by their names.
 
 use crate::roles::{find, fork};
 use crate::skeleton::{Skeleton, SkeletonPose};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Joints of a figure, by index.
+/// Joints of a character, by index.
 #[derive(Clone, Debug)]
 pub(super) struct Landmarks {
     pub pelvis: usize,
     pub chest: usize,
     pub neck: Option<usize>,
     pub head: Option<usize>,
-    /// The left one and the right one.
+    /// The left and the right hip.
     pub hips: [usize; 2],
     pub knees: [usize; 2],
     pub ankles: [usize; 2],
@@ -23,8 +23,8 @@ pub(super) struct Landmarks {
 }
 
 impl Landmarks {
-    /// The landmarks of a skeleton; none if it lacks trunk, legs or arms. `known_as` has other names of joints, such as the
-    /// bodies that follow them.
+    /// Finds the landmarks of a skeleton. `None` if it lacks a trunk, legs or arms. `known_as` maps joints to other
+    /// names, such as the bodies that follow them.
     pub fn of(skeleton: &Skeleton, known_as: &BTreeMap<String, String>) -> Option<Self> {
         let mut named = skeleton.clone();
         for bone in &mut named.bones {
@@ -61,7 +61,7 @@ impl Landmarks {
         (sound && skeleton.hangs(marks.chest, pelvis) && marks.chest != pelvis).then_some(marks)
     }
 
-    /// The way along the bones from an ankle to the top of the figure, which does not depend on its pose.
+    /// Length along the bones from an ankle to the top of the skeleton. It does not depend on the pose.
     pub fn stature(&self, skeleton: &Skeleton) -> f64 {
         let length = |from: usize, to: usize| {
             let (mut way, mut at) = (0.0, from);
@@ -79,12 +79,12 @@ impl Landmarks {
         leg + top.map_or_else(|| 1.2 * length(self.shoulders[0], self.pelvis), |top| length(top, self.pelvis))
     }
 
-    /// From the point between the hips to that between the shoulders.
+    /// Vector from the midpoint of the hips to the midpoint of the shoulders.
     pub fn trunk(&self, pose: &SkeletonPose) -> DVec3 {
         middle(pose, self.shoulders) - middle(pose, self.hips)
     }
 
-    /// Joints that can touch the ground, each with its usual height above it there, as a share of the stature.
+    /// Joints that can touch the ground, each with its usual height above the ground as a share of the stature.
     pub fn touching(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let with = |height: f64| move |joint: usize| (joint, height);
         (self.ankles.into_iter().map(with(0.05)))
@@ -97,7 +97,7 @@ impl Landmarks {
     }
 }
 
-/// The point between two joints.
+/// The midpoint of two joints.
 pub(super) fn middle(pose: &SkeletonPose, [a, b]: [usize; 2]) -> DVec3 {
     0.5 * (pose.pos[a] + pose.pos[b])
 }

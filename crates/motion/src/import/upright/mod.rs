@@ -1,7 +1,7 @@
-//! From a file's axes and unit to an upright figure in meters that stands on the floor at z = 0.
+//! Converts a recording from its file's axes and unit to an upright character in meters, on a floor at z = 0.
 //!
-//! Files do not reliably tell their unit, which way is up, where the floor is, or how the figure stands while all its joints
-//! are at rest. All four are found here, from the bones and from the motion.
+//! Files do not reliably state their unit, the up axis, the height of the floor, or the standing pose. This module
+//! finds all four from the bones and the motion.
 
 mod floor;
 mod landmarks;
@@ -21,10 +21,10 @@ use landmarks::Landmarks;
 use std::path::Path;
 use up::Moment;
 
-/// Most moments of a recording that are looked at.
+/// Limit on the moments that are sampled from a recording.
 const MOMENTS: usize = 1500;
 
-/// The recording as an animation, and notes on what was found.
+/// Converts the recording to an animation, with notes on the properties found.
 pub(super) fn settle(path: &Path, mut raw: Raw, wraps: bool, reading: &Reading) -> Result<Recording, MotionError> {
     let count = raw.keyframes.len();
     if count < 2 {
@@ -68,7 +68,7 @@ pub(super) fn settle(path: &Path, mut raw: Raw, wraps: bool, reading: &Reading) 
         notes.push(format!("{up} points up, as the motion shows; --up y|z|... says otherwise"));
     }
 
-    // upright, in meters
+    // convert to upright, in meters
     let unit = unit(stature);
     let upright = up.upright();
     for bone in &mut raw.skeleton.bones {
@@ -80,7 +80,7 @@ pub(super) fn settle(path: &Path, mut raw: Raw, wraps: bool, reading: &Reading) 
     }
     let moments = if marks.is_some() { moments(&raw.skeleton, &raw.keyframes) } else { Vec::new() };
     let rested = match rest_up.map(|up| (Up::nearest(up), up)) {
-        // an axis that is nearly that of the trunk is meant to be it
+        // an axis close to the trunk's direction is meant to be vertical
         Some((axis, trunk)) if axis.axis().dot(trunk) > 0.85 => axis.upright(),
         Some((_, trunk)) => DQuat::from_rotation_arc(trunk, DVec3::Z),
         None => upright,
@@ -105,7 +105,7 @@ pub(super) fn settle(path: &Path, mut raw: Raw, wraps: bool, reading: &Reading) 
     Ok(Recording { animation, notes })
 }
 
-/// Puts an upright recording in meters on the floor; a note if the file's floor is elsewhere.
+/// Moves an upright recording in meters so that its floor is at 0. Returns a note if the file's floor is elsewhere.
 pub(super) fn ground(skeleton: &Skeleton, keyframes: &mut [Keyframe], dt: f64, reading: &Reading) -> Option<String> {
     let marks = Landmarks::of(skeleton, &reading.known_as).filter(|_| keyframes.len() > 1);
     let moments = if marks.is_some() { moments(skeleton, keyframes) } else { Vec::new() };
@@ -135,7 +135,7 @@ fn turn_first(turn: &mut [f64; 4], by: DQuat) {
     *turn = wxyz((by * quat(turn)).normalize());
 }
 
-/// Moments of the whole recording, evenly spread.
+/// Moments spread evenly over the whole recording.
 fn moments(skeleton: &Skeleton, keyframes: &[Keyframe]) -> Vec<Moment> {
     let pairs = keyframes.len() - 1;
     let step = pairs.div_ceil(MOMENTS).max(1);

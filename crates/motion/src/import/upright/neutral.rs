@@ -1,9 +1,11 @@
-//! The pose in which a figure stands upright, legs straight and arms out to the sides, for skeletons that rest in another.
+//! Finds an upright pose, with straight legs and arms out to the sides, for skeletons with another rest pose.
 //!
-//! Retargeting compares a recording with the skeleton's rest pose, so that this pose has to show the figure as it stands. Some
-//! skeletons rest with all bones along one axis. Their bones' own axes are found from the motion then: the way to the next
-//! joint, the axis about which the knee or the elbow bends, the side on which the other hip or shoulder is, and for a foot the
-//! direction that points up while it stands.
+//! Retargeting compares a recording with the skeleton's rest pose, so the rest pose has to be a standing pose. In some
+//! skeletons, all bones point along one axis at rest. For those, the bones' axes are found from the motion:
+//! - the direction to the next joint
+//! - the axis about which the knee or the elbow bends
+//! - the side of the other hip or shoulder
+//! - for a foot, the direction that points up while the foot stands
 
 use super::landmarks::{Landmarks, middle};
 use super::up::Moment;
@@ -11,17 +13,17 @@ use crate::rotation::{log, quat, wxyz};
 use crate::skeleton::{Skeleton, SkeletonPose};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Largest angle between a trunk and the legs below it, or of a knee, in a pose that shows a figure standing, degrees.
+/// Largest bend of a hip or knee in a standing pose, degrees.
 const BENT: f64 = 40.0;
-/// Largest difference between what a rest pose and the motion say of how two neighboring bones stand, degrees.
+/// Largest difference between the rest pose and the motion in the orientation of two neighboring bones, degrees.
 const TWISTED: f64 = 50.0;
-/// Weight of a bone's twist relative to its parent beside that of a bent knee or elbow.
+/// Weight of a bone's twist relative to its parent, compared with a bent knee or elbow.
 const STRAIGHT: f64 = 0.15;
-/// A foot stands if its ankle is slower than this, m/s, and lower than this above the lowest ankle of the recording, m.
+/// A foot stands if its ankle is slower than this, m/s, and less than this above its lowest height in the recording, m.
 const FOOT_SPEED: f64 = 0.25;
 const FOOT_HEIGHT: f64 = 0.08;
 
-/// The direction in which a figure of this pose is upright; none if it does not stand.
+/// The up direction of a standing pose; `None` if the pose does not stand.
 pub(super) fn upward(marks: &Landmarks, pose: &SkeletonPose) -> Option<DVec3> {
     let way = |from: usize, to: usize| (pose.pos[to] - pose.pos[from]).normalize_or_zero();
     let within = |a: DVec3, b: DVec3, degrees: f64| {
@@ -38,7 +40,7 @@ pub(super) fn upward(marks: &Landmarks, pose: &SkeletonPose) -> Option<DVec3> {
     (stands && sides).then_some(trunk)
 }
 
-/// Axes of a bone in its own frame: the first one and the second one are to point along these axes of the world.
+/// Two axes of a bone in its own frame, and the world axes that they should point along.
 struct Axes {
     own: [DVec3; 2],
     world: [DVec3; 2],
@@ -56,7 +58,7 @@ impl Axes {
     }
 }
 
-/// What the motion says of the bones.
+/// Finds the orientation of bones from the motion.
 struct Look<'a> {
     marks: &'a Landmarks,
     moments: &'a [Moment],
@@ -64,13 +66,13 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The mean of a direction in the frame of a joint.
+    /// The mean of a direction, in the frame of a joint.
     fn mean(&self, joint: usize, direction: impl Fn(&SkeletonPose) -> DVec3) -> DVec3 {
         self.moments.iter().map(|moment| moment.now.quat[joint].conjugate() * direction(&moment.now)).sum()
     }
 
-    /// The axis, in a joint's frame, about which the second of two bones bends to the rear; an elbow's to the front. Where
-    /// they are straight, it is an axis of the bone above, turned as little as possible.
+    /// The axis, in a joint's frame, about which the second of two bones bends: knees to the rear, elbows to the front.
+    /// For straight limbs it is the given axis of the bone above, with the smallest possible rotation.
     fn hinge(&self, joint: usize, bend: [usize; 3], above: impl Fn(&SkeletonPose) -> [DVec3; 2]) -> DVec3 {
         let [a, b, c] = bend;
         self.mean(joint, |pose| {
@@ -91,11 +93,11 @@ impl Look<'_> {
         };
         let sum: DVec3 =
             self.moments.iter().filter(stands).map(|moment| moment.now.quat[ankle].conjugate() * DVec3::Z).sum();
-        // a foot that stands on its toes or lies on its back tells nothing
+        // without a clear direction, as for a foot on its toes, return `None`
         sum.try_normalize()
     }
 
-    /// The way from the pelvis up along the trunk, in the pelvis's frame.
+    /// The direction from the pelvis up along the trunk, in the pelvis's frame.
     fn spine(&self, skeleton: &Skeleton) -> DVec3 {
         let mut chain = vec![self.marks.chest];
         while let Some(parent) = skeleton.bones[chain[chain.len() - 1]].parent.filter(|p| *p != self.marks.pelvis) {
@@ -107,7 +109,7 @@ impl Look<'_> {
         self.mean(from, |pose| pose.pos[first] - pose.pos[from])
     }
 
-    /// The way up from the chest, in its frame.
+    /// The direction up from the chest, in the chest's frame.
     fn chest_up(&self) -> DVec3 {
         let chest = self.marks.chest;
         let neck = self.marks.neck.or(self.marks.head).filter(|neck| *neck != chest);
@@ -121,7 +123,7 @@ impl Look<'_> {
         self.mean(chest, |pose| self.marks.trunk(pose))
     }
 
-    /// The turn of each landmark's joint in the pose.
+    /// The rotation of each landmark's joint in the standing pose.
     fn turns(&self, skeleton: &Skeleton) -> Option<Vec<(usize, DQuat)>> {
         let marks = self.marks;
         let across =
@@ -192,7 +194,7 @@ impl Look<'_> {
     }
 }
 
-/// Whether a rest pose, upright, shows the trunk and the legs as the motion does, but for what people can turn.
+/// Whether an upright rest pose agrees with the motion on trunk and legs, within the rotations that people can make.
 pub(super) fn agrees(skeleton: &Skeleton, marks: &Landmarks, moments: &[Moment], dt: f64, rest: &SkeletonPose) -> bool {
     let Some(turns) = (Look { marks, moments, dt }).turns(skeleton) else { return true };
     let off = |joint: usize| {
@@ -204,7 +206,8 @@ pub(super) fn agrees(skeleton: &Skeleton, marks: &Landmarks, moments: &[Moment],
     pairs.into_iter().all(|(a, b)| log(off(a) * off(b).conjugate()).length().to_degrees() < TWISTED)
 }
 
-/// The skeleton with this pose as its rest pose; none if the motion does not tell enough. The moments are upright, in meters.
+/// The skeleton with the standing pose as its rest pose; `None` if the motion does not show enough. The moments are
+/// upright, in meters.
 pub(super) fn standing(skeleton: &Skeleton, marks: &Landmarks, moments: &[Moment], dt: f64) -> Option<Skeleton> {
     let turns = Look { marks, moments, dt }.turns(skeleton)?;
     let mut standing = skeleton.clone();
@@ -222,7 +225,7 @@ pub(super) fn standing(skeleton: &Skeleton, marks: &Landmarks, moments: &[Moment
     Some(standing)
 }
 
-/// The mean turn of a joint in the frame of its parent.
+/// The mean rotation of a joint in its parent's frame.
 fn mean_turn(moments: &[Moment], joint: usize, parent: Option<usize>) -> Option<DQuat> {
     let local =
         |pose: &SkeletonPose| parent.map_or(pose.quat[joint], |up| pose.quat[up].conjugate() * pose.quat[joint]);
@@ -239,7 +242,7 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
     libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees()
 }
 
-/// The smallest turn from one direction to another.
+/// The smallest rotation from one direction to another.
 fn between(from: DVec3, to: DVec3) -> DQuat {
     match (from.try_normalize(), to.try_normalize()) {
         (Some(from), Some(to)) => DQuat::from_rotation_arc(from, to),

@@ -1,4 +1,4 @@
-//! Which axis of a file points up, found from the motion.
+//! Finds the axis of a file that points up from the motion.
 
 use super::landmarks::{Landmarks, middle};
 use crate::rotation::exp;
@@ -40,7 +40,7 @@ impl Up {
         }
     }
 
-    /// The turn that makes the axis point to +z.
+    /// The rotation that turns the axis to +z.
     pub(super) fn upright(self) -> DQuat {
         match self {
             Up::X => exp(DVec3::NEG_Y * FRAC_PI_2),
@@ -58,7 +58,7 @@ impl Up {
         Up::ALL.into_iter().max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or(Up::Y)
     }
 
-    /// What speaks for this axis before anything has moved: files point y up, or z.
+    /// Score of the axis before any motion counts. Most files have y up, some z.
     fn prior(self, trust_y: f64) -> f64 {
         match self {
             Up::Y => 0.15 + trust_y,
@@ -83,19 +83,19 @@ impl fmt::Display for Up {
     }
 }
 
-/// Two poses of a recording that follow each other.
+/// Two consecutive poses of a recording.
 pub(super) struct Moment {
     pub now: SkeletonPose,
     pub next: SkeletonPose,
 }
 
-/// Speed of a joint below which it may carry the figure, in statures per second.
+/// Speed of a joint below which it may support the character, in statures per second.
 const STILL: f64 = 0.15;
-/// Speed of the trunk above which the figure moves over what carries it, in statures per second.
+/// Speed of the trunk above which the character moves relative to its supports, in statures per second.
 const MOVING: f64 = 0.12;
 
-/// The axis along which the head is above the hips and the limbs that stand still are below the trunk. Lengths of the
-/// recording are compared with the stature.
+/// The axis along which the head is above the hips and the resting limbs are below the trunk. Lengths are measured
+/// relative to the stature.
 pub(super) fn estimate(
     marks: &Landmarks,
     moments: &[Moment],
@@ -134,8 +134,8 @@ pub(super) fn estimate(
     Up::ALL.into_iter().max_by(|a, b| score(*a).total_cmp(&score(*b))).unwrap_or(Up::Y)
 }
 
-/// The mean direction of what points up while people stand, sit, walk and crawl: from the hips to the shoulders, on to the head,
-/// from the knees to the hips, and from the elbows to the shoulders.
+/// The mean of directions that point up while people stand, sit, walk and crawl. They lead from the hips to the
+/// shoulders, from the neck to the head, from the knees to the hips, and from the elbows to the shoulders.
 fn posture(marks: &Landmarks, pose: &SkeletonPose) -> DVec3 {
     let way = |from: usize, to: usize| (pose.pos[to] - pose.pos[from]).normalize_or_zero();
     let mut sum = marks.trunk(pose).normalize_or_zero();

@@ -1,5 +1,5 @@
-//! MuJoCo's conjugate gradients (`solver="CG"`): the gradient preconditioned by the mass matrix, and the direction of Hager and
-//! Zhang.
+//! MuJoCo's conjugate gradients (`solver="CG"`): the mass matrix preconditions the gradient, and Hager and Zhang's
+//! formula gives the direction.
 
 use super::islands;
 use super::line::LEAST;
@@ -9,10 +9,10 @@ use crate::lanes::Real;
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
-/// Bound of the direction's share in the next one.
+/// Bound on the previous direction's share in the next one.
 const ETA: f64 = 0.01;
 
-/// `inv(M)` times the gradient, into `solution`: the factors are those of the acceleration without constraints.
+/// Computes `inv(M)` times the gradient into `solution`, with the factors of the unconstrained acceleration.
 #[inline(always)]
 pub(super) fn precondition<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &Capped<T>) {
     work.solver.rhs.copy_from_slice(&c.gradient);
@@ -38,7 +38,7 @@ pub(super) fn direction<T: Real>(sim: &Sim<T>, work: &Work<T>, c: &mut Capped<T>
     c.old_descent.copy_from_slice(&work.solver.solution);
 }
 
-/// How much of the former direction each island keeps, in the place of the fractions of the way.
+/// The share of the previous direction that each island keeps, stored in `alpha`.
 #[inline(always)]
 fn shares<T: Real>(sim: &Sim<T>, work: &Work<T>, c: &mut Capped<T>) {
     let mut others = vec![[T::zero(); 3]; sim.trees];

@@ -1,5 +1,5 @@
-//! Islands: trees that constraints tie together. MuJoCo solves each for itself, so each has its own line search and stops
-//! when it has converged.
+//! Islands: trees that constraints connect. MuJoCo solves each island separately, with its own line search and its own
+//! convergence check.
 
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::Jacobian;
@@ -7,7 +7,7 @@ use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
 kernel_fn! {
-    /// Finds the islands of every lane, and the trees that rows belong to.
+    /// Finds the islands of every lane, and the trees of every row.
     pub(super) fn find<'a, T>(sim: &'a Sim<T>, work: &'a Work<T>, c: &'a mut Capped<T>) {
         let tree_of_dof = |d: usize| sim.links[sim.dof_link[d]].tree;
         let alone = sim.capped.as_ref().is_some_and(|x| x.islands);
@@ -56,7 +56,7 @@ kernel_fn! {
         }
         c.first_home.push(c.homes.len());
         for i in 0..c.island.len() {
-            // earlier trees have their roots already
+            // earlier trees already have their roots
             c.island[i] = c.island[c.island[i] * T::LANES + i % T::LANES];
         }
         if !alone {
@@ -67,7 +67,7 @@ kernel_fn! {
     }
 }
 
-/// Makes one island of those of two trees, in some lanes.
+/// Merges the islands of two trees, in some lanes.
 fn unite<T: Real>(island: &mut [usize], a: usize, b: usize, lanes: u32) {
     for lane in (0..T::LANES).filter(|lane| lanes >> lane & 1 == 1) {
         let root = |mut tree: usize| {
@@ -81,7 +81,7 @@ fn unite<T: Real>(island: &mut [usize], a: usize, b: usize, lanes: u32) {
     }
 }
 
-/// Adds the sums of trees to those of their islands' first trees.
+/// Adds the sums of trees to the first tree of their island.
 pub(super) fn gather<T: Real>(island: &[usize], sums: &mut [[T; 3]]) {
     for tree in 1..sums.len() {
         for lane in 0..T::LANES {
@@ -97,12 +97,12 @@ pub(super) fn gather<T: Real>(island: &[usize], sums: &mut [[T; 3]]) {
 }
 
 impl<T: Real> Capped<T> {
-    /// Trees and lanes that are the first of an island that still moves.
+    /// Trees and lanes that are the first of an island that is not finished.
     pub(super) fn leads(&self, tree: usize, lane: usize) -> bool {
         self.live[tree] >> lane & 1 == 1 && self.island[tree * T::LANES + lane] == tree
     }
 
-    /// The island that a tree leads stays where it is from now on.
+    /// Marks the island of this first tree as finished.
     pub(super) fn stop(&mut self, tree: usize, lane: usize) {
         for other in tree..self.live.len() {
             if self.island[other * T::LANES + lane] == tree {

@@ -1,13 +1,14 @@
-//! MuJoCo's line search (`PrimalSearch` in its `engine_solver.c`), turned inside out: it says where it wants to know the
-//! cost, and is fed the answer. So every agent runs its own search while the costs are evaluated in lanes.
+//! MuJoCo's line search (`PrimalSearch` in its `engine_solver.c`) as a state machine: it returns the point where it
+//! needs the cost, and continues with the answer. This way each agent runs its own search while the costs are evaluated
+//! in lanes.
 
-/// Least curvature, and least length of a direction (`mjMINVAL`).
+/// Smallest curvature, and smallest length of a direction (`mjMINVAL`).
 pub(super) const LEAST: f64 = 1e-15;
 
-/// The cost along the way, relative to its start, with its derivatives.
+/// The cost along the direction, relative to its start, with its derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Point {
-    /// Fraction of the way.
+    /// Fraction of the step.
     pub alpha: f64,
     pub cost: f64,
     pub slope: f64,
@@ -15,13 +16,13 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// Where Newton's method in one dimension goes from here.
+    /// The next point of Newton's method in one dimension.
     fn newton(&self) -> f64 {
         self.alpha - self.slope / self.curvature
     }
 }
 
-/// What the search waits for.
+/// The evaluation that the search needs next.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
     Start,
@@ -33,30 +34,30 @@ enum Phase {
     NextOfSecond,
 }
 
-/// A line search that waits for the cost at [`LineSearch::wanted`].
+/// A line search that needs the cost at [`LineSearch::wanted`].
 #[derive(Clone, Debug)]
 pub(super) struct LineSearch {
     phase: Phase,
     wanted: f64,
     /// Rounds to the precision in which the cost is evaluated.
     round: fn(f64) -> f64,
-    /// Slope at which a point counts as the minimum.
+    /// Slope below which a point counts as the minimum.
     enough: f64,
     most: usize,
     evaluations: usize,
     start: Point,
-    /// Sign of minus the slope at the first Newton point.
+    /// Sign of the negative slope at the first Newton point.
     sign: f64,
-    /// Ends of the bracket, where each would go next, and the middle.
+    /// Ends of the bracket, the next Newton point from each, and the middle.
     ends: [Point; 2],
     next: [Point; 2],
     middle: Point,
-    /// Candidates of the present round, and whether the first end moved in it.
+    /// Candidates of the current round, and whether the first end has moved in it.
     candidates: [Point; 3],
     first_moved: bool,
 }
 
-/// How a search ended: the fraction of the way, and by how much the cost falls.
+/// Result of a search: the fraction of the step, and the decrease of the cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     pub alpha: f64,
@@ -64,8 +65,8 @@ pub(super) struct Found {
 }
 
 impl LineSearch {
-    /// A search that takes slopes below `enough` for zero and evaluates the cost, at fractions that `round` leaves alone,
-    /// about `most` times.
+    /// A search that treats slopes below `enough` as zero. It evaluates the cost about `most` times, at fractions
+    /// rounded by `round`.
     pub fn new(enough: f64, most: usize, round: fn(f64) -> f64) -> Self {
         let p = Point::default();
         LineSearch {
@@ -85,12 +86,13 @@ impl LineSearch {
         }
     }
 
-    /// Where the cost is to be evaluated next.
+    /// The point where the search needs the cost next.
     pub fn wanted(&self) -> f64 {
         self.wanted
     }
 
-    /// Goes on with the cost, slope and curvature at [`LineSearch::wanted`], until it needs another or has ended.
+    /// Continues with the cost, slope and curvature at [`LineSearch::wanted`], until the search needs another point or
+    /// has ended.
     pub fn feed(&mut self, [cost, slope, curvature]: [f64; 3]) -> Option<Found> {
         self.evaluations += 1;
         let curvature = if curvature <= 0.0 { LEAST } else { curvature };
@@ -151,7 +153,7 @@ impl LineSearch {
         None
     }
 
-    /// Newton's method until the minimum has been passed.
+    /// Newton's method until it passes the minimum.
     fn one_sided(&mut self) -> Option<Found> {
         let first = self.ends[0];
         if self.sign * first.slope <= -self.enough && self.evaluations < self.most {
@@ -169,7 +171,7 @@ impl LineSearch {
         self.ask(Phase::FirstBeyond, first.newton())
     }
 
-    /// The next round within the bracket, or the better end.
+    /// Starts the next round within the bracket, or ends at the better end.
     fn bracketed(&mut self) -> Option<Found> {
         let [a, b] = self.ends;
         if self.evaluations < self.most {
@@ -184,12 +186,12 @@ impl LineSearch {
         }
     }
 
-    /// The second end's turn.
+    /// Continues with the second end.
     fn second(&mut self) -> Option<Found> {
         if narrow(&mut self.ends[1], &self.candidates) {
             return self.ask(Phase::NextOfSecond, self.ends[1].newton());
         }
-        // neither end can move: that is as accurate as numbers are
+        // neither end can move: the result is as accurate as the precision allows
         if self.first_moved { self.bracketed() } else { found(&self.middle) }
     }
 }
@@ -198,7 +200,7 @@ fn found(point: &Point) -> Option<Found> {
     Some(Found { alpha: point.alpha, improvement: -point.cost })
 }
 
-/// Moves an end of the bracket to the candidates on its side that are nearer to the minimum.
+/// Moves an end of the bracket to candidates on its side that are closer to the minimum.
 fn narrow(end: &mut Point, candidates: &[Point; 3]) -> bool {
     let mut moved = false;
     for c in candidates {

@@ -1,18 +1,18 @@
-//! MuJoCo's own iteration, for models whose cap ends it before it has converged.
+//! MuJoCo's own iteration, for models whose iteration cap stops the solver before it converges.
 //!
-//! The minimum does not depend on the way there. The point after one, two or five iterations does, and such a model was
-//! tuned with that point. So here the way is MuJoCo's (`engine_solver.c`):
+//! The minimum does not depend on the path to it. The point after one, two or five iterations does, and such a model
+//! was tuned with that point. So this solver takes MuJoCo's path (`engine_solver.c`):
 //!
 //! * The start is the better of the last step's acceleration and the one without constraints.
-//! * The direction is Newton's, `a1 - a`, for the active set at the present point, or that of conjugate gradients
+//! * The direction is Newton's, `a1 - a`, for the active set at the current point, or that of conjugate gradients
 //!   ([`conjugate`]).
 //! * The line search evaluates the same points as MuJoCo's ([`line`]).
 //! * Every island of trees stops by its own improvement, gradient, or predicted improvement ([`islands`]).
 //!
-//! The Newton points come from the same factorizations as in the other iteration ([`newton`](super::newton)). This one has no
-//! identities to save work with. It computes the acceleration without constraints `a_s`, which costs one more factorization,
-//! and the cost of moving the masses, `1/2 (a - a_s)' M (a - a_s)`. M is never formed: products with it are sums over the
-//! momenta of links.
+//! The Newton points use the same factorizations as the other iteration ([`newton`](super::newton)), but without its
+//! shortcuts. This iteration also computes the unconstrained acceleration `a_s`, which needs one more factorization.
+//! Its cost includes that of the masses, `1/2 (a - a_s)' M (a - a_s)`. M is never formed: products with it are sums
+//! over the momenta of links.
 
 mod conjugate;
 mod islands;
@@ -27,7 +27,7 @@ use crate::sim::{Caps, Sim};
 use crate::state::{Capped, Group, Work};
 use line::{LEAST, LineSearch};
 
-/// The acceleration where MuJoCo's iteration ends, into `qacc`; rows end with the forces there.
+/// Computes the acceleration where MuJoCo's iteration ends into `qacc`, and the rows' forces there.
 #[inline(always)]
 pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let mut c = std::mem::take(&mut work.solver.capped);
@@ -86,13 +86,13 @@ fn iterate<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, group: &Group<T>, work:
     work.stats.unconverged += u64::from(lanes(c).count_ones());
 }
 
-/// Lanes in which some island moves.
+/// Lanes with an unfinished island.
 #[inline(always)]
 fn lanes<T: Real>(c: &Capped<T>) -> u32 {
     c.live.iter().fold(0, |a, b| a | b)
 }
 
-/// The acceleration without constraints.
+/// Computes the unconstrained acceleration.
 #[inline(always)]
 fn smooth<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     work.solver.in_contact.fill(false);
@@ -107,8 +107,8 @@ fn smooth<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>
     c.smooth_acc.copy_from_slice(&work.solver.link_acc);
 }
 
-/// Starts at the last step's acceleration or at the one without constraints, whichever costs less; trees that nothing
-/// constrains take the latter.
+/// Starts at the last step's acceleration or at the unconstrained one, whichever costs less. Trees without constraints
+/// take the unconstrained one.
 #[inline(always)]
 fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     for row in &work.rows.contacts {
@@ -150,7 +150,7 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, 
     }
 }
 
-/// By what MuJoCo divides costs and gradients before it compares them with the tolerance.
+/// The divisor of costs and gradients before MuJoCo compares them with the tolerance.
 #[inline(always)]
 fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut Capped<T>) {
     c.scale.fill(caps.scale);
@@ -182,7 +182,7 @@ fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut 
     }
 }
 
-/// Derivative of the cost by the accelerations: what the masses need less what the constraints exert.
+/// Gradient of the cost by the accelerations: the forces that the masses need minus those of the constraints.
 #[inline(always)]
 fn gradient<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     work.solver.rhs.fill(T::zero());
@@ -209,7 +209,7 @@ fn gradient<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<
     }
 }
 
-/// By island, the square of the gradient.
+/// The squared gradient of each island.
 #[inline(always)]
 fn squares_of_gradient<T: Real>(sim: &Sim<T>, c: &mut Capped<T>) {
     for sums in c.sums.iter_mut() {
@@ -224,8 +224,8 @@ fn squares_of_gradient<T: Real>(sim: &Sim<T>, c: &mut Capped<T>) {
     islands::gather(&c.island, &mut c.sums);
 }
 
-/// Stops the islands whose last improvement or whose gradient is below the tolerance. Returns, by tree, the lanes with
-/// such a gradient: at the start that alone does not end the iteration.
+/// Finishes the islands whose last improvement or gradient is below the tolerance. Returns, by tree, the lanes with
+/// such a gradient. At the start, a small gradient alone does not end the iteration.
 #[inline(always)]
 fn ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iteration: usize) -> Vec<u32> {
     let mut small = vec![0; sim.trees];
@@ -249,7 +249,7 @@ fn ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iteration: usize)
     small
 }
 
-/// What the links and rows do along the direction, and what the masses cost there.
+/// Computes the changes of links and rows along the direction, and the cost of moving the masses.
 #[inline(always)]
 fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     for tree in 0..sim.trees {
@@ -258,7 +258,7 @@ fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     }
     for (l, link) in sim.links.iter().enumerate() {
         let tree = link.tree;
-        // by the joints' steps, not by the difference of the links' accelerations: rounding is the same in all of them then
+        // use the joints' steps, not the difference of the links' accelerations, so that all of them round alike
         let mut way = link.parent.map_or([T::zero(); 6], |p| c.way[p]);
         for d in link.dofs.clone() {
             way = S::axpy(&work.motion.axis[d], c.direction[d], &way);
@@ -282,8 +282,9 @@ fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     stages::measure_way(work, c);
 }
 
-/// Stops the islands whose direction promises an improvement below the tolerance: Newton's at any point, if the gradient is small
-/// too at the start; that of conjugate gradients at the start, where it bounds what there is to gain.
+/// Finishes the islands whose direction predicts an improvement below the tolerance. For Newton's method this applies
+/// at any point, at the start only if the gradient is also small. For conjugate gradients it applies only at the start,
+/// where the prediction bounds the possible improvement.
 #[inline(always)]
 fn predicted_ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iteration: usize, small: &[u32]) {
     for tree in 0..sim.trees {
@@ -304,7 +305,7 @@ fn predicted_ends<T: Real>(sim: &Sim<T>, caps: &Caps, c: &mut Capped<T>, iterati
     }
 }
 
-/// Finds how far each island goes; islands that do not improve stop.
+/// Finds the step length of each island, and finishes the islands that do not improve.
 #[inline(always)]
 fn search<T: Real>(sim: &Sim<T>, caps: &Caps, work: &mut Work<T>, c: &mut Capped<T>) {
     let mut searches: Vec<Option<LineSearch>> = vec![None; sim.trees * T::LANES];
@@ -313,7 +314,7 @@ fn search<T: Real>(sim: &Sim<T>, caps: &Caps, work: &mut Work<T>, c: &mut Capped
         for lane in 0..T::LANES {
             let at = tree * T::LANES + lane;
             let length = T::widen(c.sums[tree][1].get(lane)).sqrt();
-            // a way without length leads nowhere
+            // a direction without length gives no step
             if !c.leads(tree, lane) || length < LEAST {
                 continue;
             }
@@ -359,7 +360,7 @@ fn rounded<T: Real>(x: f64) -> f64 {
     T::widen(T::scalar(x))
 }
 
-/// Every tree goes as far as the first of its island.
+/// Copies the step length of each island's first tree to its other trees.
 #[inline(always)]
 fn share<T: Real>(sim: &Sim<T>, c: &mut Capped<T>) {
     for tree in 1..sim.trees {

@@ -1,4 +1,4 @@
-//! The stages of the iteration over all rows.
+//! The parts of the iteration that loop over all rows.
 
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, RowCost};
@@ -19,7 +19,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Row values for the accelerations `qacc` and `link_acc`; their total cost.
+    /// Computes the row values for the accelerations `qacc` and `link_acc`, and their total cost.
     pub(super) fn measure<'a, T>(work: &'a mut Work<T>) -> T {
         let mut cost = T::zero();
         for row in work.rows.contacts.iter_mut() {
@@ -49,7 +49,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Keeps the row values for [`choose`].
+    /// Stores the row values for [`choose`].
     pub(super) fn keep<'a, T>(work: &'a mut Work<T>) {
         for row in work.rows.contacts.iter_mut() {
             row.next = row.u;
@@ -67,7 +67,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Returns to the row values that were kept, in the lanes `kept`.
+    /// Restores the stored row values in the lanes `kept`.
     pub(super) fn choose<'a, T>(work: &'a mut Work<T>, kept: T::Mask) {
         for row in work.rows.contacts.iter_mut() {
             for i in 0..3 {
@@ -89,7 +89,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Zones and forces of the rows at the present point.
+    /// Updates the zones and forces of the rows at the current point.
     pub(super) fn push<'a, T>(work: &'a mut Work<T>) {
         let all = T::not(T::none());
         for row in work.rows.contacts.iter_mut() {
@@ -113,7 +113,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// What the rows measure along the way, in the place of their Newton points.
+    /// Computes the changes of the rows' values along the direction, stored instead of their Newton points.
     pub(super) fn measure_way<'a, T>(work: &'a mut Work<T>, c: &'a Capped<T>) {
         for row in work.rows.contacts.iter_mut() {
             row.next = row.of_motion(&c.way[row.link]);
@@ -131,7 +131,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// By tree, the cost at the fractions `alpha` of the way less that at its start, with its derivatives.
+    /// By tree, the cost at the fractions `alpha` of the step minus the cost at its start, with its derivatives.
     pub(super) fn evaluate<'a, T>(sim: &'a Sim<T>, work: &'a Work<T>, c: &'a mut Capped<T>) {
         let half = T::lit(0.5);
         for tree in 0..sim.trees {
@@ -177,7 +177,7 @@ fn add<T: Real>(sums: &mut [T; 3], row: &impl RowCost<T>, alpha: T) {
 }
 
 kernel_fn! {
-    /// Moves the rows of islands that still move.
+    /// Moves the rows of unfinished islands.
     pub(super) fn advance<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, c: &'a Capped<T>) {
         for row in work.rows.contacts.iter_mut() {
             let tree = sim.links[row.link].tree;

@@ -1,38 +1,38 @@
-//! Memory of the solver for models whose cap ends the iteration before it has converged.
+//! Memory of the solver for models whose iteration cap stops it before it converges.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::Sim;
 
-/// Memory of the solver for models whose cap ends the iteration before it has converged.
+/// Memory of the solver for models whose iteration cap stops it before it converges.
 #[derive(Clone, Debug)]
 pub(crate) struct Capped<T: Real> {
-    /// Acceleration without constraints, and the links' accelerations then.
+    /// The unconstrained acceleration, and the links' accelerations for it.
     pub smooth: Vec<T>,
     pub smooth_acc: Vec<V6<T>>,
-    /// Accelerations of the links at the present point, and on the way from there to the Newton point.
+    /// Accelerations of the links at the current point, and their change from there to the Newton point.
     pub here: Vec<V6<T>>,
     pub way: Vec<V6<T>>,
-    /// The way itself.
+    /// The direction of the step.
     pub direction: Vec<T>,
     /// Derivative of the cost by the accelerations.
     pub gradient: Vec<T>,
-    /// Of conjugate gradients: the gradient before the last step, and what it was preconditioned to.
+    /// For conjugate gradients: the gradient before the last step, and the preconditioned gradient.
     pub old_gradient: Vec<T>,
     pub old_descent: Vec<T>,
-    /// Inertia of each link with all that it carries.
+    /// Inertia of each link with all links that it carries.
     pub composite: Vec<Inertia<T>>,
-    /// By tree: fraction of the way; derivatives of the cost of moving the masses.
+    /// By tree: fraction of the step; derivatives of the cost of moving the masses.
     pub alpha: Vec<T>,
     pub masses: Vec<[T; 2]>,
-    /// By tree: sums over its degrees of freedom or rows, or over those of its island at the island's first tree.
+    /// By tree: sums over its degrees of freedom or rows. An island's first tree has the sums of the island.
     pub sums: Vec<[T; 3]>,
     /// By tree and lane: the first tree of its island.
     pub island: Vec<usize>,
-    /// By tree: lanes where a constraint acts on it, and lanes where it still moves, as bits.
+    /// By tree, as bits: lanes where a constraint acts on it, and lanes where it is not finished.
     pub constrained: Vec<u32>,
     pub live: Vec<u32>,
-    /// Trees whose islands the blocks belong to, with their lanes; where each block's begin.
+    /// Trees whose islands each block belongs to, with their lanes; the first entry of each block.
     pub homes: Vec<(usize, T::Mask)>,
     pub first_home: Vec<usize>,
     /// By tree and lane, at an island's first tree: 1 / (the sum of its diagonal of the mass matrix), and the last
@@ -68,7 +68,7 @@ impl<T: Real> Default for Capped<T> {
 }
 
 impl<T: Real> Capped<T> {
-    /// Memory for a model; none if its solver is not of this kind.
+    /// Memory for a model; `None` if its solver is not of this kind.
     pub fn new(sim: &Sim<T>) -> Self {
         if sim.capped.is_none() {
             return Capped::default();

@@ -48,14 +48,14 @@ static SHIPPED: [Shipped; 17] = shipped![
     "stand",
 ];
 
-/// Most numbers that the clips of callers hold together, 256 MB. Older ones are forgotten.
+/// Limit on the numbers in all clips that callers register, 256 MB. Beyond it, older clips are dropped.
 const MOST_NUMBERS: usize = 32_000_000;
 
-/// Clips of callers, the latest last.
+/// Clips registered by callers, the latest last.
 static ADDED: RwLock<Vec<(String, Arc<Clip>)>> = RwLock::new(Vec::new());
 
-/// Makes a clip known under a name, in place of the one that has it so far. What has been made with that one keeps it. Where
-/// all clips of callers together take more than 256 MB, the oldest ones are forgotten.
+/// Registers a clip under a name and replaces an earlier clip of that name. Environments made with the earlier clip
+/// keep it. If all registered clips exceed 256 MB, the oldest ones are dropped.
 pub fn add(name: &str, clip: Clip) {
     let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
     added.retain(|(known, _)| known != name);
@@ -63,7 +63,7 @@ pub fn add(name: &str, clip: Clip) {
     forget(&mut added, MOST_NUMBERS);
 }
 
-/// Forgets the oldest clips until the others hold no more than so many numbers; the latest one stays.
+/// Drops the oldest clips until the rest fit the limit. The latest one stays.
 fn forget(clips: &mut Vec<(String, Arc<Clip>)>, most: usize) {
     let numbers = |clip: &Clip| clip.frames() * (clip.layout().nq() + clip.layout().nv());
     let mut sum = 0;

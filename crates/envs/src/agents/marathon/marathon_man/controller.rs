@@ -375,9 +375,9 @@ impl Agent for Controller {
     }
 }
 
-/// What he obeys of the command: speed, left, turn, jump, backflip. A backflip waits until he has stopped, so as long as it is
-/// told, he is told to stand and not to jump. That is all he observes of the command then, as in the commands that he learned
-/// from.
+/// The part of the command that applies now: speed, left, turn, jump, backflip. A backflip needs a standing start. So
+/// while a backflip is commanded, speed, step, turn and jump count as 0, also in the observation. The policy was
+/// trained on such commands.
 #[inline(always)]
 fn told<T: Real>(s: &Senses<T>) -> [T; 5] {
     let backflip = s.command(4);
