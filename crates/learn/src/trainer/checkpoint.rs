@@ -362,7 +362,8 @@ impl Checkpoint {
         about.check(&path)?;
 
         let path = folder.join(&about.state.name);
-        let bytes = budget::read(&path, &budget::POLICY_FILE).map_err(Error::io(&path, "read"))?;
+        // the experience of an off-policy learner is as large as the memory of its agents
+        let bytes = budget::read(&path, &budget::AGENTS_MEMORY).map_err(Error::io(&path, "read"))?;
         if bytes.len() as u64 != about.state.bytes {
             return Err(Error::file(&path, "length", bytes.len(), format!("{} bytes", about.state.bytes)));
         }
