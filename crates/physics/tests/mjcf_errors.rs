@@ -170,7 +170,7 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<tendon><spatial limited='true' range='0 1'/></tendon>", &["<spatial> attribute 'limited'"]),
         ("<tendon><spatial range='0 1'/></tendon>", &["<spatial> attribute 'range'"]),
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
-        ("<extension><plugin/></extension>", &["plugins are not supported"]),
+        ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
         ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
         ("<actuator><motor site='s'/></actuator>", &["<motor> attribute 'site'"]),
         ("<actuator><motor cranksite='s' slidersite='s'/></actuator>", &["<motor> attribute 'cranksite'"]),
