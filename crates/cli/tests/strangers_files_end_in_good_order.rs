@@ -59,7 +59,7 @@ fn arguments_beyond_measure_are_refused_by_name() {
     let names = vec!["walk"; 100_000].join(",");
     policy(path, "MarathonMan", &[("clip", names.as_str().into())], |_| {});
     let text = refusal(path);
-    assert!(text.contains("100000 clips, asks for") && text.contains("the limit 'memory'"), "{text}");
+    assert!(text.contains("100000 clips asks for") && text.contains("the limit 'memory'"), "{text}");
 }
 
 #[cfg(unix)]
@@ -114,7 +114,7 @@ fn no_text_of_a_file_commands_the_terminal() {
     policy(path, "Hopper-v5", &[(evil, 1.0.into())], |_| {});
     harmless(&run(path, &["eval", "p.safetensors"]).stderr);
     // a configuration file
-    std::fs::write(path.join("evil.yaml"), format!("behaviors:\n  Hopper:\n    \"a\\e[2J\\x9b\": 1\n")).unwrap();
+    std::fs::write(path.join("evil.yaml"), "behaviors:\n  Hopper:\n    \"a\\e[2J\\x9b\": 1\n").unwrap();
     let text = harmless(&run(path, &["train", "hopper", "--config", "evil.yaml"]).stderr);
     assert!(text.contains("unknown key") || text.contains("expected"), "{text}");
     // success messages: names of tasks on stdout

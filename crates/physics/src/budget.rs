@@ -250,7 +250,7 @@ fn amount(value: &str, unit: Unit) -> Option<u64> {
         _ => return None,
     };
     let amount = digits.trim().parse::<f64>().ok()? * scale;
-    (amount >= 1.0 && amount <= 1e18).then_some(amount as u64)
+    (1.0..=1e18).contains(&amount).then_some(amount as u64)
 }
 
 #[cfg(test)]

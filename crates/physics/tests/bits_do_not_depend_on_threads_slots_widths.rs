@@ -52,7 +52,7 @@ fn run(model: &Model, ids: &[usize], threads: usize, isa: Isa, decisions: usize)
     for t in 0..decisions {
         let ctrl: Vec<f64> =
             ids.iter().flat_map(|&id| (0..model.nu).map(move |u| noise(id, 1000 + t * 64 + u))).collect();
-        assert!(batch.step(&ctrl, 10).is_empty(), "the trajectory stays finite");
+        assert!(batch.step(&ctrl, 10).is_empty(), "{}: the trajectory stays finite", model.name);
         for (slot, o) in out.iter_mut().enumerate() {
             o.extend(batch.qpos(slot).iter().chain(&batch.qvel(slot)).map(|x| x.to_bits()));
         }
@@ -82,7 +82,8 @@ fn models() -> Vec<Model> {
     // a low cap selects another solver, in which every agent and island has its own line search
     let low = capped.iter().enumerate().map(|(i, p)| {
         let mut model = load(p);
-        (model.opt.iterations, model.opt.ls_iterations) = (4, 8);
+        // piles that are pushed blow up where the solver stops too early
+        (model.opt.iterations, model.opt.ls_iterations) = if i == 0 { (4, 8) } else { (25, 20) };
         model.opt.solver = if i == 1 { Solver::Cg } else { Solver::Newton };
         model
     });
