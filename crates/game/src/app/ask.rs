@@ -31,7 +31,6 @@ pub struct Question(pub Option<(Asked, String)>);
 pub struct Stakes<'w> {
     lesson: Option<Res<'w, Lesson>>,
     recorder: Option<Res<'w, Recorder>>,
-    show: Option<Res<'w, Show>>,
 }
 
 impl Stakes<'_> {
@@ -56,9 +55,8 @@ impl Stakes<'_> {
         self.unsaved()
     }
 
-    /// Describes the results that an action would discard.
-    fn of(&self, deed: Deed, menu: bool) -> Option<String> {
-        let learns = self.show.as_ref().is_some_and(|show| show.mode == Mode::Learn);
+    /// Describes the results that an action would discard while the menu is open and while a policy is being trained.
+    fn of(&self, deed: Deed, menu: bool, learns: bool) -> Option<String> {
         match deed {
             Deed::Quit => self.at_the_end().or_else(|| menu.then(|| "The menu is open.".into())),
             Deed::Learn | Deed::Restart | Deed::NextAgent if learns => self.unsaved(),
@@ -88,8 +86,10 @@ pub fn gate(
     mut deeds: MessageWriter<Do>,
     mut question: ResMut<Question>,
     stakes: Stakes<'_>,
+    show: Option<Res<Show>>,
     mut menu: Option<ResMut<Menu>>,
 ) {
+    let learns = show.is_some_and(|show| show.mode == Mode::Learn);
     for Pressed(deed) in pressed.read() {
         let open = menu.as_ref().is_some_and(|menu| menu.open);
         match &question.0 {
@@ -107,7 +107,7 @@ pub fn gate(
                 question.0 = None;
                 settle(asked, &answer, &stakes, &mut deeds, menu.as_deref_mut());
             }
-            None => match stakes.of(*deed, open) {
+            None => match stakes.of(*deed, open, learns) {
                 Some(text) => question.0 = Some((Asked::Deed(*deed), text)),
                 None => {
                     deeds.write(Do(*deed));
