@@ -56,7 +56,7 @@ impl Model {
     /// # Errors
     ///
     /// The file or an included one cannot be read, is not a valid, supported model, or asks for more than the
-    /// [budget](crate::budget) allows.
+    /// [budget] allows.
     pub fn from_xml_file(path: impl AsRef<Path>) -> Result<Model, MjcfError> {
         let path = path.as_ref();
         let shown = path.display().to_string();
