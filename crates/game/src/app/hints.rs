@@ -205,6 +205,7 @@ mod tests {
     use marathon_runs::Setting;
 
     /// The hints for a command line: the line and the list.
+    #[allow(clippy::type_complexity, reason = "a line and a list")]
     fn hints(words: &[&str], pads: bool) -> Result<(Vec<(String, String)>, Vec<Row>), Box<dyn std::error::Error>> {
         let show = Show::of(&Args::parse_from([&["marathon-game"], words].concat()))?;
         let ranges = Setting::named(&show.agent)?.factory()?.spec().command.clone();
@@ -237,6 +238,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(clippy::single_range_in_vec_init, reason = "one range is one line")]
     fn a_line_breaks_where_it_is_too_long() {
         assert_eq!(broken(&[3.0, 3.0, 3.0, 9.0, 1.0], 6.0), [0..2, 2..3, 3..4, 4..5]);
         assert_eq!(broken(&[3.0], 6.0), [0..1]);

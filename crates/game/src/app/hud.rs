@@ -207,6 +207,7 @@ fn shown_speed(spec: &Spec, episode: &Episode) -> f32 {
 
 /// Draws everything.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+#[allow(clippy::type_complexity, reason = "a system names what it uses")]
 pub fn draw(
     mut contexts: EguiContexts,
     hud: Res<Hud>,

@@ -173,6 +173,7 @@ pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
 /// characters behind it. A character keeps its command until [`Deed::Release`], or until no player controls it. While a
 /// character is steered, the task's time limit does not apply. On a course, runs end by the course's rules.
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+#[allow(clippy::type_complexity, reason = "a query names what it reads")]
 pub fn steer(
     mut commands: Commands,
     keys: Res<ButtonInput<KeyCode>>,
