@@ -13,6 +13,9 @@ from marathon_envs.agent_env import AgentSpec
 FloatArray = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]
 
+# coordinates and velocities beyond this size end an episode as diverged; observations stay below it
+LARGEST = 1e6
+
 # number of steps that no episode reaches
 NEVER = 2**63 - 1
 
@@ -26,7 +29,7 @@ def observation_space(spec: Spec | AgentSpec) -> spaces.Box:
     """Single observations, `(obs_size,)`."""
     if is_gymnasiums(spec):
         return spaces.Box(-np.inf, np.inf, (spec.obs_size,), np.float64)
-    return spaces.Box(-np.inf, np.inf, (spec.obs_size,), np.float32)
+    return spaces.Box(-LARGEST, LARGEST, (spec.obs_size,), np.float32)
 
 
 def action_space(spec: Spec | AgentSpec) -> spaces.Box:
