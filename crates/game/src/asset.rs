@@ -1,10 +1,11 @@
 //! Assets: bodies from MJCF files, policies from safetensors files.
 
-use bevy::asset::{AssetLoader, LoadContext, io::Reader};
+use bevy::asset::{AssetLoader, AsyncReadExt, LoadContext, io::Reader};
 use bevy::prelude::*;
 use bevy::reflect::TypePath;
 use marathon_learn::Policy;
 use marathon_physics::Model;
+use marathon_physics::budget::{self, Limit};
 use marathon_physics::mjcf::MjcfError;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -51,6 +52,15 @@ pub enum AssetError {
     Policy(#[from] marathon_learn::Error),
 }
 
+/// Reads an asset up to a limit of the budget.
+async fn read(reader: &mut dyn Reader, limit: &Limit) -> Result<Vec<u8>, std::io::Error> {
+    let mut bytes = Vec::new();
+    let one_more = limit.most()?.saturating_add(1);
+    reader.take(one_more).read_to_end(&mut bytes).await?;
+    limit.check(bytes.len() as f64)?;
+    Ok(bytes)
+}
+
 /// Loads [`RagdollPrefab`]s; included files and height fields are looked up beside the file.
 #[derive(Default, TypePath)]
 pub struct MjcfLoader;
@@ -66,8 +76,7 @@ impl AssetLoader for MjcfLoader {
         _: &(),
         context: &mut LoadContext<'_>,
     ) -> Result<RagdollPrefab, AssetError> {
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).await?;
+        let bytes = read(reader, &budget::MODEL_FILE).await?;
         let text = String::from_utf8(bytes)?;
         let name = context.path().to_string();
         // the compiler asks for files while it runs, but files come by and by: whatever it misses is fetched before the
@@ -114,8 +123,7 @@ impl AssetLoader for PolicyLoader {
         _: &(),
         context: &mut LoadContext<'_>,
     ) -> Result<PolicyAsset, AssetError> {
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).await?;
+        let bytes = read(reader, &budget::POLICY_FILE).await?;
         Ok(Policy::from_bytes(context.path().path(), &bytes)?.into())
     }
 

@@ -203,7 +203,6 @@ fn an_environment_is_shown_in_its_time() -> Result<(), Box<dyn Error>> {
 
 /// SIGTERM ends the game cleanly, and recordings are saved. A film reports that it is not written.
 #[test]
-#[ignore = "fails: a film that is interrupted keeps no recording"]
 fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     let (_screen, display) = screen()?;
     let folder = tempfile::tempdir()?;
@@ -239,11 +238,17 @@ fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     film.args(["hopper", "--quality", "low", "--size", "320x200", "--seconds", "600", "--record", "a.mp4"]);
     film.args(["--press", "0:record"]).current_dir(folder.path());
     let mut film = start(film.stdout(Stdio::null()).stderr(Stdio::piped()))?;
-    std::thread::sleep(Duration::from_secs(15));
+    let (tell, told) = channel();
+    let lines = BufReader::new(film.0.stderr.take().ok_or("no errors")?).lines();
+    std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| tell.send(line)));
+    let mut words = Words(told, String::new());
+    words.wait("a.mp4: ", 120);
+    // a few frames more
+    words.wait("a.mp4: ", 120);
     Command::new("kill").args(["-INT", &film.0.id().to_string()]).status()?;
     assert_eq!(film.0.wait()?.code(), Some(130));
-    let mut text = String::new();
-    film.0.stderr.take().ok_or("no errors")?.read_to_string(&mut text)?;
+    words.1 += &words.0.iter().collect::<Vec<_>>().join("\n");
+    let text = &words.1;
     assert!(text.contains("interrupted: a.mp4 is not written"), "{text}");
     let left: Vec<_> = std::fs::read_dir(folder.path())?.flatten().map(|entry| entry.file_name()).collect();
     assert!(!left.iter().any(|name| name.to_string_lossy().contains("mp4")), "{left:?}");

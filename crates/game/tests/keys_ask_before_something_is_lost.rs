@@ -52,7 +52,6 @@ fn quitting_does_not_ask_when_nothing_is_lost() {
 /// The game saves policies and recordings in the current folder. A process has only one, so a single test saves
 /// everything.
 #[test]
-#[ignore = "fails: a policy that was given up learns on, and is saved"]
 fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Error>> {
     let (home, folder) = (std::env::current_dir()?, tempfile::tempdir()?);
     std::env::set_current_dir(folder.path())?;

@@ -10,7 +10,7 @@
 //! let text = r#"{
 //!   "motion": 1, "name": "bow", "model": "pole", "source": "made up", "license": "CC0-1.0", "loop": "none", "dt": 0.5,
 //!   "joints": [["hip", "hinge"]],
-//!   "checksum": "CHECKSUM",
+//!   "checksum": "a490b523fb298ca5",
 //!   "frames": [[0.0], [0.4], [0.6]]
 //! }"#;
 //! let clip = marathon_motion::Clip::parse("bow.motion".as_ref(), text.as_bytes())?;

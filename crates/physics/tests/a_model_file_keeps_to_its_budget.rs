@@ -3,7 +3,7 @@
 //! Everything whose size a file decides is checked against the budget (`MARATHON_LIMITS`) before work starts. No step of the
 //! reader takes quadratic time.
 
-use marathon_physics::Model;
+use marathon_physics::{Model, Sim, SimOptions};
 use std::time::{Duration, Instant};
 
 /// Time that a hostile file of one megabyte may take on a busy machine.
@@ -101,4 +101,30 @@ fn includes_share_one_budget() {
     let error = Model::from_xml_file(folder.join("main.xml")).expect_err("too many").to_string();
     assert!(error.contains(MEMORY), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// The pairs of geoms that may touch grow with the square of a file's size, and so does the time to find them.
+#[test]
+fn a_simulation_keeps_to_the_budget_of_its_model() {
+    let model = |moving: usize, fixed: usize, mask: usize| {
+        let spheres = |n: usize| "<geom size='.1'/>".repeat(n);
+        let text = format!(
+            "<mujoco model='crowd'><default><geom contype='{mask}' conaffinity='{mask}'/></default><worldbody>{}<body>\
+             <freejoint/>{}</body></worldbody></mujoco>",
+            spheres(fixed),
+            spheres(moving)
+        );
+        load("crowd", &text).expect("it is read")
+    };
+    let sim = |model: &Model| {
+        let begun = Instant::now();
+        let error = Sim::<f64>::new(model, SimOptions::default()).err().map(|e| e.to_string());
+        assert!(begun.elapsed() < LONGEST, "{:?}", begun.elapsed());
+        error
+    };
+    let error = sim(&model(10_000, 10_000, 1)).expect("its list of pairs is too long");
+    assert!(error.contains("model 'crowd': the list of its contacts asks for ") && error.contains(MEMORY), "{error}");
+    let error = sim(&model(60_000, 0, 1)).expect("too many geoms may collide");
+    assert!(error.contains("contact of 60000 geoms") && error.contains("at most 50000"), "{error}");
+    assert_eq!(sim(&model(60_000, 60_000, 0)), None, "geoms for the eye alone collide with nothing");
 }

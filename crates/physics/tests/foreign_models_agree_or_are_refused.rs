@@ -141,7 +141,10 @@ fn load(path: &Path) -> Outcome {
         }
         Err(e) => {
             let text = e.to_string();
-            let SimError::Unsupported { what, .. } = e;
+            let what = match e {
+                SimError::Unsupported { what, .. } => what,
+                SimError::Budget { over, .. } => over.to_string(),
+            };
             let vague = if !text.contains(&format!("'{}'", model.name)) {
                 Some("the error does not name the model")
             } else if what.contains("''") {

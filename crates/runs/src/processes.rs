@@ -2,8 +2,8 @@
 //!
 //! A process is the program with the word `rollout-worker` ([`serve`]). It reads a line of JSON, which says what it plays. Then,
 //! for every rollout, it reads two messages of the learner ([`Players::play`]) and answers with one; before each stands its
-//! length, 8 bytes, little-endian. It leaves when its input ends. The policy has the same bits as without processes. A process that is lost ends the run, which
-//! can be gone on with.
+//! length, 8 bytes, little-endian. It ends when its input ends. The policy has the same bits as without processes. If a
+//! process is lost or does not answer in time, the run ends and can be resumed.
 
 use crate::error::RunError;
 use crate::setting::Setting;
@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// What a process plays.
@@ -27,6 +28,8 @@ struct Part {
 /// Processes that play.
 pub struct Processes {
     workers: Vec<Worker>,
+    /// Longest time for a rollout.
+    patience: Duration,
     /// Why the run could not go on.
     pub error: Option<RunError>,
 }
@@ -37,6 +40,8 @@ struct Worker {
     pipes: Option<(ChildStdin, BufReader<ChildStdout>)>,
 }
 
+/// Longest time for a rollout. A process that was stopped from outside would hold up the run without end.
+const PATIENCE: Duration = Duration::from_secs(1800);
 /// How long processes may take to leave by themselves, and then to die.
 const GRACE: Duration = Duration::from_millis(500);
 /// Time between two looks at a process that is to leave.
@@ -68,7 +73,7 @@ impl Processes {
         let slices = count.clamp(1, config.run.blocks());
         let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));
         // those that have been started leave with it
-        let mut all = Processes { workers: Vec::new(), error: None };
+        let mut all = Processes { workers: Vec::new(), patience: PATIENCE, error: None };
         for slice in 0..slices {
             let mut worker = Worker::start(Command::new(program).arg("rollout-worker")).map_err(|e| failed(&e))?;
             let part = Part { task: task.clone(), config: config.clone(), slice, slices };
@@ -106,22 +111,46 @@ impl Players for Processes {
 
     fn play(&mut self, orders: &[u8], states: &[Vec<u8>], deliver: Deliver<'_>) -> Control {
         let count = self.workers.len();
+        let parts = self.workers.iter_mut().map(|worker| (&mut worker.child, &mut worker.pipes));
+        let (mut children, mut pipes): (Vec<_>, Vec<_>) = parts.unzip();
         let mut exchange = || -> Result<(), (usize, String)> {
             // a process reads all before it answers, so none waits for another
-            for (i, (worker, state)) in self.workers.iter_mut().zip(states).enumerate() {
-                let Some((requests, _)) = &mut worker.pipes else { continue };
+            for (i, (pipes, state)) in pipes.iter_mut().zip(states).enumerate() {
+                let Some((requests, _)) = pipes else { continue };
                 send(requests, &[orders, state]).map_err(|e| (i, e.to_string()))?;
             }
-            for (i, worker) in self.workers.iter_mut().enumerate() {
-                let Some((_, answers)) = &mut worker.pipes else { continue };
+            for (i, pipes) in pipes.iter_mut().enumerate() {
+                let Some((_, answers)) = pipes else { continue };
                 let answer = receive(answers).and_then(|a| a.ok_or(io::ErrorKind::UnexpectedEof.into()));
                 let answer = answer.map_err(|e| (i, e.to_string()))?;
                 deliver(i, &answer).map_err(|e| (i, e.to_string()))?;
             }
             Ok(())
         };
-        match exchange() {
+        let patience = self.patience;
+        let (finished, wait) = channel::<()>();
+        let (result, late) = std::thread::scope(|scope| {
+            // a pipe cannot be read with a time limit, but it ends with its process
+            let watch = scope.spawn(move || {
+                let late = wait.recv_timeout(patience) == Err(RecvTimeoutError::Timeout);
+                if late {
+                    children.iter_mut().for_each(|child| _ = child.kill());
+                }
+                late
+            });
+            let result = exchange();
+            drop(finished);
+            (result, watch.join().unwrap_or(false))
+        });
+        match result {
             Ok(()) => Control::Continue,
+            Err((i, _)) if late => {
+                let (which, seconds) = (i + 1, patience.as_secs_f64());
+                self.error = Some(RunError::Process(format!(
+                    "process {which} of {count}, which plays, did not answer within {seconds} s"
+                )));
+                Control::Stop
+            }
             Err((i, why)) => {
                 let which = i + 1;
                 self.error =
@@ -210,7 +239,7 @@ mod tests {
             std::thread::sleep(Duration::from_millis(100));
             let (done, wait) = std::sync::mpsc::channel();
             std::thread::spawn(move || {
-                drop(Processes { workers, error: None });
+                drop(Processes { workers, patience: PATIENCE, error: None });
                 done.send(())
             });
             let left = wait.recv_timeout(Duration::from_secs(5)).is_ok();
@@ -218,6 +247,22 @@ mod tests {
                 let _ = Command::new("sh").args(["-c", &format!("kill -KILL {id} 2> /dev/null")]).status();
             }
             assert!(left, "{program}");
+        }
+    }
+
+    /// A process that was stopped ends the run in time, whether it stopped before it read or before it answered.
+    #[cfg(unix)]
+    #[test]
+    fn a_process_that_does_not_answer_ends_the_run() {
+        for orders in [10, 1_000_000] {
+            let worker = Worker::start(Command::new("sh").args(["-c", "exec sleep 1000"])).unwrap();
+            let patience = Duration::from_millis(300);
+            let mut all = Processes { workers: vec![worker], patience, error: None };
+            let begun = Instant::now();
+            let control = all.play(&vec![0; orders], &[vec![0; 10]], &mut |_, _| Ok(()));
+            assert!(matches!(control, Control::Stop) && begun.elapsed() < Duration::from_secs(20));
+            let error = all.error.take().unwrap().to_string();
+            assert!(error.contains("process 1 of 1, which plays, did not answer within 0.3 s"), "{error}");
         }
     }
 

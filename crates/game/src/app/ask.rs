@@ -67,7 +67,7 @@ impl Stakes<'_> {
     /// Allows unsaved results to be discarded.
     fn discard(&self) {
         if let Some(lesson) = &self.lesson {
-            lesson.settle();
+            lesson.discard();
         }
     }
 }

@@ -28,6 +28,9 @@ const WARM_UP: usize = 4;
 /// Frames that pictures may come late.
 const PATIENCE: usize = 200;
 
+/// Time between two lines about how far the film is.
+const TELL: Duration = Duration::from_secs(5);
+
 /// Longest time that a skin takes to read.
 const LONGEST_FITTING: Duration = Duration::from_secs(120);
 
@@ -183,6 +186,7 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
 
     let mut frames = ((args.seconds() * fps).round() as usize).max(1);
     let (mut drawn, mut taken, mut waited) = (0, 0, 0);
+    let mut told: Option<Instant> = None;
     while taken < frames {
         if interrupt::requested() {
             replay::save_running(app.world_mut());
@@ -208,6 +212,11 @@ pub fn film(args: &Args, out: &Path, game: GamePlugin) -> Result<(), GameError> 
                 sink.push(unpad(&bytes, width as usize, height as usize)?)?;
                 taken += 1;
             }
+        }
+        if taken > 0 && told.is_none_or(|at| at.elapsed() > TELL) {
+            told = Some(Instant::now());
+            let [done, all] = [taken, frames].map(|frames| frames as f64 / fps);
+            eprintln!("{}: {done:.1} of {all:.1} s", out.display());
         }
     }
     replay::save_running(app.world_mut());

@@ -58,8 +58,10 @@ pub(crate) struct Filmed;
 struct Board {
     progress: Progress,
     newest: Option<Arc<Policy>>,
-    /// The last policy that was saved or may be discarded, and its training time in seconds.
+    /// The last policy that was saved, and its training time in seconds.
     settled: (Option<Arc<Policy>>, f64),
+    /// The user has discarded the lesson.
+    discarded: bool,
     stop: bool,
 }
 
@@ -138,28 +140,30 @@ impl Lesson {
     pub fn unsaved(&self) -> Option<f64> {
         let board = board(&self.shared);
         let (settled, at) = &board.settled;
-        let newest = board.newest.as_ref()?;
+        let newest = board.newest.as_ref().filter(|_| !board.discarded)?;
         let same = settled.as_ref().is_some_and(|settled| Arc::ptr_eq(settled, newest));
         let now = board.progress.curve.last().map_or(0.0, |point| point.seconds);
         (!same).then_some(now - at)
     }
 
-    /// Marks the newest policy as saved or as one that may be discarded.
-    pub fn settle(&self) {
-        let mut board = board(&self.shared);
-        let now = board.progress.curve.last().map_or(0.0, |point| point.seconds);
-        board.settled = (board.newest.clone(), now);
+    /// Discards the lesson: its policies, and those still to come, are not saved when it ends.
+    pub fn discard(&self) {
+        board(&self.shared).discarded = true;
     }
 
     /// Saves the newest policy and shows a note.
     fn save(&self, why: &str, notes: &mut Notes) {
-        let Some(policy) = self.newest() else {
+        let (newest, now) = {
+            let board = board(&self.shared);
+            (board.newest.clone(), board.progress.curve.last().map_or(0.0, |point| point.seconds))
+        };
+        let Some(policy) = newest else {
             notes.say(format!("{why}there is nothing to save yet"));
             return;
         };
         match save(&policy, &self.setting.agent) {
             Ok(path) => {
-                self.settle();
+                board(&self.shared).settled = (Some(policy), now);
                 notes.say(format!("{why}saved as {}", path.display()));
             }
             Err(error) => notes.error(format!("{why}{error}")),
@@ -222,7 +226,9 @@ pub fn attend(
         *failed = false;
     }
     let wanted = show.mode == Mode::Learn && show.source == Source::Trainer;
-    let right = lesson.as_ref().is_some_and(|l| l.setting == script.setting && l.ground == show.ground);
+    let right = lesson.as_ref().is_some_and(|lesson| {
+        lesson.setting == script.setting && lesson.ground == show.ground && !board(&lesson.shared).discarded
+    });
     if let Some(lesson) = lesson.filter(|_| !(wanted && right)) {
         lesson.leave(&mut notes);
         commands.remove_resource::<Lesson>();

@@ -164,7 +164,7 @@ fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
 pub fn record(
     recorder: Option<ResMut<Recorder>>,
     marathon: Res<Marathon>,
-    actors: Query<(&Actor, &Seat, &Episode), With<Anatomy>>,
+    actors: Query<(&Actor, &Seat, &Episode, &Anatomy)>,
 ) {
     let Some(mut recorder) = recorder else { return };
     let mut all: Vec<_> = actors.iter().collect();
@@ -173,25 +173,24 @@ pub fn record(
     if all.len() != recording.agents {
         return;
     }
-    let trails: Vec<_> = all.iter().filter_map(|(_, seat, _)| marathon.resident(**seat)).map(|r| &r.trail).collect();
+    let trails: Vec<_> = all.iter().filter_map(|(_, seat, ..)| marathon.resident(**seat)).map(|r| &r.trail).collect();
     let Some(first) = trails.first() else { return };
     let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > *until).collect();
     for time in times {
         let stills: Option<Vec<_>> = trails.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
         let Some(stills) = stills else { continue };
         *until = time;
-        let terms = all.iter().map(|(.., e)| e.terms.len()).max().unwrap_or(0);
-        for (still, (_, _, episode)) in stills.iter().zip(&all) {
-            take(recording, still, episode, terms);
+        for (still, (.., episode, anatomy)) in stills.iter().zip(&all) {
+            take(recording, still, episode, anatomy);
         }
     }
 }
 
-/// Appends a state of the next agent; `terms` is the number of the reward's terms, of which there are none before the first
-/// decision.
-pub fn take(recording: &mut Recording, still: &Still, episode: &Episode, terms: usize) {
+/// Appends a state of the next agent. All rows of a recording have the same width, but an episode has no terms of the reward
+/// before its first decision.
+pub fn take(recording: &mut Recording, still: &Still, episode: &Episode, anatomy: &Anatomy) {
     let mut earned = episode.terms.clone();
-    earned.resize(terms, 0.0);
+    earned.resize(anatomy.spec.as_ref().map_or(0, |spec| spec.reward_terms.len()), 0.0);
     let fresh = if still.fresh { 1.0 } else { 0.0 };
     recording.push(&Row {
         qpos: &still.qpos,

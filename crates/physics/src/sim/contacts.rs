@@ -4,11 +4,12 @@
 //! ([`floor_points`]); everything else is listed by [`pairs`].
 
 use super::broad::Broad;
-use super::contact_params::{ContactParams, declared, label, may_collide};
+use super::contact_params::{ContactParams, label, may_collide};
 use super::floor_points::{self, FloorPoint};
 use super::options::{SimError, SimOptions};
 use super::pairs::{self, GeomPair, PairSpec};
 use super::weld::BodyMount;
+use crate::budget::{MEMORY, OverBudget};
 use crate::lanes::Real;
 use crate::model::{Geom, GeomType, Model};
 use std::collections::{BTreeMap, BTreeSet};
@@ -38,7 +39,22 @@ pub(crate) struct Paired<C> {
     pub half: C,
 }
 
+/// Most geoms that may collide: the time to compare them grows with the square of their number.
+const MOST_GEOMS: usize = 50_000;
+/// Bytes of a pair, with the room that a growing list, its sorting and the broad phase take.
+const PAIR: usize = 4 * size_of::<GeomPair>();
+/// Pairs between two looks at the memory.
+const LOOK: usize = 1 << 16;
+
 impl<C> Contacts<C> {
+    /// Compares the memory of the lists with the limit, once per so many pairs.
+    fn check(&self) -> Result<(), OverBudget> {
+        match self.pairs.len() % LOOK {
+            0 => MEMORY.check((self.pairs.len() * PAIR + self.specs.len() * 2 * size_of::<PairSpec<C>>()) as f64),
+            _ => Ok(()),
+        }
+    }
+
     /// No contacts.
     pub fn none() -> Self {
         Contacts {
@@ -70,12 +86,23 @@ pub(super) fn contacts<T: Real>(
     };
     let link = |g: usize| link_of[mounts[model.geoms[g].body].body];
     let excluded: BTreeSet<[usize; 2]> = model.excludes.iter().copied().collect();
+    let declared: BTreeSet<[usize; 2]> = model.pairs.iter().map(|p| ordered(p.geoms)).collect();
     let kinds = kinds(model, mounts, link);
     // what pairs of two kinds have in common; the geoms of a crowd are of few kinds
     let mut known: BTreeMap<[usize; 2], u32> = BTreeMap::new();
-    for i in 0..model.geoms.len() {
-        for j in i + 1..model.geoms.len() {
-            let declared = declared(model, i, j).is_some();
+    // visual geoms collide with nothing
+    let mut able: Vec<bool> = model.geoms.iter().map(|g| g.contype != 0 || g.conaffinity != 0).collect();
+    declared.iter().flatten().for_each(|g| able[*g] = true);
+    let able: Vec<usize> = (0..able.len()).filter(|g| able[*g]).collect();
+    if able.len() > MOST_GEOMS {
+        return refuse(
+            format!("contact of {} geoms", able.len()),
+            &format!("at most {MOST_GEOMS} may collide; turn contacts off with contype and conaffinity"),
+        );
+    }
+    for (at, i) in able.iter().copied().enumerate() {
+        for j in able[at + 1..].iter().copied() {
+            let declared = declared.contains(&[i, j]);
             if !declared && !may_collide(model, mounts, &excluded, i, j) {
                 continue;
             }
@@ -89,6 +116,7 @@ pub(super) fn contacts<T: Real>(
             // in the order of MuJoCo's shape types
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
             let geoms = [a as u32, b as u32];
+            out.check().map_err(|over| SimError::Budget { model: model.name.clone(), over })?;
             if let (false, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
                 out.pairs.push(GeomPair { geoms, spec: *spec });
                 continue;
@@ -123,6 +151,11 @@ pub(super) fn contacts<T: Real>(
     let group = |g: usize| link(g).map(|l| tree_of[l]);
     out.broad = Broad::of(&out, tree_of.iter().max().map_or(0, |t| t + 1), group);
     Ok(out)
+}
+
+/// Numbers of two geoms, the lower first.
+fn ordered([i, j]: [usize; 2]) -> [usize; 2] {
+    [i.min(j), i.max(j)]
 }
 
 /// Geoms from which on a model is a crowd.

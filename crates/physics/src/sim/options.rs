@@ -1,5 +1,6 @@
 //! What a user chooses when building a [`Sim`](super::Sim), and why that may fail.
 
+use crate::budget::OverBudget;
 use thiserror::Error;
 
 /// Rows between moving links (and over several joints) up to which an agent is solved by a correction of low rank. Eight
@@ -18,6 +19,14 @@ pub enum SimError {
         what: String,
         /// What to do about it.
         remedy: String,
+    },
+    /// The lists of a simulation would take more memory than the [budget](crate::budget) allows.
+    #[error("model '{model}': the list of its contacts {over}")]
+    Budget {
+        /// Model name.
+        model: String,
+        /// The amount and the limit.
+        over: OverBudget,
     },
 }
 

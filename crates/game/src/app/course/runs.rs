@@ -162,7 +162,6 @@ pub fn follow(
         let at = runs.under_way.iter().position(|run| run.ragdoll == entity);
         let mut run = at.map(|at| runs.under_way.swap_remove(at));
         let until = run.as_ref().map(|run| run.until);
-        let terms = anatomy.spec.as_ref().map_or(0, |spec| spec.reward_terms.len());
         for still in resident.trail.iter().filter(|still| until.is_none_or(|until| still.time > until)) {
             if still.fresh {
                 let place = track.translation.to_array().to_vec();
@@ -184,7 +183,7 @@ pub fn follow(
             (run.until, run.slowest) = (still.time, run.slowest.min(pace));
             // an episode that begins has neither way nor reward
             let told = if still.fresh { &Episode::default() } else { episode };
-            take(&mut run.recording, still, told, terms);
+            take(&mut run.recording, still, told, anatomy);
         }
         if let Some(run) = &mut run {
             let told = anatomy.spec.as_ref().and_then(|spec| spec.info.iter().position(|name| name == "distance"));
