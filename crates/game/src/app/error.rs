@@ -1,6 +1,7 @@
 //! What can keep the game from starting, with the remedy.
 
 use marathon_physics::hint::did_you_mean;
+use marathon_runs::text::printable;
 use marathon_runs::{Flags, RunError};
 use std::path::PathBuf;
 use thiserror::Error;
@@ -82,15 +83,9 @@ pub enum GameError {
     },
 }
 
-/// Escapes the control characters of a text, which names from files may contain, and keeps its line breaks.
-pub fn plain(text: &str) -> String {
-    let spelled = |c: char| if c.is_control() && c != '\n' { c.escape_debug().collect() } else { String::from(c) };
-    text.chars().map(spelled).collect()
-}
-
-/// Escapes the control characters of a text and its line breaks.
-pub fn plain_line(text: &str) -> String {
-    plain(text).replace('\n', "\\n")
+/// Makes a text from a file safe for one line of a terminal.
+pub fn printable_line(text: &str) -> String {
+    printable(text).replace('\n', "\\n")
 }
 
 impl From<marathon_learn::Error> for GameError {

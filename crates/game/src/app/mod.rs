@@ -59,6 +59,7 @@ use bevy::window::{PresentMode, WindowResolution};
 use bevy_egui::{EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use clap::Parser;
 use marathon_runs::RunError;
+use marathon_runs::text::printable;
 use std::ffi::OsString;
 use std::io::{BufReader, Write};
 use std::process::ExitCode;
@@ -80,7 +81,8 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let told = error::plain(&error.to_string());
+            let told = error.to_string();
+            let told = printable(&told);
             if let GameError::Interrupted(_) = error {
                 eprintln!("{told}");
                 return ExitCode::from(interrupt::CODE);

@@ -82,33 +82,39 @@ impl Playback {
     }
 }
 
-/// Begins and ends recordings.
+/// Begins and ends recordings. One that is asked for before the characters are on stage begins with them.
 pub fn obey(
     mut commands: Commands,
     mut deeds: MessageReader<Do>,
     (show, script): (Res<Show>, Res<Script>),
     recorder: Option<Res<Recorder>>,
     mut notes: ResMut<Notes>,
+    mut wanted: Local<bool>,
     actors: Query<(&Actor, &Anatomy, &Transform), With<Seat>>,
 ) {
+    let nothing = matches!(show.mode, Mode::Testbed | Mode::Replay | Mode::Outside);
+    *wanted &= !nothing;
     for _ in deeds.read().filter(|d| d.0 == Deed::Record) {
         if let Some(recorder) = &recorder {
             commands.remove_resource::<Recorder>();
             finish(recorder, "", &mut notes);
-            continue;
-        }
-        if matches!(show.mode, Mode::Testbed | Mode::Replay | Mode::Outside) {
+        } else if nothing {
             notes.say("only agents can be recorded");
-            continue;
+        } else {
+            *wanted = !*wanted;
         }
-        let mut all: Vec<_> = actors.iter().collect();
-        all.sort_by_key(|(actor, ..)| actor.0);
-        let Some((_, anatomy, _)) = all.first() else { continue };
-        let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
-        let recording = Recording::new(script.setting.clone(), script.ground, anatomy.dt, places);
-        commands.insert_resource(Recorder { recording, until: Duration::ZERO, stage: script.version });
-        notes.say("recording; the same key ends it");
     }
+    if !*wanted {
+        return;
+    }
+    let mut all: Vec<_> = actors.iter().collect();
+    all.sort_by_key(|(actor, ..)| actor.0);
+    let Some((_, anatomy, _)) = all.first() else { return };
+    *wanted = false;
+    let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
+    let recording = Recording::new(script.setting.clone(), script.ground, anatomy.dt, places);
+    commands.insert_resource(Recorder { recording, until: Duration::ZERO, stage: script.version });
+    notes.say("recording; the same key ends it");
 }
 
 /// Ends a recording when the characters change or the replay reaches its maximum length.
