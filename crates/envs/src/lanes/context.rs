@@ -87,20 +87,11 @@ impl<T: Real> Commands<T> {
         }
     }
 
-    /// Goes on from a snapshot; from one of before there were commands, the schedule begins at observation `step`.
-    pub fn load(&mut self, task: &Task<T>, lane: usize, id: EpisodeId, step: u64, saved: Option<&SavedCommand>) {
-        match saved {
-            Some(saved) => {
-                self.told[lane] = saved.told.clone();
-                for (present, x) in self.present.iter_mut().zip(&saved.present) {
-                    present.set(lane, T::scalar(*x));
-                }
-            }
-            None => {
-                self.told[lane] = Told { scheduled: idle(&task.spec.command), due: 0, given: None };
-                self.tell(task, lane, id, step);
-                self.begin(lane);
-            }
+    /// Restores the command of a snapshot.
+    pub fn load(&mut self, lane: usize, saved: &SavedCommand) {
+        self.told[lane] = saved.told.clone();
+        for (present, x) in self.present.iter_mut().zip(&saved.present) {
+            present.set(lane, T::scalar(*x));
         }
     }
 }

@@ -5,10 +5,9 @@ use marathon_physics::{Group, Sim, Work};
 
 use super::agent_kernel::{Named, Occasion, Perceived};
 use super::context::Commands;
-use super::saved::{Body, Whole};
+use super::saved::LaneState;
 use super::task::{EpisodeStart, Task};
 use crate::agent::{Controls, Site};
-use crate::episode_rng::EpisodeId;
 use crate::shard::{BLOCK, BlockStep};
 
 /// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
@@ -140,44 +139,27 @@ impl<T: Real> LaneGroup<T> {
     }
 
     /// Copies an agent out of its lane: with its life, everything that its future depends on.
-    pub fn save(&self, sim: &Sim<T>, lane: usize) -> Whole {
+    pub fn save(&self, sim: &Sim<T>, lane: usize) -> LaneState {
         let numbers = |v: &[T]| v.iter().map(|x| T::widen(x.get(lane))).collect();
-        Whole {
+        LaneState {
             physics: self.physics.save(sim, lane),
             memory: numbers(&self.memory),
-            given: Some((numbers(&self.action), self.commands.save(lane))),
+            action: numbers(&self.action),
+            command: self.commands.save(lane),
         }
     }
 
-    /// Puts an agent where it was when it was saved, in observation number `step` of an episode.
-    pub fn load(&mut self, task: &Task<T>, lane: usize, id: EpisodeId, step: u64, body: &Body) {
-        let LaneGroup { physics: p, memory, action, commands, .. } = self;
+    /// Puts an agent where it was when it was saved.
+    pub fn load(&mut self, sim: &Sim<T>, lane: usize, saved: &LaneState) {
         let put = |to: &mut [T], from: &[f64]| {
             for (v, x) in to.iter_mut().zip(from) {
                 v.set(lane, T::scalar(*x));
             }
         };
-        let given = match body {
-            Body::Whole(whole) => {
-                let Whole { physics, memory: saved, given } = &**whole;
-                p.load(&task.sim, lane, physics);
-                put(memory, saved);
-                given.as_ref()
-            }
-            Body::Unmarked(saved) => {
-                let there = p.qpos.iter_mut().chain(&mut p.qvel).chain(&mut p.qacc_warmstart).chain(memory);
-                for (v, x) in there.zip(saved) {
-                    v.set(lane, T::scalar(*x));
-                }
-                None
-            }
-        };
-        match given {
-            Some((saved, _)) => put(action, saved),
-            // before actions and controls were two things
-            None => action.iter_mut().zip(&p.ctrl).for_each(|(a, c)| a.set(lane, c.get(lane))),
-        }
-        commands.load(task, lane, id, step, given.map(|(_, command)| command));
+        self.physics.load(sim, lane, &saved.physics);
+        put(&mut self.memory, &saved.memory);
+        put(&mut self.action, &saved.action);
+        self.commands.load(lane, &saved.command);
     }
 
     /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.

@@ -11,7 +11,7 @@ use marathon_physics::{Variation, Work};
 use super::context::LaneContext;
 use super::demonstrations::demonstrations;
 use super::group::LaneGroup;
-use super::saved;
+use super::saved::{self, Saved};
 use super::start_cache::StartCache;
 use super::task::{AgentFactory, EpisodeStart, Task};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
@@ -195,7 +195,8 @@ impl<T: Real> Shard for LaneShard<T> {
         saved::begin(bytes);
         for (i, life) in lives.iter().enumerate() {
             let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
-            saved::add(bytes, [seed, agent, episode, steps], &groups[i / T::LANES].save(&self.task.sim, i % T::LANES));
+            let state = groups[i / T::LANES].save(&self.task.sim, i % T::LANES);
+            saved::add(bytes, &Saved { life: [seed, agent, episode, steps], state });
         }
     }
 
@@ -203,10 +204,10 @@ impl<T: Real> Shard for LaneShard<T> {
         let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
         let (agents, rest) = saved::read(&task.blueprint.model, &task.spec, task.facts.memory, bytes)?;
-        for (i, (life, agent)) in lives.iter_mut().zip(&agents).enumerate() {
-            let [seed, number, episode, steps] = agent.life;
-            *life = Life { id: EpisodeId { seed, agent: number, episode }, steps };
-            groups[i / T::LANES].load(task, i % T::LANES, life.id, steps, &agent.body);
+        for (i, (life, saved)) in lives.iter_mut().zip(&agents).enumerate() {
+            let [seed, agent, episode, steps] = saved.life;
+            *life = Life { id: EpisodeId { seed, agent, episode }, steps };
+            groups[i / T::LANES].load(&task.sim, i % T::LANES, &saved.state);
         }
         Ok(rest)
     }

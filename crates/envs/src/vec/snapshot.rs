@@ -9,13 +9,13 @@
 //! | as long | the task's name |
 //!
 //! Then, for every sixteen agents, their block (`lanes/saved.rs`) and two bytes: a bit per agent that begins an episode at the
-//! next step. Integers are little-endian. Snapshots of `MRTHNv02` had no checksum; they are still read.
+//! next step. Integers are little-endian.
 
 use super::vec_env::VecEnv;
 use crate::error::EnvError;
 
+/// The last two digits are the version.
 const MARK: &[u8; 8] = b"MRTHNv03";
-const UNCHECKED: &[u8; 8] = b"MRTHNv02";
 
 fn refuse<X>(problem: String) -> Result<X, EnvError> {
     Err(EnvError::Snapshot(problem))
@@ -41,8 +41,7 @@ impl VecEnv {
         bytes
     }
 
-    /// Restores what [`VecEnv::save`] returned, of an earlier version too unless that left out something that this task needs.
-    /// Who [decides](VecEnv::decides) next is not in it.
+    /// Restores what [`VecEnv::save`] returned. The roles that [decide](VecEnv::decides) next are not in it.
     ///
     /// # Errors
     /// If the bytes are damaged, or not a snapshot of an environment with the same agent and the same number of them; then
@@ -75,13 +74,11 @@ impl VecEnv {
                 }
                 body
             }
-            _ if mark == UNCHECKED => rest,
             _ if mark.starts_with(b"MRTHNv") => {
                 return refuse(format!(
-                    "its format is '{}', expected '{}' or '{}': another version of Marathon has saved it",
+                    "its format is '{}', expected '{}': another version of Marathon has saved it",
                     mark.escape_ascii(),
-                    MARK.escape_ascii(),
-                    UNCHECKED.escape_ascii()
+                    MARK.escape_ascii()
                 ));
             }
             _ => return refuse("it does not begin like one of an environment".into()),
