@@ -2,8 +2,8 @@
 """Writes seeds for the targets `motion` and `files`: small files of each format, with a byte before them, in corpus/motion-0 to -4
 and corpus/files-0 to -7.
 
-Few bytes make a file of a format out of nothing; what is whole can be changed. Needs no packages. Networks and demonstrations need the
-program in target/release.
+The fuzzer rarely finds a whole file of a format by itself, but it can change one. The script needs no packages. Networks,
+demonstrations, tables and descriptions need the program in target/release.
 """
 
 import json
@@ -17,7 +17,6 @@ from pathlib import Path
 HERE = Path(__file__).parent
 MOTIONS = HERE.parent / "assets/motions"
 POLICIES = HERE.parent / "assets/policies"
-RUNS = HERE.parent / "crates/learn/tests/files"
 PROGRAM = HERE.parent / "target/release/marathon"
 
 
@@ -123,21 +122,32 @@ def mappings():
     yield (MOTIONS / "mappings/walker2d.json").read_text()
 
 
-def policies():
+def train(folder):
+    """Train a small policy with each algorithm in a folder of its own, if there is the program."""
+    for algorithm in ["ppo", "a2c", "acktr", "sac"] if PROGRAM.exists() else []:
+        config = folder / f"{algorithm}.yaml"
+        network = "{hidden_units: 4, num_layers: 1}"
+        settings = f"trainer_type: {algorithm}, network_settings: {network}, max_steps: 640, marathon: {{agents: 16}}"
+        config.write_text(f"behaviors: {{Hopper: {{{settings}}}}}\n")
+        words = ["train", "hopper", "--config", config, "--threads", "1", "--out", folder / algorithm]
+        subprocess.run([PROGRAM, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def policies(runs):
     """Small policies without their checksums, which would refuse every change."""
-    for path in [*RUNS.glob("*/policy.safetensors"), POLICIES / "hopper.safetensors", POLICIES / "TerrainWalker2d.safetensors"]:
+    for path in [*runs.glob("*/policy.safetensors"), POLICIES / "hopper.safetensors", POLICIES / "TerrainWalker2d.safetensors"]:
         data = path.read_bytes()
         (length,) = struct.unpack("<Q", data[:8])
         header = re.sub(rb',\\"checksum\\":\\"[0-9a-f]{16}\\"', b"", data[8 : 8 + length])
         yield struct.pack("<Q", len(header)) + header + data[8 + length :]
 
 
-def program(ending, *words):
-    """What the program makes of a small policy."""
+def program(runs, ending, *words):
+    """The file that the program writes for a small policy."""
     if PROGRAM.exists():
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / f"seed.{ending}"
-            policy = RUNS / "ppo/policy.safetensors"
+            policy = runs / "ppo/policy.safetensors"
             subprocess.run([PROGRAM, words[0], policy, *words[1:], "--out", out], check=True, stdout=subprocess.DEVNULL)
             yield out.read_bytes()
 
@@ -148,9 +158,9 @@ def configurations():
         yield path.read_bytes()
 
 
-def tables():
+def tables(runs):
     """Rows of small runs."""
-    yield from (path.read_bytes() for path in RUNS.glob("*/progress.csv"))
+    yield from (path.read_bytes() for path in runs.glob("*/progress.csv"))
     yield b"iteration,a\n1,\n2,1\n3,1.5\n"
 
 
@@ -175,9 +185,9 @@ def events():
     yield record
 
 
-def descriptions(name):
-    """Of runs or checkpoints, without their checksums."""
-    for path in RUNS.glob(f"*/{name}"):
+def descriptions(runs, name):
+    """Descriptions of runs or checkpoints without their checksums."""
+    for path in runs.glob(f"*/{name}"):
         document = json.loads(path.read_text())
         document.pop("checksum", None)
         yield json.dumps(document, indent=1)
@@ -186,9 +196,12 @@ def descriptions(name):
 def main():
     """Writes all seeds."""
     write("motion", [clips(), bvh(), deep_mimic(), glb(), mappings()])
-    demonstration = program("demo", "record-demo", "--episodes", "1")
-    files = [policies(), program("onnx", "export"), configurations(), demonstration, tables(), events()]
-    write("files", [*files, descriptions("run.json"), descriptions("checkpoint/checkpoint.json")])
+    with tempfile.TemporaryDirectory() as folder:
+        runs = Path(folder)
+        train(runs)
+        network, demonstration = program(runs, "onnx", "export"), program(runs, "demo", "record-demo", "--episodes", "1")
+        files = [policies(runs), network, configurations(), demonstration, tables(runs), events()]
+        write("files", [*files, descriptions(runs, "run.json"), descriptions(runs, "checkpoint/checkpoint.json")])
 
 
 def write(target, kinds):

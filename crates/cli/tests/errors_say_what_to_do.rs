@@ -68,7 +68,7 @@ fn a_changed_description_is_refused() {
     };
     refused(&whole.replacen("\"lr\": 0.00", "\"lr\": 0.01", 1), &["a/run.json: checksum: found "]);
 
-    // runs of earlier versions have no checksum; their values are looked at all the same
+    // a description edited by hand has no checksum, but its values are checked
     let mut run = json(&whole);
     run.as_object_mut().unwrap().remove("checksum").expect("a checksum");
     let with = |run: &serde_json::Value, pointer: &str, value: serde_json::Value| {
@@ -77,6 +77,12 @@ fn a_changed_description_is_refused() {
         run.to_string()
     };
     for (pointer, value, text) in [
+        (
+            "/format",
+            "marathon-policy".into(),
+            "a/run.json: format: found \"marathon-policy\", expected \"marathon-run\"",
+        ),
+        ("/version", 1.into(), "a/run.json: version: found 1, expected 2, the one that this program knows"),
         ("/config/algorithm/ppo/lr", (-1.0).into(), "config.algorithm.ppo.lr: found -1, expected a positive number"),
         ("/config/run/horizon", 0.into(), "config.run.horizon: found 0, expected at least 1"),
         ("/config/run/horizon", 32.into(), "config.run.horizon: found 32, expected 64, as in checkpoint"),

@@ -407,24 +407,3 @@ fn a_closed_pipe_does_not_end_a_run() {
     assert!(child.wait().unwrap().success());
     assert!(temp.path().join("a/summary.json").is_file());
 }
-
-/// A run that a program of version 1 made goes on, and is of the version of today then.
-#[test]
-fn runs_of_version_1_go_on() {
-    let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("../learn/tests/files");
-    for algorithm in ["ppo", "a2c", "acktr", "sac"] {
-        let temp = tempfile::tempdir().unwrap();
-        for folder in ["", "checkpoint"] {
-            std::fs::create_dir_all(temp.path().join("run").join(folder)).unwrap();
-            for file in std::fs::read_dir(files.join(algorithm).join(folder)).unwrap().flatten() {
-                if file.path().is_file() {
-                    std::fs::copy(file.path(), temp.path().join("run").join(folder).join(file.file_name())).unwrap();
-                }
-            }
-        }
-        succeed(temp.path(), &["train", "--resume", "run", "--steps", "1280"]);
-        let run = read_json(&temp.path().join("run/run.json"));
-        assert_eq!((&run["version"], &run["config"]["run"]["total_steps"]), (&2.into(), &1280.into()), "{algorithm}");
-        assert_eq!(read_json(&temp.path().join("run/summary.json"))["steps"], 1280, "{algorithm}");
-    }
-}

@@ -197,7 +197,7 @@ impl<'a> TensorReader<'a> {
         let mut value = json(self.path, &self.document, format)?;
         // the checksum covers all bytes: see `seal`
         value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM));
-        known(self.path, value, format, version, None)
+        known(self.path, value, format, version)
     }
     /// Checks and returns the checksum of `bytes`, which this reader was created from. `None` if the document has no
     /// checksum.
@@ -257,9 +257,6 @@ impl<'a> TensorReader<'a> {
     }
 }
 
-/// Makes a document of an earlier version into one of this version; or says where it is none, and what is found there.
-pub type Upgrade = fn(u64, Value) -> Result<Value, (String, String)>;
-
 /// Position of the checksum's digits in a sealed file: in the header, after the last checksum key of the document. The
 /// document is JSON text within JSON.
 fn seal_place(bytes: &[u8]) -> Option<usize> {
@@ -279,37 +276,24 @@ fn json(path: &Path, text: &str, format: &str) -> Result<Value, Error> {
     serde_json::from_str(text).map_err(|e| Error::file(path, "JSON", format!("'{e}'"), format!("a {format} document")))
 }
 
-/// Reads a JSON document that states its format and version. Upgrades an earlier version if there is an upgrade.
-fn known<D: DeserializeOwned>(
-    path: &Path,
-    mut value: Value,
-    format: &str,
-    version: u32,
-    upgrade: Option<Upgrade>,
-) -> Result<D, Error> {
-    let expected = || format!("a {format} document");
+/// Reads a JSON document that states its format and version.
+fn known<D: DeserializeOwned>(path: &Path, mut value: Value, format: &str, version: u32) -> Result<D, Error> {
     let (found, number) = (&value["format"], &value["version"]);
     if found != format {
         return Err(Error::file(path, "format", found, format!("\"{format}\"")));
     }
-    let earlier = number.as_u64().filter(|n| upgrade.is_some() && (1..version as u64).contains(n));
-    if *number != version && earlier.is_none() {
+    if *number != version {
         return Err(Error::file(path, "version", number, format!("{version}, the one that this program knows")));
     }
-    // earlier versions wrote none
     if let Some(found) = value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM)) {
         let sum = checksum_of(&value);
         if found != sum.as_str() {
             return Err(changed(path, &found, &sum));
         }
     }
-    if let (Some(number), Some(upgrade)) = (earlier, upgrade) {
-        value = upgrade(number, value)
-            .map_err(|(place, found)| Error::file(path, place, format!("'{found}'"), expected()))?;
-    }
     serde_path_to_error::deserialize(value).map_err(|e| {
-        let place = e.path().to_string();
-        Error::file(path, if place == "." { "JSON" } else { &place }, format!("'{}'", e.into_inner()), expected())
+        let (place, expected) = (e.path().to_string(), format!("a {format} document"));
+        Error::file(path, if place == "." { "JSON" } else { &place }, format!("'{}'", e.into_inner()), expected)
     })
 }
 
@@ -325,26 +309,13 @@ pub fn write_description(path: &Path, document: &impl Serialize) -> Result<(), E
     write_atomic(path, format!("{open},\n  \"{CHECKSUM}\": \"{sum}\"\n}}\n").as_bytes())
 }
 
-/// Reads a description; one without a checksum, as earlier versions wrote them, too.
+/// Reads a description. A missing checksum is no error, so that a person can edit the file.
 ///
 /// # Errors
 /// If the file cannot be read, has changed since it was written, or is of another format.
 pub fn read_description<D: DeserializeOwned>(path: &Path, format: &str, version: u32) -> Result<D, Error> {
-    read_versions(path, format, version, None)
-}
-
-/// As [`read_description`], also for earlier versions that can be upgraded.
-///
-/// # Errors
-/// The same.
-pub fn read_versions<D: DeserializeOwned>(
-    path: &Path,
-    format: &str,
-    version: u32,
-    upgrade: Option<Upgrade>,
-) -> Result<D, Error> {
     let text = budget::read_to_string(path, &budget::CONFIG_FILE).map_err(Error::io(path, "read"))?;
-    known(path, json(path, &text, format)?, format, version, upgrade)
+    known(path, json(path, &text, format)?, format, version)
 }
 
 /// Checksum of a document's values, whatever the order of its keys and the spelling of its numbers.

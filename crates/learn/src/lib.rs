@@ -71,7 +71,7 @@ pub use algorithms::sac::Sac;
 pub use algorithms::schedule::{Moving, Schedule};
 pub use distill::{Distiller, Halfway, Lessons};
 pub use error::Error;
-pub use files::{AtomicFile, Upgrade, checksum, read_description, read_versions, write_atomic, write_description};
+pub use files::{AtomicFile, checksum, read_description, write_atomic, write_description};
 pub use lanes::BLOCK;
 pub use nets::NetworkConfig;
 pub use nets::activation::Activation;

@@ -78,6 +78,20 @@ fn a_file_without_a_checksum_is_refused_with_the_command_that_writes_one() {
 }
 
 #[test]
+fn a_policy_of_another_version_is_refused() {
+    let policy = small();
+    let (mean, std) = (policy.normalizer().mean().to_vec(), policy.normalizer().std().to_vec());
+    for version in [0, 2] {
+        let mut meta = policy.meta().clone();
+        meta.version = version;
+        let stats = (mean.clone(), std.clone());
+        let other = Policy::from_parts(meta, policy.params().to_vec(), stats, policy.log_std().to_vec()).unwrap();
+        let expected = "expected 1, the one that this program knows";
+        assert_eq!(refusal(&other.to_bytes()), format!("puck.safetensors: version: found {version}, {expected}"));
+    }
+}
+
+#[test]
 fn shipped_policies_have_theirs() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/policies");
     let mut count = 0;

@@ -125,14 +125,23 @@ fn damaged_checkpoints_are_refused() {
     std::fs::write(&description, json.replacen("\"agents\": 80", "\"agents\": 96", 1)).unwrap();
     assert!(error().contains("checkpoint.json: checksum: found "), "{}", error());
 
-    // descriptions of earlier versions have no checksum; their values are looked at all the same
+    // a description edited by hand has no checksum, but its values are checked
     about.as_object_mut().unwrap().remove("checksum").expect("a checksum");
     let json = serde_json::to_string_pretty(&about).unwrap();
     std::fs::write(&description, &json).unwrap();
     assert_eq!(Checkpoint::load(folder).unwrap(), whole);
     for (from, to, text) in [
         ("marathon-checkpoint", "marathon-policy", "format: found"),
-        ("\"version\": 2", "\"version\": 7", "version: found 7, expected 2"),
+        (
+            "\"version\": 2",
+            "\"version\": 1",
+            "checkpoint.json: version: found 1, expected 2, the one that this program knows",
+        ),
+        (
+            "\"version\": 2",
+            "\"version\": 7",
+            "checkpoint.json: version: found 7, expected 2, the one that this program knows",
+        ),
         ("\"agents\": 80", "\"agents\": 81", "config.run.agents: found 81, expected a multiple of 16, such as 80"),
         ("\"horizon\": 24", "\"horizon\": -24", "config.run.horizon: found 'invalid value: integer `-24`"),
         ("\"lr\"", "\"lrr\"", "lr"),

@@ -7,7 +7,7 @@ use crate::text;
 use marathon_config::Loaded;
 use marathon_envs::Options;
 use marathon_learn::policy::options;
-use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_versions, write_atomic, write_description};
+use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_description, write_atomic, write_description};
 use marathon_physics::budget;
 use marathon_physics::hint::did_you_mean;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,6 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
-/// Since version 2, each algorithm has settings of its own.
 const VERSION: u32 = 2;
 const RUN: &str = "run.json";
 const LOCK: &str = ".lock";
@@ -46,7 +45,7 @@ pub struct RunFile {
     pub version: u32,
     /// Registry name of the agent.
     pub agent: String,
-    /// Arguments of its task; empty for a task without, and in files of earlier versions.
+    /// Arguments of its task; empty for a task without arguments.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
     /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
@@ -92,7 +91,7 @@ impl RunFile {
 
     /// Reads a description and looks at every value.
     fn read(path: &Path) -> Result<Self, RunError> {
-        let run: RunFile = read_versions(path, FORMAT, VERSION, Some(upgrade))?;
+        let run: RunFile = read_description(path, FORMAT, VERSION)?;
         run.config.validate_in(path, "config")?;
         run.clips.keys().try_for_each(|name| clips::check_name(name))?;
         for (key, n) in [("summary_freq", run.summary_freq), ("checkpoint_interval", run.checkpoint_interval)] {
@@ -149,14 +148,6 @@ fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<
         }
         _ => (found != expected).then(|| (place.to_string(), found, expected)),
     }
-}
-
-/// Makes a description of version 1 into one of version 2.
-fn upgrade(_: u64, mut run: Value) -> Result<Value, (String, String)> {
-    let config = TrainConfig::upgrade(run["config"].take());
-    run["config"] = config.map_err(|e| (format!("config.{}", e.path()), e.inner().to_string()))?;
-    run["version"] = VERSION.into();
-    Ok(run)
 }
 
 /// The folder of a run, locked against a second writer while this value lives.

@@ -55,8 +55,7 @@ pub struct PolicyMeta {
     pub version: u32,
     /// Name of the agent and its task, such as `Hopper-v0`.
     pub agent: String,
-    /// Arguments of the task, with the values that the policy is for; empty for a task without, and in files of earlier
-    /// versions.
+    /// Arguments of the task, with the values that the policy is for; empty for a task without arguments.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
     /// Motion clips that the arguments name and that do not come with Marathon: names, and texts of `.motion` files.
@@ -121,8 +120,7 @@ impl PolicyMeta {
 /// Summary of a policy's training: nothing that would tell equal policies apart, so without the time that it took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Training {
-    /// Configuration, without the number of threads, which is 0: a document that acting does not look into, so that a new
-    /// setting does not make older programs refuse a policy.
+    /// Configuration, with 0 for the number of threads. It is for people to read: no program depends on its keys.
     pub config: Value,
     /// Agent-steps.
     pub steps: u64,

@@ -9,18 +9,16 @@ use super::roles::RoleReplica;
 use super::{Clocks, Trainer, states};
 use crate::algorithms::{Numbers, Saved};
 use crate::error::Error;
-use crate::files::{self, Dtype, TensorReader, TensorWriter, read_versions, write_atomic, write_description};
+use crate::files::{self, Dtype, TensorReader, TensorWriter, read_description, write_atomic, write_description};
 use crate::nets::normalize::Moments;
 use crate::rewards::RewardConfig;
 use crate::rollout::states::{AgentStates, StatesShape};
 use marathon_physics::budget;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 const FORMAT: &str = "marathon-checkpoint";
-/// Since version 2, each algorithm keeps its own state by its own names.
 const VERSION: u32 = 2;
 const DESCRIPTION: &str = "checkpoint.json";
 /// Lists of a role beside those of its learner.
@@ -91,7 +89,7 @@ impl AboutRole {
 }
 
 impl About {
-    /// Refuses values that no run has: files of earlier versions have no checksum.
+    /// Refuses values that no run has. A file that was edited by hand has no checksum.
     fn check(&self, path: &Path) -> Result<(), Error> {
         self.config.validate_in(path, "config")?;
         let roles = || [&self.first].into_iter().chain(self.others.iter().map(|(_, role)| role));
@@ -137,36 +135,6 @@ fn rewards(config: &TrainConfig) -> String {
         None => reward.kind.name().into(),
     };
     config.rewards.iter().map(of).collect::<Vec<_>>().join(", ")
-}
-
-/// Makes a description of version 1 into one of version 2.
-fn upgrade(_: u64, mut about: Value) -> Result<Value, (String, String)> {
-    let Some(keys) = about.as_object_mut() else { return Ok(about) };
-    let config = keys.remove("config").unwrap_or_default();
-    let config = TrainConfig::upgrade(config).map_err(|e| (format!("config.{}", e.path()), e.inner().to_string()))?;
-    let mut learner = serde_json::Map::new();
-    let powers = keys.remove("adam_powers").unwrap_or_default();
-    if !config["algorithm"]["ppo"].is_null() || !config["algorithm"]["sac"].is_null() {
-        learner.insert("adam_power_1".into(), powers[0].clone());
-        learner.insert("adam_power_2".into(), powers[1].clone());
-    }
-    for (old, new) in [("lr", "lr"), ("skipped_minibatches", "skipped")] {
-        learner.insert(new.into(), keys.remove(old).unwrap_or_default());
-    }
-    keys.insert("config".into(), config);
-    keys.insert("learner".into(), learner.into());
-    keys.insert("version".into(), json!(VERSION));
-    Ok(about)
-}
-
-/// The name today of a learner's list in a file of version 1, which had Adam's for every algorithm.
-fn renamed<'n>(name: &'n str, algorithm: &str) -> Option<&'n str> {
-    match (name, algorithm) {
-        ("adam_v", "a2c") => Some("mean_square"),
-        ("adam_m", "acktr") => Some("momentum"),
-        ("adam_m", "a2c") | ("adam_v", "acktr") => None,
-        (name, _) => Some(name),
-    }
 }
 
 impl Checkpoint {
@@ -358,7 +326,7 @@ impl Checkpoint {
     /// If a file is missing, damaged or of another format.
     pub fn load(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(DESCRIPTION);
-        let about: About = read_versions(&path, FORMAT, VERSION, Some(upgrade))?;
+        let about: About = read_description(&path, FORMAT, VERSION)?;
         about.check(&path)?;
 
         let path = folder.join(&about.state.name);
@@ -374,21 +342,17 @@ impl Checkpoint {
         let file = TensorReader::new(&path, &bytes)?;
         let prefixes = Self::prefixes(&about);
         let mut roles = Vec::new();
-        for (i, prefix) in prefixes.iter().enumerate() {
+        for prefix in &prefixes {
             let [obs_mean, obs_var] = OBSERVATIONS.map(|name| format!("{prefix}{name}"));
             let (obs_mean, obs_var) = (file.list(&obs_mean)?, file.list(&obs_var)?);
-            let algorithm = match i {
-                0 => about.config.algorithm.name(),
-                _ => about.config.of_role(&about.others[i - 1].0).algorithm.name(),
-            };
-            roles.push(RoleLists { learner: learner_lists(&file, prefix, algorithm)?, obs_mean, obs_var });
+            roles.push(RoleLists { learner: learner_lists(&file, prefix)?, obs_mean, obs_var });
         }
         Ok(Self { roles, agents: states::read(&file, &prefixes)?, about })
     }
 }
 
-/// The lists of a role's learner, by their names today.
-fn learner_lists(file: &TensorReader<'_>, prefix: &str, algorithm: &str) -> Result<Vec<(String, Numbers)>, Error> {
+/// The lists of a role's learner with their names.
+fn learner_lists(file: &TensorReader<'_>, prefix: &str) -> Result<Vec<(String, Numbers)>, Error> {
     let mut lists = Vec::new();
     for (full, kind) in file.names() {
         let Some(name) = full.strip_prefix(prefix).filter(|name| !name.contains('/')) else { continue };
@@ -404,9 +368,7 @@ fn learner_lists(file: &TensorReader<'_>, prefix: &str, algorithm: &str) -> Resu
             Dtype::U32 => Numbers::U32(file.list(full)?),
             _ => Numbers::U64(file.list(full)?),
         };
-        if let Some(name) = renamed(name, algorithm) {
-            lists.push((name.to_string(), numbers));
-        }
+        lists.push((name.to_string(), numbers));
     }
     Ok(lists)
 }

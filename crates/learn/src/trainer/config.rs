@@ -118,7 +118,7 @@ impl Default for RunConfig {
     }
 }
 
-/// Whether a setting is off that files of earlier versions do not have.
+/// Whether a setting is off. Files leave it out then.
 fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
@@ -165,18 +165,9 @@ impl TrainConfig {
         self
     }
 
-    /// The configuration in a file of version 1, as the document that files have today. Settings that mean nothing to the
-    /// algorithm, which that version accepted, are left out.
-    ///
-    /// # Errors
-    /// If it is none.
-    pub fn upgrade(version_1: Value) -> Result<Value, serde_path_to_error::Error<serde_json::Error>> {
-        let flat: FlatConfig = serde_path_to_error::deserialize(version_1)?;
-        Ok(serde_json::to_value(TrainConfig::from(&flat)).expect("a configuration is plain data"))
-    }
-
-    /// A configuration from settings by name without their sections, such as `total_steps`, `gamma` or `actor_hidden`;
-    /// `final_min_std` and its like are the ends of settings that move. The rest has PPO's defaults.
+    /// A configuration from settings by name without their sections, such as `total_steps`, `gamma` or `actor_hidden`.
+    /// Settings that change during a run end at the value of their second name, such as `final_min_std` for `min_std`.
+    /// Other settings have PPO's defaults.
     ///
     /// # Errors
     /// If there is no such setting, its value is of the wrong kind, or it means nothing to the algorithm.

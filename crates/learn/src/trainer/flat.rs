@@ -1,5 +1,5 @@
-//! The configuration of version 1, one list of settings for all algorithms: `run.json`, checkpoints and policies of that
-//! version have it.
+//! The configuration as one flat list of settings for all algorithms. Python's `MarathonAgent.learn` takes its keyword
+//! arguments from it.
 
 use super::config::{RunConfig, TrainConfig};
 use crate::algorithms::actor_critic::Deviations;
@@ -89,7 +89,7 @@ enum Algorithm {
     Sac(Sac),
 }
 
-/// All settings, with the defaults of version 1.
+/// All settings with their defaults.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlatConfig {
@@ -193,7 +193,7 @@ impl Default for FlatConfig {
 }
 
 impl From<&FlatConfig> for TrainConfig {
-    /// What means nothing to the algorithm is left out.
+    /// Leaves out the settings of other algorithms.
     fn from(flat: &FlatConfig) -> Self {
         let moving = |first: f64, last: Option<f64>| Moving { first, last: last.unwrap_or(first) };
         let entropy_coef = moving(flat.entropy_coef, flat.final_entropy_coef);

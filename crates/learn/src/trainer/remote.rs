@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::Path;
 
-/// Since version 2, sums have the number of decisions; since version 3, the task's metrics.
+/// Both sides must have the same version.
 const VERSION: u32 = 3;
 
 /// What a message says of itself.

@@ -203,7 +203,7 @@ mod tests {
         assert_eq!((log.before(ITERATION), log.before("a")), (Some(1.0), None));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n");
         assert_eq!(History::read(&path).unwrap().column("a"), [None]);
-        // a file of an older version goes on with the columns that it has
+        // a file keeps the columns that it has
         log.push(&[("new".into(), Some(7.0)), ("a".into(), Some(1.0)), (ITERATION.into(), Some(2.0))]).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n");
     }
