@@ -67,6 +67,5 @@ pub struct Learned {
     /// Minibatches left out in the whole run because their gradient was not finite.
     pub skipped_minibatches: u64,
     /// Mean of each reward per decision but the task's, by name, in the order of the configuration.
-    #[serde(default)]
     pub signal_rewards: Vec<(String, f64)>,
 }

@@ -34,10 +34,8 @@ pub struct Summary {
     /// Agent-steps by processor seconds.
     pub steps_per_cpu_second: f64,
     /// Times that the state of an agent was not finite while it learned; it was then made whole.
-    #[serde(default)]
     pub diverged: u64,
     /// Minibatches that were left out because their gradient was not finite.
-    #[serde(default)]
     pub skipped_minibatches: u64,
     /// Whether the run was stopped before its last step.
     pub interrupted: bool,
