@@ -1,9 +1,10 @@
-//! `--against mujoco`: both engines on the same workload, in turns, so that whatever slows the computer slows both.
+//! `--against mujoco`: both engines on the same workload, in turns, so that other load on the computer slows both.
 
 use super::mujoco::{Mujoco, Turn};
 use super::options::Head;
-use super::physics::{Counts, Plan, Subject, Which, repeat};
+use super::plan::{Counts, Plan, Which};
 use super::row::{Sample, spread};
+use super::workload::{Subject, controls, repeat};
 use crate::console::{note, print_json, say};
 use crate::error::CliError;
 use marathon_physics::lanes::Isa;
@@ -21,7 +22,7 @@ struct Row {
     lanes: usize,
     threads: usize,
     rounds: usize,
-    /// MuJoCo's time by ours: processor time, and time that passed.
+    /// MuJoCo's time divided by Marathon's: processor time, and wall time.
     ratio: f64,
     wall_ratio: f64,
     marathon: Side,
@@ -33,12 +34,12 @@ struct Row {
 struct Side {
     /// Agent-steps of all rounds.
     steps: u64,
-    /// Processor time of an agent-step, and the time that passed for one with all threads at work.
+    /// Processor time per agent-step, and wall time per agent-step with all threads at work.
     ns_per_agent_step: f64,
     wall_ns_per_agent_step: f64,
-    /// Slowest round by fastest, less one.
+    /// Time of the slowest round divided by that of the fastest, minus one.
     spread: f64,
-    /// Contacts of an agent, on average.
+    /// Mean number of contacts of an agent.
     contacts: f64,
     /// Agents whose simulation broke down.
     broken: u64,
@@ -52,7 +53,7 @@ struct Document<'a> {
     against: &'static str,
     mujoco_version: &'a str,
     seconds: f64,
-    /// Agents of each thread, and steps before those that are timed.
+    /// Agents of each thread, and untimed steps at the start of a repetition.
     agents: usize,
     warmup: usize,
     limp: bool,
@@ -63,7 +64,7 @@ struct Document<'a> {
 /// Measures every model on both engines.
 ///
 /// # Errors
-/// If there is no MuJoCo, or one of the engines refuses a model.
+/// If MuJoCo is missing, or an engine refuses a model.
 pub fn run(plan: &Plan, subjects: &[Subject], head: Head, json: bool) -> Result<(), CliError> {
     let mut mujoco = Mujoco::start()?;
     if !json {
@@ -139,7 +140,7 @@ fn compare(plan: &Plan, subject: &Subject, mujoco: &mut Mujoco) -> Result<Vec<Ro
     Ok(plan.isas.iter().zip(&ours).map(row).collect())
 }
 
-/// Our turn: repetitions until the time is used up.
+/// Marathon's turn: repetitions until the time is used up.
 fn turn(
     plan: &Plan,
     subject: &Subject,
@@ -149,7 +150,7 @@ fn turn(
     counts: &mut Counts,
 ) -> Result<Sample, CliError> {
     let mut sum = Sample::default();
-    // rounds have starts and controls of their own
+    // each round has its own starts and controls
     let mut seed = (round as u64) << 32;
     while sum.cpu < seconds * plan.threads as f64 {
         let sample = repeat(plan, subject, isa, seed, counts).map_err(|e| subject.refused(e))?;
@@ -190,7 +191,7 @@ fn print_head(plan: &Plan, subjects: &[Subject], version: &str) {
         "MuJoCo {version} in double precision and Marathon by instruction set, in turns on {threads} thread(s), {agents} \
          agent(s) each:"
     ));
-    say(format!("one physics step of one agent {}, nobody reset, {contacts}; medians\n", plan.load(subjects)));
+    say(format!("one physics step of one agent {}, without resets, {contacts}; medians\n", controls(plan, subjects)));
     let (theirs, ours) = ("MuJoCo", "Marathon");
     say(format!(
         "{:23}  {:^26}  {:^26}  {:^18}",

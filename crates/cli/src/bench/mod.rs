@@ -1,7 +1,8 @@
-//! `marathon bench`: how fast the physics, the environments or the training are on this computer, and how well a policy obeys.
+//! `marathon bench`: speed of the physics, the environments and the training on this computer, and how well a policy follows
+//! commands.
 //!
-//! Figures are processor time: what a step costs, whoever else uses the computer. The step is that of one agent. A row is
-//! the median of several repetitions; `spread` is the distance between its fastest and slowest repetition.
+//! Times are processor time, so other programs on the computer hardly change them. A step is a step of one agent. A row is
+//! the median of several repetitions; `spread` compares its slowest repetition with its fastest.
 
 mod against;
 mod controller;
@@ -10,9 +11,11 @@ mod gait;
 mod mujoco;
 mod options;
 mod physics;
+mod plan;
 mod row;
 mod scene;
 mod train;
+mod workload;
 
 use crate::error::CliError;
 use clap::Subcommand;
@@ -21,8 +24,8 @@ use clap::Subcommand;
 #[derive(Debug, clap::Args)]
 #[command(
     arg_required_else_help = true,
-    after_help = "Compare rows of the same threads only: cores share caches and power, so that a step costs more with all \
-                  of them busy."
+    after_help = "Compare only rows with the same number of threads: cores share caches and power, so a step costs more \
+                  when all of them are busy."
 )]
 pub struct BenchArgs {
     /// What to measure.
@@ -33,22 +36,22 @@ pub struct BenchArgs {
 /// What to measure.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// The physics alone: random torques, or what a policy did. A step is a physics step.
+    /// The physics alone, under random torques or the recorded controls of a policy. A step is a physics step.
     Physics(physics::PhysicsArgs),
-    /// The environments: random actions, observations, rewards, resets. A step is a decision.
+    /// The environments: random actions, physics, observations, rewards, resets. A step is a decision.
     Env(env::EnvArgs),
-    /// Training with the agent's own configuration, everything included. A step is a decision.
+    /// Training with the agent's default configuration, everything included. A step is a decision.
     Train(train::TrainArgs),
-    /// Processor seconds of training until the agent runs at --speed and hardly falls, for each of --seeds.
+    /// Processor seconds of training until the agent runs at --speed with at most --falls falls, for each seed.
     Gait(gait::GaitArgs),
-    /// How well a policy obeys commands: a minute of random ones, steps of the speed, turns, standing, jumps, pushes.
+    /// How well a policy follows commands: a minute of random commands, speed steps, turns, standing, jumps, pushes.
     Controller(controller::ControllerArgs),
 }
 
-/// Measures and prints.
+/// Measures and prints the results.
 ///
 /// # Errors
-/// If an agent or model is unknown or cannot be simulated, or what to compare with is missing.
+/// If an agent or model is unknown or cannot be simulated, or MuJoCo is missing.
 pub fn run(args: &BenchArgs, json: bool) -> Result<(), CliError> {
     match &args.what {
         What::Physics(args) => physics::run(args, json),

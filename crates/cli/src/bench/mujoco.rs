@@ -1,7 +1,8 @@
-//! MuJoCo in a Python process of its own: finding one, and talking to it.
+//! MuJoCo in a Python process: starts the process and exchanges messages with it.
 
-use super::physics::{Plan, STEPS, Source, Subject};
+use super::plan::Plan;
 use super::row::Sample;
+use super::workload::{STEPS, Source, Subject};
 use crate::error::CliError;
 use crate::python::{self, VARIABLE};
 use marathon_physics::workload::HOLD;
@@ -12,7 +13,7 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout};
 use std::thread::JoinHandle;
 
-/// What the process runs; its requests and answers are described there.
+/// Program of the process; it documents requests and answers.
 const SCRIPT: &str = include_str!("mujoco_side.py");
 
 /// A Python process with MuJoCo.
@@ -23,19 +24,19 @@ pub struct Mujoco {
     child: Child,
     requests: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
-    /// Collects what the process complains about.
+    /// Collects the error output of the process.
     complaints: Option<JoinHandle<String>>,
 }
 
-/// What MuJoCo did in a turn.
+/// Results of a turn of MuJoCo.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct Turn {
     steps: u64,
     cpu: f64,
     wall: f64,
-    /// Contacts of an agent, on average.
+    /// Mean number of contacts of an agent.
     pub contacts: f64,
-    /// Agents that MuJoCo gave up on.
+    /// Agents whose simulation broke down.
     pub broken: u64,
 }
 
@@ -91,7 +92,7 @@ impl Mujoco {
         )))
     }
 
-    /// Gives it a model.
+    /// Loads a model.
     ///
     /// # Errors
     /// If MuJoCo cannot read the model, or the process has ended.
@@ -117,7 +118,7 @@ impl Mujoco {
         Ok(())
     }
 
-    /// Lets it run the model that it was given last for so many processor seconds of each thread, more or less.
+    /// Runs the loaded model for about `seconds` processor seconds of each thread.
     ///
     /// # Errors
     /// If the process has ended.

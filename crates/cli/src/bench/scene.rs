@@ -1,53 +1,39 @@
-//! What a policy's agents do, to be done again by the physics alone: `bench physics --policy`.
+//! Recorded states and controls of a policy's agents, replayed by the physics alone: `bench physics --policy`.
 
-use super::physics::{Counts, Plan, Source, Subject, Which};
+use super::plan::{Counts, Plan, Which};
 use super::row::{Sample, on_threads, thread_cpu};
 use crate::error::CliError;
-use marathon_envs::{ModelSource, VecEnvOptions, registry};
+use marathon_envs::VecEnvOptions;
 use marathon_learn::Policy;
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, SimError, SimOptions};
-use marathon_runs::{Play, PolicySource};
+use marathon_runs::Play;
 use serde::Serialize;
-use std::path::Path;
 use std::time::Instant;
 
-/// Scenes of a policy, each with every agent.
+/// Scenes of a policy; each has all agents.
 const SCENES: usize = 6;
-/// Decisions of a scene: controls alone do not hold a figure up for long.
+/// Decisions of a scene. Scenes are short: a character falls soon when controls do not react to its state.
 const DECISIONS: usize = 20;
 /// Decisions between two scenes.
 const BETWEEN: usize = 60;
 
-/// Where agents are at some moment, and their controls from then on.
+/// States of the agents at some moment, and the controls that follow.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scene {
     /// `qpos` and `qvel` of each agent.
     starts: Vec<[Vec<f64>; 2]>,
-    /// By decision, `[agents][nu]`, row-major.
+    /// One entry per decision, `[agents][nu]`, row-major.
     controls: Vec<Vec<f64>>,
     /// Physics steps of a decision.
     hold: usize,
 }
 
-/// The model of a policy's task, with scenes of so many agents.
+/// Plays a policy and records scenes of `agents` agents, with `hold` physics steps per decision.
 ///
 /// # Errors
-/// If there is no such policy.
-pub fn subject(file: &Path, agents: usize) -> Result<Subject, CliError> {
-    let (policy, factory) = PolicySource { policy: file.into(), ..Default::default() }.load()?;
-    let spec = factory.spec();
-    let agent = registry::global().agent_with(&spec.id, &spec.options)?;
-    let model = agent.model()?;
-    let source = match agent.facts().model {
-        ModelSource::Text(text) => Source::Text(text.into()),
-        ModelSource::File(path) => Source::File(path),
-    };
-    let scenes = record(&policy, agents, spec.frame_skip)?;
-    Ok(Subject { name: spec.id.clone(), model, source, scenes })
-}
-
-fn record(policy: &Policy, agents: usize, hold: usize) -> Result<Vec<Scene>, CliError> {
+/// If the task cannot be simulated.
+pub fn record(policy: &Policy, agents: usize, hold: usize) -> Result<Vec<Scene>, CliError> {
     let mut play = Play::new(policy, &VecEnvOptions { agents, ..Default::default() })?;
     let mut scenes = Vec::new();
     for _ in 0..SCENES {
@@ -71,7 +57,7 @@ fn record(policy: &Policy, agents: usize, hold: usize) -> Result<Vec<Scene>, Cli
     Ok(scenes)
 }
 
-/// All scenes once on every thread, and their counts.
+/// Replays all scenes once on every thread and adds their counts to `counts`.
 ///
 /// # Errors
 /// If the model cannot be simulated.
