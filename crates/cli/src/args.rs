@@ -3,7 +3,6 @@
 use crate::bench::BenchArgs;
 use crate::film::Ghost;
 use crate::motion::MotionArgs;
-use crate::study::StudyArgs;
 use clap::{Parser, Subcommand};
 use marathon_runs::distill::DistillOptions;
 use marathon_runs::{FilmOptions, PolicySource, RunOptions, TaskOptions};
@@ -66,8 +65,6 @@ pub enum Command {
     Motion(MotionArgs),
     /// Measure the speed of the physics, the environments or the training.
     Bench(BenchArgs),
-    /// Make the paper's experiments again: a table, a picture and a page each.
-    Study(StudyArgs),
     /// Play rollouts for `train --processes`, which starts this.
     #[command(hide = true)]
     RolloutWorker,

@@ -1,4 +1,4 @@
-//! What ends a command early.
+//! Errors that end a command.
 
 use crate::program;
 use marathon_config::ConfigError;
@@ -13,55 +13,47 @@ use std::path::Path;
 /// An error with a text for the user: which file or option, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// Of a run, a policy or a film.
+    /// An error of a run, a policy or a film.
     #[error("{}", program::spelled(|flags| .0.spelled(flags)))]
     Run(#[from] RunError),
-    /// Of a model file.
+    /// An error of a model file.
     #[error(transparent)]
     Model(#[from] MjcfError),
-    /// Of a motion or a mapping.
+    /// An error of a motion or a mapping.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Of the pictures.
+    /// An error of a picture.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A process that plays is lost; what was learned is saved.
+    /// A process that plays is lost; the learned policy is saved.
     #[error("{cause}\n{advice}")]
     Lost {
-        /// What failed first.
+        /// The first failure.
         cause: RunError,
-        /// What is left and how to go on.
+        /// What is saved, and how to continue.
         advice: String,
     },
-    /// A Python program cannot be asked.
+    /// A Python process does not start or answer.
     #[error("{0}")]
     Python(String),
-    /// The system refuses something.
-    #[error("{0}")]
-    Process(String),
     /// The game cannot be started, or failed.
     #[error("{0}")]
     Game(String),
-    /// The command line makes no sense.
+    /// The command line is wrong.
     #[error("{0}")]
     Usage(String),
-    /// A check has found something; its report is on stdout.
+    /// A check has found faults; its report is on stdout.
     #[error("{0}")]
     Found(String),
-    /// The user pressed Ctrl-C; the text says what is left and how to go on.
+    /// The user pressed Ctrl-C; the text says what is saved and how to continue.
     #[error("interrupted: {0}")]
     Interrupted(String),
 }
 
 impl CliError {
-    /// For `map_err` after something was tried on a file.
+    /// For `map_err` after an operation on a file.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| RunError::io(path, action)(source).into()
-    }
-
-    /// A file with wrong contents.
-    pub fn file(path: &Path, place: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
-        RunError::file(path, place, found, expected).into()
     }
 
     /// Exit code of the program.

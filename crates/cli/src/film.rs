@@ -2,13 +2,13 @@
 //! their ghost.
 
 use crate::error::CliError;
-use crate::interrupt;
 use clap::ValueEnum;
 use marathon_envs::{Autoreset, Spec, VecEnvOptions, registry};
 use marathon_learn::Policy;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size};
+use marathon_runs::terminal::interrupt;
 use marathon_runs::text::unsigned_zero;
 use marathon_runs::{Play, Setting, text};
 use serde::Serialize;

@@ -1,32 +1,33 @@
 //! The `marathon` command: trains, evaluates, benchmarks and shows agents.
 //!
-//! What a person reads goes to stdout, progress and errors to stderr. With `--json`, stdout carries exactly one JSON
-//! object. The exit code is 0 on success, 1 on failure, 2 on a command line that makes no sense, 130 after Ctrl-C. What
-//! stdout does not take is a failure, but for a reader that has left.
+//! Results go to stdout, progress and errors to stderr. With `--json`, stdout carries exactly one JSON object. The exit code is
+//! 0 on success, 1 on failure, 2 for a wrong command line, 130 after Ctrl-C. If stdout loses output, the command fails, unless
+//! the reader has closed the pipe.
 //!
-//! What makes a run is in `marathon-runs`, which the game and the Python package use, too.
+//! Training runs are in `marathon-runs`, which the game and the Python package use, too.
 
 mod args;
 mod bench;
 mod commands;
-mod console;
 mod error;
 mod film;
-mod interrupt;
 mod motion;
 mod program;
-mod python;
-mod study;
 
 use args::{Args, Command};
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
 use error::CliError;
+use marathon_runs::terminal;
 use std::ffi::OsString;
+
+/// Advice for `marathon study`, which was a command.
+const STUDIES: &str = "the studies are in marathon-studies: `cargo run --release -p marathon-studies -- --help`";
 
 /// Runs the command with the words of a command line, the first being the program's own name, and returns its exit code.
 ///
-/// It is a function because the Python package brings the command along; nothing else uses this library. It belongs at the
-/// end of a process: commands that take long replace the handler of Ctrl-C.
+/// It is a function for the Python package, which includes the command; nothing else uses this library. Call it at the end of
+/// a process: long commands replace the handler of Ctrl-C.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     program::set_name(words.first());
@@ -34,34 +35,23 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(args) => match dispatch(&args) {
             Ok(()) => 0,
             Err(error) => {
-                console::note(format!("error: {error}"));
                 // an interrupted run has printed its summary already, a check its report
-                if args.json && !matches!(error, CliError::Interrupted(_) | CliError::Found(_)) {
-                    console::print_json(&serde_json::json!({ "error": error.to_string() }));
-                }
+                let json = args.json && !matches!(error, CliError::Interrupted(_) | CliError::Found(_));
+                terminal::failed(&error, json);
                 error.exit_code()
             }
         },
-        // help goes to stdout with code 0, a wrong command line to stderr with code 2
-        Err(answer) => {
-            let printed = answer.print();
-            if !answer.use_stderr() {
-                console::written(printed);
-            } else if words.iter().any(|word| word == "--json") {
-                let text = answer.render().to_string();
-                let text = text.trim().trim_start_matches("error: ");
-                console::print_json(&serde_json::json!({ "error": text }));
-            }
-            answer.exit_code() as u8
-        }
+        Err(answer) => terminal::refused(&with_advice(answer), words.iter().any(|word| word == "--json")),
     };
-    match console::finish() {
-        Ok(()) => code,
-        Err(error) => {
-            console::note(format!("error: {error}"));
-            if code == 0 { error.exit_code() } else { code }
-        }
+    terminal::finish(code)
+}
+
+/// Adds the place of the studies to the error of `marathon study`.
+fn with_advice(mut answer: clap::Error) -> clap::Error {
+    if answer.get(ContextKind::InvalidSubcommand) == Some(&ContextValue::String("study".into())) {
+        answer.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![STUDIES.into()]));
     }
+    answer
 }
 
 fn dispatch(args: &Args) -> Result<(), CliError> {
@@ -79,6 +69,5 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Bench(bench) => bench::run(bench, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Motion(what) => motion::run(what, args.json),
-        Command::Study(study) => study::run(study, args.json),
     }
 }

@@ -19,6 +19,7 @@ fn unknown_names_come_with_the_nearest() {
     says(&fail(temp.path(), 1, &["train", "hoper"]), &["agent 'hoper' does not exist", "did you mean 'Hopper-v0'?"]);
     assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
     says(&fail(temp.path(), 2, &["trian", "hopper"]), &["trian", "'train'"]);
+    says(&fail(temp.path(), 2, &["study", "table1"]), &["'study'", "-p marathon-studies"]);
     says(&fail(temp.path(), 2, &["train", "hopper", "--sede", "3"]), &["--sede", "--seed"]);
     says(&fail(temp.path(), 2, &["train"]), &["<AGENT>"]);
     says(&fail(temp.path(), 2, &["train", "hopper", "--steps", "lots"]), &["lots", "4M"]);

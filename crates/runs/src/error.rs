@@ -115,6 +115,8 @@ pub enum RunError {
     },
     /// A process that plays has failed.
     Process(String),
+    /// The system does not report Ctrl-C.
+    Signal(String),
     /// Training stopped because its results could no longer be written.
     Stopped {
         /// What failed first.
@@ -195,7 +197,7 @@ impl RunError {
                  with a mapping of your own",
                 path_word(path)
             ),
-            RunError::Process(text) => text.clone(),
+            RunError::Process(text) | RunError::Signal(text) => text.clone(),
             RunError::Stopped { cause, folder, steps, saved } => {
                 let (done, resume) = (thousands(*steps), spelling.resume(folder));
                 let advice = match saved {

@@ -1,9 +1,9 @@
-//! Training runs: what they are told, their folders and reports, the policies that they leave, and processes that play for
-//! them.
+//! Training runs: their options, folders, reports and policies, and processes that play for them.
 //!
-//! The command, the game and the Python package are front ends of this crate. [`RunOptions`], [`PolicySource`] and
-//! [`FilmOptions`] are plain structs, which the feature `clap` makes arguments of a command line. A [`RunError`] carries the
-//! names of options; each front end spells them in its own way ([`Spelling`]).
+//! The command, the studies, the game and the Python package are front ends of this crate. [`RunOptions`], [`PolicySource`] and
+//! [`FilmOptions`] are plain structs; the feature `clap` makes them arguments of a command line. The feature `terminal` adds
+//! output, Ctrl-C and exit codes for programs in a terminal. A [`RunError`] carries the names of options; each front end spells
+//! them in its own way ([`Spelling`]).
 
 pub mod average;
 pub mod clips;
@@ -20,10 +20,14 @@ pub mod output;
 pub mod play;
 pub mod policy_file;
 pub mod processes;
+pub mod python;
 pub mod report;
 pub mod session;
 pub mod setting;
+pub mod speed;
 pub mod task;
+#[cfg(feature = "terminal")]
+pub mod terminal;
 pub mod text;
 
 pub use controller::Obedience;

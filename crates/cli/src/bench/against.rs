@@ -3,11 +3,11 @@
 use super::mujoco::{Mujoco, Turn};
 use super::options::Head;
 use super::plan::{Counts, Plan, Which};
-use super::row::{Sample, spread};
 use super::workload::{Subject, controls, repeat};
-use crate::console::{note, print_json, say};
 use crate::error::CliError;
 use marathon_physics::lanes::Isa;
+use marathon_runs::speed::{Sample, spread};
+use marathon_runs::terminal::{note, print_json, say};
 use marathon_runs::text::broken;
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
 //! How well policies obey commands.
 
 use super::options::Head;
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::EvalOptions;
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::{Obedience, PolicySource, controller, output};
 use serde::Serialize;
 use std::path::PathBuf;

@@ -2,13 +2,13 @@
 //! evaluation that is off the clock, until all the episodes of one meet the demand.
 
 use super::options::{Common, Head, for_networks};
-use crate::console::{note, print_json, say};
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, Snapshot, evaluate, train};
 use marathon_physics::lanes::Isa;
 use marathon_runs::configuration;
+use marathon_runs::terminal::{note, print_json, say};
 use marathon_runs::text::{broken, short};
 use serde::Serialize;
 use std::path::PathBuf;

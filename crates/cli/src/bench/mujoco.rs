@@ -1,11 +1,11 @@
 //! MuJoCo in a Python process: starts the process and exchanges messages with it.
 
 use super::plan::Plan;
-use super::row::Sample;
 use super::workload::{STEPS, Source, Subject};
 use crate::error::CliError;
-use crate::python::{self, VARIABLE};
 use marathon_physics::workload::HOLD;
+use marathon_runs::python::{self, VARIABLE};
+use marathon_runs::speed::Sample;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};

@@ -3,13 +3,14 @@
 use super::against;
 use super::options::{Common, Head, isas, seconds, supported};
 use super::plan::{Counts, Plan, Which};
-use super::row::{Figures, Row, Sample, Table};
+use super::row::{Figures, Row, Table};
 use super::workload::{Subject, controls, repeat};
 use crate::error::CliError;
 use clap::ValueEnum;
 use marathon_physics::SimError;
 use marathon_physics::lanes::Isa;
 use marathon_physics::workload::HOLD;
+use marathon_runs::speed::Sample;
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -1,33 +1,11 @@
-//! Repetitions, and the row of a table that they make.
+//! The tables of the benchmarks; a row is a median of repetitions.
 
 use super::options::{Head, Machine};
-use crate::console::{note, print_json, say};
 use marathon_physics::lanes::Isa;
+use marathon_runs::speed::{Sample, median, spread};
+use marathon_runs::terminal::{note, print_json, say};
 use marathon_runs::text::short;
 use serde::Serialize;
-use std::time::Instant;
-
-/// One repetition.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
-    /// Agent-steps.
-    pub steps: u64,
-    /// Processor time of all threads, s.
-    pub cpu: f64,
-    /// Time that passed, s.
-    pub wall: f64,
-}
-
-impl Sample {
-    /// Processor time of an agent-step, s.
-    pub fn cpu_per_step(&self) -> f64 {
-        self.cpu / self.steps as f64
-    }
-    /// Time that passed per agent-step, s.
-    pub fn wall_per_step(&self) -> f64 {
-        self.wall / self.steps as f64
-    }
-}
 
 /// Figures that only one benchmark has.
 pub trait Figures: Serialize {
@@ -39,7 +17,7 @@ pub trait Figures: Serialize {
     fn broken(&self) -> u64;
 }
 
-/// What was measured of an agent.
+/// The results of an agent.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row<F> {
     pub agent: String,
@@ -47,7 +25,7 @@ pub struct Row<F> {
     pub lanes: usize,
     pub isa: &'static str,
     pub threads: usize,
-    /// Agents that were simulated.
+    /// Simulated agents.
     pub agents: usize,
     pub repetitions: usize,
     /// Steps of all repetitions.
@@ -55,19 +33,17 @@ pub struct Row<F> {
     pub ns_per_agent_step: f64,
     pub steps_per_cpu_second: f64,
     pub steps_per_wall_second: f64,
-    /// Slowest repetition by fastest, less one.
+    /// Time of the slowest repetition divided by that of the fastest, minus one.
     pub spread: f64,
     #[serde(flatten)]
     pub figures: F,
 }
 
 impl<F: Figures> Row<F> {
-    /// From its repetitions, of which there is at least one; `size` is the number of threads and of agents.
+    /// A row from at least one repetition; `size` is the number of threads and of agents.
     pub fn new(agent: &str, isa: Isa, size: (usize, usize), samples: &[Sample], figures: F) -> Self {
         let (threads, agents) = size;
-        let mut sorted = samples.to_vec();
-        sorted.sort_by(|a, b| a.cpu_per_step().total_cmp(&b.cpu_per_step()));
-        let median = sorted[sorted.len() / 2];
+        let median = median(samples);
         Row {
             agent: agent.into(),
             lanes: isa.lanes(),
@@ -113,14 +89,7 @@ impl<F: Figures> Row<F> {
     }
 }
 
-/// Processor time of the slowest repetition by that of the fastest, less one.
-pub fn spread(samples: &[Sample]) -> f64 {
-    let costs = samples.iter().map(Sample::cpu_per_step);
-    let (fast, slow) = costs.fold((f64::INFINITY, 0.0_f64), |(fast, slow), x| (fast.min(x), slow.max(x)));
-    slow / fast - 1.0
-}
-
-/// Rows that appear as they are measured, or all at once as JSON.
+/// Rows, printed one by one, or all at once as JSON.
 pub struct Table<F> {
     json: bool,
     head: Head,
@@ -128,7 +97,7 @@ pub struct Table<F> {
     rows: Vec<Row<F>>,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Document<'a, F> {
     #[serde(flatten)]
@@ -138,7 +107,7 @@ struct Document<'a, F> {
 }
 
 impl<F: Figures> Table<F> {
-    /// Prints the head; `step` says what a step is, `seconds` those of a row.
+    /// Prints the heading; `step` describes a step, `seconds` is the time of a row.
     pub fn new(json: bool, head: Head, seconds: f64, step: &str) -> Self {
         if !json {
             let Machine { arch, os, cores, isas, best_isa } = &head.machine;
@@ -160,7 +129,7 @@ impl<F: Figures> Table<F> {
         self.rows.push(row);
     }
 
-    /// Prints what is still to be said.
+    /// Prints the JSON document, and a note if simulations broke down.
     pub fn finish(self) {
         if self.json {
             print_json(&Document { head: &self.head, seconds: self.seconds, rows: &self.rows });
@@ -169,27 +138,6 @@ impl<F: Figures> Table<F> {
             note(line);
         }
     }
-}
-
-/// Processor time of this thread, s.
-pub fn thread_cpu() -> f64 {
-    cpu_time::ThreadTime::try_now().map_or(0.0, |t| t.as_duration().as_secs_f64())
-}
-
-/// Runs `work` on every worker, each on a thread of its own (a single one on this thread), and returns what they
-/// returned with the time that passed.
-pub fn on_threads<W: Send, R: Send>(workers: &mut [W], work: impl Fn(usize, &mut W) -> R + Sync) -> (Vec<R>, f64) {
-    let start = Instant::now();
-    let results = match workers {
-        [one] => vec![work(0, one)],
-        many => std::thread::scope(|scope| {
-            let work = &work;
-            let handles: Vec<_> =
-                many.iter_mut().enumerate().map(|(i, worker)| scope.spawn(move || work(i, worker))).collect();
-            handles.into_iter().map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-        }),
-    };
-    (results, start.elapsed().as_secs_f64())
 }
 
 #[cfg(test)]
@@ -217,12 +165,5 @@ mod tests {
         assert_eq!((row.steps_per_wall_second, row.spread), (250.0, 2.0));
         assert_eq!((row.steps, row.repetitions, row.lanes, row.agents), (3000, 3, 1, 64));
         assert_eq!(row.line().len(), Row::<Nothing>::header().len());
-    }
-
-    #[test]
-    fn workers_keep_their_order() {
-        let (sums, _) = on_threads(&mut [10, 20, 30], |i, x| *x + i);
-        assert_eq!(sums, [10, 21, 32]);
-        assert_eq!(on_threads(&mut [5], |i, x| *x + i).0, [5]);
     }
 }

@@ -1,13 +1,13 @@
 //! Recorded states and controls of a policy's agents, replayed by the physics alone: `bench physics --policy`.
 
 use super::plan::{Counts, Plan, Which};
-use super::row::{Sample, on_threads, thread_cpu};
 use crate::error::CliError;
 use marathon_envs::VecEnvOptions;
 use marathon_learn::Policy;
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, SimError, SimOptions};
 use marathon_runs::Play;
+use marathon_runs::speed::{Sample, on_threads, thread_cpu};
 use serde::Serialize;
 use std::time::Instant;
 

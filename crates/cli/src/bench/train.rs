@@ -1,13 +1,14 @@
 //! Training with the agent's own configuration, everything included.
 
 use super::options::{Common, Head, for_networks, seconds};
-use super::row::{Figures, Row, Sample, Table};
+use super::row::{Figures, Row, Table};
 use crate::error::CliError;
 use crate::program;
 use marathon_config as config;
 use marathon_learn::{Control, IterationStats, Players, Snapshot, train_with};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
+use marathon_runs::speed::Sample;
 use marathon_runs::text::short;
 use marathon_runs::{Setting, TaskOptions};
 use serde::Serialize;

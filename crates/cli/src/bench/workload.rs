@@ -1,7 +1,6 @@
 //! A model with its controls, and one repetition of its simulation.
 
 use super::plan::{Counts, Plan, Which};
-use super::row::{Sample, on_threads, thread_cpu};
 use super::scene::{self, Scene};
 use crate::error::CliError;
 use marathon_envs::{EnvError, ModelSource, registry};
@@ -9,6 +8,7 @@ use marathon_physics::lanes::Isa;
 use marathon_physics::workload::{Report, Workload};
 use marathon_physics::{Model, SimError, SimOptions};
 use marathon_runs::PolicySource;
+use marathon_runs::speed::{Sample, on_threads, thread_cpu};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -1,9 +1,9 @@
 //! `marathon export` and `marathon import`: policies to and from ONNX.
 
 use crate::args::{ExportArgs, ImportArgs};
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::Policy;
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::text::path_word;
 use marathon_runs::{TaskOptions, output, policy_file};
 use std::path::Path;

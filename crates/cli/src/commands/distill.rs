@@ -1,14 +1,13 @@
 //! `marathon distill`: one policy that does what several do.
 
 use crate::args::DistillArgs;
-use crate::console::{note, print_json, say};
 use crate::error::CliError;
-use crate::interrupt;
 use crate::program;
 use cpu_time::ProcessTime;
 use marathon_learn::Control;
 use marathon_runs::distill::{Distilled, resumable};
 use marathon_runs::report::progress::bar;
+use marathon_runs::terminal::{interrupt, note, print_json, say};
 use marathon_runs::{Setting, output, policy_file, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! `marathon eval`: how good a policy is.
 
 use crate::args::EvalArgs;
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_learn::{EvalOptions, Evaluation, Policy, evaluate_roles};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::summary;
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::{Imitation, imitation};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,9 +1,9 @@
 //! `marathon list`: the agents, or one of them.
 
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_envs::{CommandRange, ObsGroup, OptionInfo, registry};
 use marathon_physics::lanes::Isa;
+use marathon_runs::terminal::{print_json, say};
 use serde::Serialize;
 
 /// What is told of an agent.

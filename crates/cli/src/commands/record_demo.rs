@@ -1,11 +1,11 @@
 //! `marathon record-demo`: a policy's decisions as a demonstration for ML-Agents' imitation learning.
 
 use crate::args::RecordDemoArgs;
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use marathon_envs::VecEnvOptions;
 use marathon_learn::{AtomicFile, Policy};
 use marathon_mlagents::{Demonstration, Episode};
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::{Play, Setting, output, text};
 use serde::Serialize;
 use std::io::{BufWriter, Seek, Write};

@@ -1,12 +1,12 @@
 //! `marathon render`: a policy in pictures.
 
 use crate::args::RenderArgs;
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::film::{Cast, Shot, shoot};
 use marathon_physics::budget::MEMORY;
 use marathon_render::Format;
 use marathon_runs::output;
+use marathon_runs::terminal::{print_json, say};
 
 /// Memory per pixel while a frame is drawn, bytes.
 const PIXEL: f64 = 4.0;

@@ -1,8 +1,8 @@
 //! `marathon rollout-worker`: plays for `marathon train --processes`.
 
 use crate::error::CliError;
-use crate::interrupt;
 use marathon_runs::processes;
+use marathon_runs::terminal::interrupt;
 
 /// Plays what the learner asks for, until it hangs up.
 ///

@@ -1,14 +1,13 @@
 //! `marathon train`: from a configuration to a folder with a policy.
 
 use crate::args::TrainArgs;
-use crate::console::{self, print_json, say};
 use crate::error::CliError;
-use crate::interrupt;
 use crate::program::{self, resume_command};
 use marathon_learn::{Control, IterationStats, Players};
 use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::summary::{EPISODES, evaluation_table};
+use marathon_runs::terminal::{self, interrupt, print_json, say};
 use marathon_runs::{Session, Task, text};
 
 /// Trains, evaluates, writes everything.
@@ -19,7 +18,7 @@ use marathon_runs::{Session, Task, text};
 pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let task = args.agent.as_deref().map(Task::named).transpose()?;
     let (session, notes) = Session::open(task, &args.run, None, false)?;
-    notes.iter().for_each(|note| console::note(format!("note: {note}")));
+    notes.iter().for_each(|note| terminal::note(format!("note: {note}")));
     let spec = session.factory.spec().clone();
     let (total_steps, agent) = (session.run.config.run.total_steps, session.run.agent.clone());
     interrupt::install("finishing this iteration and writing the results")?;
@@ -42,10 +41,10 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
         return Err(CliError::Lost { cause, advice });
     }
     if let Some(line) = text::broken(outcome.summary.diverged) {
-        console::note(format!("{line}; see the column `diverged` of progress.csv"));
+        terminal::note(format!("{line}; see the column `diverged` of progress.csv"));
     }
     if let Some(line) = text::skipped(outcome.summary.skipped_minibatches) {
-        console::note(line);
+        terminal::note(line);
     }
     if json {
         print_json(&outcome.summary);
@@ -80,7 +79,7 @@ fn announce(session: &Session) {
         0 => ("training", String::new()),
         _ => ("going on with", format!(" from step {}", text::thousands(done))),
     };
-    console::note(format!(
+    terminal::note(format!(
         "{verb} {}{from} to {}: {} agents, {} thread{}, {}, seed {}; results in {}",
         run.agent,
         text::thousands(config.run.total_steps),

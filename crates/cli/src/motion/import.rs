@@ -1,7 +1,6 @@
 //! `marathon motion import` and `retarget`.
 
 use super::{Edits, ImportArgs, Looping, RetargetArgs, model, show};
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::program;
 use marathon_learn::write_atomic;
@@ -10,6 +9,7 @@ use marathon_motion::{About, Animation, Clip, Mapping};
 use marathon_physics::Model;
 use marathon_physics::budget::{self, CLIP_FILE, CONFIG_FILE, RECORDING_FILE};
 use marathon_runs::clips;
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::text::path_word;
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -1,7 +1,6 @@
 //! `marathon motion render --policy`: a policy beside the clip that it follows.
 
 use super::{RenderArgs, model, show};
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::film::{Cast, Ghost, shoot};
 use marathon_envs::options::Value;
@@ -9,6 +8,7 @@ use marathon_envs::registry;
 use marathon_learn::{EvalOptions, PolicyMeta};
 use marathon_motion::{About, Clip};
 use marathon_render::Format;
+use marathon_runs::terminal::{print_json, say};
 use marathon_runs::text::path_word;
 use marathon_runs::{PolicySource, TaskOptions, policy_file};
 use std::path::Path;

@@ -1,12 +1,11 @@
 //! `marathon motion check` and `render`.
 
 use super::{CheckArgs, RenderArgs, model};
-use crate::console::{print_json, say};
 use crate::error::CliError;
 use crate::film::Shot;
-use crate::interrupt;
 use marathon_motion::{Fit, Report, soles};
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene};
+use marathon_runs::terminal::{interrupt, print_json, say};
 use marathon_runs::text::path_word;
 use serde_json::{Value, json};
 use std::path::Path;

@@ -1,30 +1,34 @@
-//! Table 1: how fast the four agents train with the paper's own settings, sixteen agents each.
+//! Table 1: training speed of the four agents with the paper's settings, sixteen agents each.
 
-use super::record::{Record, each_seed, plus_minus, spread, train_one};
-use super::{Options, Peers, peers};
-use crate::error::CliError;
+use crate::args::{Options, PeerOptions};
+use crate::error::StudyError;
+use crate::peers;
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::training::{each_seed, train_one};
 use marathon_config as config;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::text::thousands;
 use std::path::Path;
 
-/// The paper's settings, and what it reports: agent-steps per second.
-const PAPER: &[u8] = include_bytes!("../../../../assets/configs/paper-appendix-b.yaml");
+/// The paper's settings.
+const PAPER: &[u8] = include_bytes!("../../../assets/configs/paper-appendix-b.yaml");
+/// Agents, and the agent-steps per second that the paper reports.
 const AGENTS: [(&str, f64); 4] =
     [("Hopper-v0", 2190.0), ("Walker2d-v0", 2149.0), ("Ant-v0", 2359.0), ("Humanoid-v0", 1229.0)];
-/// Steps of ML-Agents, and updates in them at least.
+/// Fewest steps of ML-Agents, and fewest updates.
 const PEER_STEPS: u64 = 40_000;
 const PEER_UPDATES: u64 = 3;
-/// Decisions of a stretch there; it makes no difference to the speed.
+/// ML-Agents' `time_horizon`; it does not change the speed.
 const TIME_HORIZON: u64 = 128;
-/// The humanoid's network is 2 x 512: a twentieth of the steps tells its speed as well.
+/// Divisor of the humanoid's steps. Its network of 2 x 512 is slow, and fewer steps measure its speed as well.
 const HUMANOID: u64 = 20;
 
 /// Trains each agent with each seed.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
+pub fn run(options: &Options, peers: &PeerOptions) -> Result<Record, StudyError> {
     let (mut rows, mut bars, mut versions) = (Vec::new(), Vec::new(), Vec::new());
     for (agent, paper) in AGENTS {
         let mut config = config::parse(Path::new("paper-appendix-b.yaml"), PAPER, agent)?.config;
@@ -39,7 +43,7 @@ pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
         let cpu = spread(runs.iter().map(|r| r.steps as f64 / r.cpu));
         let wall = spread(runs.iter().map(|r| r.steps as f64 / r.wall));
         let steps = config.run.total_steps;
-        // the same settings, trained by ML-Agents, right after
+        // ML-Agents trains right after, under the same load of the computer
         config.run.total_steps = (PEER_UPDATES * config.run.rollout_steps()).max(PEER_STEPS);
         let mut of_peers = Vec::new();
         for seed in 1..=peers.peer_seeds {

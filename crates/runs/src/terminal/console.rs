@@ -1,14 +1,14 @@
-//! Output that outlives its reader: `marathon train ... | head` must not lose a run because nobody reads on. A result that
-//! stdout does not take for another reason, such as a full disk, is an error.
+//! Output that outlives its reader: when the reader of `marathon train ... | head` exits, the run continues. If stdout loses a
+//! result for another reason, such as a full disk, the program ends with an error.
 
-use crate::error::CliError;
-use marathon_runs::text::{printable, printable_json};
+use crate::error::RunError;
+use crate::text::{printable, printable_json};
 use serde::Serialize;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::path::Path;
 use std::sync::Mutex;
 
-/// Why something is missing on stdout, the first time.
+/// The first error of stdout.
 static LOST: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// Prints text for the user, or a command's result, on stdout. The text may contain parts of files. Control characters
@@ -22,7 +22,7 @@ fn put(text: &str) {
     written(writeln!(out, "{text}").and_then(|()| out.flush()));
 }
 
-/// Prints what is not a result on stderr: progress, notes, errors.
+/// Prints progress, notes and errors on stderr.
 pub fn note(text: impl AsRef<str>) {
     let _ = writeln!(stderr(), "{}", printable(text.as_ref()));
 }
@@ -35,8 +35,8 @@ pub fn print_json(document: &impl Serialize) {
     }
 }
 
-/// Takes note of what became of something written to stdout.
-pub fn written(result: io::Result<()>) {
+/// Keeps the first error of stdout for [`flush`]. A closed pipe is no error.
+pub(super) fn written(result: io::Result<()>) {
     if let Err(error) = result
         && error.kind() != ErrorKind::BrokenPipe
     {
@@ -44,14 +44,11 @@ pub fn written(result: io::Result<()>) {
     }
 }
 
-/// The error of a program whose output was lost.
-///
-/// # Errors
-/// If stdout has not taken something.
-pub fn finish() -> Result<(), CliError> {
+/// Flushes stdout and returns its first error.
+pub(super) fn flush() -> Result<(), RunError> {
     written(stdout().flush());
     match LOST.lock().unwrap_or_else(|e| e.into_inner()).take() {
         None => Ok(()),
-        Some(error) => Err(CliError::io(Path::new("stdout"), "write")(error)),
+        Some(error) => Err(RunError::io(Path::new("stdout"), "write")(error)),
     }
 }

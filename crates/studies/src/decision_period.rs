@@ -1,14 +1,16 @@
-//! Decision period: a decision after every physics step against one after every few, with physics-only steps between.
+//! Decision period: a decision after every physics step, or after every few, with physics-only steps between.
 
-use super::Options;
-use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_on};
-use crate::bench::env;
-use crate::error::CliError;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::training::{Run, each_seed, mean_curve, train_on};
 use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::Algorithm;
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
+use marathon_runs::speed::{env_speed, median};
 use marathon_runs::text::thousands;
 
 const AGENT: &str = "Hopper-v0";
@@ -20,13 +22,13 @@ const SECONDS: f64 = 2.0;
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let (isa, mut rows, mut lines) = (Isa::best(), Vec::new(), Vec::new());
     for agent in AGENTS {
         let own = registry::factory(agent, isa)?.spec().frame_skip;
         for frame_skip in [own, 1] {
             let factory = registry::factory_every(agent, frame_skip, isa)?;
-            let decisions = env::measure(1, SECONDS, &*factory, isa).steps_per_cpu_second;
+            let decisions = 1.0 / median(&env_speed(1, SECONDS, &*factory).samples).cpu_per_step();
             rows.push(vec![
                 agent.to_string(),
                 "random actions, no learning".into(),
@@ -70,7 +72,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             train_on(&*factory, &config, None)
         })?;
         let decisions = spread(runs.iter().map(|r| r.steps as f64 / r.cpu)).0;
-        let seconds = |r: &super::record::Run| r.eval.length_mean * factory.spec().dt;
+        let seconds = |r: &Run| r.eval.length_mean * factory.spec().dt;
         rows.push(vec![
             AGENT.to_string(),
             format!("training: {name}"),

@@ -1,8 +1,9 @@
-//! With and without pictures.
+//! Speed with and without pictures.
 
-use super::Options;
-use super::record::{Record, plus_minus, spread};
-use crate::error::CliError;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_render::{Follow, Renderer, Scene};
 use marathon_runs::report::chart::Chart;
@@ -12,12 +13,12 @@ use std::time::Instant;
 const AGENTS: [&str; 2] = ["Hopper-v0", "Humanoid-v0"];
 /// Agents in a scene.
 const COUNT: usize = 16;
-/// Decisions without pictures that are measured together.
+/// Decisions of a measurement without pictures.
 const STRETCH: usize = 2000;
-/// Pictures that are measured together.
+/// Pictures of a measurement.
 const PICTURES: usize = 40;
 
-/// Pictures of a row: a name, the size, and pictures per simulated second; none: after every decision.
+/// Pictures of a row: a name, the size, and pictures per simulated second, or none for a picture after every decision.
 type Case = (&'static str, [usize; 2], Option<f64>);
 const CASES: [Case; 3] = [
     ("84 x 84 after every decision, ML-Agents' size", [84, 84], None),
@@ -25,20 +26,20 @@ const CASES: [Case; 3] = [
     ("480 x 270, 25 per simulated second", [480, 270], Some(25.0)),
 ];
 
-/// Plays sixteen agents with pictures of different sizes and without.
+/// Plays sixteen agents without pictures and with pictures of different sizes.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let (mut rows, mut bars) = (Vec::new(), Vec::new());
     for agent in AGENTS {
-        let none = measure(options, |seed| Stage::new(agent, seed)?.play(STRETCH, None))?;
+        let none = measure(options, |seed| World::new(agent, seed)?.play(STRETCH, None))?;
         rows.push(row(agent, "none", none, none.0));
         for (name, size, rate) in CASES {
             let speed = measure(options, |seed| {
-                let mut stage = Stage::new(agent, seed)?;
-                let every = rate.map_or(1, |rate| (1.0 / (rate * stage.env.spec().dt)).round().max(1.0) as usize);
-                stage.play(PICTURES * every, Some((size, every)))
+                let mut world = World::new(agent, seed)?;
+                let every = rate.map_or(1, |rate| (1.0 / (rate * world.env.spec().dt)).round().max(1.0) as usize);
+                world.play(PICTURES * every, Some((size, every)))
             })?;
             rows.push(row(agent, name, speed, none.0));
             bars.push((format!("{agent}, {name}"), speed.0));
@@ -60,7 +61,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     })
 }
 
-fn measure(options: &Options, one: impl FnMut(u64) -> Result<f64, CliError>) -> Result<(f64, f64), CliError> {
+fn measure(options: &Options, one: impl FnMut(u64) -> Result<f64, StudyError>) -> Result<(f64, f64), StudyError> {
     let speeds: Vec<f64> = (1..=options.seeds).map(one).collect::<Result<_, _>>()?;
     Ok(spread(speeds.iter().copied()))
 }
@@ -69,21 +70,21 @@ fn row(agent: &str, pictures: &str, speed: (f64, f64), none: f64) -> Vec<String>
     vec![agent.into(), pictures.into(), plus_minus(speed, 0), thousands((none / speed.0).round() as u64)]
 }
 
-/// Agents that may be looked at.
-struct Stage {
+/// Agents and their scene.
+struct World {
     env: VecEnv,
     scene: Scene,
 }
 
-impl Stage {
-    fn new(agent: &str, seed: u64) -> Result<Self, CliError> {
+impl World {
+    fn new(agent: &str, seed: u64) -> Result<Self, StudyError> {
         let env = VecEnv::new(agent, &VecEnvOptions { agents: COUNT, seed, threads: 1, ..Default::default() })?;
-        Ok(Stage { env, scene: Scene::new(&registry::agent(agent)?.model()?) })
+        Ok(World { env, scene: Scene::new(&registry::agent(agent)?.model()?) })
     }
 
-    /// Plays; returns the agent-steps per second. Pictures have a size and come after every so many decisions.
-    fn play(&mut self, decisions: usize, pictures: Option<([usize; 2], usize)>) -> Result<f64, CliError> {
-        let Stage { env, scene } = self;
+    /// Plays and returns the agent-steps per second. `pictures`: the size, and the decisions between two pictures.
+    fn play(&mut self, decisions: usize, pictures: Option<([usize; 2], usize)>) -> Result<f64, StudyError> {
+        let World { env, scene } = self;
         let dt = env.spec().dt;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
@@ -104,7 +105,7 @@ impl Stage {
             env.step(&actions, &mut step.as_mut())?;
             if let Some((renderer, camera, every)) = view.as_mut().filter(|(_, _, every)| decision % every == 0) {
                 let poses: Vec<Vec<f64>> =
-                    (0..COUNT).map(|i| Ok(env.state(i)?.qpos)).collect::<Result<_, CliError>>()?;
+                    (0..COUNT).map(|i| Ok(env.state(i)?.qpos)).collect::<Result<_, StudyError>>()?;
                 let frame = scene.frame(&poses)?;
                 renderer.render(&frame, &camera.update(&frame, dt * *every as f64));
             }

@@ -1,31 +1,33 @@
-//! Assault courses: figures learn on level, random, ever harder and adversarial ground, with and without seeing it, and are judged
-//! on courses that none of them has trained on.
+//! Assault courses: figures learn on level, random, ever harder and adversarial ground, with and without seeing it. Their
+//! policies are evaluated on courses that are new to all of them.
 
-use super::Options;
-use super::kept::{self, cell, median};
-use super::record::{EPISODES, Record};
-use crate::error::CliError;
-use crate::interrupt;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::kept;
+use crate::record::Record;
+use crate::statistics::{cell, median};
+use crate::training::EPISODES;
 use marathon_config::{against, default_for};
 use marathon_envs::options::Value;
 use marathon_learn::{EvalOptions, Evaluation, evaluate};
 use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
+use marathon_runs::terminal::interrupt;
 use marathon_runs::text::thousands;
 use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskOptions};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Folder that keeps the runs unless another is named.
+/// Default folder of the kept runs.
 const KEEP: &str = "runs/assault-course";
 /// The figures.
 const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
 
-/// Those who see the ground, and those who do not.
+/// Runners that see the ground, and runners that do not.
 const SIGHTS: [&str; 2] = ["heights", "blind"];
 
-/// Ground to learn on: its name and the arguments that make it.
+/// Ground to learn on: its name and its arguments.
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// Grounds to learn on.
@@ -39,10 +41,10 @@ const GROUNDS: [Ground; 7] = [
     ("regret", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1"), REGRET]),
 ];
 
-/// Two runners take turns, so a run has twice the decisions.
+/// The reward of the builder. With it, two runners take turns, so a run has twice the decisions.
 const REGRET: (&str, &str) = ("builder", "regret");
 
-/// Courses that policies are judged on: what the table calls them, kind, difficulty.
+/// Courses of the evaluation: name in the table, kind, difficulty.
 const COURSES: [(&str, &str, &str); 5] = [
     ("flat", "flat", "0"),
     ("bumps", "bumps", "1"),
@@ -51,34 +53,37 @@ const COURSES: [(&str, &str, &str); 5] = [
     ("meters", "meters", "0.5"),
 ];
 
-/// What a runner's own adversary may build, and for how many of the runner's decisions it learns.
+/// Ground that a runner's own adversary may build.
 const ADVERSARY: [(&str, &str); 3] = [("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")];
+/// Decisions of the runner for which its own adversary learns.
 const ADVERSARY_STEPS: u64 = 4_000_000;
 
-/// What a finished run has found.
+/// Results of a finished run.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Found {
-    /// What was trained.
+    /// The run.
     run: RunFile,
     /// Agent-steps done.
     steps: u64,
     /// Processor seconds of the training.
     cpu_seconds: f64,
-    /// On each course: the mean way of an episode, m, and how many episodes ended with a fall.
+    /// The evaluation on each course.
     courses: Vec<Judged>,
-    /// On the ground of an adversary that has learned against it while it stayed as it was; findings of earlier studies have none.
+    /// The evaluation on the ground of its own adversary, which learned against the fixed policy; older files have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     adversary: Option<Judged>,
 }
 
-/// A policy on a course.
+/// Evaluation of a policy on a course.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Judged {
     course: String,
     difficulty: f64,
+    /// Mean distance of an episode, m.
     distance: f64,
+    /// Episodes that ended with a fall.
     falls: u64,
 }
 
@@ -89,11 +94,12 @@ impl Judged {
     }
 }
 
-/// Trains and measures, `only` some tasks, grounds and sights if any are named; with `kept_only`, tells of what is kept without training anything.
+/// Trains and evaluates. `only` names tasks, grounds and sights; an empty list means all. With `kept_only`, uses the kept runs
+/// and trains nothing.
 ///
 /// # Errors
 /// If a name is unknown, or a run cannot be trained or read, or was made with another configuration.
-pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<Record, CliError> {
+pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<Record, StudyError> {
     let [tasks, grounds, sights] = only;
     let tasks = chosen("--tasks", tasks, &TASKS)?;
     let grounds = chosen("--grounds", grounds, &GROUNDS.map(|(name, _)| name))?;
@@ -121,7 +127,7 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
         }
     }
     if rows.is_empty() {
-        return Err(CliError::file(&keep, "runs", "none of these", "what an earlier study has kept"));
+        return Err(StudyError::file(&keep, "runs", "none of these", "what an earlier study has kept"));
     }
     let mut columns = vec!["figure", "learned on", "sees the ground", "seeds", "decisions", "processor seconds"];
     columns.extend(COURSES.iter().map(|(name, ..)| *name));
@@ -164,18 +170,18 @@ fn about() -> String {
     )
 }
 
-/// Those of `all` that are asked for; all without any.
-fn chosen(flag: &str, asked: &[String], all: &[&'static str]) -> Result<Vec<&'static str>, CliError> {
+/// The names of `all` that are in `asked`; all if `asked` is empty.
+fn chosen(flag: &str, asked: &[String], all: &[&'static str]) -> Result<Vec<&'static str>, StudyError> {
     for name in asked {
         if !all.contains(&name.as_str()) {
             let (near, known) = (did_you_mean(nearest(name, all.iter().copied())), all.join(", "));
-            return Err(CliError::Usage(format!("{flag}: found '{name}', expected some of {known}{near}")));
+            return Err(StudyError::Usage(format!("{flag}: found '{name}', expected some of {known}{near}")));
         }
     }
     Ok(all.iter().copied().filter(|name| asked.is_empty() || asked.iter().any(|a| a == name)).collect())
 }
 
-/// What a run has found; none if it is not there and none is to be made.
+/// Results of a run; none if it is not kept and `kept_only` forbids training.
 fn one(
     task: &str,
     ground: &[(&str, &str)],
@@ -184,7 +190,7 @@ fn one(
     folder: &Path,
     options: &Options,
     kept_only: bool,
-) -> Result<Option<Found>, CliError> {
+) -> Result<Option<Found>, StudyError> {
     let sight = ("heights".into(), Value::Bool(heights));
     let with_sight = |list| TaskOptions { given: [arguments(list).given, vec![sight.clone()]].concat() };
     let mut loaded = default_for(task);
@@ -218,14 +224,14 @@ fn one(
     Ok(Some(found))
 }
 
-/// Arguments of a task from names and values.
+/// Arguments of a task, from names and values.
 fn arguments(list: &[(&str, &str)]) -> TaskOptions {
     let read = |text: &str| text.parse().unwrap_or_else(|never| match never {});
     TaskOptions { given: list.iter().map(|(name, value)| ((*name).into(), read(value))).collect() }
 }
 
-/// Plays a finished run's policy on all courses.
-fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
+/// Evaluates the policy of a finished run on all courses.
+fn judged(path: &Path, options: &Options) -> Result<Found, StudyError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
     let judge = EvalOptions { episodes: EPISODES, threads: options.threads, ..EvalOptions::default() };
     let mut courses = Vec::new();
@@ -239,7 +245,7 @@ fn judged(path: &Path, options: &Options) -> Result<Found, CliError> {
     Ok(Found { run, steps, cpu_seconds, courses, adversary: None })
 }
 
-/// A line of the table.
+/// A row of the table.
 fn row(task: &str, ground: &str, heights: bool, found: &[Found]) -> Vec<String> {
     let of = |value: &dyn Fn(&Found) -> f64, text: &dyn Fn(f64) -> String| {
         let values: Vec<Option<f64>> = found.iter().map(|f| Some(value(f))).collect();

@@ -1,10 +1,10 @@
-//! Ctrl-C: the first asks, the second ends the program at once. So do SIGTERM and SIGHUP; but SIGHUP stays ignored if the
-//! program was started to ignore it, as `nohup` does.
+//! Ctrl-C: the first asks the program to stop, the second ends it at once. SIGTERM and SIGHUP do the same, but SIGHUP stays
+//! ignored if the program was started that way, as by `nohup`.
 //!
-//! Files are written under temporary names and renamed, so even the second leaves none half-written.
+//! Files are written under temporary names and renamed, so even the second Ctrl-C leaves no half-written file.
 
-use crate::console::note;
-use crate::error::CliError;
+use super::console::note;
+use crate::error::RunError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
@@ -12,11 +12,11 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 /// Exit code after an interruption.
 const EXIT_CODE: i32 = 130;
 
-/// From now on, the first Ctrl-C (or SIGTERM) prints `message` and makes [`requested`] true.
+/// From now on, the first Ctrl-C prints `message` and makes [`requested`] true.
 ///
 /// # Errors
-/// If the system refuses.
-pub fn install(message: &'static str) -> Result<(), CliError> {
+/// If the system does not report Ctrl-C.
+pub fn install(message: &'static str) -> Result<(), RunError> {
     let handler = move || {
         if REQUESTED.swap(true, Ordering::SeqCst) {
             note("\naborted");
@@ -27,17 +27,17 @@ pub fn install(message: &'static str) -> Result<(), CliError> {
     listen(handler)
 }
 
-/// Calls `handler` at every Ctrl-C, SIGTERM, and SIGHUP unless that is ignored.
+/// Calls `handler` at every Ctrl-C and SIGTERM, and at every SIGHUP unless it is ignored.
 ///
 /// # Errors
-/// If the system refuses.
-pub fn listen(handler: impl Fn() + Send + 'static) -> Result<(), CliError> {
+/// If the system does not report Ctrl-C.
+pub fn listen(handler: impl Fn() + Send + 'static) -> Result<(), RunError> {
     let ignored = hangups_are_ignored();
     let set = ctrlc::set_handler(handler);
     if ignored {
         ignore_hangups();
     }
-    set.map_err(|e| CliError::Process(format!("cannot listen for Ctrl-C: {e}")))
+    set.map_err(|e| RunError::Signal(format!("cannot listen for Ctrl-C: {e}")))
 }
 
 #[cfg(unix)]
@@ -63,7 +63,7 @@ fn hangups_are_ignored() -> bool {
 #[cfg(not(unix))]
 fn ignore_hangups() {}
 
-/// Whether the user wants to stop.
+/// Whether the user has asked the program to stop.
 pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }

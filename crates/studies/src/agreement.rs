@@ -1,28 +1,29 @@
-//! The same configurations in `mlagents-learn` and in our own trainer.
+//! The same configurations in `mlagents-learn` and in Marathon's trainer.
 
-use super::Options;
-use super::peers;
-use super::record::{Record, Run, mean_curve, train_one};
-use crate::error::CliError;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::peers;
+use crate::record::Record;
+use crate::training::{Run, mean_curve, train_one};
 use marathon_config as config;
 use marathon_runs::report::chart::Chart;
 use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";
-/// Settings for both trainers: the paper's for this agent, and today's keys for its networks and rates.
+/// Configurations of both trainers: the paper's for this agent, and one with the keys of today's ML-Agents.
 const FILES: [(&str, &[u8]); 2] = [
-    ("paper-appendix-c", include_bytes!("../../../../assets/configs/paper-appendix-c.yaml")),
-    ("hopper-mlagents", include_bytes!("../../../../assets/configs/hopper-mlagents.yaml")),
+    ("paper-appendix-c", include_bytes!("../../../assets/configs/paper-appendix-c.yaml")),
+    ("hopper-mlagents", include_bytes!("../../../assets/configs/hopper-mlagents.yaml")),
 ];
 const TIME_HORIZON: u64 = 128;
 /// Agents of the paper's scenes.
 const AGENTS: usize = 16;
 
-/// Trains each seed with each configuration in both.
+/// Trains each seed with each configuration in both trainers.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let (mut rows, mut versions, mut lines) = (Vec::new(), Vec::new(), Vec::new());
     for (name, file) in FILES {
         let mut config = config::parse(Path::new(&format!("{name}.yaml")), file, AGENT)?.config;

@@ -1,18 +1,18 @@
-//! What the study keeps of a finished run.
+//! Kept results of a finished run.
 
 use super::Job;
-use crate::error::CliError;
-use crate::study::kept;
+use crate::error::StudyError;
+use crate::kept;
 use marathon_learn::checksum;
 use marathon_runs::{Imitation, RunFile};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What a finished run has found.
+/// Results of a finished run.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Found {
-    /// What was trained.
+    /// The run.
     pub run: RunFile,
     /// Checksum of the clip.
     pub clip: String,
@@ -22,21 +22,22 @@ pub struct Found {
     pub cpu_seconds: f64,
     /// How well the policy follows its clip.
     pub imitation: Imitation,
-    /// Agent-steps, processor seconds, and share of the longest time that is followed from the clip's beginning.
+    /// For policies on the way: agent-steps, processor seconds, and the share of the longest time for which the policy follows
+    /// the clip from its beginning.
     pub curve: Vec<[f64; 3]>,
 }
 
 impl Found {
-    /// What is kept of a run, if anything is. `expected`: what would be trained today.
+    /// The kept results of a run, if any. `expected`: the run that a new training would make.
     ///
     /// # Errors
-    /// If the file cannot be read, or is of another configuration or clip.
-    pub fn read(path: &Path, job: &Job, expected: &RunFile) -> Result<Option<Self>, CliError> {
+    /// If the file cannot be read, or belongs to another configuration or clip.
+    pub fn read(path: &Path, job: &Job, expected: &RunFile) -> Result<Option<Self>, StudyError> {
         let Some(found) = kept::read::<Found>(path)? else { return Ok(None) };
         let clip = clip(job);
         if found.clip != clip {
             let expected = format!("{clip}, that of the clip {}; delete the file to train again", job.clip);
-            return Err(CliError::file(path, "clip", found.clip, expected));
+            return Err(StudyError::file(path, "clip", found.clip, expected));
         }
         kept::check(path, &found.run, expected)?;
         Ok(Some(found))

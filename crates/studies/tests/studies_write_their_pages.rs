@@ -1,19 +1,50 @@
-//! A study writes a table, a picture and a page that holds its command; one that needs other people's programs says which are
-//! missing and how to get them, before it trains anything.
+//! A study writes a table, a picture and a page with its command. If a study needs programs of other projects, it names the
+//! missing ones and how to get them before it trains. It checks its output folder first.
 
-mod common;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
-use common::*;
+/// The program, to be run in `folder`.
+fn studies(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_marathon-studies"));
+    command.current_dir(folder).args(args);
+    command
+}
+
+/// Runs the program, which must succeed; returns its stdout.
+fn succeed(folder: &Path, args: &[&str]) -> String {
+    let output = studies(folder, args).output().expect("the program starts");
+    assert!(output.status.success(), "{args:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).expect("stdout is text")
+}
+
+/// Runs the program, which must fail with `code`; returns its stderr.
+fn fail(folder: &Path, code: i32, args: &[&str]) -> String {
+    let output = studies(folder, args).output().expect("the program starts");
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
+    assert!(output.stdout.is_empty(), "{args:?} writes on stdout: {}", String::from_utf8_lossy(&output.stdout));
+    stderr(&output)
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
 
 #[test]
 fn a_page_has_its_command_and_its_files() {
     let folder = tempfile::tempdir().unwrap();
     for study in ["multi-env", "concurrency"] {
-        let text = succeed(folder.path(), &["study", study, "--seeds", "1", "--steps", "2000", "--out", "pages"]);
+        let text = succeed(folder.path(), &[study, "--seeds", "1", "--steps", "2000", "--out", "pages"]);
         let file = |extension: &str| folder.path().join("pages").join(format!("{study}.{extension}"));
         let page = std::fs::read_to_string(file("md")).unwrap();
-        assert!(text.starts_with(page.trim_end()), "what is said is what is written: {text}");
-        assert!(page.contains(&format!("marathon study {study} --seeds 1 --steps 2000 --threads 1")), "{page}");
+        assert!(text.starts_with(page.trim_end()), "stdout has the page: {text}");
+        assert!(
+            page.contains(&format!(
+                "cargo run --release -p marathon-studies -- {study} --seeds 1 --steps 2000 --threads 1"
+            )),
+            "{page}"
+        );
         assert!(page.contains(&format!("({study}.png)")) && std::fs::metadata(file("png")).unwrap().len() > 1000);
         let rows = std::fs::read_to_string(file("csv")).unwrap();
         let table = page.lines().filter(|line| line.starts_with('|')).count();
@@ -21,50 +52,49 @@ fn a_page_has_its_command_and_its_files() {
     }
 }
 
-/// A study of clips keeps its runs, and goes on with them.
+/// A study of clips keeps its runs and continues with them.
 #[test]
 fn a_study_of_clips_makes_no_run_twice() {
     let folder = tempfile::tempdir().unwrap();
-    let words =
-        ["study", "style-transfer", "--clips", "walk,kick", "--seeds", "2", "--steps", "4096", "--keep", "kept"];
+    let words = ["style-transfer", "--clips", "walk,kick", "--seeds", "2", "--steps", "4096", "--keep", "kept"];
     let study = || succeed(folder.path(), &[&words[..], &["--out", "pages"]].concat());
     let page = study();
     assert!(
-        page.contains("marathon study style-transfer --seeds 2 --steps 4096 --threads 1 --clips walk,kick"),
+        page.contains("marathon-studies -- style-transfer --seeds 2 --steps 4096 --threads 1 --clips walk,kick"),
         "{page}"
     );
     let rows = std::fs::read_to_string(folder.path().join("pages/style-transfer.csv")).unwrap();
     let lines: Vec<&str> = rows.lines().skip(1).collect();
-    // what both seeds agree on is told once, what they do not for each
+    // a number that both seeds share appears once, others for each seed
     assert!(lines.len() == 2, "{rows}");
     for (line, clip) in lines.iter().zip(["walk", "kick"]) {
         assert!(line.starts_with(&format!("{clip},2,\"4,096\",")), "{rows}");
         let of_each = |cell: &str| cell.split_once(" (").is_some_and(|(_, each)| each.split(", ").count() == 2);
-        assert!(line.split('"').any(of_each), "both seeds are told: {rows}");
+        assert!(line.split('"').any(of_each), "both seeds are in the row: {rows}");
     }
     let policy = folder.path().join("kept/MarathonManKick-v0-2/policy.safetensors");
     let made = std::fs::metadata(&policy).unwrap().modified().unwrap();
     assert_eq!(study(), page);
     assert_eq!(std::fs::metadata(&policy).unwrap().modified().unwrap(), made);
-    // what is kept beside the runs is enough for the page, and says so where it is of another configuration
+    // the small files beside the runs are enough for the page; those of another configuration are refused
     for task in ["MarathonManWalk-v0-1", "MarathonManWalk-v0-2", "MarathonManKick-v0-1", "MarathonManKick-v0-2"] {
         std::fs::remove_dir_all(folder.path().join("kept").join(task)).unwrap();
     }
     let kept = succeed(folder.path(), &[&words[..], &["--kept-only", "--out", "pages"]].concat());
     assert_eq!(kept.replace(" --kept-only", ""), page);
-    let error = fail(folder.path(), 1, &[&words[..6], &["--steps", "8192", "--keep", "kept"]].concat());
+    let error = fail(folder.path(), 1, &[&words[..5], &["--steps", "8192", "--keep", "kept"]].concat());
     assert!(error.contains("MarathonManWalk-v0-1.json") && error.contains("run.config"), "{error}");
-    let error = fail(folder.path(), 1, &["study", "style-transfer", "--clips", "run", "--kept-only", "--keep", "kept"]);
+    let error = fail(folder.path(), 1, &["style-transfer", "--clips", "run", "--kept-only", "--keep", "kept"]);
     assert!(error.contains("none of these clips"), "{error}");
-    let error = fail(folder.path(), 2, &["study", "style-transfer", "--clips", "wlak"]);
+    let error = fail(folder.path(), 2, &["style-transfer", "--clips", "wlak"]);
     assert!(error.contains("did you mean 'walk'?"), "{error}");
 }
 
-/// A study of courses trains on each ground, an adversary's too, and judges the runners on courses that are nobody's.
+/// A study of courses trains on each ground, also on that of an adversary, and evaluates the runners on new courses.
 #[test]
 fn a_study_of_courses_judges_every_runner() {
     let folder = tempfile::tempdir().unwrap();
-    let words = ["study", "assault-course", "--tasks", "TerrainHopper", "--grounds", "flat,adversary", "--seeds", "1"];
+    let words = ["assault-course", "--tasks", "TerrainHopper", "--grounds", "flat,adversary", "--seeds", "1"];
     let study = |more: &[&str]| {
         succeed(folder.path(), &[&words[..], &["--steps", "8192", "--keep", "kept", "--out", "pages"], more].concat())
     };
@@ -79,18 +109,18 @@ fn a_study_of_courses_judges_every_runner() {
     }
     assert_eq!(lines.len(), 4, "{rows}");
     assert!(folder.path().join("kept/TerrainHopper-adversary-heights-1/policy-builder.safetensors").is_file());
-    // each runner has met a builder of its own
+    // each runner has its own builder
     assert!(folder.path().join("kept/TerrainHopper-flat-blind-1/adversary/policy-builder.safetensors").is_file());
     assert_eq!(study(&["--kept-only"]).replace(" --kept-only", ""), page);
-    let error = fail(folder.path(), 2, &["study", "assault-course", "--grounds", "flt"]);
+    let error = fail(folder.path(), 2, &["assault-course", "--grounds", "flt"]);
     assert!(error.contains("did you mean 'flat'?"), "{error}");
 }
 
 #[test]
 fn json_is_all_that_is_printed_if_it_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let args = ["study", "concurrency", "--seeds", "1", "--steps", "2000", "--out", "pages", "--json"];
-    let record = json(&succeed(folder.path(), &args));
+    let args = ["concurrency", "--seeds", "1", "--steps", "2000", "--out", "pages", "--json"];
+    let record: serde_json::Value = serde_json::from_str(&succeed(folder.path(), &args)).unwrap();
     assert_eq!(record["name"], "concurrency");
     assert!(folder.path().join("pages/concurrency.md").is_file());
 }
@@ -99,8 +129,8 @@ fn json_is_all_that_is_printed_if_it_is_asked_for() {
 fn missing_programs_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let asked = |study: &str, variable: &str| {
-        let args = ["study", study, "--seeds", "1", "--steps", "100"];
-        let output = marathon(folder.path(), &args).env(variable, "no-such-python").output().unwrap();
+        let args = [study, "--seeds", "1", "--steps", "100"];
+        let output = studies(folder.path(), &args).env(variable, "no-such-python").output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         let error = stderr(&output);
         assert!(error.contains("no-such-python: cannot be started") && error.contains(variable), "{error}");
@@ -108,9 +138,19 @@ fn missing_programs_are_named() {
     asked("table2", "MARATHON_PYTHON");
     if cfg!(unix) {
         // the player has to be there first
-        let player = std::path::Path::new(env!("CARGO_BIN_EXE_marathon")).with_file_name("marathon-player");
+        let player = Path::new(env!("CARGO_BIN_EXE_marathon-studies")).with_file_name("marathon-player");
         if player.exists() {
             asked("mlagents-agreement", "MARATHON_MLAGENTS_PYTHON");
         }
     }
+}
+
+#[test]
+fn the_output_folder_is_checked_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let begun = Instant::now();
+    let error = fail(folder.path(), 2, &["table3", "--steps", "1000000000", "--out", "file/pages"]);
+    assert!(error.contains("--out is file/pages, but file is a file; expected a folder"), "{error}");
+    assert!(begun.elapsed() < Duration::from_secs(60), "no work is done");
 }

@@ -1,9 +1,9 @@
-"""Other people's trainers, for `marathon study`: one JSON request on stdin, one JSON answer as the last line of stdout.
+"""Trainers of other projects, for `marathon-studies`: one JSON request on stdin, one JSON answer as the last line of stdout.
 
 A request names a trainer. `sb3` trains with Stable-Baselines3 on Marathon's environments in this process; `mlagents` runs
-`mlagents-learn` with `marathon-player` and leaves the policy in a file. Answers have seconds of time passed and of
-processor time of all processes, and the mean returns of episodes on the way as `[steps, return]`; or `missing`, what is
-not installed.
+`mlagents-learn` with `marathon-player` and writes the policy to a file. An answer has the wall time and the processor time of
+all processes in seconds, and the mean returns of episodes during training as `[steps, return]`. If a package is not
+installed, the answer names it as `missing`.
 """
 
 import importlib.metadata
@@ -44,7 +44,7 @@ def sb3(job):
 
     class Watch(BaseCallback):
         def _on_step(self):
-            # returns as they are, not as they are scaled for learning
+            # the returns of the task, not those scaled for learning
             ended = [info["episode"]["r"] for info in self.locals["infos"] if "episode" in info]
             if ended:
                 curve.append([self.num_timesteps, float(np.mean(ended))])
@@ -68,7 +68,7 @@ def sb3(job):
     model.learn(job["steps"], callback=Watch())
     wall, used = time.perf_counter() - start, time.process_time() - used
 
-    # each agent plays one whole episode with the best actions, whatever ends first
+    # each agent plays one whole episode with the best actions
     env = marathon_envs.VecEnv(job["agent"], job["episodes"], seed=1_000_003, threads=1, autoreset="disabled")
     spec, obs = env.spec, env.reset()
     alive = np.ones(job["episodes"], bool)
@@ -115,7 +115,7 @@ def mlagents(job):
     policy = folder / "run" / f"{job['agent']}.onnx"
     if done.returncode != 0 or not policy.exists():
         return {"error": text[-2000:]}
-    # "Step: 1000. Time Elapsed: 2.5 s. Mean Reward: 1.25.", and without the reward where no episode has ended
+    # "Step: 1000. Time Elapsed: 2.5 s. Mean Reward: 1.25."; the reward is missing if no episode has ended
     times = [(int(n), float(t)) for n, t in re.findall(r"Step: (\d+)\. Time Elapsed: ([\d.]+) s", text)]
     (first, began), (last, ended) = times[0], times[-1]
     found = re.findall(r"Step: (\d+)\. Time Elapsed: [\d.]+ s\. Mean Reward: (-?\d+\.\d+)", text)

@@ -1,12 +1,12 @@
-//! Style transfer: Marathon Man learns each motion clip, with the configuration that comes with him.
+//! Style transfer: Marathon Man learns each motion clip with his default configuration.
 
 mod findings;
 
-use super::Options;
-use super::kept::{self, median};
-use super::record::Record;
-use crate::error::CliError;
-use crate::interrupt;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::kept;
+use crate::record::Record;
+use crate::statistics::{self, median};
 use findings::Found;
 use marathon_config::{Loaded, default_for};
 use marathon_envs::registry;
@@ -15,34 +15,35 @@ use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::report::csv::History;
+use marathon_runs::terminal::interrupt;
 use marathon_runs::text::thousands;
 use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskOptions, imitation};
 use std::path::{Path, PathBuf};
 
-/// Folder that keeps the runs unless another is named.
+/// Default folder of the kept runs.
 const KEEP: &str = "runs/style-transfer";
-/// Episodes by which a policy on the way is judged.
+/// Episodes of the evaluation of a policy on the way.
 const EPISODES: usize = 16;
-/// Policies on the way that are judged have at least so many times the steps of the one before.
+/// Smallest ratio of the steps of two policies on the way that are evaluated.
 const APART: f64 = 1.1;
-/// Most lines that can be told apart in a picture.
+/// Most lines in the picture; more cannot be told apart.
 const LINES: usize = 16;
 
-/// A clip and the task that has it.
+/// A clip and its task.
 struct Job {
-    /// The clip's name, or for other figures than Marathon Man that of the task.
+    /// The clip's name; for other figures than Marathon Man, the name of the task.
     clip: String,
     task: String,
     /// The clip's file.
     motion: Vec<u8>,
-    /// Of the clip, seconds.
+    /// Duration of the clip, s.
     duration: f64,
-    /// Most that an episode from the clip's beginning can have, seconds.
+    /// Longest episode from the clip's beginning, s.
     longest: f64,
 }
 
 impl Job {
-    /// Its training with a seed; each policy on the way is looked at afterwards.
+    /// Its training with a seed; keeps all policies on the way for the evaluation.
     fn training(&self, seed: u64) -> kept::Job {
         let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&self.task) };
         let (task, arguments) = (self.task.clone(), TaskOptions::default());
@@ -50,11 +51,11 @@ impl Job {
     }
 }
 
-/// Trains and measures; with `kept_only`, tells of what is kept without training anything.
+/// Trains and evaluates; with `kept_only`, uses the kept runs and trains nothing.
 ///
 /// # Errors
 /// If a clip is unknown, or a run cannot be trained or read, or was made with another configuration.
-pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Record, CliError> {
+pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Record, StudyError> {
     let jobs = jobs(clips)?;
     interrupt::install("finishing this iteration; the same command goes on from there")?;
     let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
@@ -84,7 +85,7 @@ pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Recor
     }
     lines.truncate(LINES);
     if rows.is_empty() {
-        return Err(CliError::file(&keep, "runs", "none of these clips", "what an earlier study has kept"));
+        return Err(StudyError::file(&keep, "runs", "none of these clips", "what an earlier study has kept"));
     }
     let mut words = match clips {
         [] => String::new(),
@@ -135,8 +136,8 @@ fn about() -> String {
     )
 }
 
-/// The tasks of the clips that are asked for, of all without any.
-fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
+/// The tasks of the named clips; of all if `clips` is empty.
+fn jobs(clips: &[String]) -> Result<Vec<Job>, StudyError> {
     let mut all = Vec::new();
     for id in registry::ids() {
         let agent = registry::agent(&id)?;
@@ -158,7 +159,7 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
         if known().all(|name| name != clip) {
             let near = did_you_mean(nearest(clip, known()));
             let known: Vec<&str> = known().collect();
-            return Err(CliError::Usage(format!(
+            return Err(StudyError::Usage(format!(
                 "--clips: found '{clip}', expected some of {}{near}",
                 known.join(", ")
             )));
@@ -168,21 +169,26 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, CliError> {
     Ok(all)
 }
 
-/// Reads a finished run, and judges the policies that it has left on the way.
-fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
+/// Reads a finished run and evaluates its policies on the way.
+fn measured(job: &Job, path: &Path) -> Result<Found, StudyError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
     let summary = kept::summary(&folder)?;
     let Some(imitation) = summary.imitation.first().cloned() else {
-        return Err(CliError::file(&folder.summary(), "imitation", "nothing", "what a finished run tells of its clip"));
+        return Err(StudyError::file(
+            &folder.summary(),
+            "imitation",
+            "nothing",
+            "what a finished run tells of its clip",
+        ));
     };
     let history = History::read(&folder.progress())?;
     let column = |name: &str| history.column(name).into_iter().map(|cell| cell.unwrap_or(0.0));
     let clock: Vec<(f64, f64)> = column("steps").zip(column("cpu_seconds")).collect();
     let mut policies: Vec<(u64, PathBuf)> = vec![(summary.steps, folder.policy())];
     let kept = folder.policies();
-    // a short run has left none on the way
+    // a short run has no policies on the way
     for entry in std::fs::read_dir(&kept).into_iter().flatten() {
-        let path = entry.map_err(CliError::io(&kept, "read"))?.path();
+        let path = entry.map_err(StudyError::io(&kept, "read"))?.path();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         policies.extend(name.rsplit('-').next().and_then(|steps| steps.parse().ok()).map(|steps| (steps, path)));
     }
@@ -204,16 +210,16 @@ fn measured(job: &Job, path: &Path) -> Result<Found, CliError> {
     Ok(Found { run, clip: findings::clip(job), steps, cpu_seconds, imitation, curve })
 }
 
-/// A line of the table.
+/// A row of the table.
 fn row(job: &Job, found: &[Found]) -> Vec<String> {
     let cell = |text: &dyn Fn(f64) -> String, of: &dyn Fn(&Found) -> Option<f64>| {
         let values: Vec<Option<f64>> = found.iter().map(of).collect();
-        kept::cell(&values, text)
+        statistics::cell(&values, text)
     };
     let whole = |x: f64| thousands(x.round() as u64);
     let once = |found: &Found, i: usize| {
         let share = job.duration / job.longest;
-        // the last decision of a clip that ends is no longer shown
+        // an episode ends one decision before the end of the clip
         found.curve.iter().find(|point| point[2] >= 0.98 * share).map(|point| point[i])
     };
     vec![
@@ -238,7 +244,7 @@ fn row(job: &Job, found: &[Found]) -> Vec<String> {
     ]
 }
 
-/// The seeds' medians at the places of the first curve.
+/// Medians of the seeds at the steps of the first curve.
 fn middle(found: &[Found]) -> Vec<(f64, f64)> {
     let Some(first) = found.first() else { return Vec::new() };
     let at = |steps: f64| {

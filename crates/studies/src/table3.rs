@@ -1,9 +1,11 @@
 //! Table 3: PPO, A2C and ACKTR on the hopper, time and score at equal steps, all agents and several seeds.
 
-use super::peers::{self, Sb3};
-use super::record::{Record, Run, each_seed, mean_curve, plus_minus, spread, train_one};
-use super::{Options, Peers};
-use crate::error::CliError;
+use crate::args::{Options, PeerOptions};
+use crate::error::StudyError;
+use crate::peers::{self, Sb3};
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::training::{Run, each_seed, mean_curve, train_one};
 use marathon_config as config;
 use marathon_learn::{A2c, Algorithm, Deviations, Moving, Ppo, Schedule, TrainConfig};
 use marathon_runs::report::chart::Chart;
@@ -11,16 +13,16 @@ use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";
 /// The settings of the paper's ML-Agents side.
-const PAPER: &[u8] = include_bytes!("../../../../assets/configs/paper-appendix-c.yaml");
+const PAPER: &[u8] = include_bytes!("../../../assets/configs/paper-appendix-c.yaml");
 
-/// Decisions of a stretch in the paper's file.
+/// `time_horizon` of the paper's file.
 const TIME_HORIZON: u64 = 128;
 
-/// What is compared: a name, what the paper reports (seconds, score), and the settings.
+/// A row: a name, the paper's seconds and score, and the settings.
 type Case = (&'static str, &'static str, TrainConfig);
 
 /// The settings of the paper's ML-Agents side.
-fn supplement_c() -> Result<TrainConfig, CliError> {
+fn supplement_c() -> Result<TrainConfig, StudyError> {
     Ok(config::parse(Path::new("paper-appendix-c.yaml"), PAPER, AGENT)?.config)
 }
 
@@ -44,8 +46,8 @@ pub fn ppo2() -> TrainConfig {
     })
 }
 
-fn cases() -> Result<Vec<Case>, CliError> {
-    // the same start for all, where a third of the actions is not clipped
+fn cases() -> Result<Vec<Case>, StudyError> {
+    // a smaller deviation at the start, so that a third of the actions is not clipped
     let faster = Algorithm::A2c(A2c { lr: 2e-3, ..Default::default() });
     let faster = TrainConfig::a2c().with(|config| config.algorithm = faster);
     let quieter = |config: TrainConfig| {
@@ -73,11 +75,11 @@ fn cases() -> Result<Vec<Case>, CliError> {
     ])
 }
 
-/// Trains with each seed of each case, and with other people's trainers.
+/// Trains each seed of each case, and with the trainers of other projects.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options, peers: &Peers) -> Result<Record, CliError> {
+pub fn run(options: &Options, peers: &PeerOptions) -> Result<Record, StudyError> {
     let (mut rows, mut lines, mut versions) = (Vec::new(), Vec::new(), Vec::new());
     let mut add = |name: &str, paper: &str, runs: &[Run]| {
         let returns = || runs.iter().map(|r| r.eval.return_mean);

@@ -1,22 +1,24 @@
 //! Table 2: training on the processor and on a GPU.
 
-use super::Options;
-use super::peers::{self, Sb3};
-use super::record::{Record, Run, each_seed, plus_minus, spread, train_one};
-use super::table3::ppo2;
-use crate::error::CliError;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::peers::{self, Sb3};
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::table3::ppo2;
+use crate::training::{Run, each_seed, train_one};
 use marathon_learn::TrainConfig;
 use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
-/// Agents, decisions, passes: the same in every row of an algorithm.
+/// Algorithms, and the paper's times on the processor and on the GPU. The rows of an algorithm share all settings.
 const ALGORITHMS: [(Sb3, &str, &str); 2] = [(Sb3::Ppo, "475 s", "1423 s (300%)"), (Sb3::A2c, "291 s", "458 s (158%)")];
 
-/// Trains with each seed of each case; on a GPU, if PyTorch finds one.
+/// Trains each seed of each case, also on a GPU if PyTorch finds one.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let gpu = peers::gpu()?;
     let (mut rows, mut bars, mut versions) = (Vec::new(), Vec::new(), Vec::new());
     let wall = |runs: &[Run]| spread(runs.iter().map(|r| r.wall));

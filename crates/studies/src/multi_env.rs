@@ -1,9 +1,10 @@
-//! The paper's three ways: one agent, many agents in one world, several processes.
+//! The paper's three ways to simulate: one agent, many agents in one world, several processes.
 
-use super::Options;
-use super::record::{Record, Run, each_seed, plus_minus, spread, train_on};
-use crate::error::CliError;
-use crate::program;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::training::{Run, each_seed, train_on};
 use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_learn::{BLOCK, Players};
@@ -11,17 +12,18 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::Setting;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::chart::Chart;
+use std::path::Path;
 use std::time::Instant;
 
 const AGENT: &str = "Hopper-v0";
 /// Decisions of a measurement without learning.
 const DECISIONS: usize = 20_000;
 
-/// Steps one agent and more, and trains with threads and processes.
+/// Steps one agent and many, and trains with threads and processes.
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let (mut rows, mut bars) = (Vec::new(), Vec::new());
     let mut add = |way: &str, agents: usize, learns: &str, speeds: (f64, f64), eval: String| {
         rows.push(vec![
@@ -39,10 +41,11 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
         add(way, agents, "no", spread(speeds.iter().copied()), String::new());
     }
 
+    let program = std::env::current_exe().map_err(StudyError::io(Path::new("marathon-studies"), "find"))?;
     let factory = registry::factory(AGENT, Isa::best())?;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let base = config::default_for(AGENT).config.with(|c| c.run.total_steps = options.steps());
-    // the same rollouts of one agent, and as long a time
+    // one agent with rollouts of the same size, for about the same time
     let solo = base.clone().with(|c| {
         c.run.agents = 1;
         c.run.horizon *= base.run.agents;
@@ -64,7 +67,7 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
             match processes {
                 0 => train_on(&*factory, &config, None),
                 n => {
-                    let mut players = Processes::start(&program::file(), &Setting::named(AGENT)?, &config, n)?;
+                    let mut players = Processes::start(&program, &Setting::named(AGENT)?, &config, n)?;
                     let run = train_on(&*factory, &config, Some(&mut players as &mut dyn Players))?;
                     players.error.take().map_or(Ok(run), |error| Err(error.into()))
                 }
@@ -100,8 +103,8 @@ pub fn run(options: &Options) -> Result<Record, CliError> {
     })
 }
 
-/// Agent-steps per second of so many agents on one thread.
-fn play(agents: usize, seed: u64) -> Result<f64, CliError> {
+/// Agent-steps per second of `agents` agents on one thread.
+fn play(agents: usize, seed: u64) -> Result<f64, StudyError> {
     let mut env = VecEnv::new(AGENT, &VecEnvOptions { agents, seed, threads: 1, ..Default::default() })?;
     let mut step = env.buffers();
     env.reset(None, &mut step.obs)?;

@@ -1,26 +1,26 @@
-//! Other people's trainers: Stable-Baselines3 and ML-Agents, each in a Python of its own.
+//! Trainers of other projects: Stable-Baselines3 and ML-Agents, each in its own Python.
 
-use super::record::{EPISODES, Run};
-use crate::error::CliError;
-use crate::python::{self, VARIABLE};
+use crate::error::StudyError;
+use crate::training::{EPISODES, Run};
 use marathon_envs::registry;
 use marathon_learn::{Algorithm, EvalOptions, Evaluation, Schedule, TrainConfig, evaluate, write_atomic};
 use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
+use marathon_runs::python::{self, VARIABLE};
 use marathon_runs::{policy_file, text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What the Python processes run; requests and answers are described there.
+/// Program of the Python processes; it documents requests and answers.
 const SCRIPT: &str = include_str!("peers.py");
-/// Names the Python that has ML-Agents, which asks for versions of its own.
+/// Environment variable that names the Python with ML-Agents, which needs its own versions of packages.
 const MLAGENTS_VARIABLE: &str = "MARATHON_MLAGENTS_PYTHON";
 /// Agents of the paper's scenes.
 const AGENTS: usize = 16;
 
-/// What a process answers.
+/// Answer of a process.
 #[derive(Deserialize)]
 struct Answer {
     steps: u64,
@@ -41,14 +41,14 @@ struct Answer {
 /// An algorithm of Stable-Baselines3 with the settings of OpenAI Baselines, which the paper used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sb3 {
-    /// PPO with those of PPO2 for MuJoCo.
+    /// PPO with the settings of PPO2 for MuJoCo.
     Ppo,
-    /// A2C, with the rate of the paper's authors.
+    /// A2C with the learning rate of the paper's authors.
     A2c,
 }
 
 impl Sb3 {
-    /// Its name there.
+    /// Its name in Stable-Baselines3.
     pub fn name(self) -> &'static str {
         match self {
             Sb3::Ppo => "PPO",
@@ -70,7 +70,7 @@ impl Sb3 {
     }
 }
 
-/// A finished training, as a file keeps it.
+/// A finished training in a file.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     job: Value,
@@ -78,20 +78,20 @@ struct Kept {
     versions: String,
 }
 
-/// A training of other people's, which takes minutes: taken from a folder where the same one is kept, else made and put there.
+/// Returns the training of `job` from the folder `keep`, or makes it, which takes minutes, and keeps it there.
 fn once(
     keep: Option<&Path>,
     (name, seed): (&str, u64),
     job: &Value,
-    make: impl FnOnce() -> Result<(Run, String), CliError>,
-) -> Result<(Run, String), CliError> {
+    make: impl FnOnce() -> Result<(Run, String), StudyError>,
+) -> Result<(Run, String), StudyError> {
     let Some(folder) = keep else { return make() };
     let agent = job["agent"].as_str().unwrap_or_default();
     let path = folder.join(format!("{name}-{agent}-{seed}.json"));
     if path.exists() {
-        let bytes = budget::read(&path, &budget::TABLE_FILE).map_err(CliError::io(&path, "read"))?;
+        let bytes = budget::read(&path, &budget::TABLE_FILE).map_err(StudyError::io(&path, "read"))?;
         let kept: Kept = serde_json::from_slice(&bytes)
-            .map_err(|e| CliError::file(&path, "kept run", e, "a run that a study has put there"))?;
+            .map_err(|e| StudyError::file(&path, "kept run", e, "a run that a study has put there"))?;
         if kept.job == *job {
             kept.run.note(&format!("{name} seed {seed}, kept"));
             return Ok((kept.run, kept.versions));
@@ -99,14 +99,14 @@ fn once(
     }
     let (run, versions) = make()?;
     let kept = Kept { job: job.clone(), run, versions };
-    std::fs::create_dir_all(folder).map_err(CliError::io(folder, "create folder"))?;
-    let bytes = serde_json::to_vec(&kept).map_err(|e| CliError::file(&path, "kept run", e, "numbers and words"))?;
+    std::fs::create_dir_all(folder).map_err(StudyError::io(folder, "create folder"))?;
+    let bytes = serde_json::to_vec(&kept).map_err(|e| StudyError::file(&path, "kept run", e, "numbers and words"))?;
     write_atomic(&path, &bytes)?;
     Ok((kept.run, kept.versions))
 }
 
-/// Trains with Stable-Baselines3, sixteen agents, on a device of PyTorch's (`cpu`, `cuda`). Deviations of the actions start
-/// at `exp(log_std)`. A training that `keep` has is not made again. Returns the versions too.
+/// Trains sixteen agents with Stable-Baselines3 on a device of PyTorch (`cpu`, `cuda`). The standard deviation of actions
+/// starts at `exp(log_std)`. A training in `keep` is not made again. Returns the run and the versions of the packages.
 ///
 /// # Errors
 /// If the packages are missing, or training fails.
@@ -115,7 +115,7 @@ pub fn sb3(
     (device, log_std): (&str, f64),
     (seed, steps): (u64, u64),
     keep: Option<&Path>,
-) -> Result<(Run, String), CliError> {
+) -> Result<(Run, String), StudyError> {
     let job = json!({
         "trainer": "sb3", "agent": agent, "algorithm": algorithm.name(), "settings": algorithm.settings(),
         "device": device, "log_std": log_std, "agents": AGENTS, "seed": seed, "steps": steps, "threads": 1,
@@ -135,8 +135,8 @@ pub fn sb3(
     })
 }
 
-/// Trains with `mlagents-learn` and our player with the settings of a PPO configuration that came from a file of ML-Agents,
-/// and evaluates its policy as our own. A training that `keep` has is not made again. Returns the versions too.
+/// Trains with `mlagents-learn` and `marathon-player`, with the settings of a PPO configuration from a file of ML-Agents, and
+/// evaluates the policy in Marathon. A training in `keep` is not made again. Returns the run and the versions of the packages.
 ///
 /// # Errors
 /// If ML-Agents or the player is missing, or training fails.
@@ -145,7 +145,7 @@ pub fn mlagents(
     config: &TrainConfig,
     time_horizon: u64,
     keep: Option<&Path>,
-) -> Result<(Run, String), CliError> {
+) -> Result<(Run, String), StudyError> {
     let factory = registry::factory(agent, Isa::best())?;
     let id = &factory.spec().id;
     let job = json!({
@@ -156,7 +156,7 @@ pub fn mlagents(
         let mut job = job.clone();
         let folder =
             std::env::temp_dir().join(format!("marathon-study-{}-{id}-{}", std::process::id(), config.run.seed));
-        std::fs::create_dir_all(&folder).map_err(CliError::io(&folder, "create folder"))?;
+        std::fs::create_dir_all(&folder).map_err(StudyError::io(&folder, "create folder"))?;
         (job["player"], job["folder"]) = (json!(player()?), json!(folder));
         let named = std::env::var_os(MLAGENTS_VARIABLE).filter(|name| !name.is_empty());
         let python = named.map_or_else(|| ".venv-mlagents/bin/python".into(), PathBuf::from);
@@ -171,11 +171,11 @@ pub fn mlagents(
     })
 }
 
-/// Name of the GPU that PyTorch can use, if there is one.
+/// Name of the GPU that PyTorch can use, if any.
 ///
 /// # Errors
 /// If there is no Python with PyTorch.
-pub fn gpu() -> Result<Option<String>, CliError> {
+pub fn gpu() -> Result<Option<String>, StudyError> {
     let answer = ask(&python::find(), VARIABLE, "pip install torch", &json!({ "trainer": "gpu" }))?;
     Ok(answer["gpu"].as_str().map(Into::into))
 }
@@ -187,7 +187,7 @@ fn finish(answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
     run
 }
 
-/// The settings as ML-Agents reads them (JSON is YAML).
+/// The configuration file of ML-Agents (JSON is YAML).
 fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
     let Algorithm::Ppo(ppo) = &config.algorithm else { unreachable!("the comparison is of PPO") };
     let schedule = if ppo.schedule == Schedule::Linear { "linear" } else { "constant" };
@@ -216,47 +216,47 @@ fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
     }}})
 }
 
-/// Our player, which is built beside this program.
-fn player() -> Result<PathBuf, CliError> {
+/// `marathon-player`, which is built beside this program.
+fn player() -> Result<PathBuf, StudyError> {
     let name = if cfg!(windows) { "marathon-player.exe" } else { "marathon-player" };
-    let own = std::env::current_exe().map_err(CliError::io(Path::new("marathon"), "find"))?;
+    let own = std::env::current_exe().map_err(StudyError::io(Path::new("marathon-studies"), "find"))?;
     let player = own.with_file_name(name);
     if player.exists() {
         return Ok(player);
     }
-    Err(CliError::Python(format!(
-        "{}: no such file, expected ML-Agents' player; build it by `cargo build --release --bin marathon-player`",
+    Err(StudyError::Python(format!(
+        "{}: no such file, expected ML-Agents' player; build it by `cargo build --release -p marathon-mlagents`",
         player.display()
     )))
 }
 
-/// Lets a Python carry a job out.
-fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value, CliError> {
+/// Runs a job in a Python process.
+fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value, StudyError> {
     let place = text::path_word(python);
     let advice = format!("install it by `{advice}`, or let the variable {variable} name a Python that has it");
-    let failed = |e: &dyn std::fmt::Display| CliError::Python(format!("{place}: cannot be started: {e}; {advice}"));
+    let failed = |e: &dyn std::fmt::Display| StudyError::Python(format!("{place}: cannot be started: {e}; {advice}"));
     let mut child = python::command(python, SCRIPT).spawn().map_err(|e| failed(&e))?;
     let mut requests = child.stdin.take().ok_or_else(|| failed(&"no pipe"))?;
-    // a process that has ended already tells why below
+    // if the process has ended already, its error output is reported below
     let _ = writeln!(requests, "{job}");
     drop(requests);
     let output = child.wait_with_output().map_err(|e| failed(&e))?;
     let said = String::from_utf8_lossy(&output.stdout);
     let answer: Value = said.lines().next_back().and_then(|line| serde_json::from_str(line).ok()).unwrap_or_default();
     if let Some(missing) = answer["missing"].as_str() {
-        return Err(CliError::Python(format!("{place}: found no {missing}; {advice}")));
+        return Err(StudyError::Python(format!("{place}: found no {missing}; {advice}")));
     }
     if answer.is_object() && answer["error"].is_null() {
         return Ok(answer);
     }
     let said = String::from_utf8_lossy(&output.stderr);
     let complaint = python::complaint(answer["error"].as_str().unwrap_or(&said));
-    Err(CliError::Python(format!("{place}: failed ({}):\n{complaint}", output.status)))
+    Err(StudyError::Python(format!("{place}: failed ({}):\n{complaint}", output.status)))
 }
 
-/// The answer of a trainer.
-fn trained(answer: Value) -> Result<Answer, CliError> {
-    serde_json::from_value(answer).map_err(|e| CliError::Python(format!("an answer of Python's makes no sense: {e}")))
+/// Reads the answer of a trainer.
+fn trained(answer: Value) -> Result<Answer, StudyError> {
+    serde_json::from_value(answer).map_err(|e| StudyError::Python(format!("an answer of Python's makes no sense: {e}")))
 }
 
 #[cfg(test)]
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn a_configuration_survives_the_way_to_mlagents_and_back() {
-        let text = include_bytes!("../../../../assets/configs/hopper-mlagents.yaml");
+        let text = include_bytes!("../../../assets/configs/hopper-mlagents.yaml");
         let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().config;
         let written = file("Hopper-v0", &ppo, 128).to_string();
         let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().config;

@@ -1,15 +1,16 @@
-//! The Python that others' programs run in.
+//! The Python interpreter for programs of other projects, such as MuJoCo and Stable-Baselines3.
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Names the Python to use.
+/// Environment variable that names the Python to use.
 pub const VARIABLE: &str = "MARATHON_PYTHON";
-/// Last characters of a process's complaints that are worth showing.
+/// Characters that [`complaint`] keeps.
 const COMPLAINT: usize = 2000;
 
-/// The Python that the user names, else that of the virtual environment at hand, else the system's.
+/// The Python that [`VARIABLE`] names, else that of `.venv` in the working directory or the root of its repository, else the
+/// system's.
 pub fn find() -> PathBuf {
     if let Some(named) = env::var_os(VARIABLE).filter(|name| !name.is_empty()) {
         return named.into();
@@ -22,16 +23,16 @@ pub fn find() -> PathBuf {
     found.unwrap_or_else(|| if cfg!(windows) { "python".into() } else { "python3".into() })
 }
 
-/// A Python that runs a script of ours and is talked to through pipes.
+/// A Python process that runs `script`, with pipes for input and output.
 pub fn command(python: &Path, script: &str) -> Command {
     let mut command = Command::new(python);
-    // a folder called like a package in the working directory is not the package
+    // a folder in the working directory with the name of a package must not replace the package
     command.args(["-c", script]).env("PYTHONSAFEPATH", "1");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
 
-/// The end of what a process complained of.
+/// The end of the error output of a process.
 pub fn complaint(text: &str) -> &str {
     let text = text.trim();
     let from = text.char_indices().rev().nth(COMPLAINT).map_or(0, |(i, _)| i);

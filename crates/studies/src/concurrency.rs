@@ -1,17 +1,19 @@
-//! How many agents: speed and score at equal steps with 16 to 4096 of them.
+//! Speed and score at equal steps with 16 to 4096 agents.
 
-use super::Options;
-use super::record::{Record, each_seed, mean_curve, plus_minus, spread, train_one};
-use crate::error::CliError;
+use crate::args::Options;
+use crate::error::StudyError;
+use crate::record::Record;
+use crate::statistics::{plus_minus, spread};
+use crate::training::{each_seed, mean_curve, train_one};
 use marathon_config as config;
 use marathon_learn::Algorithm;
 use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
 const AGENTS: [usize; 4] = [16, 64, 512, 4096];
-/// Decisions of a rollout of all agents, where there are not more agents than that.
+/// Decisions of all agents in a rollout; more if [`SHORTEST`] asks for it.
 const ROLLOUT: usize = 8192;
-/// Decisions of each agent per rollout, at least: with fewer, advantages see too little.
+/// Fewest decisions of each agent per rollout; advantages need that many.
 const SHORTEST: usize = 16;
 /// Samples of a minibatch.
 const MINIBATCH: usize = 1024;
@@ -20,7 +22,7 @@ const MINIBATCH: usize = 1024;
 ///
 /// # Errors
 /// If that fails.
-pub fn run(options: &Options) -> Result<Record, CliError> {
+pub fn run(options: &Options) -> Result<Record, StudyError> {
     let base = config::default_for(AGENT).config;
     let (mut rows, mut lines) = (Vec::new(), Vec::new());
     for agents in AGENTS {

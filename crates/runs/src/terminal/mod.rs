@@ -1,0 +1,8 @@
+//! Programs in a terminal: output, Ctrl-C and exit codes.
+
+mod console;
+mod exit;
+pub mod interrupt;
+
+pub use console::{note, print_json, say};
+pub use exit::{failed, finish, refused};
