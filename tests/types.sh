@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Checks the types of what the tests do not build: the fuzzers, for browsers the crates that compute without files, threads and
-# clocks, and the command and the studies for macOS and Windows. Part of ./test.sh --all. Needs rustup, or a toolchain that has these targets.
+# clocks, and the command and the studies for macOS and Windows. Part of ./test.sh --all. Needs rustup, or a toolchain that has
+# these targets.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target="${CARGO_TARGET_DIR:-target}"

@@ -1,4 +1,4 @@
-//! This program as the user called it, and how its command line spells what errors speak of.
+//! The program as the user called it, and the spelling of options and commands in errors.
 
 use marathon_runs::text::word;
 use marathon_runs::{Flags, Spelling};
@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 static PROGRAM: OnceLock<String> = OnceLock::new();
 static CALLED: OnceLock<PathBuf> = OnceLock::new();
 
-/// Notes the name that the program was called by.
+/// Stores the name that the user called the program by.
 pub fn set_name(called: Option<&OsString>) {
     if let Some(called) = called {
         CALLED.get_or_init(|| called.into());
@@ -24,19 +24,19 @@ pub fn name() -> String {
     PROGRAM.get().cloned().unwrap_or_else(|| "marathon".into())
 }
 
-/// The program, to be started again: this file, or what the user called where this is a part of another program, as in the
-/// Python package.
+/// The file that starts this program again: this executable, or the called name if another program includes the command, as
+/// the Python package does.
 pub fn file() -> PathBuf {
     let own = std::env::current_exe().ok().filter(|file| file.file_stem().is_some_and(|stem| stem == "marathon"));
     own.or_else(|| CALLED.get().cloned()).unwrap_or_else(|| "marathon".into())
 }
 
-/// How to go on with a run.
+/// The command that continues a run.
 pub fn resume_command(folder: &Path) -> String {
     spelled(|flags| flags.resume(folder))
 }
 
-/// What errors speak of as this command line spells it.
+/// A text whose options and commands are spelled as on this command line.
 pub fn spelled(text: impl FnOnce(&dyn Spelling) -> String) -> String {
     text(&Flags(&name()))
 }

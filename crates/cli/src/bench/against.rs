@@ -45,7 +45,7 @@ struct Side {
     broken: u64,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]

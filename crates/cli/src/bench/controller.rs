@@ -1,4 +1,4 @@
-//! How well policies obey commands.
+//! How well policies follow commands.
 
 use super::options::Head;
 use crate::error::CliError;
@@ -27,7 +27,7 @@ pub struct ControllerArgs {
     pub out: Option<PathBuf>,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
@@ -39,7 +39,7 @@ struct Document<'a> {
 /// Plays the trials.
 ///
 /// # Errors
-/// If there is no such policy, its task cannot be told a speed, or the picture cannot be written.
+/// If there is no such policy, its task takes no speed command, or the picture cannot be written.
 pub fn run(args: &ControllerArgs, json: bool) -> Result<(), CliError> {
     if let Some(out) = &args.out {
         output::check(out, &["png"], &[&args.source.policy])?;

@@ -1,5 +1,5 @@
-//! Processor seconds until a gait: training with a configuration, interrupted every so many steps by an
-//! evaluation that is off the clock, until all the episodes of one meet the demand.
+//! Processor seconds until a gait: training stops when an evaluation meets the demanded speed and falls. Evaluations come at
+//! regular steps, and their time does not count.
 
 use super::options::{Common, Head, for_networks};
 use crate::error::CliError;
@@ -21,10 +21,10 @@ const EPISODES: usize = 100;
 pub struct GaitArgs {
     #[command(flatten)]
     pub common: Common,
-    /// Instruction set: f32, baseline, avx2 or avx512 [default: the best that the processor has].
+    /// Instruction set: f32, baseline, avx2 or avx512 [default: the best of this processor].
     #[arg(long, value_name = "ISA", value_parser = for_networks)]
     pub isa: Option<Isa>,
-    /// Configuration of all the agents; without it, each has its own fast one.
+    /// Configuration of all agents [default: the fast configuration of each agent].
     #[arg(long, value_name = "F.yaml")]
     pub config: Option<PathBuf>,
     /// Number of seeds.
@@ -33,18 +33,18 @@ pub struct GaitArgs {
     /// The first seed; the others follow it.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::MAX - 1000))]
     pub first_seed: u64,
-    /// Mean speed that is asked for, m/s.
+    /// Demanded mean speed, m/s.
     #[arg(long, value_name = "M/S", default_value_t = 2.0, value_parser = speed)]
     pub speed: f64,
-    /// Episodes of 100 that may end in a fall.
+    /// Largest number of falls in 100 episodes.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=EPISODES as u64))]
     pub falls: u64,
-    /// Steps between the evaluations, which do not count.
+    /// Steps between two evaluations, whose time does not count.
     #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub every: u64,
 }
 
-/// A speed that can be reached or missed.
+/// Reads a finite speed.
 fn speed(text: &str) -> Result<f64, String> {
     let speed = text.parse().ok().filter(|x: &f64| x.is_finite());
     speed.ok_or_else(|| "expected a finite number of meters per second, such as 2.5".into())
@@ -55,7 +55,7 @@ fn speed(text: &str) -> Result<f64, String> {
 struct Run {
     agent: String,
     seed: u64,
-    /// Whether the demand was met before the configuration's steps were over.
+    /// Whether an evaluation met the demand within the configuration's steps.
     reached: bool,
     steps: u64,
     cpu_seconds: f64,
@@ -66,7 +66,7 @@ struct Run {
     eval: Option<Evaluation>,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]

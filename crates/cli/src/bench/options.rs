@@ -1,4 +1,4 @@
-//! What the benchmarks have in common: whom to measure, on what.
+//! Options of all benchmarks, and the facts of the computer.
 
 use crate::error::CliError;
 use marathon_envs::registry;
@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Agents and threads.
 #[derive(Debug, clap::Args)]
 pub struct Common {
-    /// Agent to measure; may be repeated [default: all; one of those with the same model, where only the model counts].
+    /// Agent to measure; may be repeated [default: all; without tasks, one agent per model].
     #[arg(long, value_name = "AGENT")]
     pub agent: Vec<String>,
     /// Threads; 0 means one per processor.
@@ -17,7 +17,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// Ids of the agents that the user names, or of all; of those with the same model one, unless their tasks count.
+    /// Ids of the named agents, or of all. Unless `tasks_count`, agents with the same model are measured once.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -51,13 +51,13 @@ pub struct Machine {
     pub os: &'static str,
     /// Processors that this program may use.
     pub cores: usize,
-    /// Instruction sets that the processor has, narrowest first.
+    /// Instruction sets of the processor, narrowest first.
     pub isas: Vec<&'static str>,
-    /// The one that everything else uses.
+    /// The instruction set of all other commands.
     pub best_isa: &'static str,
 }
 
-/// How every `--json` document begins.
+/// The first fields of every `--json` document.
 #[derive(Serialize)]
 pub struct Head {
     pub bench: &'static str,
@@ -67,7 +67,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// Of a benchmark on this computer.
+    /// The fields of a benchmark on this computer.
     pub fn new(bench: &'static str, threads: usize) -> Self {
         let machine = Machine {
             arch: std::env::consts::ARCH,
@@ -84,7 +84,7 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-/// The chosen instruction sets, or all that the processor has.
+/// The chosen instruction sets, or all of the processor.
 pub fn isas(chosen: &[Isa]) -> Vec<Isa> {
     match chosen {
         [] => Isa::ALL.into_iter().filter(|isa| isa.supported()).collect(),
@@ -92,7 +92,7 @@ pub fn isas(chosen: &[Isa]) -> Vec<Isa> {
     }
 }
 
-/// Reads an instruction set that this processor has.
+/// Reads an instruction set of this processor.
 pub fn supported(text: &str) -> Result<Isa, String> {
     let isa: Isa = text.parse()?;
     if isa.supported() {
@@ -103,7 +103,7 @@ pub fn supported(text: &str) -> Result<Isa, String> {
     }
 }
 
-/// Reads an instruction set that networks train on.
+/// Reads an instruction set that can train networks.
 pub fn for_networks(text: &str) -> Result<Isa, String> {
     match supported(text)? {
         Isa::F64 => Err("networks train in single precision; expected f32, baseline, avx2 or avx512".into()),
@@ -111,7 +111,7 @@ pub fn for_networks(text: &str) -> Result<Isa, String> {
     }
 }
 
-/// Reads a duration.
+/// Reads a duration in seconds.
 pub fn seconds(text: &str) -> Result<f64, String> {
     let x: f64 = text.parse().map_err(|_| "expected a number of seconds".to_string())?;
     if x > 0.0 && x <= 86_400.0 { Ok(x) } else { Err("expected a positive number of seconds, at most a day".into()) }

@@ -1,4 +1,4 @@
-//! Training with the agent's own configuration, everything included.
+//! Training with the agent's default configuration, everything included.
 
 use super::options::{Common, Head, for_networks, seconds};
 use super::row::{Figures, Row, Table};
@@ -13,9 +13,9 @@ use marathon_runs::text::short;
 use marathon_runs::{Setting, TaskOptions};
 use serde::Serialize;
 
-/// Repetitions of a row, each with a seed of its own.
+/// Repetitions of a row, each with its own seed.
 const REPETITIONS: usize = 3;
-/// Iterations with an update that a repetition has at least.
+/// Fewest iterations with an update in a repetition.
 const ITERATIONS: u64 = 2;
 
 /// Options of `bench train`.
@@ -25,19 +25,19 @@ pub struct TrainArgs {
     pub common: Common,
     #[command(flatten)]
     pub task: TaskOptions,
-    /// Instruction set: f32, baseline, avx2 or avx512; may be repeated [default: the best that the processor has].
+    /// Instruction set: f32, baseline, avx2 or avx512; may be repeated [default: the best of this processor].
     #[arg(long, value_name = "ISA", value_parser = for_networks)]
     pub isa: Vec<Isa>,
-    /// Processor seconds of each thread for every row, more or less.
+    /// Approximate processor seconds of each thread for every row.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
-    /// Widths of both hidden layers, instead of the configuration's.
+    /// Width of both hidden layers [default: the configuration's].
     #[arg(long, value_name = "WIDTH", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub hidden: Option<u32>,
-    /// Agents that act side by side, a multiple of 16, instead of the configuration's.
+    /// Number of agents, a multiple of 16 [default: the configuration's].
     #[arg(long, value_name = "N")]
     pub agents: Option<usize>,
-    /// Processes that play; 0: the one that learns plays, on its threads. Their processor time counts.
+    /// Processes that play rollouts; with 0, the learner plays them on its threads. The time of all processes counts.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub processes: usize,
 }
@@ -45,8 +45,9 @@ pub struct TrainArgs {
 /// Columns of this benchmark.
 #[derive(Serialize)]
 struct Train {
-    /// Part of the time spent in the environments, and on gradients.
+    /// Share of the time in the environments.
     env_share: f64,
+    /// Share of the time in gradient updates.
     update_share: f64,
     physics_steps_per_wall_second: f64,
     /// Agents whose simulation broke down.
@@ -93,7 +94,7 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
     let mut samples = Vec::new();
     let (mut shares, mut weight, mut diverged) = ([0.0; 2], 0.0, 0);
     for seed in 0..REPETITIONS as u64 {
-        // it ends by the clock; agents fall at first and run later, so the cost of a step moves with learning
+        // a repetition ends by the clock; the cost of a step changes as agents learn to run
         let config = base.clone().with(|c| {
             c.run.seed = seed;
             c.run.threads = threads;
