@@ -1,12 +1,13 @@
-//! Imports from room to room: `use` lines, paths inside code and paths inside macro calls that begin with `crate` or `super`.
+//! Imports from file to file: `use` lines, paths inside code and paths inside macro calls.
 
-use crate::Error;
+use crate::names::{Kind, Names, is_public};
+use crate::sources::{Source, Sources, is_test};
 use proc_macro2::{TokenStream, TokenTree};
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 use syn::visit::Visit;
 
-/// A room names something of another room.
+/// A file names something that another file of the crate defines.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Import {
     /// The room that needs something.
@@ -17,217 +18,98 @@ pub struct Import {
     pub file: PathBuf,
     /// Where the path begins.
     pub line: usize,
+    /// The source that defines what is imported, below the crate's `src`.
+    pub target: PathBuf,
 }
 
-/// The sources of a crate without its unit tests.
-pub struct Sources {
-    pub files: Vec<Source>,
-}
-
-/// One source.
-pub struct Source {
-    /// Below `src`.
-    path: PathBuf,
-    /// Names from the root of the crate; none for the root itself.
-    pub module: Vec<String>,
-    pub lines: usize,
-    syntax: syn::File,
-}
-
-impl Sources {
-    /// Reads the folder `src`.
-    pub fn read(src: &Path) -> Result<Sources, Error> {
-        let mut files = Vec::new();
-        read_folder(src, src, &mut files)?;
-        files.sort_by(|a, b| a.path.cmp(&b.path));
-        Ok(Sources { files })
+impl Import {
+    /// Whether the import leads from one room to another. The root of a crate is above all rooms and may import any.
+    pub fn leaves_room(&self) -> bool {
+        self.from != self.to && self.from != "lib" && self.from != "main"
     }
 
-    /// Every import that leaves its room, once for each line.
-    pub fn imports(&self) -> Vec<Import> {
-        let rooms: BTreeSet<&str> = self.files.iter().filter_map(|f| f.module.first().map(String::as_str)).collect();
-        let doors = self.doors(&rooms);
-        let mut imports = BTreeSet::new();
-        for file in self.files.iter().filter(|f| !f.module.is_empty()) {
-            for (first, line) in file.paths() {
-                let to = match rooms.get(first.as_str()) {
-                    Some(room) => room,
-                    None => match doors.get(&first) {
-                        Some(room) => room.as_str(),
-                        None => continue,
-                    },
-                };
-                if to != file.module[0] {
-                    let (from, to) = (file.module[0].clone(), to.to_string());
-                    imports.insert(Import { from, to, file: file.path.clone(), line });
-                }
+    /// Whether the import leads from the file of a module to a file below that module.
+    pub fn leads_inside(&self) -> bool {
+        let is_module = ["mod.rs", "lib.rs", "main.rs"].iter().any(|name| self.file.ends_with(name));
+        is_module && self.file.parent().is_some_and(|folder| self.target.starts_with(folder))
+    }
+}
+
+/// Every import that leaves its file, once for each line.
+pub fn imports(sources: &Sources) -> Vec<Import> {
+    let names = Names::of(sources);
+    let mut imports = BTreeSet::new();
+    for source in &sources.files {
+        let mut reader = Reader { names: &names, module: source.module.clone(), found: BTreeSet::new() };
+        reader.visit_file(&source.syntax);
+        for (target, line) in reader.found {
+            let target: &Source = &sources.files[target];
+            if target.path != source.path {
+                let (from, to) = (source.room(), target.room());
+                imports.insert(Import { from, to, file: source.path.clone(), line, target: target.path.clone() });
             }
         }
-        imports.into_iter().collect()
     }
-
-    /// What the root of the crate offers under a name of its own, and the room that it is from. What the root itself defines
-    /// is in a room of the root's name.
-    fn doors(&self, rooms: &BTreeSet<&str>) -> BTreeMap<String, String> {
-        let mut doors = BTreeMap::new();
-        for file in &self.files {
-            for item in &file.syntax.items {
-                // macros are exported to the root from wherever they are
-                if let syn::Item::Macro(item) = item
-                    && item.attrs.iter().any(|a| a.path().is_ident("macro_export"))
-                    && let (Some(name), Some(room)) = (&item.ident, file.module.first())
-                {
-                    doors.insert(name.to_string(), room.clone());
-                }
-            }
-        }
-        for file in self.files.iter().filter(|f| f.module.is_empty()) {
-            let root = file.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            for item in &file.syntax.items {
-                if let syn::Item::Use(item) = item {
-                    let mut found = Vec::new();
-                    names(&item.tree, &mut Vec::new(), &mut found);
-                    for (path, name) in found {
-                        let path: Vec<_> = path.into_iter().filter(|s| s != "crate" && s != "self").collect();
-                        if let Some(room) = path.first().filter(|first| rooms.contains(first.as_str())) {
-                            doors.insert(name, room.clone());
-                        }
-                    }
-                } else if let Some(name) = defined(item) {
-                    doors.entry(name).or_insert_with(|| root.clone());
-                }
-            }
-        }
-        doors
-    }
+    imports.into_iter().collect()
 }
 
-/// The name that an item gives to the root.
-fn defined(item: &syn::Item) -> Option<String> {
-    Some(match item {
-        syn::Item::Const(item) => item.ident.to_string(),
-        syn::Item::Enum(item) => item.ident.to_string(),
-        syn::Item::Fn(item) => item.sig.ident.to_string(),
-        syn::Item::Macro(item) => item.ident.as_ref()?.to_string(),
-        syn::Item::Static(item) => item.ident.to_string(),
-        syn::Item::Struct(item) => item.ident.to_string(),
-        syn::Item::Trait(item) => item.ident.to_string(),
-        syn::Item::Type(item) => item.ident.to_string(),
-        _ => return None,
-    })
-}
-
-/// Whole paths of a `use` with the name that each is bound to.
-fn names(tree: &syn::UseTree, way: &mut Vec<String>, found: &mut Vec<(Vec<String>, String)>) {
-    match tree {
-        syn::UseTree::Path(path) => {
-            way.push(path.ident.to_string());
-            names(&path.tree, way, found);
-            way.pop();
-        }
-        syn::UseTree::Name(name) => {
-            found.push(([&way[..], &[name.ident.to_string()]].concat(), name.ident.to_string()))
-        }
-        syn::UseTree::Rename(name) => {
-            found.push(([&way[..], &[name.ident.to_string()]].concat(), name.rename.to_string()))
-        }
-        syn::UseTree::Glob(_) => found.push((way.clone(), "*".into())),
-        syn::UseTree::Group(group) => group.items.iter().for_each(|tree| names(tree, way, found)),
-    }
-}
-
-fn read_folder(src: &Path, folder: &Path, files: &mut Vec<Source>) -> Result<(), Error> {
-    let io = |path: &Path| {
-        let path = path.to_path_buf();
-        move |source| Error::Io { path, source }
-    };
-    for entry in std::fs::read_dir(folder).map_err(io(folder))? {
-        let path = entry.map_err(io(folder))?.path();
-        if path.file_stem().is_some_and(|stem| stem == "tests") {
-            continue;
-        }
-        if path.is_dir() {
-            read_folder(src, &path, files)?;
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            let text = std::fs::read_to_string(&path).map_err(io(&path))?;
-            let syntax = syn::parse_file(&text).map_err(|e| Error::Syntax {
-                path: path.clone(),
-                line: e.span().start().line,
-                message: e.to_string(),
-            })?;
-            let below = path.strip_prefix(src).expect("a file below the folder").to_path_buf();
-            let mut module: Vec<String> =
-                below.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
-            let last = module.last().cloned().unwrap_or_default();
-            // programs of a crate use it from outside
-            if module[0] == "bin" {
-                continue;
-            }
-            if last == "mod" || module.len() == 1 && (last == "lib" || last == "main") {
-                module.pop();
-            }
-            files.push(Source { path: below, module, lines: text.lines().count(), syntax });
-        }
-    }
-    Ok(())
-}
-
-impl Source {
-    /// First names after the root of the crate of every path that leads there, with their lines.
-    fn paths(&self) -> Vec<(String, usize)> {
-        let mut reader = Reader { module: self.module.clone(), found: Vec::new() };
-        reader.visit_file(&self.syntax);
-        reader.found
-    }
-}
-
-struct Reader {
+struct Reader<'n> {
+    names: &'n Names,
     /// Where the reader is.
     module: Vec<String>,
-    found: Vec<(String, usize)>,
+    /// Files that define what is named, with lines.
+    found: BTreeSet<(usize, usize)>,
 }
 
-impl Reader {
-    /// Takes in a path by its names.
-    fn note(&mut self, names: &[(String, usize)]) {
-        let mut module = self.module.clone();
-        let mut rest = names;
-        match rest.first() {
-            Some((name, _)) if name == "crate" || name == "$crate" => module.clear(),
-            Some((name, _)) if name == "super" || name == "self" => {
-                rest = &rest[usize::from(name == "self")..];
-                while rest.first().is_some_and(|(name, _)| name == "super") {
-                    module.pop();
-                    rest = &rest[1..];
-                }
-                if let (true, Some((name, line))) = (module.is_empty(), rest.first()) {
-                    self.found.push((name.clone(), *line));
-                }
-                return;
-            }
-            _ => return,
-        }
-        if let Some((name, line)) = rest.get(1) {
-            self.found.push((name.clone(), *line));
+/// The names of a path, with their lines.
+type Path = Vec<(String, usize)>;
+
+impl Reader<'_> {
+    fn find(&mut self, path: &Path, kind: Kind) {
+        let names: Vec<String> = path.iter().map(|(name, _)| name.clone()).collect();
+        let line = path.get(1).or(path.first()).map_or(0, |(_, line)| *line);
+        self.found.extend(self.names.file(&self.module, &names, kind).map(|file| (file, line)));
+    }
+
+    /// Takes in a path in code. A single name is defined here or brought in by a `use`, which is read where it stands,
+    /// unless it only passes the name on.
+    fn note(&mut self, path: &Path) {
+        let single = |name: &str| self.names.re_exports(&self.module, name);
+        match &path[..] {
+            [] => {}
+            [(name, _)] if !single(name) => {}
+            _ => self.find(path, Kind::Item),
         }
     }
 
-    fn note_tree(&mut self, tree: &syn::UseTree, way: &mut Vec<(String, usize)>) {
+    /// Takes in a `use`. `own_names` are those of modules below, passed on: a folder's `mod.rs` offers what its files define,
+    /// but does not need it.
+    fn note_tree(&mut self, tree: &syn::UseTree, public: bool, way: &mut Path) {
         let name = |ident: &syn::Ident| (ident.to_string(), ident.span().start().line);
         match tree {
             syn::UseTree::Path(path) => {
                 way.push(name(&path.ident));
-                self.note_tree(&path.tree, way);
+                self.note_tree(&path.tree, public, way);
                 way.pop();
             }
-            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.note_tree(tree, way)),
-            syn::UseTree::Glob(_) => self.note(way),
+            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.note_tree(tree, public, way)),
+            syn::UseTree::Glob(_) => self.note_leaf(way, public),
             syn::UseTree::Name(syn::UseName { ident }) | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
-                way.push(name(ident));
-                self.note(way);
-                way.pop();
+                let itself = ident == "self" && !way.is_empty();
+                way.extend((!itself).then(|| name(ident)));
+                self.note_leaf(way, public);
+                way.truncate(way.len() - usize::from(!itself));
             }
         }
+    }
+
+    fn note_leaf(&mut self, path: &Path, public: bool) {
+        let below = path.first().is_some_and(|(name, _)| !matches!(name.as_str(), "crate" | "$crate" | "super"));
+        if public && below {
+            return;
+        }
+        self.find(path, Kind::Item);
+        self.find(path, Kind::Module);
     }
 
     /// Paths in the arguments of a macro, which have no syntax of their own.
@@ -248,7 +130,9 @@ impl Reader {
                 }
                 i += 2;
             }
-            self.note(&names);
+            if names.len() > 1 {
+                self.note(&names);
+            }
             if let Some(TokenTree::Group(group)) = tokens.get(i) {
                 self.note_tokens(group.stream());
             }
@@ -257,16 +141,13 @@ impl Reader {
     }
 }
 
-impl<'a> Visit<'a> for Reader {
+impl<'a> Visit<'a> for Reader<'_> {
     fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
-        self.note_tree(&item.tree, &mut Vec::new());
+        self.note_tree(&item.tree, is_public(&item.vis), &mut Vec::new());
     }
 
     fn visit_item_mod(&mut self, item: &'a syn::ItemMod) {
-        let test = |a: &syn::Attribute| {
-            a.path().is_ident("cfg") && a.parse_args::<syn::Path>().is_ok_and(|p| p.is_ident("test"))
-        };
-        if item.attrs.iter().any(test) {
+        if is_test(&item.attrs) {
             return;
         }
         self.module.push(item.ident.to_string());

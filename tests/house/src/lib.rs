@@ -5,9 +5,11 @@
 //! them; `cargo run -p house` draws the picture of that page.
 
 mod imports;
+mod names;
 mod order;
 pub mod picture;
 mod plan;
+mod sources;
 
 pub use imports::Import;
 pub use order::{Order, Step};

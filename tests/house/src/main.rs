@@ -1,14 +1,22 @@
 //! `cargo run -p house` writes `docs/images/house.svg`, the picture of `docs/architecture.md`. `cargo run -p house -- order`
 //! prints for each crate an order in which its rooms can stand, and the imports that stand in the way of one.
+//! `cargo run -p house -- circles` prints the groups of files that import each other, and their imports.
 
-use house::{House, Order, picture};
+use house::{House, Import, Order, picture};
 use std::path::Path;
 
 fn main() -> Result<(), house::Error> {
     let house = House::read(Path::new("."))?;
-    if std::env::args().nth(1).is_some_and(|argument| argument == "order") {
-        print_orders(&house);
-        return Ok(());
+    match std::env::args().nth(1).as_deref() {
+        Some("order") => {
+            print_orders(&house);
+            return Ok(());
+        }
+        Some("circles") => {
+            print_circles(&house);
+            return Ok(());
+        }
+        _ => {}
     }
     let order = Order::read(&house.root.join("docs/architecture.md"))?;
     let path = house.root.join("docs/images/house.svg");
@@ -20,8 +28,21 @@ fn print_orders(house: &House) {
         println!("{}: {}", found.name, found.order().join(", "));
         let Some(ring) = found.ring() else { continue };
         println!("  ring: {}", ring.join(", "));
-        for import in found.imports.iter().filter(|i| ring.contains(&i.from) && ring.contains(&i.to)) {
+        for import in found.between_rooms().filter(|i| ring.contains(&i.from) && ring.contains(&i.to)) {
             println!("  src/{}:{}: {} imports {}", import.file.display(), import.line, import.from, import.to);
+        }
+    }
+}
+
+fn print_circles(house: &House) {
+    for found in &house.crates {
+        for circle in found.circles() {
+            let files: Vec<_> = circle.iter().map(|file| file.display().to_string()).collect();
+            println!("crates/{}/src: {}", found.name, files.join(", "));
+            let inside = |i: &&Import| circle.contains(&i.file.as_path()) && circle.contains(&i.target.as_path());
+            for import in found.imports.iter().filter(inside) {
+                println!("  {}:{} imports {}", import.file.display(), import.line, import.target.display());
+            }
         }
     }
 }

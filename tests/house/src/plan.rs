@@ -1,7 +1,8 @@
 //! Crates and rooms, read from the workspace.
 
 use crate::Error;
-use crate::imports::{Import, Sources};
+use crate::imports::{Import, imports};
+use crate::sources::Sources;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -25,7 +26,7 @@ pub struct Crate {
     pub depends_on: BTreeSet<String>,
     /// In the order of their names.
     pub rooms: Vec<Room>,
-    /// Imports from one room to another.
+    /// Imports from one file to another.
     pub imports: Vec<Import>,
 }
 
@@ -112,8 +113,35 @@ impl Crate {
             room.files += 1;
         }
         let rooms: Vec<Room> = rooms.into_values().collect();
-        let imports = sources.imports();
+        let imports = imports(&sources);
         Ok(Crate { name, depends_on, rooms, imports })
+    }
+
+    /// Imports from one room to another.
+    pub fn between_rooms(&self) -> impl Iterator<Item = &Import> {
+        self.imports.iter().filter(|import| import.leaves_room())
+    }
+
+    /// Groups of files that import each other in circles, the largest first.
+    ///
+    /// The file of a module (`mod.rs`, `lib.rs`) and the files below it do not count as a circle: they may use what it
+    /// shares with them, and it may call them.
+    pub fn circles(&self) -> Vec<Vec<&Path>> {
+        let mut next: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
+        for import in self.imports.iter().filter(|import| !import.leads_inside()) {
+            next.entry(&import.file).or_default().insert(&import.target);
+        }
+        let reach: BTreeMap<&Path, BTreeSet<&Path>> = next.keys().map(|file| (*file, reached(file, &next))).collect();
+        let mut circles: Vec<Vec<&Path>> = Vec::new();
+        for (&file, there) in &reach {
+            if !there.contains(file) || circles.iter().any(|circle| circle.contains(&file)) {
+                continue;
+            }
+            let back = |other: &&Path| reach.get(other).is_some_and(|from_there| from_there.contains(file));
+            circles.push(there.iter().copied().filter(back).collect());
+        }
+        circles.sort_by_key(|circle| std::cmp::Reverse(circle.len()));
+        circles
     }
 
     /// The rooms in an order in which each imports only from those before it; those of a ring are left out, and all that
@@ -122,7 +150,7 @@ impl Crate {
         let mut order: Vec<&str> = Vec::new();
         loop {
             let stands = |room: &&Room| {
-                let mut needed = self.imports.iter().filter(|i| i.from == room.name);
+                let mut needed = self.between_rooms().filter(|i| i.from == room.name);
                 !order.contains(&room.name.as_str()) && needed.all(|i| order.contains(&i.to.as_str()))
             };
             match self.rooms.iter().find(stands) {
@@ -135,12 +163,25 @@ impl Crate {
     /// Rooms that import each other in a ring, if there are any: each imports the next, the last the first.
     pub fn ring(&self) -> Option<Vec<String>> {
         let mut next: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for import in &self.imports {
+        for import in self.between_rooms() {
             next.entry(&import.from).or_default().insert(&import.to);
         }
         let (mut done, mut way) = (BTreeSet::new(), Vec::new());
         self.rooms.iter().find_map(|room| walk(&room.name, &next, &mut done, &mut way))
     }
+}
+
+/// The files that are imported by `file`, by those that it imports, and so on.
+fn reached<'a>(file: &'a Path, next: &BTreeMap<&'a Path, BTreeSet<&'a Path>>) -> BTreeSet<&'a Path> {
+    let (mut reached, mut open) = (BTreeSet::new(), vec![file]);
+    while let Some(file) = open.pop() {
+        for target in next.get(file).into_iter().flatten() {
+            if reached.insert(*target) {
+                open.push(target);
+            }
+        }
+    }
+    reached
 }
 
 /// Follows imports from `room` until the way meets itself.

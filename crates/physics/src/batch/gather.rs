@@ -1,68 +1,13 @@
 //! Readings of all agents at once, in arrays with a row per agent: for callers to whom an agent at a time is too slow.
 
-use super::{Batch, lanes::LaneBatch};
+use super::Batch;
+use super::lanes::LaneBatch;
+use super::quantity::{Felt, Quantity};
 use crate::algebra::spatial::V3;
 use crate::lanes::{Kernel, Real};
-use crate::model::Model;
 use crate::readings::Readings;
 use crate::sim::Sim;
 use crate::state::{Group, Work};
-
-/// What [`Batch::gather`] can write. World axes and SI units; indices are those of the [`Model`].
-///
-/// Positions and velocities are those of the present state. Contacts are those of the last [`Batch::step`], with the
-/// static world; an agent that was put into a state since has none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Configuration, `[nq]`.
-    Qpos,
-    /// Velocity, `[nv]`.
-    Qvel,
-    /// Origins of the bodies' frames, m, `[body][3]`.
-    BodyPos,
-    /// Directions of the bodies' x, y and z axes, `[body][axis][3]`.
-    BodyAxes,
-    /// Velocities of the origins of the bodies' frames, m/s, `[body][3]`.
-    BodyVelocity,
-    /// Angular velocities of the bodies, rad/s, `[body][3]`.
-    BodyAngularVelocity,
-    /// Centers of the geoms, m, `[geom][3]`.
-    GeomPos,
-    /// Velocities of the geoms' centers, m/s, `[geom][3]`.
-    GeomVelocity,
-    /// 1 for a geom that touched the static world at the last physics step, else 0, `[geom]`.
-    Touching,
-    /// 1 for a geom that touched the static world at any physics step of the last call, else 0, `[geom]`.
-    Touched,
-    /// Normal force of a geom's contacts at the last physics step, N, `[geom]`.
-    NormalForce,
-    /// Sensors as in [`Batch::sensors`], in the model's order.
-    Sensors,
-}
-
-impl Quantity {
-    /// Numbers per agent.
-    pub fn width(self, model: &Model) -> usize {
-        match self {
-            Quantity::Qpos => model.nq,
-            Quantity::Qvel => model.nv,
-            Quantity::BodyPos | Quantity::BodyVelocity | Quantity::BodyAngularVelocity => 3 * model.bodies.len(),
-            Quantity::BodyAxes => 9 * model.bodies.len(),
-            Quantity::GeomPos | Quantity::GeomVelocity => 3 * model.geoms.len(),
-            Quantity::Touching | Quantity::Touched | Quantity::NormalForce => model.geoms.len(),
-            Quantity::Sensors => model.sensors.iter().map(|s| s.dim).sum(),
-        }
-    }
-
-    /// It needs the frames of the present state.
-    fn is_frame(self) -> bool {
-        use Quantity as Q;
-        matches!(
-            self,
-            Q::BodyPos | Q::BodyAxes | Q::BodyVelocity | Q::BodyAngularVelocity | Q::GeomPos | Q::GeomVelocity
-        )
-    }
-}
 
 impl Batch {
     /// Writes readings of all agents, `[agents][width]` each, row-major; on the batch's threads.
@@ -88,39 +33,6 @@ impl Batch {
         let each = places.len() / self.agents;
         if each > 0 {
             self.inner.ground_height(&self.model.grounds(), places, each, heights);
-        }
-    }
-}
-
-/// Contacts of a group in the last call of [`Batch::step`], by geom.
-#[derive(Clone, Debug)]
-pub(super) struct Felt<T: Real> {
-    touching: Vec<T::Mask>,
-    touched: Vec<T::Mask>,
-    normal_force: Vec<T>,
-}
-
-impl<T: Real> Felt<T> {
-    pub(super) fn new(model: &Model) -> Self {
-        let n = model.geoms.len();
-        Felt { touching: vec![T::none(); n], touched: vec![T::none(); n], normal_force: vec![T::zero(); n] }
-    }
-
-    /// Those of the group that was stepped last with `work`.
-    pub(super) fn keep(&mut self, work: &Work<T>) {
-        self.touching.copy_from_slice(&work.contacts.touching);
-        self.touched.copy_from_slice(&work.contacts.touched);
-        self.normal_force.copy_from_slice(&work.contacts.normal_force);
-    }
-
-    /// An agent has left where it was.
-    pub(super) fn forget(&mut self, lane: usize) {
-        let others = T::from_bits(!(1 << lane) & ((1 << T::LANES) - 1));
-        for mask in self.touching.iter_mut().chain(&mut self.touched) {
-            *mask = T::and(*mask, others);
-        }
-        for force in &mut self.normal_force {
-            force.set(lane, T::scalar(0.0));
         }
     }
 }

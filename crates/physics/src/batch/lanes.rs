@@ -1,8 +1,8 @@
 //! The agents of a batch in lanes of one width.
 
-use super::gather::Felt;
+use super::BodyReading;
 use super::pool::Helpers;
-use super::{BodyReading, Quantity};
+use super::quantity::{Felt, Quantity};
 use crate::lanes::Real;
 use crate::readings::Readings;
 use crate::sim::Sim;

@@ -8,10 +8,11 @@ mod blowup;
 mod gather;
 mod lanes;
 mod pool;
+mod quantity;
 pub mod workload;
 
 pub use blowup::{Blowup, Replay};
-pub use gather::Quantity;
+pub use quantity::Quantity;
 
 use crate::lanes::Isa;
 use crate::model::Model;

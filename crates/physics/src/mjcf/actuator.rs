@@ -1,16 +1,16 @@
 //! `<actuator>`: motors and servos on joints and tendons.
 
+use super::actuator_params::{ActuatorParams, Limits};
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::joint::{check_limit, is_limited};
-use super::law::{Law, Limits};
+use super::limit::{check_limit, is_limited};
+use super::mass_matrix::MassMatrix;
 use super::math::{MIN_VAL, rotate};
 use super::names::Registry;
-use super::set0::MassMatrix;
 use super::settings::{Settings, entries};
-use super::tendon::{self, polynomial, require_fixed};
-use super::value::{Attrs, Tristate};
+use super::tendon::{self, require_fixed};
+use super::value::{Attrs, Tristate, polynomial};
 use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
 
 /// All elements of `<actuator>` sections.
@@ -27,7 +27,7 @@ pub(crate) fn check_default(attrs: &Attrs) -> Result<(), MjcfError> {
 
 /// Everything that does not depend on the rest of the model.
 fn read(attrs: &Attrs, ends: &[usize]) -> Result<Actuator, MjcfError> {
-    let law = Law::compile(attrs, ends)?;
+    let params = ActuatorParams::compile(attrs, ends)?;
     let Limits { ctrl_limited, ctrl_range, act_limited, act_range, act_early } = Limits::read(attrs)?;
     let force_range = attrs.array_or("forcerange", [0.0; 2])?;
     Ok(Actuator {
@@ -38,9 +38,9 @@ fn read(attrs: &Attrs, ends: &[usize]) -> Result<Actuator, MjcfError> {
         ctrl_range,
         force_limited: is_limited(attrs, "forcelimited", force_range)?,
         force_range,
-        gain: law.gain,
-        bias: law.bias,
-        dynamics: law.dynamics(),
+        gain: params.gain,
+        bias: params.bias,
+        dynamics: params.dynamics(),
         act: None,
         act_limited: applies(act_limited, act_range),
         act_range,
@@ -142,9 +142,9 @@ fn target(element: &Element, names: &Registry, model: &Model) -> Result<Transmis
 /// the activation of an integrated one.
 fn inherit_range(attrs: &Attrs, ends: &[usize], actuator: &mut Actuator, model: &Model) -> Result<(), MjcfError> {
     let element = attrs.element;
-    let law = Law::compile(attrs, ends)?;
-    let part = law.inherited_range;
-    if !law.is_position_servo() || part == 0.0 {
+    let params = ActuatorParams::compile(attrs, ends)?;
+    let part = params.inherited_range;
+    if !params.is_position_servo() || part == 0.0 {
         return Ok(());
     }
     let of_activation = actuator.dynamics == Dynamics::Integrator;

@@ -13,7 +13,8 @@ use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{
-    actuator, asset, contact, custom, equality, geom, inertia, schema, sensor, set0, settings, statistics, tendon, tree,
+    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, schema, sensor, settings, statistics,
+    tendon, tree,
 };
 use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
@@ -78,13 +79,13 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
 
-    let pose = set0::Pose::new(&model);
+    let pose = mass_matrix::Pose::new(&model);
     model.equalities = equality::compile(root, &defaults, &names, &model, &pose)?;
     let simple: Vec<bool> = bodies.iter().map(|b| b.simple).collect();
-    let mass_matrix =
-        set0::weights(&mut model, &pose, &simple, room).map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
+    let mass_matrix = mass_matrix::inverse_weights(&mut model, &pose, &simple, room)
+        .map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
-    tendon::weights(&mut model, &mass_matrix);
+    mass_matrix::tendon_inverse_weights(&mut model, &mass_matrix);
     actuator::resolve_damping(&mut model, &mass_matrix);
     spring_dampers(&mut model, &bodies);
     check_finite(&model, &bodies)?;

@@ -4,9 +4,9 @@ use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
 use super::geom::NO_MESH;
-use super::joint::{SOLIMP, SOLREF};
 use super::names::{Names, Registry};
 use super::settings::entries;
+use super::solver_params::{SOLIMP, SOLREF};
 use super::value::Attrs;
 use crate::model::{Geom, GeomType, Pair};
 

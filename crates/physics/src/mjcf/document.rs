@@ -92,6 +92,13 @@ impl Element {
     }
 }
 
+impl Room {
+    /// Takes room for `count` things of `bytes` bytes that an element asks for.
+    pub fn take_for(&self, element: &Element, count: usize, bytes: usize) -> Result<(), MjcfError> {
+        self.take(count, bytes).map_err(|over| element.invalid(format!("the model {over}")))
+    }
+}
+
 /// Reads the text of an included file, given the path relative to the main file.
 pub(crate) type Resolve<'a> = dyn Fn(&str) -> Result<String, String> + 'a;
 

@@ -3,11 +3,11 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::joint::{SOLIMP, SOLREF};
+use super::mass_matrix::Pose;
 use super::math::{EPS, IDENTITY, mul_quat, quat_norm, rotate, sub};
 use super::names::{Names, Registry};
-use super::set0::Pose;
 use super::settings::entries;
+use super::solver_params::{SOLIMP, SOLREF};
 use super::tendon::require_fixed;
 use super::value::Attrs;
 use crate::model::{Equality, EqualityKind, JointType, Model, Quat, SolImp, SolRef, Vec3};

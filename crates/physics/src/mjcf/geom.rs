@@ -3,10 +3,10 @@
 use super::asset::Assets;
 use super::document::Element;
 use super::error::MjcfError;
-use super::joint::{SOLIMP, SOLREF};
 use super::math::*;
 use super::orientation::orientation;
 use super::settings::Settings;
+use super::solver_params::{SOLIMP, SOLREF};
 use super::value::Attrs;
 use crate::model::{GeomType, Quat, SolImp, SolRef, Vec3};
 use std::f64::consts::PI;

@@ -9,12 +9,13 @@
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
 //! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
-//! `set0` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
+//! `mass_matrix` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
 //! that all of them ask for.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.
 
 mod actuator;
+mod actuator_params;
 mod assemble;
 mod asset;
 mod contact;
@@ -27,15 +28,16 @@ mod factor;
 mod geom;
 mod inertia;
 mod joint;
-mod law;
+mod limit;
+mod mass_matrix;
 mod math;
 mod names;
 mod orientation;
 mod room;
 mod schema;
 mod sensor;
-mod set0;
 mod settings;
+mod solver_params;
 mod statistics;
 mod tendon;
 mod tree;

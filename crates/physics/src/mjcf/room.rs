@@ -1,7 +1,5 @@
 //! How much memory a model may take.
 
-use super::document::Element;
-use super::error::MjcfError;
 use crate::budget::{MEMORY, OverBudget};
 use std::cell::Cell;
 
@@ -20,10 +18,5 @@ impl Room {
     pub fn take(&self, count: usize, bytes: usize) -> Result<(), OverBudget> {
         self.0.set(self.0.get() + COPIES * count as f64 * bytes as f64);
         MEMORY.check(self.0.get())
-    }
-
-    /// The same for what an element asks for.
-    pub fn take_for(&self, element: &Element, count: usize, bytes: usize) -> Result<(), MjcfError> {
-        self.take(count, bytes).map_err(|over| element.invalid(format!("the model {over}")))
     }
 }

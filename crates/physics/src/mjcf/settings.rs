@@ -2,7 +2,7 @@
 
 use super::document::Element;
 use super::error::MjcfError;
-use super::joint::{SOLIMP, SOLREF};
+use super::solver_params::{SOLIMP, SOLREF};
 use super::value::{Attrs, Tristate};
 use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Solver, Vec3};
 

@@ -3,11 +3,11 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::joint::{SOLIMP, SOLREF, check_limit, is_limited};
+use super::limit::{check_limit, is_limited};
 use super::names::Registry;
-use super::set0::MassMatrix;
 use super::settings::{Settings, entries};
-use super::value::{Attrs, numbers};
+use super::solver_params::{SOLIMP, SOLREF};
+use super::value::{Attrs, numbers, polynomial};
 use crate::model::{JointType, Model, Tendon, TendonKind};
 use std::collections::BTreeSet;
 
@@ -64,12 +64,6 @@ fn read(attrs: &Attrs) -> Result<Tendon, MjcfError> {
         invweight0: 0.0,
         group: attrs.integer_or("group", 0)?,
     })
-}
-
-/// Linear coefficient and the two higher ones.
-pub(crate) fn polynomial(attrs: &Attrs, name: &str) -> Result<(f64, [f64; 2]), MjcfError> {
-    let [linear, second, third] = attrs.partial_or(name, [0.0; 3])?;
-    Ok((linear, [second, third]))
 }
 
 /// `springlength`: one number stands for both ends.
@@ -191,12 +185,5 @@ pub(crate) fn moments(model: &Model, tendon: &Tendon) -> Vec<(usize, f64)> {
     match &tendon.kind {
         TendonKind::Fixed(path) => path.iter().map(|(j, coef)| (model.joints[*j].dof_adr, *coef)).collect(),
         TendonKind::Spatial => Vec::new(),
-    }
-}
-
-/// Sets the inverse weights.
-pub(crate) fn weights(model: &mut Model, mass: &MassMatrix) {
-    for i in 0..model.tendons.len() {
-        model.tendons[i].invweight0 = mass.inverse_form(&moments(model, &model.tendons[i]));
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct BodySpec<'a> {
     pub frame: Frame,
     pub mocap: bool,
     pub gravcomp: f64,
-    /// `simple="auto"`: inverse weights may be those of a lone sliding body, see [`super::set0`].
+    /// `simple="auto"`: inverse weights may be those of a lone sliding body, see [`super::mass_matrix`].
     pub simple: bool,
     /// `<inertial>`, in the body's frame.
     pub inertial: Option<Inertial<'a>>,

@@ -123,6 +123,12 @@ impl<'a> Attrs<'a> {
     }
 }
 
+/// Coefficients of a polynomial: the linear one and the two higher ones.
+pub(crate) fn polynomial(attrs: &Attrs, name: &str) -> Result<(f64, [f64; 2]), MjcfError> {
+    let [linear, second, third] = attrs.partial_or(name, [0.0; 3])?;
+    Ok((linear, [second, third]))
+}
+
 /// The choice that `attr` names.
 pub(crate) fn keyword<T: Copy>(element: &Element, attr: &Attr, choices: &[(&str, T)]) -> Result<T, MjcfError> {
     if let Some(&(_, value)) = choices.iter().find(|(word, _)| *word == attr.value) {

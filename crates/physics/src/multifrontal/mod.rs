@@ -15,12 +15,15 @@
 
 mod assembly;
 mod front;
+mod numbers;
 mod order;
 mod plan;
+mod tie;
 
-pub(crate) use assembly::Tie;
-pub(crate) use front::{JointRow, Numbers, factorize, solve};
+pub(crate) use front::{factorize, solve};
+pub(crate) use numbers::{JointRow, Numbers};
 pub(crate) use plan::{NONE, Plan, RowTerms};
+pub(crate) use tie::Tie;
 
 use crate::lanes::Real;
 

@@ -4,8 +4,8 @@
 //! is tied to by contacts or by earlier eliminations, and the rows over joints that have terms here or above. What is
 //! left of a front after the elimination is added to the front of whichever of its members is eliminated next.
 
-use super::assembly::Tie;
 use super::order::TreeOrder;
+use super::tie::Tie;
 use crate::lanes::Real;
 use crate::sim::Link;
 

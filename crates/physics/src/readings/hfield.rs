@@ -1,6 +1,6 @@
 //! Rays against a height field: a box below, triangles above it, and walls where the field ends.
 
-use super::rays::{Hit, TINY, along, normalized, ray_face};
+use super::ray::{Hit, TINY, along, normalized, ray_face};
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 

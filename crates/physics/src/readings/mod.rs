@@ -12,6 +12,7 @@ mod hfield;
 mod joint_space;
 mod joints;
 mod measure;
+mod ray;
 mod rays;
 mod sensors;
 mod touch;

@@ -8,8 +8,10 @@ mod blocks;
 mod cone;
 mod cost;
 mod floor;
+mod force;
 mod jacobian;
 mod joint;
+mod measure;
 mod row;
 
 pub(crate) use block::{Block, RowValues, Source, at};

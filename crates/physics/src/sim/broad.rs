@@ -1,7 +1,7 @@
 //! Which pairs belong to which groups, for the broad phase of models with many pairs: every tree, and every geom that
 //! stands still, is a group.
 
-use super::contacts::Contacts;
+use super::pairs::{GeomPair, PairSpec, Paired};
 use crate::lanes::Real;
 
 /// Pairs across trees from which on the broad phase is worth its while.
@@ -23,19 +23,25 @@ pub(crate) struct Broad<C> {
 
 impl<C: Real> Broad<C> {
     /// Sorts the pairs of a model into groups; none if they are few. `tree_of` gives the tree of a geom that moves.
-    pub fn of(contacts: &Contacts<C>, trees: usize, tree_of: impl Fn(usize) -> Option<usize>) -> Option<Self> {
-        let mut group_of = vec![usize::MAX; contacts.paired.last().map_or(0, |p| p.geom + 1)];
+    pub fn of(
+        paired: &[Paired<C>],
+        geom_pairs: &[GeomPair],
+        specs: &[PairSpec<C>],
+        trees: usize,
+        tree_of: impl Fn(usize) -> Option<usize>,
+    ) -> Option<Self> {
+        let mut group_of = vec![usize::MAX; paired.last().map_or(0, |p| p.geom + 1)];
         let mut members = vec![Vec::new(); trees];
-        for paired in &contacts.paired {
-            let group = tree_of(paired.geom).unwrap_or_else(|| {
+        for geom in paired {
+            let group = tree_of(geom.geom).unwrap_or_else(|| {
                 members.push(Vec::new());
                 members.len() - 1
             });
-            group_of[paired.geom] = group;
-            members[group].push(paired.geom);
+            group_of[geom.geom] = group;
+            members[group].push(geom.geom);
         }
-        let mut keys: Vec<([usize; 2], u32)> = Vec::with_capacity(contacts.pairs.len());
-        for (index, pair) in contacts.pairs.iter().enumerate() {
+        let mut keys: Vec<([usize; 2], u32)> = Vec::with_capacity(geom_pairs.len());
+        for (index, pair) in geom_pairs.iter().enumerate() {
             let [a, b] = pair.geoms.map(|g| group_of[g as usize]);
             keys.push(([a.min(b), a.max(b)], index as u32));
         }
@@ -50,7 +56,7 @@ impl<C: Real> Broad<C> {
                 _ => partners[*a].push((*b, at, at + 1)),
             }
         }
-        let margin = contacts.specs.iter().map(|s| C::widen(s.margin.get(0))).fold(0.0, f64::max);
+        let margin = specs.iter().map(|s| C::widen(s.margin.get(0))).fold(0.0, f64::max);
         let pairs = keys.into_iter().map(|(_, index)| index).collect();
         Some(Broad { members, partners, pairs, margin: C::lit(0.5 * margin) })
     }

@@ -6,8 +6,9 @@
 use super::broad::Broad;
 use super::contact_params::{ContactParams, label, may_collide};
 use super::floor_points::{self, FloorPoint};
+use super::link::Mount;
 use super::options::{SimError, SimOptions};
-use super::pairs::{self, GeomPair, PairSpec};
+use super::pairs::{self, GeomPair, GeomPairOf, PairSpec, Paired};
 use super::weld::BodyMount;
 use crate::budget::{MEMORY, OverBudget};
 use crate::lanes::Real;
@@ -29,14 +30,6 @@ pub(crate) struct Contacts<C> {
     pub hard: bool,
     /// How to find those of the pairs that may touch, if they are many.
     pub broad: Option<Broad<C>>,
-}
-
-/// A geom that meets others.
-#[derive(Clone, Debug)]
-pub(crate) struct Paired<C> {
-    pub geom: usize,
-    /// Length on either side of the center along the third axis, of a capsule; else 0, and it is a ball that bounds it.
-    pub half: C,
 }
 
 /// Most geoms that may collide: the time to compare them grows with the square of their number.
@@ -65,6 +58,14 @@ impl<C> Contacts<C> {
             hard: false,
             broad: None,
         }
+    }
+
+    /// A pair by its number.
+    #[inline(always)]
+    pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> GeomPairOf<'a, C> {
+        let pair = &self.pairs[index];
+        let ends = pair.geoms.map(|g| g as usize);
+        GeomPairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
     }
 }
 
@@ -122,10 +123,10 @@ pub(super) fn contacts<T: Real>(
                 continue;
             }
             let params = ContactParams::of(model, i, j);
-            if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out) {
+            if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor, &mut out.hard) {
                 continue;
             }
-            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out) {
+            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.specs, &mut out.hard) {
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
@@ -149,7 +150,7 @@ pub(super) fn contacts<T: Real>(
     let half = |g: &Geom| if g.kind == GeomType::Capsule { g.size[1] } else { 0.0 };
     out.paired = paired.map(|g| Paired { geom: g, half: T::scalar(half(&model.geoms[g])) }).collect();
     let group = |g: usize| link(g).map(|l| tree_of[l]);
-    out.broad = Broad::of(&out, tree_of.iter().max().map_or(0, |t| t + 1), group);
+    out.broad = Broad::of(&out.paired, &out.pairs, &out.specs, tree_of.iter().max().map_or(0, |t| t + 1), group);
     Ok(out)
 }
 

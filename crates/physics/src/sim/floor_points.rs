@@ -4,7 +4,6 @@
 //! corners. Each is a [`FloorPoint`].
 
 use super::contact_params::ContactParams;
-use super::contacts::Contacts;
 use super::softness::{Softness, softness};
 use super::weights::{inverse_weights, is_hard};
 use super::weld::BodyMount;
@@ -35,14 +34,15 @@ pub(crate) struct FloorPoint<C> {
 }
 
 /// Adds the points of a moving geom that may touch a level plane. Returns whether the list takes it: pyramidal cones
-/// of condim 1 or 3, spheres, capsules and boxes.
+/// of condim 1 or 3, spheres, capsules and boxes. Sets `hard` if the points [are](is_hard).
 pub(super) fn add<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
     (fixed, geom): (usize, usize),
     link: Option<usize>,
     params: &ContactParams,
-    contacts: &mut Contacts<T::Scalar>,
+    out: &mut Vec<FloorPoint<T::Scalar>>,
+    hard: &mut bool,
 ) -> bool {
     let (plane_geom, fixed, moving) = (fixed, &model.geoms[fixed], &model.geoms[geom]);
     let Some(link) = link else { return false };
@@ -66,8 +66,7 @@ pub(super) fn add<T: Real>(
     } else {
         2.0 * mu[0] * mu[0] / model.opt.impratio * invweight * (1.0 + mu[0] * mu[0])
     };
-    contacts.hard |= is_hard(model, mounts, [moving.body, fixed.body], diag);
-    let out = &mut contacts.floor;
+    *hard |= is_hard(model, mounts, [moving.body, fixed.body], diag);
     let soft = softness::<T>(model, &params.solref, &params.solimp, params.margin, diag);
 
     let on_link = &mounts[moving.body];

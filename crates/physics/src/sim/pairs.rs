@@ -1,8 +1,6 @@
 //! Pairs of geoms that may touch: moving bodies with each other, and with terrain.
 
 use super::contact_params::ContactParams;
-use super::contacts::Contacts;
-use super::link::Mount;
 use super::softness::{Cost, Softness, softness};
 use super::weights::{inverse_weights, is_hard};
 use super::weld::BodyMount;
@@ -72,12 +70,20 @@ pub(crate) struct GeomPair {
     pub spec: u32,
 }
 
+/// A geom that meets others.
+#[derive(Clone, Debug)]
+pub(crate) struct Paired<C> {
+    pub geom: usize,
+    /// Length on either side of the center along the third axis, of a capsule; else 0, and it is a ball that bounds it.
+    pub half: C,
+}
+
 /// A pair with everything that belongs to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeomPairOf<'a, C> {
     pub geoms: [usize; 2],
     pub links: [Option<usize>; 2],
-    spec: &'a PairSpec<C>,
+    pub(super) spec: &'a PairSpec<C>,
 }
 
 /// What pairs of equal geoms have in common.
@@ -102,16 +108,6 @@ pub(crate) struct PairSpec<C> {
     pub soft: Softness<C>,
     /// Stiffness of the rows in units of the first row's.
     pub ratios: [C; 6],
-}
-
-impl<C> Contacts<C> {
-    /// A pair by its number.
-    #[inline(always)]
-    pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> GeomPairOf<'a, C> {
-        let pair = &self.pairs[index];
-        let ends = pair.geoms.map(|g| g as usize);
-        GeomPairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
-    }
 }
 
 impl<C> GeomPairOf<'_, C> {
@@ -142,13 +138,15 @@ impl<C> PairSpec<C> {
 }
 
 /// Adds what pairs like this pair of geoms have in common. Returns false if their contacts are not simulated.
+/// Sets `hard` if the pair [is](is_hard).
 pub(super) fn add<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
     geoms: [usize; 2],
     links: [Option<usize>; 2],
     params: &ContactParams,
-    contacts: &mut Contacts<T::Scalar>,
+    specs: &mut Vec<PairSpec<T::Scalar>>,
+    hard: &mut bool,
 ) -> bool {
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
@@ -179,8 +177,8 @@ pub(super) fn add<T: Real>(
     };
     let radius = |g: &Geom| bounding_radius(g.kind, &g.size);
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
-    contacts.hard |= is_hard(model, mounts, [a.body, b.body], diag);
-    contacts.specs.push(PairSpec {
+    *hard |= is_hard(model, mounts, [a.body, b.body], diag);
+    specs.push(PairSpec {
         coupled: links[0].is_some() && links[1].is_some(),
         sizes: [sizes(a).map(c), sizes(b).map(c)],
         shapes,

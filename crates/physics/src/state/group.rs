@@ -1,7 +1,6 @@
 //! State of a lane group.
 
-use super::variation::Varied;
-use crate::algebra::spatial::V6;
+use crate::algebra::spatial::{V3, V6};
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
 use crate::model::JointType;
@@ -30,6 +29,17 @@ pub struct Group<T: Real> {
     pub(crate) varied: Option<Box<Varied<T>>>,
     /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
     pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
+}
+
+/// What the agents of a group have of their own in place of the model's constants.
+#[derive(Clone, Debug)]
+pub(crate) struct Varied<T: Real> {
+    /// Per link.
+    pub mass: Vec<T>,
+    pub friction: T,
+    /// Per actuator.
+    pub strength: Vec<T>,
+    pub gravity: V3<T>,
 }
 
 impl<T: Real> Group<T> {

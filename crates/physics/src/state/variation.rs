@@ -3,7 +3,7 @@
 //! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
 //! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
 
-use super::group::Group;
+use super::group::{Group, Varied};
 use crate::algebra::spatial::V3;
 use crate::geometry::height::HeightField;
 use crate::lanes::{MAX_LANES, Real};
@@ -36,17 +36,6 @@ impl Variation {
             gravity: if model.opt.flags.gravity { model.opt.gravity } else { [0.0; 3] },
         }
     }
-}
-
-/// The deviations of a lane group.
-#[derive(Clone, Debug)]
-pub(crate) struct Varied<T: Real> {
-    /// Per link.
-    pub mass: Vec<T>,
-    pub friction: T,
-    /// Per actuator.
-    pub strength: Vec<T>,
-    pub gravity: V3<T>,
 }
 
 impl<T: Real> Group<T> {

@@ -42,7 +42,7 @@ impl Pose {
 
 /// Why the reference quantities do not exist.
 #[derive(Debug)]
-pub(crate) enum Set0Error {
+pub(crate) enum MassMatrixError {
     /// The tree of this body has too many degrees of freedom.
     TooLarge(usize),
     /// The mass matrix of the tree of this body is not positive definite.
@@ -51,19 +51,20 @@ pub(crate) enum Set0Error {
     OverBudget(usize, OverBudget),
 }
 
-impl Set0Error {
+impl MassMatrixError {
     pub fn body(&self) -> usize {
-        let (Set0Error::TooLarge(body) | Set0Error::Singular(body) | Set0Error::OverBudget(body, _)) = self;
+        let (MassMatrixError::TooLarge(body) | MassMatrixError::Singular(body) | MassMatrixError::OverBudget(body, _)) =
+            self;
         *body
     }
 }
 
-impl std::fmt::Display for Set0Error {
+impl std::fmt::Display for MassMatrixError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Set0Error::TooLarge(_) => write!(f, "its tree has more than {MAX_TREE_DOFS} degrees of freedom"),
-            Set0Error::Singular(_) => write!(f, "the mass matrix of its tree is not positive definite"),
-            Set0Error::OverBudget(_, over) => write!(f, "the model {over}"),
+            MassMatrixError::TooLarge(_) => write!(f, "its tree has more than {MAX_TREE_DOFS} degrees of freedom"),
+            MassMatrixError::Singular(_) => write!(f, "the mass matrix of its tree is not positive definite"),
+            MassMatrixError::OverBudget(_, over) => write!(f, "the model {over}"),
         }
     }
 }
@@ -94,7 +95,12 @@ impl MassMatrix {
 /// Sets the inverse weights of bodies and dofs, and returns the mass matrix.
 ///
 /// `simple` says for each body whether it may be treated as a lone slider.
-pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool], room: &Room) -> Result<MassMatrix, Set0Error> {
+pub(crate) fn inverse_weights(
+    model: &mut Model,
+    pose: &Pose,
+    simple: &[bool],
+    room: &Room,
+) -> Result<MassMatrix, MassMatrixError> {
     let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
     let heavy = HeavyTendons::new(model);
     let mut first = 0;
@@ -103,9 +109,9 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool], room: &Ro
         let in_tree = |d: &crate::model::Dof| model.bodies[d.body].root_id == root;
         let count = model.dofs[first..].iter().take_while(|d| in_tree(d)).count();
         if count > MAX_TREE_DOFS {
-            return Err(Set0Error::TooLarge(root));
+            return Err(MassMatrixError::TooLarge(root));
         }
-        room.take(count * count, size_of::<f64>()).map_err(|over| Set0Error::OverBudget(root, over))?;
+        room.take(count * count, size_of::<f64>()).map_err(|over| MassMatrixError::OverBudget(root, over))?;
         let tree = Tree::new(model, pose, root, first, count);
         let mass = tree.mass_matrix(model, pose, &heavy);
         for i in 0..count {
@@ -113,7 +119,7 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool], room: &Ro
         }
         let within = |dof: usize| model.dofs[dof].parent.map(|parent| parent - first);
         let parents: Vec<Option<usize>> = (first..first + count).map(within).collect();
-        let factor = Factor::new(mass, &parents).ok_or(Set0Error::Singular(root))?;
+        let factor = Factor::new(mass, &parents).ok_or(MassMatrixError::Singular(root))?;
         tree.set_weights(model, pose, &factor);
         mass_matrix.blocks.push((first, count, factor));
         first += count;
@@ -129,6 +135,13 @@ pub(crate) fn weights(model: &mut Model, pose: &Pose, simple: &[bool], room: &Ro
         }
     }
     Ok(mass_matrix)
+}
+
+/// Sets the inverse weights of tendons.
+pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix) {
+    for i in 0..model.tendons.len() {
+        model.tendons[i].invweight0 = mass.inverse_form(&moments(model, &model.tendons[i]));
+    }
 }
 
 /// A body without children that only slides, along its own axes, on the world or on a child of the world without joints.

@@ -19,8 +19,8 @@ enum Activation {
 
 /// Gain, bias and activation as the elements of a class and the actuator itself set them, one after the other.
 #[derive(Clone, Copy)]
-pub(crate) struct Law<'a> {
-    /// Element that set the law last.
+pub(crate) struct ActuatorParams<'a> {
+    /// Element that set the parameters last.
     element: &'a str,
     pub gain: [f64; 3],
     gain_affine: bool,
@@ -30,7 +30,7 @@ pub(crate) struct Law<'a> {
     time_constant: f64,
     /// Part of the range of the joint or tendon that a position servo takes over; 0: none.
     pub inherited_range: f64,
-    /// Unsupported settings, by the part of the law that may still replace them.
+    /// Unsupported settings, by the part of the parameters that may still replace them.
     refused: [Option<Refused<'a>>; PARTS],
 }
 
@@ -42,14 +42,14 @@ struct Refused<'a> {
     reason: &'static str,
 }
 
-/// Parts of a law that can be unsupported: the element, then the attributes of `<general>`, the kind of gain first.
+/// Parts that can be unsupported: the element, then the attributes of `<general>`, the kind of gain first.
 const PARTS: usize = 1 + ATTRIBUTES.len();
 const ATTRIBUTES: [&str; 6] = ["gaintype", "biastype", "dyntype", "gainprm", "biasprm", "input"];
-/// The reason for refusing other laws.
+/// The reason for refusing other kinds of gain and bias.
 const LAWS: &str = "only constant and affine laws are supported";
 
-impl<'a> Law<'a> {
-    const GENERAL: Law<'static> = Law {
+impl<'a> ActuatorParams<'a> {
+    const GENERAL: ActuatorParams<'static> = ActuatorParams {
         element: "general",
         gain: [1.0, 0.0, 0.0],
         gain_affine: false,
@@ -61,30 +61,30 @@ impl<'a> Law<'a> {
         refused: [None; PARTS],
     };
 
-    /// The law of an actuator: the classes' elements in order, then its own.
+    /// The parameters of an actuator: the classes' elements in order, then its own.
     ///
     /// `ends` counts the elements up to the end of each class, outermost first.
     pub fn compile(attrs: &Attrs<'a>, ends: &[usize]) -> Result<Self, MjcfError> {
-        let mut law: Law = Law::GENERAL;
-        let mut enclosing: Vec<Law> = Vec::new();
+        let mut params: ActuatorParams = ActuatorParams::GENERAL;
+        let mut enclosing: Vec<ActuatorParams> = Vec::new();
         for (i, element) in attrs.chain().enumerate() {
             // the element's own class, the last one, stays open for it
             while enclosing.len() + 1 < ends.len() && ends[enclosing.len()] <= i {
-                enclosing.push(law);
+                enclosing.push(params);
             }
-            law.apply(element, &enclosing)?;
+            params.apply(element, &enclosing)?;
         }
-        if let Some(refused) = law.refused.iter().flatten().next() {
+        if let Some(refused) = params.refused.iter().flatten().next() {
             return Err(refused.element.unsupported(refused.attribute, refused.reason));
         }
-        // without its type an affine law has no effect, so it is not stored
-        if !law.gain_affine {
-            law.gain = [law.gain[0], 0.0, 0.0];
+        // the coefficients of an affine gain or bias have no effect without its type, so they are not stored
+        if !params.gain_affine {
+            params.gain = [params.gain[0], 0.0, 0.0];
         }
-        if !law.bias_affine {
-            law.bias = [0.0; 3];
+        if !params.bias_affine {
+            params.bias = [0.0; 3];
         }
-        Ok(law)
+        Ok(params)
     }
 
     /// How the activation follows the control.
@@ -103,7 +103,7 @@ impl<'a> Law<'a> {
         !self.gain_affine && self.bias_affine && self.gain[0] == -self.bias[1]
     }
 
-    /// Whether a shortcut element can take its parameters from this law.
+    /// Whether a shortcut element can start from these parameters.
     fn serves(&self, shortcut: &str) -> bool {
         self.element == shortcut || (self.element == "general" && !self.gain_affine && self.refused[1].is_none())
     }
@@ -115,9 +115,9 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// Applies one element. What a shortcut does not set it takes from the law so far, else from the nearest enclosing
-    /// class with a law of its own kind or a general one.
-    fn apply(&mut self, element: &'a Element, enclosing: &[Law<'a>]) -> Result<(), MjcfError> {
+    /// Applies one element. A shortcut takes the parameters that it does not set from those so far, else from
+    /// the nearest enclosing class with an element of its own kind or a general one.
+    fn apply(&mut self, element: &'a Element, enclosing: &[ActuatorParams<'a>]) -> Result<(), MjcfError> {
         let attrs = Attrs::plain(element);
         let name = element.name.as_str();
         if name == "general" {
@@ -125,12 +125,13 @@ impl<'a> Law<'a> {
             return self.inherit(element, &attrs);
         }
         if !self.serves(name) {
-            *self = enclosing.iter().rev().find(|law| law.serves(name)).copied().unwrap_or(Law::GENERAL);
+            *self =
+                enclosing.iter().rev().find(|params| params.serves(name)).copied().unwrap_or(ActuatorParams::GENERAL);
         }
         // of the activation of a general actuator a shortcut keeps only what it could have set itself
         let known = name == "cylinder" || (name == "position" && self.activation == Activation::FilterExact);
         if self.element != name && !known {
-            (self.activation, self.time_constant) = (Activation::None, Law::GENERAL.time_constant);
+            (self.activation, self.time_constant) = (Activation::None, ActuatorParams::GENERAL.time_constant);
         }
         // the shortcut sets all parts itself, but keeps unknown parts of an unsupported element; adhesion has a
         // constant gain
@@ -162,10 +163,10 @@ impl<'a> Law<'a> {
                 self.time_constant = attrs.number_or("timeconst", self.time_constant)?;
                 self.activation = Activation::Filter;
             }
-            "motor" => *self = Law::GENERAL,
+            "motor" => *self = ActuatorParams::GENERAL,
             // the class's settings, which the element may replace
             _ => {
-                *self = Law::GENERAL;
+                *self = ActuatorParams::GENERAL;
                 let refused = Some(Refused { element, attribute: None, reason: NO_ACTUATOR });
                 self.refused[0] = refused;
                 if name == "adhesion" {
@@ -296,7 +297,7 @@ impl<'a> Law<'a> {
     }
 }
 
-/// The reason for refusing the inputs in `<general>`, if they are not supported. A law with one control has one input,
+/// The reason for refusing the inputs in `<general>`, if they are not supported. An actuator with one control has one input,
 /// and the input's name changes nothing.
 fn input(element: &Element, attr: &Attr) -> Result<Option<&'static str>, MjcfError> {
     const INPUTS: [&str; 8] = ["pos", "vel", "ff", "voltage", "pressure", "none", "expmap", "quat"];
