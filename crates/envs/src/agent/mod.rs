@@ -7,6 +7,7 @@
 
 pub(crate) mod bindings;
 mod command;
+mod ctrl;
 mod facts;
 pub mod memory;
 pub mod options;
@@ -23,7 +24,8 @@ use marathon_physics::lanes::Real;
 
 use crate::episode_rng::EpisodeRng;
 
-pub use command::{CommandRange, Ctrl};
+pub use command::CommandRange;
+pub use ctrl::Ctrl;
 pub(crate) use facts::FORWARD;
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
 pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Seconds, Share, Value};

@@ -5,7 +5,8 @@ use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Model, Readings, Work};
 
 use super::group::LaneGroup;
-use super::task::Task;
+use super::perception::{Named, Occasion, Perceived};
+use super::task::TaskData;
 use crate::agent::{Agent, Ctrl, Obs, Senses, Site, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
@@ -18,45 +19,20 @@ pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     /// Draws a command, see [`Agent::command`].
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize;
     /// Turns the group's actions into controls, see [`Agent::ctrl`].
-    fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>);
+    fn control(&self, task: &TaskData<T>, group: &mut LaneGroup<T>);
     /// Lanes whose ground changes now, a bit each, see [`Agent::builds`].
     fn builds(&self, group: &LaneGroup<T>) -> u32;
     /// Changes an agent's ground, see [`Agent::build`].
     fn build(&self, site: &mut Site);
     /// Begins or remembers, observes, rewards, reports and terminates, all in one kernel: an agent's code is compiled into it
     /// once per instruction set.
-    fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived;
-}
-
-/// What an agent perceives for.
-pub(crate) enum Occasion<'a> {
-    /// A decision that has been carried out; with it the time of the episodes in the lanes `last` is over, a bit each.
-    Decision { last: u32 },
-    /// The start of episodes in these lanes, a bit each; the reward is then not used.
-    Start(u32),
-    /// A start in all lanes, to see what the agent names.
-    Rehearsal(&'a mut Named),
-}
-
-/// What an agent gives names to.
-#[derive(Default)]
-pub(crate) struct Named {
-    /// Terms of the reward.
-    pub terms: Vec<&'static str>,
-    /// Parts of the observation, and where they begin.
-    pub groups: Vec<(&'static str, usize)>,
-}
-
-/// What an agent perceived.
-pub(crate) struct Perceived {
-    /// How many numbers it observed.
-    pub observed: usize,
-    /// How many numbers it reported.
-    pub reported: usize,
-    /// Lanes that failed, a bit each.
-    pub failed: u32,
-    /// Lanes whose episode is over all the same.
-    pub over: u32,
+    fn perceive(
+        &self,
+        task: &TaskData<T>,
+        group: &mut LaneGroup<T>,
+        work: &Work<T>,
+        occasion: Occasion<'_>,
+    ) -> Perceived;
 }
 
 impl<T: Real, A: Agent> AgentKernel<T> for A {
@@ -72,7 +48,7 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
         Agent::command(self, random, step, out)
     }
 
-    fn control(&self, task: &Task<T>, group: &mut LaneGroup<T>) {
+    fn control(&self, task: &TaskData<T>, group: &mut LaneGroup<T>) {
         T::enter(Drive { agent: self, task, group });
     }
 
@@ -84,7 +60,13 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
         Agent::build(self, site);
     }
 
-    fn perceive(&self, task: &Task<T>, group: &mut LaneGroup<T>, work: &Work<T>, occasion: Occasion<'_>) -> Perceived {
+    fn perceive(
+        &self,
+        task: &TaskData<T>,
+        group: &mut LaneGroup<T>,
+        work: &Work<T>,
+        occasion: Occasion<'_>,
+    ) -> Perceived {
         T::enter(Perceive { agent: self, task, group, work, occasion })
     }
 }
@@ -106,7 +88,7 @@ impl<T: Real, A: Agent> Kernel<T> for Ask<'_, T, A> {
 /// What [`AgentKernel::control`] runs.
 struct Drive<'a, T: Real, A> {
     agent: &'a A,
-    task: &'a Task<T>,
+    task: &'a TaskData<T>,
     group: &'a mut LaneGroup<T>,
 }
 
@@ -125,7 +107,7 @@ impl<T: Real, A: Agent> Kernel<T> for Drive<'_, T, A> {
 /// What [`AgentKernel::perceive`] runs.
 struct Perceive<'a, T: Real, A> {
     agent: &'a A,
-    task: &'a Task<T>,
+    task: &'a TaskData<T>,
     group: &'a mut LaneGroup<T>,
     work: &'a Work<T>,
     occasion: Occasion<'a>,

@@ -1,14 +1,18 @@
 //! How an agent runs: on the physics kernels, as many agents side by side as a vector has lanes.
 
 mod agent_kernel;
+mod commands;
 mod context;
+mod decision;
 mod demonstrations;
+mod factory;
 mod group;
+mod perception;
 mod roles;
 mod saved;
 mod shard;
 mod start_cache;
 mod task;
 
-pub(crate) use task::AgentFactory;
-pub use task::TERMINATION_TERM;
+pub(crate) use factory::AgentFactory;
+pub use factory::TERMINATION_TERM;

@@ -6,7 +6,7 @@
 
 use marathon_physics::{AgentState as PhysicsState, Model};
 
-use super::context::SavedCommand;
+use super::commands::{SavedCommand, numbers};
 use crate::error::EnvError;
 use crate::shard::{BLOCK, Spec};
 
@@ -89,11 +89,4 @@ fn life(bytes: &mut &[u8]) -> Option<[u64; 4]> {
         (*word, *bytes) = (u64::from_le_bytes(*first), rest);
     }
     Some(words)
-}
-
-/// The next numbers.
-pub(crate) fn numbers(bytes: &mut &[u8], count: usize) -> Option<Vec<f64>> {
-    let (mine, rest) = bytes.split_at_checked(count * 8)?;
-    *bytes = rest;
-    Some(mine.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
 }

@@ -9,11 +9,13 @@ use marathon_physics::lanes::Real;
 use marathon_physics::{Variation, Work};
 
 use super::context::LaneContext;
+use super::decision::Task;
 use super::demonstrations::demonstrations;
+use super::factory::AgentFactory;
 use super::group::LaneGroup;
 use super::saved::{self, Saved};
 use super::start_cache::StartCache;
-use super::task::{AgentFactory, EpisodeStart, Task};
+use super::task::{EpisodeStart, TaskData};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::error::EnvError;
 use crate::shard::spec::NUMBER;
@@ -23,7 +25,7 @@ use crate::shard::{
 
 impl<T: Real> ShardFactory for AgentFactory<T> {
     fn spec(&self) -> &Spec {
-        &self.task.spec
+        &self.task.data.spec
     }
 
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
@@ -31,7 +33,7 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
     }
 
     fn agent_bytes(&self) -> usize {
-        let Task { spec, facts, blueprint, .. } = &*self.task;
+        let TaskData { spec, facts, blueprint, .. } = &self.task.data;
         let model = &blueprint.model;
         // pushes: six numbers per body; a start state that took physics steps is stored with its memory
         let own = 2 * model.nu + model.na + 6 * model.bodies.len() + 3 * facts.memory + model.nq + model.nv;
@@ -47,7 +49,7 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
 
 impl<T: Real> AgentShards for AgentFactory<T> {
     fn unvaried(&self) -> Variation {
-        Variation::none(&self.task.blueprint.model)
+        Variation::none(&self.task.data.blueprint.model)
     }
 
     fn agent_shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn AgentShard> {
@@ -97,16 +99,16 @@ struct LaneShard<T: Real> {
 
 impl<T: Real> LaneShard<T> {
     fn new(task: Arc<Task<T>>, first: usize, blocks: usize, seed: u64) -> Self {
-        let groups = |task| (0..BLOCK / T::LANES).map(|_| LaneGroup::new(task)).collect();
+        let groups = |data| (0..BLOCK / T::LANES).map(|_| LaneGroup::new(data)).collect();
         let starts = StartCache::new(blocks * BLOCK);
         let blocks = (first..first + blocks)
             .map(|b| Block {
-                groups: groups(&task),
+                groups: groups(&task.data),
                 lives: std::array::from_fn(|i| Life::new(seed, (b * BLOCK + i) as u64)),
             })
             .collect();
-        let work = Work::new(&task.sim);
-        let max_episode_steps = task.spec.max_episode_steps as u64;
+        let work = Work::new(&task.data.sim);
+        let max_episode_steps = task.data.spec.max_episode_steps as u64;
         let start = EpisodeStart::new();
         LaneShard { task, work, blocks, max_episode_steps, starts, start }
     }
@@ -118,15 +120,15 @@ impl<T: Real> LaneShard<T> {
         let (group, lane, number) = (&mut groups[agent / T::LANES], agent % T::LANES, block * BLOCK + agent);
         let id = lives[agent].next();
         if starts.get(number, id).is_none() {
-            let previous = if id.episode <= 1 { vec![0.0; task.facts.memory] } else { group.memory_of(lane) };
+            let previous = if id.episode <= 1 { vec![0.0; task.data.facts.memory] } else { group.memory_of(lane) };
             task.draw_start(start, id, &mut EpisodeRng::new(id), &previous);
             if start.takes_physics() {
                 let ids: Vec<EpisodeId> = lives[agent - lane..][..T::LANES].iter().map(Life::next).collect();
                 starts.make(task, work, number - lane, &ids);
             }
         }
-        group.put_at_start(&task.sim, lane, starts.get(number, id).unwrap_or(start));
-        group.commands.tell(task, lane, id, 0);
+        group.put_at_start(&task.data.sim, lane, starts.get(number, id).unwrap_or(start));
+        task.tell(&mut group.commands, lane, id, 0);
         group.commands.begin(lane);
         lives[agent] = Life { id, steps: 0 };
     }
@@ -139,7 +141,7 @@ fn lanes_of<T: Real>(mask: u16, first: usize) -> u32 {
 
 impl<T: Real> Shard for LaneShard<T> {
     fn spec(&self) -> &Spec {
-        &self.task.spec
+        &self.task.data.spec
     }
 
     fn blocks(&self) -> usize {
@@ -156,22 +158,22 @@ impl<T: Real> Shard for LaneShard<T> {
     fn step(&mut self, block: usize, action: &[f32], obs: &mut [f32], out: &mut BlockStep) {
         let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
-        out.terms.resize(BLOCK * task.spec.reward_terms.len(), 0.0);
-        out.info.resize(BLOCK * task.spec.info.len(), 0.0);
+        out.terms.resize(BLOCK * task.data.spec.reward_terms.len(), 0.0);
+        out.info.resize(BLOCK * task.data.spec.info.len(), 0.0);
         (out.terminated, out.truncated, out.diverged) = (0, 0, 0);
         out.decides.clear();
-        out.decides.resize(task.spec.roles.len(), 0);
+        out.decides.resize(task.data.spec.roles.len(), 0);
         out.leaves.clear();
-        out.leaves.resize(task.spec.roles.len(), [0; 2]);
+        out.leaves.resize(task.data.spec.roles.len(), [0; 2]);
         for (i, group) in groups.iter_mut().enumerate() {
             let first = i * T::LANES;
             let mut last = 0;
             for (lane, life) in lives[first..].iter_mut().take(T::LANES).enumerate() {
                 life.steps += 1;
-                group.commands.tell(task, lane, life.id, life.steps);
+                task.tell(&mut group.commands, lane, life.id, life.steps);
                 last |= u32::from(life.steps >= self.max_episode_steps) << lane;
             }
-            let ended = group.decide(task, &mut self.work, action, first, last);
+            let ended = task.decide(group, &mut self.work, action, first, last);
             group.report(first, obs, out);
             out.terminated |= (ended.terminated << first) as u16;
             out.truncated |= ((ended.truncated | last) << first) as u16;
@@ -184,7 +186,7 @@ impl<T: Real> Shard for LaneShard<T> {
             }
             // a broken state is put away at once: it must not slow its group down until the caller resets it
             for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
-                group.put(&task.sim, lane, &task.blueprint.spawn, &vec![0.0; task.blueprint.model.nv]);
+                group.put(&task.data.sim, lane, &task.data.blueprint.spawn, &vec![0.0; task.data.blueprint.model.nv]);
             }
         }
         out.truncated &= !out.terminated;
@@ -195,7 +197,7 @@ impl<T: Real> Shard for LaneShard<T> {
         saved::begin(bytes);
         for (i, life) in lives.iter().enumerate() {
             let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
-            let state = groups[i / T::LANES].save(&self.task.sim, i % T::LANES);
+            let state = groups[i / T::LANES].save(&self.task.data.sim, i % T::LANES);
             saved::add(bytes, &Saved { life: [seed, agent, episode, steps], state });
         }
     }
@@ -203,11 +205,11 @@ impl<T: Real> Shard for LaneShard<T> {
     fn load<'a>(&mut self, block: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         let task = &*self.task;
         let Block { groups, lives } = &mut self.blocks[block];
-        let (agents, rest) = saved::read(&task.blueprint.model, &task.spec, task.facts.memory, bytes)?;
+        let (agents, rest) = saved::read(&task.data.blueprint.model, &task.data.spec, task.data.facts.memory, bytes)?;
         for (i, (life, saved)) in lives.iter_mut().zip(&agents).enumerate() {
             let [seed, agent, episode, steps] = saved.life;
             *life = Life { id: EpisodeId { seed, agent, episode }, steps };
-            groups[i / T::LANES].load(&task.sim, i % T::LANES, &saved.state);
+            groups[i / T::LANES].load(&task.data.sim, i % T::LANES, &saved.state);
         }
         Ok(rest)
     }
@@ -221,13 +223,13 @@ impl<T: Real> AgentShard for LaneShard<T> {
     }
 
     fn reference(&self, agent: usize) -> Option<Vec<f64>> {
-        let reference = self.task.reference.as_ref().filter(|_| self.task.facts.follows_clips)?;
+        let reference = self.task.data.reference.as_ref().filter(|_| self.task.data.facts.follows_clips)?;
         let group = &self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
         Some(reference.qpos(&group.memory_of(agent % T::LANES)))
     }
 
     fn x_positions(&self, out: &mut [f64]) -> bool {
-        let along_x = &self.task.bindings.along_x;
+        let along_x = &self.task.data.bindings.along_x;
         let groups = self.blocks.iter().flat_map(|block| &block.groups);
         for (group, out) in groups.zip(out.chunks_mut(T::LANES)) {
             group.x_positions(along_x, out);
@@ -240,7 +242,7 @@ impl<T: Real> AgentShard for LaneShard<T> {
     }
 
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
-        let model = &self.task.blueprint.model;
+        let model = &self.task.data.blueprint.model;
         for (what, given, expected) in [("qpos", &state.qpos, model.nq), ("qvel", &state.qvel, model.nv)] {
             if given.len() != expected {
                 return Err(EnvError::Shape { what: what.into(), found: given.len(), expected });
@@ -253,16 +255,16 @@ impl<T: Real> AgentShard for LaneShard<T> {
         let life = &mut block.lives[agent % BLOCK];
         life.steps = 0;
         let (group, lane) = (&mut block.groups[agent % BLOCK / T::LANES], agent % T::LANES);
-        group.put(&self.task.sim, lane, &state.qpos, &state.qvel);
-        group.commands.tell(&self.task, lane, life.id, 0);
+        group.put(&self.task.data.sim, lane, &state.qpos, &state.qvel);
+        self.task.tell(&mut group.commands, lane, life.id, 0);
         group.commands.begin(lane);
-        group.begin(&self.task, &mut self.work, 1 << lane);
+        self.task.begin(group, &mut self.work, 1 << lane);
         Ok(())
     }
 
     fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_> {
         let group = &mut self.blocks[agent / BLOCK].groups[agent % BLOCK / T::LANES];
-        Box::new(LaneContext { task: &self.task, group, lane: agent % T::LANES })
+        Box::new(LaneContext { task: &self.task.data, group, lane: agent % T::LANES })
     }
 
     fn feet(&self, agent: usize) -> u32 {
@@ -292,7 +294,7 @@ impl<T: Real> AgentShard for LaneShard<T> {
             let first = i * T::LANES;
             let lanes = lanes_of::<T>(mask, first);
             if lanes != 0 {
-                group.begin(task, &mut self.work, lanes);
+                task.begin(group, &mut self.work, lanes);
                 group.report_start(lanes, first, obs);
             }
         }

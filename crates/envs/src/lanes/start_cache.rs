@@ -7,8 +7,8 @@
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
 
-use super::group::LARGEST;
-use super::task::{EpisodeStart, Task};
+use super::decision::{LARGEST, Task};
+use super::task::EpisodeStart;
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::shard::AgentState;
 
@@ -37,11 +37,11 @@ impl<T: Real> StartCache<T> {
     /// Makes the starts of the episodes `ids` of consecutive agents, one per lane, as far as they have not been made.
     pub fn make(&mut self, task: &Task<T>, work: &mut Work<T>, first: usize, ids: &[EpisodeId]) {
         let due: Vec<usize> = (0..T::LANES).filter(|lane| self.get(first + lane, ids[*lane]).is_none()).collect();
-        let group = self.scratch.get_or_insert_with(|| Group::new(&task.sim));
+        let group = self.scratch.get_or_insert_with(|| Group::new(&task.data.sim));
         // the others must not slow the group down
-        let (spawn, at_rest) = (&task.blueprint.spawn, vec![0.0; task.blueprint.model.nv]);
+        let (spawn, at_rest) = (&task.data.blueprint.spawn, vec![0.0; task.data.blueprint.model.nv]);
         for lane in 0..T::LANES {
-            group.reset_lane(&task.sim, lane, spawn, &at_rest);
+            group.reset_lane(&task.data.sim, lane, spawn, &at_rest);
         }
         let drawn = draw(task, work, group, &due, ids);
         let mut steps = 0;
@@ -58,7 +58,7 @@ impl<T: Real> StartCache<T> {
             let Some(next) = due.iter().map(|lane| drawn[*lane].settle).filter(|n| *n > steps).min() else { break };
             // in calls of single steps: a lane's bits must not depend on when others have settled
             while steps < next {
-                task.sim.advance(work, group, 1);
+                task.data.sim.advance(work, group, 1);
                 steps += 1;
             }
         }
@@ -81,15 +81,15 @@ fn draw<T: Real>(
     let mut drawn = vec![EpisodeStart::new(); T::LANES];
     let mut missing = due.to_vec();
     // a start that is made in advance cannot know how the episode before it ends
-    let no_past = vec![0.0; task.facts.memory];
+    let no_past = vec![0.0; task.data.facts.memory];
     for _ in 0..DRAWS {
         let mut doubtful = Vec::new();
         for lane in missing {
             let start = &mut drawn[lane];
             task.draw_start(start, ids[lane], &mut randoms[lane], &no_past);
-            group.reset_lane(&task.sim, lane, &start.state.qpos, &start.state.qvel);
+            group.reset_lane(&task.data.sim, lane, &start.state.qpos, &start.state.qvel);
             for (field, elevations) in &start.grounds {
-                group.set_ground(&task.sim, lane, *field, elevations);
+                group.set_ground(&task.data.sim, lane, *field, elevations);
             }
             if start.free_of_contacts {
                 doubtful.push(lane);
@@ -98,8 +98,8 @@ fn draw<T: Real>(
         if doubtful.is_empty() {
             break;
         }
-        task.sim.forward(work, group);
-        let touching = T::enter(Touching { sim: &task.sim, group, work });
+        task.data.sim.forward(work, group);
+        let touching = T::enter(Touching { sim: &task.data.sim, group, work });
         missing = doubtful.into_iter().filter(|lane| touching >> lane & 1 == 1).collect();
     }
     drawn

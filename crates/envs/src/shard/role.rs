@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{BLOCK, BlockStep, Spec};
+use super::{BLOCK, BlockStep};
 
 /// One who decides in a task, and what of the task is its own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,42 +27,6 @@ pub fn role_id(task: &str, role: &str) -> String {
 /// The task that an id of [`role_id`] is about, or the id itself.
 pub fn task_of_role(id: &str) -> &str {
     id.split_once('/').map_or(id, |(task, _)| task)
-}
-
-impl Spec {
-    /// All who decide in the task: [`Spec::roles`], or one who has it all.
-    pub fn deciders(&self) -> Vec<Role> {
-        if !self.roles.is_empty() {
-            return self.roles.clone();
-        }
-        vec![Role { obs: 0..self.obs, act: 0..self.act, terms: 0..self.reward_terms.len(), ..Role::default() }]
-    }
-
-    /// The task as a role knows it. Its id is `<task>/<role>`, unless the role has it all.
-    pub fn of_role(&self, role: &Role) -> Spec {
-        if role.name.is_empty() {
-            return self.clone();
-        }
-        let Role { name, obs, act, terms, .. } = role;
-        let seen =
-            self.observations.iter().filter(|group| obs.start <= group.range.start && group.range.end <= obs.end);
-        let observations = seen.cloned().map(|mut group| {
-            group.range = group.range.start - obs.start..group.range.end - obs.start;
-            group
-        });
-        Spec {
-            id: role_id(&self.id, name),
-            obs: obs.len(),
-            act: act.len(),
-            action_names: self.action_names[act.clone()].to_vec(),
-            action_low: self.action_low[act.clone()].to_vec(),
-            action_high: self.action_high[act.clone()].to_vec(),
-            reward_terms: self.reward_terms[terms.clone()].to_vec(),
-            observations: observations.collect(),
-            roles: Vec::new(),
-            ..self.clone()
-        }
-    }
 }
 
 impl BlockStep {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Role;
+use super::role::{Role, role_id};
 use crate::agent::{CommandRange, Options};
 
 /// Size of a double-precision number, bytes.
@@ -66,6 +66,40 @@ impl Spec {
         let told = self.act + self.reward_terms.len() + self.info.len() + 4 * self.command.len();
         let observed = self.obs * 7;
         NUMBER * (state + 4 * told + observed) + OVERHEAD
+    }
+
+    /// All who decide in the task: [`Spec::roles`], or one who has it all.
+    pub fn deciders(&self) -> Vec<Role> {
+        if !self.roles.is_empty() {
+            return self.roles.clone();
+        }
+        vec![Role { obs: 0..self.obs, act: 0..self.act, terms: 0..self.reward_terms.len(), ..Role::default() }]
+    }
+
+    /// The task as a role knows it. Its id is `<task>/<role>`, unless the role has it all.
+    pub fn of_role(&self, role: &Role) -> Spec {
+        if role.name.is_empty() {
+            return self.clone();
+        }
+        let Role { name, obs, act, terms, .. } = role;
+        let seen =
+            self.observations.iter().filter(|group| obs.start <= group.range.start && group.range.end <= obs.end);
+        let observations = seen.cloned().map(|mut group| {
+            group.range = group.range.start - obs.start..group.range.end - obs.start;
+            group
+        });
+        Spec {
+            id: role_id(&self.id, name),
+            obs: obs.len(),
+            act: act.len(),
+            action_names: self.action_names[act.clone()].to_vec(),
+            action_low: self.action_low[act.clone()].to_vec(),
+            action_high: self.action_high[act.clone()].to_vec(),
+            reward_terms: self.reward_terms[terms.clone()].to_vec(),
+            observations: observations.collect(),
+            roles: Vec::new(),
+            ..self.clone()
+        }
     }
 }
 

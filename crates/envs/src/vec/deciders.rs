@@ -1,8 +1,6 @@
 //! Who decides next, where a task has several roles.
 
-use super::vec_env::VecEnv;
-use crate::error::EnvError;
-use crate::shard::{BLOCK, BlockStep};
+use crate::shard::BlockStep;
 
 /// Who decides next in the blocks of a worker, and whose part has just ended.
 pub(super) struct Deciders {
@@ -13,11 +11,11 @@ pub(super) struct Deciders {
 
 /// Agents of a block, a bit each, by what they ask of a role.
 #[derive(Clone, Copy)]
-struct Turn {
+pub(super) struct Turn {
     /// It decides next.
-    decides: u16,
+    pub decides: u16,
     /// Its part has just ended before the episode: it has failed, or it has not.
-    leaves: [u16; 2],
+    pub leaves: [u16; 2],
 }
 
 impl Turn {
@@ -52,50 +50,12 @@ impl Deciders {
         self.turns.fill(Turn::START);
     }
 
+    /// What the agents of a block ask of a role. A task with a single role keeps no entry: that role acts at every step.
+    pub fn turn(&self, block: usize, role: usize) -> &Turn {
+        self.turns.get(block * self.roles + role).unwrap_or(&Turn::START)
+    }
+
     fn of(&mut self, block: usize) -> &mut [Turn] {
         &mut self.turns[block * self.roles..][..self.roles]
-    }
-}
-
-impl VecEnv {
-    /// Writes for which agents a role decides next, `[agents]`. Roles are numbered as in
-    /// [`Spec::deciders`](crate::Spec::deciders). Where an intermittent role does not decide, its last action is to be repeated.
-    /// All roles decide at the start of an episode, and after [`VecEnv::load`] until the next step.
-    ///
-    /// # Errors
-    /// If there is no such role, or the array's length is wrong.
-    pub fn decides(&self, role: usize, out: &mut [bool]) -> Result<(), EnvError> {
-        self.check("decides [agents]", out.len(), 1)?;
-        self.ask(role, |turn| turn.decides, out)
-    }
-
-    /// Writes for which agents a role's part of the episode has ended with the last decision while others go on, `[agents]`: those in
-    /// which it has failed, and those in which it has not, see [`Agent::leaves`](crate::Agent::leaves).
-    ///
-    /// # Errors
-    /// The same.
-    pub fn leaves(&self, role: usize, [failed, finished]: [&mut [bool]; 2]) -> Result<(), EnvError> {
-        for (which, out) in [failed, finished].into_iter().enumerate() {
-            self.check("leaves [agents]", out.len(), 1)?;
-            self.ask(role, |turn| turn.leaves[which], out)?;
-        }
-        Ok(())
-    }
-
-    /// Writes a mask of a role for all agents.
-    fn ask(&self, role: usize, mask: impl Fn(&Turn) -> u16, out: &mut [bool]) -> Result<(), EnvError> {
-        let roles = self.spec.roles.len();
-        if role >= roles.max(1) {
-            let expected = "less than the number of roles";
-            return Err(EnvError::Option { option: "role", found: role.to_string(), expected });
-        }
-        for (worker, rows) in self.workers.iter().zip(out.chunks_mut(self.stride)) {
-            for (block, rows) in rows.chunks_mut(BLOCK).enumerate() {
-                // who has it all is not in the list, and always decides
-                let mask = mask(worker.deciders.turns.get(block * roles + role).unwrap_or(&Turn::START));
-                rows.iter_mut().enumerate().for_each(|(i, bit)| *bit = mask >> i & 1 == 1);
-            }
-        }
-        Ok(())
     }
 }

@@ -8,61 +8,16 @@ use marathon_physics::lanes::Isa;
 use rayon::prelude::*;
 
 use super::arrays::{ObsNumber, Step, StepMut, to_rows};
+use super::deciders::Turn;
+use super::options::{Autoreset, VecEnvOptions};
 use super::pool::Pool;
 use super::worker::Worker;
-use crate::agent::Options;
 use crate::error::EnvError;
 use crate::registry::{self, Registry};
 use crate::shard::{AgentContext, AgentState, BLOCK, Spec, check_memory};
 
 /// Limit on the number of threads. Each has its own working memory.
 const MOST_THREADS: usize = 1024;
-
-/// What happens to an agent whose episode ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Autoreset {
-    /// It starts a new episode within the same step: `obs` is the first of the new, `final_obs` the last of the old.
-    #[default]
-    SameStep,
-    /// It starts a new episode at the next step, which ignores its action and gives the first observation, reward 0 and
-    /// neither end.
-    NextStep,
-    /// Nothing: the caller resets it with [`VecEnv::reset_agents`].
-    Disabled,
-}
-
-/// How a [`VecEnv`] is made.
-#[derive(Clone, Debug)]
-pub struct VecEnvOptions {
-    /// Number of agents, at least 1.
-    pub agents: usize,
-    /// Seed until [`VecEnv::reset`] gives another.
-    pub seed: u64,
-    /// Number of threads, at most 1024. 0 means one per processor core. The number of blocks is another upper bound.
-    pub threads: usize,
-    /// Instruction set; `None` means the widest that the processor has.
-    pub isa: Option<Isa>,
-    /// What happens at the end of an episode.
-    pub autoreset: Autoreset,
-    /// Decisions after which an episode is truncated; `None` means the task's own number.
-    pub max_episode_steps: Option<usize>,
-    /// Arguments of the agent that differ from its defaults.
-    pub options: Options,
-}
-
-impl Default for VecEnvOptions {
-    fn default() -> Self {
-        VecEnvOptions {
-            agents: 1,
-            seed: 0,
-            threads: 1,
-            isa: None,
-            autoreset: Autoreset::SameStep,
-            max_episode_steps: None,
-            options: Options::new(),
-        }
-    }
-}
 
 /// Agents of one kind that are stepped together.
 pub struct VecEnv {
@@ -369,6 +324,46 @@ impl VecEnv {
     pub fn feet(&self, agent: usize) -> Result<u32, EnvError> {
         self.check_agent(agent)?;
         Ok(self.workers[agent / self.stride].shard.feet(agent % self.stride))
+    }
+
+    /// Writes for which agents a role decides next, `[agents]`. Roles are numbered as in
+    /// [`Spec::deciders`](crate::Spec::deciders). Where an intermittent role does not decide, its last action is to be repeated.
+    /// All roles decide at the start of an episode, and after [`VecEnv::load`] until the next step.
+    ///
+    /// # Errors
+    /// If there is no such role, or the array's length is wrong.
+    pub fn decides(&self, role: usize, out: &mut [bool]) -> Result<(), EnvError> {
+        self.check("decides [agents]", out.len(), 1)?;
+        self.ask(role, |turn| turn.decides, out)
+    }
+
+    /// Writes for which agents a role's part of the episode has ended with the last decision while others go on, `[agents]`: those in
+    /// which it has failed, and those in which it has not, see [`Agent::leaves`](crate::Agent::leaves).
+    ///
+    /// # Errors
+    /// The same.
+    pub fn leaves(&self, role: usize, [failed, finished]: [&mut [bool]; 2]) -> Result<(), EnvError> {
+        for (which, out) in [failed, finished].into_iter().enumerate() {
+            self.check("leaves [agents]", out.len(), 1)?;
+            self.ask(role, |turn| turn.leaves[which], out)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a mask of a role for all agents.
+    fn ask(&self, role: usize, mask: impl Fn(&Turn) -> u16, out: &mut [bool]) -> Result<(), EnvError> {
+        let roles = self.spec.roles.len();
+        if role >= roles.max(1) {
+            let expected = "less than the number of roles";
+            return Err(EnvError::Option { option: "role", found: role.to_string(), expected });
+        }
+        for (worker, rows) in self.workers.iter().zip(out.chunks_mut(self.stride)) {
+            for (block, rows) in rows.chunks_mut(BLOCK).enumerate() {
+                let mask = mask(worker.deciders.turn(block, role));
+                rows.iter_mut().enumerate().for_each(|(i, bit)| *bit = mask >> i & 1 == 1);
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn check(&self, what: &str, found: usize, columns: usize) -> Result<(), EnvError> {

@@ -2,7 +2,7 @@
 
 use super::arrays::{ObsNumber, StepMut, to_rows};
 use super::deciders::Deciders;
-use super::vec_env::Autoreset;
+use super::options::Autoreset;
 use crate::shard::{AgentShard, BLOCK, BlockStep};
 
 /// A shard and the block-shaped arrays that it reads and writes.
