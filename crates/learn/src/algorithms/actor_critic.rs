@@ -18,7 +18,7 @@ use crate::optim::kfac::Kfac;
 use crate::optim::sum;
 use crate::policy::{Policy, PolicyMeta};
 use crate::rewards::{Judge, Lesson, Stream};
-use crate::rollout::collect::{Collecting, Values};
+use crate::rollout::context::{RolloutContext, Values};
 use crate::rollout::data::{Experience, Samples, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
@@ -193,8 +193,8 @@ impl ActorCritic {
     }
 
     /// What a horizon is played with.
-    pub fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
-        Collecting {
+    pub fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_> {
+        RolloutContext {
             acting: Acting {
                 isa: self.isa,
                 net: &self.layout.actor,

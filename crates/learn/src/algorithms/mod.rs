@@ -23,7 +23,7 @@ use crate::nets::mlp::CHUNK;
 use crate::nets::normalize::Normalizer;
 use crate::policy::{Policy, PolicyMeta};
 use crate::rewards::{Purpose, RewardConfig, RewardKind};
-use crate::rollout::collect::Collecting;
+use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::{Statistics, StatisticsConfig};
 use crate::rollout::sums::Totals;
@@ -223,7 +223,7 @@ pub trait Learner: Send {
     /// What is to be kept of a decision.
     fn shape(&self) -> Shape;
     /// What a horizon is played with.
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_>;
+    fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_>;
 
     /// Learns from a rollout together with all other workers, and adds up what the objective was.
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums);

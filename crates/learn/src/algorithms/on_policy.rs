@@ -10,7 +10,7 @@ use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
 use crate::policy::{Policy, PolicyMeta};
 use crate::rewards::Lesson;
-use crate::rollout::collect::Collecting;
+use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
@@ -110,7 +110,7 @@ impl<R: Rule> Learner for OnPolicy<R> {
     fn shape(&self) -> Shape {
         self.student.nets.shape()
     }
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+    fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_> {
         self.student.nets.collecting(statistics)
     }
     fn follow(&mut self, before: &Normalizer, after: &Normalizer) {

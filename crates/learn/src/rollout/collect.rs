@@ -1,4 +1,4 @@
-//! Collecting: a worker's agents play one horizon, and what happened is kept for learning.
+//! RolloutContext: a worker's agents play one horizon, and what happened is kept for learning.
 //!
 //! A worker owns a run of consecutive blocks and goes through the whole rollout without waiting for anyone. Everything
 //! it adds up is kept per block, so that the totals, taken in the order of the blocks, do not depend on how blocks are
@@ -6,41 +6,14 @@
 //!
 //! Each role of the task has a [`Seat`], with a rollout of its own; most tasks have one.
 
+use super::context::RolloutContext;
 use super::data::Rollout;
 use super::seat::{Seat, SeatPlan};
 use crate::lanes::BLOCK;
 use crate::lanes::mirror;
-use crate::nets::acting::Acting;
-use crate::nets::mlp::{CHUNK, Mlp};
-use crate::rewards::Stream;
+use crate::nets::mlp::CHUNK;
 use marathon_envs::{BlockStep, Shard, ShardFactory};
 use std::ops::DerefMut;
-
-/// What a horizon is played with; the same for all workers.
-pub struct Collecting<'a> {
-    /// What acts.
-    pub acting: Acting<'a>,
-    /// The streams of rewards, the task's first.
-    pub streams: &'a [Stream],
-    /// All parameters, with those of the rewards' networks.
-    pub params: &'a [f32],
-    /// What judges observations. Without it, observations are kept as they are, for later.
-    pub values: Option<Values<'a>>,
-    /// Multiplies the task's rewards.
-    pub reward_scale: f64,
-    /// Center of the statistics of discounted returns.
-    pub return_center: f32,
-}
-
-/// The value function, which has an output for each stream of rewards.
-pub struct Values<'a> {
-    /// Network.
-    pub net: &'a Mlp,
-    /// Its parameters.
-    pub params: &'a [f32],
-    /// Decay of the estimator of advantages.
-    pub lambda: f64,
-}
 
 /// Plays a worker's agents.
 pub struct Collector {
@@ -123,7 +96,7 @@ impl Collector {
     /// environments, by the clock `now`.
     pub fn collect<R: DerefMut<Target = Rollout>>(
         &mut self,
-        with: &[Collecting<'_>],
+        with: &[RolloutContext<'_>],
         rollouts: &mut [R],
         now: fn() -> f64,
     ) -> f64 {
@@ -152,7 +125,7 @@ impl Collector {
     }
 
     /// Tells the environments the actions of all blocks, in their own units.
-    fn announce<R: DerefMut<Target = Rollout>>(&mut self, with: &[Collecting<'_>], rollouts: &[R], t: usize) {
+    fn announce<R: DerefMut<Target = Rollout>>(&mut self, with: &[RolloutContext<'_>], rollouts: &[R], t: usize) {
         let Self { shard, seats, action, blocks, .. } = self;
         let spec = shard.spec();
         for ((seat, with), rollout) in seats.iter().zip(with).zip(rollouts) {
@@ -177,7 +150,7 @@ impl Collector {
     /// One decision of one block, with all bookkeeping.
     fn step<R: DerefMut<Target = Rollout>>(
         &mut self,
-        with: &[Collecting<'_>],
+        with: &[RolloutContext<'_>],
         rollouts: &mut [R],
         item: usize,
         b: usize,

@@ -4,6 +4,7 @@ use super::sums::{BlockSums, Totals};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Aligned;
 use crate::rewards::Step;
+use std::ops::Deref;
 
 /// What is kept of a decision.
 #[derive(Clone, Copy, Debug)]
@@ -264,5 +265,17 @@ impl<'a> Experience<'a> {
     /// Its own rollout.
     pub fn own(&self) -> &'a Rollout {
         self.rollouts[self.worker]
+    }
+}
+
+impl Totals {
+    /// Of the workers' rollouts, in order.
+    pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
+        let mut t = Totals::default();
+        for rollout in rollouts {
+            t.samples += (rollout.sums.len() * horizon * rollout.lanes) as f64;
+            rollout.sums.iter().for_each(|block| t.sums.add(block));
+        }
+        t
     }
 }

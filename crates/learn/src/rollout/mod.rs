@@ -2,6 +2,7 @@
 
 pub(crate) mod advantage;
 pub mod collect;
+pub mod context;
 pub mod data;
 pub(crate) mod replay;
 pub mod seat;

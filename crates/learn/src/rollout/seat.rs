@@ -1,7 +1,7 @@
 //! A role's seat at a worker's agents: it acts, and keeps what it has seen and earned.
 
 use super::advantage;
-use super::collect::{Collecting, Values};
+use super::context::{RolloutContext, Values};
 use super::data::Rollout;
 use super::sums::BlockSums;
 use crate::lanes::BLOCK;
@@ -24,7 +24,7 @@ pub struct SeatPlan<'a> {
     /// Numbers that tell how well the task is done.
     pub metrics: Vec<Metric>,
     /// Networks like those.
-    pub with: Collecting<'a>,
+    pub with: RolloutContext<'a>,
 }
 
 /// A role's part in the playing of a run of blocks.
@@ -94,7 +94,7 @@ impl Seat {
     }
 
     /// Makes a rollout ready for a horizon.
-    pub fn begin(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
+    pub fn begin(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let rewards = vec![0.0; with.streams.len() - 1];
         let terms = vec![0.0; self.role.terms.len()];
         let metrics = vec![0.0; self.metrics.len()];
@@ -105,7 +105,7 @@ impl Seat {
     }
 
     /// Normalizes the observations of `n` blocks, and draws and stores their actions.
-    pub fn act(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
+    pub fn act(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout, item: usize, first: usize, n: usize) {
         let (obs_row, act_row) = (rollout.obs_len * BLOCK, rollout.act_len * BLOCK);
         let log_prob_row = rollout.log_prob.len() / rollout.items();
         let of = |row: usize| first * row..(first + n) * row;
@@ -129,7 +129,7 @@ impl Seat {
     }
 
     /// Keeps what a decision of block `b` led to.
-    pub fn take(&mut self, with: &Collecting<'_>, rollout: &mut Rollout, item: usize, b: usize, out: &BlockStep) {
+    pub fn take(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout, item: usize, b: usize, out: &BlockStep) {
         let obs_row = rollout.obs_len * BLOCK;
         let earned = out.reward_of(self.number, &self.role);
 
@@ -208,7 +208,7 @@ impl Seat {
     }
 
     /// Completes a rollout: values, and with them advantages.
-    pub fn end(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
+    pub fn end(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         self.add_up_observations(rollout);
         let Some(values) = &with.values else { return };
         self.judge(with, rollout);
@@ -232,7 +232,7 @@ impl Seat {
     }
 
     /// Rewards that networks give.
-    fn judge(&mut self, with: &Collecting<'_>, rollout: &mut Rollout) {
+    fn judge(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
         for (s, (stream, judge)) in with.streams.iter().zip(&mut self.judges).enumerate() {
@@ -256,7 +256,7 @@ impl Seat {
 
     /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
     /// episodes, and in the streams that go on beyond an episode's end to those of all.
-    fn evaluate(&mut self, with: &Collecting<'_>, values: &Values<'_>, rollout: &mut Rollout) {
+    fn evaluate(&mut self, with: &RolloutContext<'_>, values: &Values<'_>, rollout: &mut Rollout) {
         let Self { space: ActingSpace { input, .. }, tape: Some(tape), .. } = self else { return };
         let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, streams, .. } = rollout;
         let (row, streams) = (*obs_len * BLOCK, *streams);

@@ -1,8 +1,5 @@
 //! What is added up over a rollout, block by block: totals taken in the order of the blocks do not depend on workers.
 
-use super::data::Rollout;
-use std::ops::Deref;
-
 /// Sums over the episodes that ended in a block, and over its rewards.
 #[derive(Clone, Debug, Default)]
 pub struct BlockSums {
@@ -87,15 +84,6 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Of the workers' rollouts, in order.
-    pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
-        let mut t = Totals::default();
-        for rollout in rollouts {
-            t.samples += (rollout.sums.len() * horizon * rollout.lanes) as f64;
-            rollout.sums.iter().for_each(|block| t.sums.add(block));
-        }
-        t
-    }
     /// Takes in those of another rollout.
     pub fn add(&mut self, other: &Totals) {
         self.samples += other.samples;

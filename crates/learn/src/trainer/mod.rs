@@ -34,7 +34,8 @@ use crate::algorithms::schedule::Progress;
 use crate::algorithms::{Needs, Now, share};
 use crate::error::Error;
 use crate::policy::Policy;
-use crate::rollout::collect::{Collecting, Collector};
+use crate::rollout::collect::Collector;
+use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Rollout};
 use crate::rollout::sums::Totals;
 use barrier::Barrier;
@@ -180,7 +181,7 @@ impl Replica {
     }
 
     /// What a horizon is played with, by each role.
-    fn collecting(&self) -> Vec<Collecting<'_>> {
+    fn collecting(&self) -> Vec<RolloutContext<'_>> {
         self.roles.iter().map(|role| role.learner.collecting(&role.statistics)).collect()
     }
 }

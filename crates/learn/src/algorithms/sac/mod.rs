@@ -29,7 +29,7 @@ use crate::optim::adam::Adam;
 use crate::optim::sum;
 use crate::policy::{Policy, PolicyMeta};
 use crate::rewards::Stream;
-use crate::rollout::collect::Collecting;
+use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::replay::{self, Replay};
 use crate::rollout::statistics::Statistics;
@@ -286,9 +286,9 @@ impl Learner for SacLearner {
     fn shape(&self) -> Shape {
         self.nets.layout.shape(self.lanes)
     }
-    fn collecting(&self, statistics: &Statistics) -> Collecting<'_> {
+    fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_> {
         let layout = &self.nets.layout;
-        Collecting {
+        RolloutContext {
             acting: Acting {
                 isa: self.nets.isa,
                 net: &layout.actor,
