@@ -82,8 +82,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Takes in a `use`. `own_names` are those of modules below, passed on: a folder's `mod.rs` offers what its files define,
-    /// but does not need it.
+    /// Takes in a `use`.
     fn note_tree(&mut self, tree: &syn::UseTree, public: bool, way: &mut Path) {
         let name = |ident: &syn::Ident| (ident.to_string(), ident.span().start().line);
         match tree {
@@ -104,6 +103,7 @@ impl Reader<'_> {
     }
 
     fn note_leaf(&mut self, path: &Path, public: bool) {
+        // a folder's `mod.rs` passes on what its files define, and does not need it
         let below = path.first().is_some_and(|(name, _)| !matches!(name.as_str(), "crate" | "$crate" | "super"));
         if public && below {
             return;

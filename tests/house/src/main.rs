@@ -2,7 +2,7 @@
 //! prints for each crate an order in which its rooms can stand, and the imports that stand in the way of one.
 //! `cargo run -p house -- circles` prints the groups of files that import each other, and their imports.
 
-use house::{House, Import, Order, picture};
+use house::{House, Order, picture};
 use std::path::Path;
 
 fn main() -> Result<(), house::Error> {
@@ -39,8 +39,7 @@ fn print_circles(house: &House) {
         for circle in found.circles() {
             let files: Vec<_> = circle.iter().map(|file| file.display().to_string()).collect();
             println!("crates/{}/src: {}", found.name, files.join(", "));
-            let inside = |i: &&Import| circle.contains(&i.file.as_path()) && circle.contains(&i.target.as_path());
-            for import in found.imports.iter().filter(inside) {
+            for import in found.imports_within(&circle) {
                 println!("  {}:{} imports {}", import.file.display(), import.line, import.target.display());
             }
         }

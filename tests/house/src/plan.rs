@@ -144,6 +144,12 @@ impl Crate {
         circles
     }
 
+    /// Imports between files of a circle.
+    pub fn imports_within(&self, circle: &[&Path]) -> impl Iterator<Item = &Import> {
+        let inside = |path: &Path| circle.contains(&path);
+        self.imports.iter().filter(move |i| !i.leads_inside() && inside(&i.file) && inside(&i.target))
+    }
+
     /// The rooms in an order in which each imports only from those before it; those of a ring are left out, and all that
     /// stand on them.
     pub fn order(&self) -> Vec<&str> {

@@ -3,11 +3,16 @@
 //! 1. The page names every crate and every room, and no other.
 //! 2. A crate depends only on crates below it.
 //! 3. A room imports only from rooms below it. So there is no ring of rooms that import each other.
-//! 4. The picture on the page shows the house of today.
+//! 4. Files do not import each other in circles, inside the rooms either.
+//! 5. The picture on the page shows the house of today.
 
 use house::{Crate, House, Order, Step, picture};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// Crates with circles of files that are still to be opened. The list must shrink: the test also fails if a crate on it has
+/// no circle.
+const CIRCLES_LEFT: [&str; 3] = ["cli", "game", "learn"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -32,7 +37,7 @@ fn faults(found: &Crate, steps: &[Step]) -> Vec<String> {
     let fault = |i: &house::Import| {
         format!("crates/{}/src/{}:{}: {} imports {}", found.name, i.file.display(), i.line, i.from, i.to)
     };
-    found.imports.iter().filter(wrong).map(fault).collect()
+    found.between_rooms().filter(wrong).map(fault).collect()
 }
 
 #[test]
@@ -72,6 +77,28 @@ fn rooms_import_from_rooms_below() {
 }
 
 #[test]
+fn files_do_not_import_each_other_in_circles() {
+    let (house, _) = today();
+    let mut wrong = Vec::new();
+    for found in &house.crates {
+        let circles = found.circles();
+        let expected = CIRCLES_LEFT.contains(&found.name.as_str());
+        if expected && circles.is_empty() {
+            wrong.push(format!("crates/{} has no circles left: take it off CIRCLES_LEFT", found.name));
+        }
+        for circle in circles.iter().filter(|_| !expected) {
+            wrong.push(format!("crates/{}/src:", found.name));
+            wrong.extend(
+                found
+                    .imports_within(circle)
+                    .map(|i| format!("  {}:{} imports {}", i.file.display(), i.line, i.target.display())),
+            );
+        }
+    }
+    assert!(wrong.is_empty(), "files that import each other in circles:\n{}", wrong.join("\n"));
+}
+
+#[test]
 fn the_picture_shows_the_house_of_today() {
     let (house, order) = today();
     let drawn = std::fs::read_to_string(root().join("docs/images/house.svg")).expect("the picture is there");
@@ -95,7 +122,7 @@ fn crate_of(files: &[(&str, &str)]) -> Crate {
 }
 
 fn pairs(found: &Crate) -> Vec<(&str, &str, usize)> {
-    found.imports.iter().map(|i| (i.from.as_str(), i.to.as_str(), i.line)).collect()
+    found.between_rooms().map(|i| (i.from.as_str(), i.to.as_str(), i.line)).collect()
 }
 
 #[test]
@@ -133,6 +160,41 @@ fn rings_and_wrong_ways_are_found() {
     assert_eq!(found.ring().map(|ring| ring.len()), Some(3));
     let step = |name: &str| Step { name: name.into(), about: String::new() };
     assert_eq!(faults(&found, &[step("c"), step("b"), step("a")]), ["crates/test/src/c.rs:1: c imports a"]);
+}
+
+#[test]
+fn circles_of_files_are_found() {
+    let circles = |files: &[(&str, &str)]| -> Vec<String> {
+        let found = crate_of(files);
+        let names = |circle: &Vec<&Path>| circle.iter().map(|file| file.display().to_string()).collect::<Vec<_>>();
+        found.circles().iter().map(|circle| names(circle).join(" ")).collect()
+    };
+    // through names that a folder and the crate pass on, macros included
+    let passed_on = [
+        ("lib.rs", "mod f;\npub use f::{A, B};"),
+        ("f/mod.rs", "mod a;\nmod b;\nmod c;\npub use a::A;\npub use b::B;"),
+        ("f/a.rs", "use super::B;\npub struct A;"),
+        ("f/b.rs", "pub struct B;\nfn f() { use_it!(crate::f::c::C); }"),
+        ("f/c.rs", "pub use super::b;\npub struct C(b::B, crate::A);"),
+    ];
+    assert_eq!(circles(&passed_on), ["f/a.rs f/b.rs f/c.rs"]);
+    // a module may use the files below it, and they what it shares with them
+    let module = [
+        ("lib.rs", "mod f;\nfn g() { f::call() }\npub struct Shared;"),
+        ("f/mod.rs", "mod a;\nuse a::A;\npub struct B;\npub fn call() { a::f() }"),
+        ("f/a.rs", "use super::B;\nuse crate::Shared;\npub struct A;\npub fn f() {}"),
+    ];
+    assert_eq!(circles(&module), [""; 0]);
+    // neither unit tests nor names of other crates and functions count
+    let none = [
+        ("lib.rs", "mod a;\nmod b;"),
+        ("a.rs", "use crate::b::B;\npub struct A;"),
+        (
+            "b.rs",
+            "use other::a::A;\npub struct B;\nfn f(a: u32) -> u32 { a }\n#[cfg(test)]\nmod tests { use crate::a::A; }",
+        ),
+    ];
+    assert_eq!(circles(&none), [""; 0]);
 }
 
 #[test]
