@@ -1,13 +1,13 @@
 //! What is wrong with a clip, if anything: limits, ground, overlaps, jumps, slides.
 
-use crate::apart::Couple;
 use crate::clip::{Clip, Nearness};
 use crate::contact::{self, clearance};
 use crate::effort::{Efforts, efforts};
 use crate::error::MotionError;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
-use crate::worst::Worst;
+use crate::peak::Peak;
+use crate::self_collision::CapsulePair;
 use glam::DVec3;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
@@ -22,17 +22,17 @@ pub struct Report {
     /// Length, s.
     pub seconds: f64,
     /// Furthest beyond a limit, rad or m.
-    pub limit: Worst,
+    pub limit: Peak,
     /// Deepest below the ground, m.
-    pub depth: Worst,
+    pub depth: Peak,
     /// Deepest overlap of two bodies that collide, m.
-    pub overlap: Worst,
+    pub overlap: Peak,
     /// Highest speed of a hinge, rad/s.
-    pub speed: Worst,
+    pub speed: Peak,
     /// Largest change of a hinge's speed from frame to frame, rad/s.
-    pub jump: Worst,
+    pub jump: Peak,
     /// Furthest that a sole slides while it stands, m.
-    pub slide: Worst,
+    pub slide: Peak,
     /// Mean speed along the ground of what stands, m/s.
     pub slide_speed: f64,
     /// Share of the frames in which a sole stands.
@@ -76,16 +76,16 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
     let count = clip.frames() + usize::from(clip.cycle().is_some());
     let frames: Vec<Vec<f64>> = (0..count as i64).map(|i| clip.frame_at(i)).collect();
     let poses: Vec<Pose> = frames.iter().map(|frame| Pose::of(model, frame)).collect();
-    let (touches, couples) = (Touch::all(model), Couple::all(model));
+    let (touches, capsule_pairs) = (Touch::all(model), CapsulePair::all(model));
     let mut report = Report {
         frames: clip.frames(),
         seconds: clip.duration(),
-        limit: Worst::default(),
-        depth: Worst::default(),
-        overlap: Worst::default(),
-        speed: Worst::default(),
-        jump: Worst::default(),
-        slide: Worst::default(),
+        limit: Peak::default(),
+        depth: Peak::default(),
+        overlap: Peak::default(),
+        speed: Peak::default(),
+        jump: Peak::default(),
+        slide: Peak::default(),
         slide_speed: 0.0,
         standing: 0.0,
         fit: clip.about().fit,
@@ -96,23 +96,25 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
         for joint in model.joints.iter().filter(|joint| joint.limited && joint.kind != JointType::Ball) {
             let at = frame[joint.qpos_adr];
             let beyond = (joint.range[0] - at).max(at - joint.range[1]);
-            report.limit.meet(beyond, i, || joint.name.clone());
+            report.limit.update(beyond, i, || joint.name.clone());
         }
-        report.depth.meet(-clearance(&touches, pose), i, || {
+        report.depth.update(-clearance(&touches, pose), i, || {
             let lowest = touches.iter().min_by(|a, b| a.lowest(pose).z.total_cmp(&b.lowest(pose).z));
             lowest.map_or(String::new(), |touch| body(touch.body))
         });
-        for couple in &couples {
-            let gap = couple.gap(pose);
-            report.overlap.meet(-gap.distance, i, || format!("{} and {}", body(gap.bodies[0]), body(gap.bodies[1])));
+        for pair in &capsule_pairs {
+            let separation = pair.separation(pose);
+            report.overlap.update(-separation.distance, i, || {
+                format!("{} and {}", body(separation.bodies[0]), body(separation.bodies[1]))
+            });
         }
     }
     for joint in model.joints.iter().filter(|joint| joint.kind == JointType::Hinge) {
         let speed = |i: usize| (frames[i + 1][joint.qpos_adr] - frames[i][joint.qpos_adr]) / clip.dt();
         for i in 0..count - 1 {
-            report.speed.meet(speed(i).abs(), i, || joint.name.clone());
+            report.speed.update(speed(i).abs(), i, || joint.name.clone());
             if i > 0 {
-                report.jump.meet((speed(i) - speed(i - 1)).abs() / (60.0 * clip.dt()), i, || joint.name.clone());
+                report.jump.update((speed(i) - speed(i - 1)).abs() / (60.0 * clip.dt()), i, || joint.name.clone());
             }
         }
     }
@@ -136,7 +138,7 @@ fn slides(
         let mut slid = DVec3::ZERO;
         for (i, step) in steps.iter().enumerate() {
             slid += *step;
-            report.slide.meet(slid.length(), begin + i, || model.bodies[touches[k].body].name.clone());
+            report.slide.update(slid.length(), begin + i, || model.bodies[touches[k].body].name.clone());
             way += step.length();
             seconds += dt;
         }
@@ -150,9 +152,9 @@ impl Report {
     /// What a person should know, one sentence each; none if the clip is sound.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
-        let mut warn = |worst: &Worst, bound: f64, text: String| {
-            if worst.value > bound {
-                out.push(format!("frame {}: {text}", worst.frame));
+        let mut warn = |peak: &Peak, bound: f64, text: String| {
+            if peak.value > bound {
+                out.push(format!("frame {}: {text}", peak.frame));
             }
         };
         let Report { limit, depth, overlap, speed, jump, slide, .. } = self;

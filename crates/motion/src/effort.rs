@@ -6,7 +6,7 @@ use crate::dynamics::{self, Motion};
 use crate::error::MotionError;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
-use crate::worst::Worst;
+use crate::peak::Peak;
 use glam::DVec3;
 use marathon_physics::Model;
 use marathon_physics::model::{Actuator, JointType};
@@ -66,9 +66,9 @@ pub struct Efforts {
     /// Joints by how much of their strength the clip takes, the hardest first.
     pub joints: Vec<Effort>,
     /// Force at the root that neither motors nor ground give, as a share of the weight, where it is largest.
-    pub missing: Worst,
+    pub missing: Peak,
     /// Moment at the root that neither motors nor ground give, as a share of the weight times a meter, where it is largest.
-    pub unbalanced: Worst,
+    pub unbalanced: Peak,
     /// Flights of a tenth of a second or more.
     pub flights: Vec<Flight>,
 }
@@ -106,16 +106,16 @@ pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, Motio
         carry(model, &pose, &near, &strengths, weight, &mut forces);
         needs.push(forces);
     }
-    let [mut missing, mut unbalanced] = [Worst::default(), Worst::default()];
+    let [mut missing, mut unbalanced] = [Peak::default(), Peak::default()];
     let mut hardest: Vec<Option<(f64, Effort)>> = vec![None; model.nv];
     let mut beyond = vec![0usize; model.nv];
     let half = libm::round(0.5 * WINDOW / clip.dt()) as usize;
     for i in 0..clip.frames() {
         let window = &needs[i.saturating_sub(half)..(i + half + 1).min(needs.len())];
         let mean = |dof: usize| window.iter().map(|forces| forces[dof]).sum::<f64>() / window.len() as f64;
-        for (worst, dofs) in [(&mut missing, &lifts), (&mut unbalanced, &turns)] {
+        for (peak, dofs) in [(&mut missing, &lifts), (&mut unbalanced, &turns)] {
             let left = dofs.iter().map(|dof| mean(*dof) * mean(*dof)).sum::<f64>();
-            worst.meet(left.sqrt() / weight, i, || model.bodies[root].name.clone());
+            peak.update(left.sqrt() / weight, i, || model.bodies[root].name.clone());
         }
         for dof in 0..model.nv {
             let Some([low, high]) = strengths[dof] else { continue };

@@ -25,8 +25,8 @@
 
 mod error;
 mod limits;
+mod peak;
 mod rotation;
-mod worst;
 
 mod layout;
 
@@ -36,8 +36,8 @@ pub mod kinematics;
 
 pub mod dynamics;
 
-mod apart;
 mod ground;
+mod self_collision;
 
 mod contact;
 
@@ -59,7 +59,7 @@ pub use contact::contacts;
 pub use effort::{Effort, Efforts, Flight, efforts};
 pub use error::MotionError;
 pub use layout::{JointKind, Layout};
-pub use retarget::{Fit, Mapping, Wear, fit, retarget, soles};
+pub use peak::Peak;
+pub use retarget::{Fit, Mapping, SkeletonPoser, fit, retarget, soles};
 pub use skeleton::{Animation, Bone, Keyframe, Seam, Skeleton};
 pub use tracking::{Places, Tracking};
-pub use worst::Worst;

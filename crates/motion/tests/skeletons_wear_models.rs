@@ -6,7 +6,7 @@ mod common;
 use common::{file, model, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
-use marathon_motion::{Animation, Bone, Keyframe, Mapping, Skeleton, Wear};
+use marathon_motion::{Animation, Bone, Keyframe, Mapping, Skeleton, SkeletonPoser};
 use marathon_physics::Model;
 use std::path::Path;
 
@@ -43,10 +43,10 @@ fn the_models_own_skeleton_moves_exactly_so() {
     let own = Animation::of_clip("cartwheel".as_ref(), &model, &clip).expect("its own clip");
     let hips = ["left_thigh", "right_thigh"];
     let mapping = Mapping::by_name("own".as_ref(), own.skeleton(), &model, hips).expect("its own names");
-    let wear = Wear::new(&model, &mapping, own.skeleton());
-    assert!((wear.scale() - 1.0).abs() < 1e-12);
+    let poser = SkeletonPoser::new(&model, &mapping, own.skeleton());
+    assert!((poser.scale() - 1.0).abs() < 1e-12);
     for i in 0..clip.frames() {
-        let frame = wear.pose(&bodies(&model, clip.frame(i)));
+        let frame = poser.pose(&bodies(&model, clip.frame(i)));
         let theirs = own.clip().frame(i);
         for k in 0..3 {
             assert!((frame.root[k] - theirs[k]).abs() < 1e-9, "frame {i}: root {:?}, {:?}", frame.root, &theirs[..3]);
@@ -97,8 +97,8 @@ fn figure() -> Skeleton {
 fn limbs_of_another_figure_are_parallel_to_the_models() {
     let (model, skeleton) = (model("marathon_man"), figure());
     let mapping = Mapping::built_in("figure.glb".as_ref(), &skeleton, &model).expect("names that are understood");
-    let wear = Wear::new(&model, &mapping, &skeleton);
-    assert!((0.007..0.011).contains(&wear.scale()), "centimeters: {}", wear.scale());
+    let poser = SkeletonPoser::new(&model, &mapping, &skeleton);
+    assert!((0.007..0.011).contains(&poser.scale()), "centimeters: {}", poser.scale());
     let anchor = |pose: &Pose, name: &str| {
         let body = model.bodies.iter().position(|body| body.name == name).expect("a body");
         let first = &model.joints[model.bodies[body].joint_start];
@@ -116,14 +116,14 @@ fn limbs_of_another_figure_are_parallel_to_the_models() {
         let clip = shipped("marathon_man", name);
         for i in (0..clip.frames()).step_by(7) {
             let pose = Pose::of(&model, clip.frame(i));
-            let frame = wear.pose(&bodies(&model, clip.frame(i)));
-            let at = joints(&skeleton, wear.scale(), &frame);
+            let frame = poser.pose(&bodies(&model, clip.frame(i)));
+            let at = joints(&skeleton, poser.scale(), &frame);
             let hips = 0.5 * (at[1] + at[4]);
             let ours = 0.5 * (anchor(&pose, "left_thigh") + anchor(&pose, "right_thigh"));
             assert!(hips.distance(ours) < 1e-9, "{name}, frame {i}: hips at {hips}, the model's at {ours}");
             for (a, b, above, below) in limbs {
                 let (theirs, ours) = (at[b] - at[a], anchor(&pose, below) - anchor(&pose, above));
-                let length = wear.scale() * DVec3::from_array(skeleton.bones[b].offset).length();
+                let length = poser.scale() * DVec3::from_array(skeleton.bones[b].offset).length();
                 assert!((theirs.length() - length).abs() < 1e-9, "{name}, frame {i}: {above} keeps its length");
                 let angle = theirs.angle_between(ours);
                 assert!(angle < 1e-6, "{name}, frame {i}: {above} is off by {angle} rad");
@@ -143,20 +143,20 @@ fn limbs_of_another_figure_are_parallel_to_the_models() {
 #[test]
 fn a_figure_with_short_legs_is_no_giant() {
     let model = model("marathon_man");
-    let wear = |skeleton: &Skeleton| {
+    let poser = |skeleton: &Skeleton| {
         let mapping = Mapping::built_in("figure.glb".as_ref(), skeleton, &model).expect("names that are understood");
-        Wear::new(&model, &mapping, skeleton)
+        SkeletonPoser::new(&model, &mapping, skeleton)
     };
     let (usual, mut short) = (figure(), figure());
     for bone in [2, 3, 5, 6] {
         short.bones[bone].offset = short.bones[bone].offset.map(|x| x / 3.0);
     }
-    let (own, shrunk) = (wear(&usual), wear(&short));
+    let (own, shrunk) = (poser(&usual), poser(&short));
     let larger = shrunk.scale() / own.scale();
     assert!((1.2..2.0).contains(&larger), "{larger} times as large as with usual legs");
-    let heights = |skeleton: &Skeleton, wear: &Wear| {
-        let frame = wear.pose(&bodies(&model, &model.qpos0));
-        joints(skeleton, wear.scale(), &frame).iter().map(|at| at.z).collect::<Vec<_>>()
+    let heights = |skeleton: &Skeleton, poser: &SkeletonPoser| {
+        let frame = poser.pose(&bodies(&model, &model.qpos0));
+        joints(skeleton, poser.scale(), &frame).iter().map(|at| at.z).collect::<Vec<_>>()
     };
     let (a, b) = (heights(&usual, &own), heights(&short, &shrunk));
     assert!((a[3] - b[3]).abs() < 0.03 && (a[6] - b[6]).abs() < 0.03, "feet at {} and {} m", a[3], b[3]);
@@ -186,14 +186,14 @@ fn the_skin_of_marathon_man_fits_him() {
     assert!(std::fs::metadata(&path).expect("the skin").len() < 300_000);
     let skeleton = skin(&path);
     let mapping = Mapping::built_in(&path, &skeleton, &model).expect("names that are understood");
-    let wear = Wear::new(&model, &mapping, &skeleton);
-    assert!((wear.scale() - 1.0).abs() < 1e-4, "as large as he is: {}", wear.scale());
+    let poser = SkeletonPoser::new(&model, &mapping, &skeleton);
+    assert!((poser.scale() - 1.0).abs() < 1e-4, "as large as he is: {}", poser.scale());
     let find = |name: &str| skeleton.bones.iter().position(|bone| bone.name == name).expect("a bone");
     let clip = shipped("marathon_man", "cartwheel");
     let rest = std::iter::once(model.qpos0.as_slice());
     for qpos in rest.chain((0..clip.frames()).map(|i| clip.frame(i))) {
-        let frame = wear.pose(&bodies(&model, qpos));
-        let at = joints(&skeleton, wear.scale(), &frame);
+        let frame = poser.pose(&bodies(&model, qpos));
+        let at = joints(&skeleton, poser.scale(), &frame);
         // the arms hang from a spine that bends elsewhere
         for (bone, body, most) in [
             ("LeftUpLeg", "left_thigh", 1e-3),

@@ -14,7 +14,7 @@ use bevy::camera::visibility::NoFrustumCulling;
 use bevy::ecs::entity::EntityHashMap;
 use bevy::mesh::skinning::SkinnedMesh;
 use bevy::prelude::*;
-use marathon_motion::{Bone, Mapping, Skeleton, Wear};
+use marathon_motion::{Bone, Mapping, Skeleton, SkeletonPoser};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -69,7 +69,7 @@ struct Clothes {
 
 /// How a scene's skeleton follows the ragdoll.
 struct Fitted {
-    wear: Wear,
+    poser: SkeletonPoser,
     /// Bones, those of the skeleton in its order.
     bones: Vec<Entity>,
     /// What is above the first bone, in the axes of the ragdoll: a place, a turn, and a scale.
@@ -121,13 +121,13 @@ fn fit(
             _ => continue,
         };
         match result {
-            Ok((scene, nodes, (wear, above, bones))) => {
-                let scale = wear.scale() as f32;
+            Ok((scene, nodes, (poser, above, bones))) => {
+                let scale = poser.scale() as f32;
                 let spawned = spawn(&mut commands, entity, &scene.world, &nodes, bones[0]);
                 let bones = bones.into_iter().map(|bone| spawned[bone]).collect();
                 transform.scale = Vec3::splat(scale);
                 let above = Transform { translation: scale * above.translation, scale: scale * above.scale, ..above };
-                worn.fitted = Some(Fitted { wear, bones, above });
+                worn.fitted = Some(Fitted { poser, bones, above });
                 commands.entity(worn.ragdoll).insert(Dressed);
             }
             Err(problem) => {
@@ -205,7 +205,7 @@ fn spawn(commands: &mut Commands, below: Entity, scene: &World, tree: &[Node], f
 }
 
 /// How the skeleton of a scene follows a ragdoll, what is above its first bone, and the nodes of its bones.
-fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(Wear, Transform, Vec<usize>), String> {
+fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(SkeletonPoser, Transform, Vec<usize>), String> {
     let Some((above, bones, skeleton)) = skeleton(tree) else {
         return Err("it has no skinned mesh, expected a character with a skeleton".into());
     };
@@ -219,8 +219,8 @@ fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(Wear, Transf
             )
         }),
     };
-    let wear = Wear::new(model, &mapping?, &skeleton);
-    Ok((wear, above, bones))
+    let poser = SkeletonPoser::new(model, &mapping?, &skeleton);
+    Ok((poser, above, bones))
 }
 
 /// The skeleton with the most joints among a scene's nodes: what is above its first bone, the nodes of its bones, and the bones
@@ -271,7 +271,7 @@ fn wear(
             Some((to_physics(translation), [f64::from(rotation.w), x, y, z]))
         };
         let Some(bodies) = anatomy.parts.iter().map(body).collect::<Option<Vec<_>>>() else { continue };
-        let frame = fitted.wear.pose(&bodies);
+        let frame = fitted.poser.pose(&bodies);
         for (i, (entity, turn)) in fitted.bones.iter().zip(&frame.rotations).enumerate() {
             let Ok(mut bone) = bones.get_mut(*entity) else { continue };
             let [w, x, y, z] = turn.map(|x| x as f32);

@@ -5,9 +5,9 @@ use super::target::Targets;
 use crate::clip::{Clip, Nearness};
 use crate::error::MotionError;
 use crate::kinematics::Pose;
+use crate::peak::Peak;
 use crate::rotation::log;
 use crate::skeleton::Animation;
-use crate::worst::Worst;
 use glam::DVec3;
 use marathon_physics::Model;
 use serde::Serialize;
@@ -25,9 +25,9 @@ pub struct Fit {
     /// depend on the skeleton's rest pose.
     pub bones: f64,
     /// Furthest distance, m.
-    pub furthest: Worst,
+    pub furthest: Peak,
     /// Largest angle of a part whose orientation has a large weight, such as the trunk, the thighs and the feet, rad.
-    pub most_turned: Worst,
+    pub most_turned: Peak,
 }
 
 /// Weight above which an orientation counts for [`Fit::most_turned`], 1/rad.
@@ -47,10 +47,10 @@ impl Fit {
         let bones = bones.warning().map(|_| {
             format!("its bones point {:.0} degrees away from the recording's in the mean", self.bones.to_degrees())
         });
-        let worst = &self.most_turned;
-        let crossed = (worst.value > CROSSED).then(|| {
-            let degrees = worst.value.to_degrees();
-            format!("frame {}: {} is turned by {degrees:.0} degrees from the recording's", worst.frame, worst.name)
+        let peak = &self.most_turned;
+        let crossed = (peak.value > CROSSED).then(|| {
+            let degrees = peak.value.to_degrees();
+            format!("frame {}: {} is turned by {degrees:.0} degrees from the recording's", peak.frame, peak.name)
         });
         near.into_iter().chain(bones).chain(crossed).map(|text| format!("{text}; {remedy}")).collect()
     }
@@ -99,13 +99,13 @@ pub fn fit(
             let distance = ((place(k) - hips) - (target.pos[k] - target.hips)).length();
             fit.position += distance;
             places += 1.0;
-            fit.furthest.meet(distance, i, || name(model, part.body));
+            fit.furthest.update(distance, i, || name(model, part.body));
             if part.rotation > 0.0 {
                 let angle = log(target.quat[k] * pose.quat[part.body].conjugate()).length();
                 fit.rotation += angle;
                 turns += 1.0;
                 if part.rotation >= COUNTS {
-                    fit.most_turned.meet(angle, i, || name(model, part.body));
+                    fit.most_turned.update(angle, i, || name(model, part.body));
                 }
             }
         }

@@ -11,15 +11,14 @@ mod band;
 mod fit;
 mod mapping;
 mod problem;
+mod skeleton_poser;
 mod target;
-mod wear;
 mod weight;
 
 pub use fit::{Fit, fit};
 pub use mapping::{Mapping, soles};
-pub use wear::Wear;
+pub use skeleton_poser::SkeletonPoser;
 
-use crate::apart::Couple;
 use crate::clip::{About, Clip, Cycle};
 use crate::contact;
 use crate::error::MotionError;
@@ -28,6 +27,7 @@ use crate::kinematics::Pose;
 use crate::layout::Layout;
 use crate::limits;
 use crate::rotation::wxyz;
+use crate::self_collision::CapsulePair;
 use crate::skeleton::Animation;
 use glam::DVec3;
 use marathon_physics::Model;
@@ -64,7 +64,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let band = 3.0 * 8.0 * (3 * model.nv * model.nv) as f64;
     limits::check_memory(path, band * (count + 2 * margin) as f64)?;
     let all: Vec<Target> = (0..count + 2 * margin).map(|i| targets.at(i as i64 - margin as i64)).collect();
-    let (touches, couples) = (Touch::all(model), Couple::all(model));
+    let (touches, capsule_pairs) = (Touch::all(model), CapsulePair::all(model));
     let layout = Layout::of(model);
     let cycle = cycle.map(|Cycle { pos: [x, y], yaw }| {
         let travel = targets.place(DVec3::new(x, y, 0.0));
@@ -77,7 +77,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         model,
         mapping,
         touches: &touches,
-        couples: &[],
+        capsule_pairs: &[],
         targets,
         held,
         support: &[],
@@ -110,7 +110,8 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
             }
         }
         let rough = problem(&all, &none);
-        let fine = Problem { couples: &couples, held: &held, support: &support, calm: mapping.smooth, ..rough };
+        let fine =
+            Problem { capsule_pairs: &capsule_pairs, held: &held, support: &support, calm: mapping.smooth, ..rough };
         if pass == 0 {
             rough.solve(&mut frames, 25)
         } else {
@@ -122,7 +123,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let mut calm = mapping.smooth;
     while calm > 0.0 && calm < CALM * mapping.smooth && fastest(model, &frames, dt) > FASTEST {
         calm *= 2.0;
-        Problem { couples: &couples, held: &held, support: &support, calm, ..problem(&all, &none) }
+        Problem { capsule_pairs: &capsule_pairs, held: &held, support: &support, calm, ..problem(&all, &none) }
             .solve(&mut frames, 25);
     }
 

@@ -3,10 +3,10 @@
 use super::band::Band;
 use super::mapping::Mapping;
 use super::target::Target;
-use crate::apart::Couple;
 use crate::ground::Touch;
 use crate::kinematics::Pose;
 use crate::rotation::{exp, log, quat, wxyz};
+use crate::self_collision::CapsulePair;
 use glam::DVec3;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
@@ -45,7 +45,7 @@ pub(super) struct Problem<'a> {
     pub model: &'a Model,
     pub mapping: &'a Mapping,
     pub touches: &'a [Touch],
-    pub couples: &'a [Couple],
+    pub capsule_pairs: &'a [CapsulePair],
     pub targets: &'a [Target],
     /// Per frame and touch: whether it is held.
     pub held: &'a [Vec<bool>],
@@ -325,13 +325,13 @@ impl Problem<'_> {
 
     /// Parts do not overlap.
     fn apart_rows(&self, i: usize, pose: &Pose, sink: &mut Sink) {
-        for couple in self.couples {
-            let gap = couple.gap(pose);
-            if gap.distance < NEAR {
+        for pair in self.capsule_pairs {
+            let separation = pair.separation(pose);
+            if separation.distance < NEAR {
                 let mut row = vec![0.0; self.model.nv];
                 for (k, sign) in [(0, 1.0), (1, -1.0)] {
-                    pose.motions(self.model, gap.bodies[k], gap.points[k], |dof, _, shift| {
-                        row[dof] += weight::APART * sign * gap.normal.dot(shift);
+                    pose.motions(self.model, separation.bodies[k], separation.points[k], |dof, _, shift| {
+                        row[dof] += weight::APART * sign * separation.normal.dot(shift);
                     });
                 }
                 let row: Vec<_> = row
@@ -340,7 +340,7 @@ impl Problem<'_> {
                     .filter(|(_, by)| **by != 0.0)
                     .map(|(dof, by)| (i * row.len() + dof, *by))
                     .collect();
-                sink(Row::Bound(weight::APART * (gap.distance - APART_MARGIN), &row));
+                sink(Row::Bound(weight::APART * (separation.distance - APART_MARGIN), &row));
             }
         }
     }

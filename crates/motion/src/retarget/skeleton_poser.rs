@@ -1,4 +1,5 @@
-//! The way back: a skeleton that moves as a model does, with bones of its own lengths. A skinned mesh needs it to be worn.
+//! From a model to a skeleton: poses that move as the model does, with the bone lengths of the skeleton. Skinned meshes need
+//! them.
 
 use super::align::{Alignment, place};
 use super::mapping::Mapping;
@@ -8,9 +9,9 @@ use crate::skeleton::{Keyframe, Skeleton, SkeletonPose};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 
-/// How a skeleton wears a model.
+/// Poses a skeleton as a model moves.
 #[derive(Clone, Debug)]
-pub struct Wear {
+pub struct SkeletonPoser {
     skeleton: Skeleton,
     /// Orientation of each bone at rest, with the skeleton's front turned to the model's.
     rest: Vec<DQuat>,
@@ -37,7 +38,7 @@ enum Follows {
     Parent,
 }
 
-impl Wear {
+impl SkeletonPoser {
     /// A skeleton that is to move as a model. A mapping's parts turn their joints; the joints between two that one part lies
     /// between, such as those of a spine, share the turn; all others keep their rest pose.
     pub fn new(model: &Model, mapping: &Mapping, skeleton: &Skeleton) -> Self {
@@ -72,7 +73,7 @@ impl Wear {
         let lower = if proportionate { 0.0 } else { leg * (1.0 - ratio / scale) };
         let down = model_rest.quat[pelvis].conjugate() * DVec3::new(0.0, 0.0, -lower);
         let scale = if proportionate { scale } else { ratio };
-        Wear { skeleton: skeleton.clone(), rest, follows, hips, scale, shift: (pelvis, down) }
+        SkeletonPoser { skeleton: skeleton.clone(), rest, follows, hips, scale, shift: (pelvis, down) }
     }
 
     /// Scale of the skeleton's lengths. It makes the legs as long as the model's. If the legs are unusually long or
@@ -81,7 +82,7 @@ impl Wear {
         self.scale
     }
 
-    /// The skeleton, with its lengths times [`Wear::scale`], while the model's bodies are at these places: position, m, and
+    /// The skeleton, with its lengths times [`SkeletonPoser::scale`], while the model's bodies are at these places: position, m, and
     /// orientation, `[w, x, y, z]`, of each. The skeleton's hips are where the model's are, or as much lower or higher as its legs are
     /// shorter or longer.
     ///

@@ -14,7 +14,7 @@ use crate::sim::{Cull, GeomPairOf, Mount, ShapePair, Sim};
 use crate::state::{Group, Work, clearance};
 
 /// A pair that comes near in some lanes.
-struct Meeting<T: Real> {
+struct Candidate<T: Real> {
     place: Place,
     /// Centers of the geoms, relative to the place's reference point.
     centers: [V3<T>; 2],
@@ -48,8 +48,8 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
         let (near, within) = (near(sim, group, work, pair, &centers), few && within_tree(sim, pair));
         let clearance = if T::any(near) {
-            let meeting = Meeting { place: Place { index, base }, centers, near };
-            touch_pair(sim, group, work, &mut slots, &meeting)
+            let candidate = Candidate { place: Place { index, base }, centers, near };
+            touch_pair(sim, group, work, &mut slots, &candidate)
         } else if within {
             let (d, reach) = (sub3(&centers[1], &centers[0]), T::splat(pair.reach));
             Some(clearance(dot(&d, &d).sqrt() - reach, reach))
@@ -132,11 +132,11 @@ fn touch_pair<T: Real>(
     group: &Group<T>,
     work: &mut Work<T>,
     slots: &mut Slots<T>,
-    meeting: &Meeting<T>,
+    candidate: &Candidate<T>,
 ) -> Option<T> {
-    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
+    let pair = &sim.contacts.pair(&sim.geoms, candidate.place.index);
     let [a, b] = pair.geoms;
-    let (mb, [ca, cb]) = (&sim.geoms[b], meeting.centers);
+    let (mb, [ca, cb]) = (&sim.geoms[b], candidate.centers);
     let margin = T::splat(pair.margin);
     let [size_a, size_b]: [V3<T>; 2] = [splat3(&pair.sizes[0]), splat3(&pair.sizes[1])];
     let mut known = None;
@@ -167,15 +167,15 @@ fn touch_pair<T: Real>(
             &round::capsule_capsule(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b), margin)
         }
         ShapePair::FieldCapsule => {
-            touch_field(sim, group, work, slots, meeting);
+            touch_field(sim, group, work, slots, candidate);
             return None;
         }
         ShapePair::CapsuleBox | ShapePair::BoxBox | ShapePair::FieldBox => {
-            one_by_one(sim, group, work, slots, meeting);
+            one_by_one(sim, group, work, slots, candidate);
             return None;
         }
     };
-    add_all(sim, group, work, slots, meeting.place, found);
+    add_all(sim, group, work, slots, candidate.place, found);
     known
 }
 
@@ -218,31 +218,37 @@ fn touch_field<T: Real>(
     group: &Group<T>,
     work: &mut Work<T>,
     slots: &mut Slots<T>,
-    meeting: &Meeting<T>,
+    candidate: &Candidate<T>,
 ) {
-    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
+    let pair = &sim.contacts.pair(&sim.geoms, candidate.place.index);
     let fields = group.all_grounds(sim, pair.field);
-    let terrain = Terrain { fields, center: meeting.centers[0], axes: work.motion.axes(&sim.geoms[pair.geoms[0]]) };
-    let capsule = capsule(work, pair.geoms[1], meeting.centers[1], splat3(&pair.sizes[1]));
+    let terrain = Terrain { fields, center: candidate.centers[0], axes: work.motion.axes(&sim.geoms[pair.geoms[0]]) };
+    let capsule = capsule(work, pair.geoms[1], candidate.centers[1], splat3(&pair.sizes[1]));
     let mut found = std::mem::take(&mut work.contacts.touches);
     found.clear();
     let margin = T::splat(pair.margin);
-    field_capsule::field_capsule(&terrain, &capsule, margin, meeting.near, &mut work.contacts.gaps, &mut found);
-    add_all(sim, group, work, slots, meeting.place, &found);
+    field_capsule::field_capsule(&terrain, &capsule, margin, candidate.near, &mut work.contacts.gaps, &mut found);
+    add_all(sim, group, work, slots, candidate.place, &found);
     work.contacts.touches = found;
 }
 
 /// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
 #[inline(always)]
-fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots: &mut Slots<T>, meeting: &Meeting<T>) {
-    let pair = &sim.contacts.pair(&sim.geoms, meeting.place.index);
+fn one_by_one<T: Real>(
+    sim: &Sim<T>,
+    group: &Group<T>,
+    work: &mut Work<T>,
+    slots: &mut Slots<T>,
+    candidate: &Candidate<T>,
+) {
+    let pair = &sim.contacts.pair(&sim.geoms, candidate.place.index);
     let axes = pair.geoms.map(|g| work.motion.axes(&sim.geoms[g]));
     let mut found = std::mem::take(&mut work.contacts.touches);
     let mut own = std::mem::take(&mut work.contacts.lane_touches);
     found.clear();
-    let bits = T::bits(meeting.near);
+    let bits = T::bits(candidate.near);
     for lane in (0..T::LANES).filter(|l| bits >> l & 1 == 1) {
-        let [a, b] = [pick(&meeting.centers[0], lane), pick(&meeting.centers[1], lane)];
+        let [a, b] = [pick(&candidate.centers[0], lane), pick(&candidate.centers[1], lane)];
         let [turned_a, turned_b] = [pick_axes(&axes[0], lane), pick_axes(&axes[1], lane)];
         let [size_a, size_b] = pair.sizes;
         let cuboid = Cuboid { center: b, axes: turned_b, half: size_b };
@@ -264,7 +270,7 @@ fn one_by_one<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, slots
         }
         gather(&own, lane, &mut found);
     }
-    add_all(sim, group, work, slots, meeting.place, &found);
+    add_all(sim, group, work, slots, candidate.place, &found);
     work.contacts.touches = found;
     work.contacts.lane_touches = own;
 }

@@ -1,4 +1,5 @@
-//! Which geoms of a model must not overlap, and how far they are apart. Spheres and capsules only, of which ragdolls are made.
+//! Self-collision: pairs of geoms of a model that must not overlap, and their separation. Spheres and capsules only, of which
+//! ragdolls are made.
 
 use crate::kinematics::Pose;
 use crate::rotation::quat;
@@ -7,22 +8,22 @@ use marathon_physics::model::{GeomType, Model};
 
 /// A sphere or a capsule: all points within `radius` of a line.
 #[derive(Clone, Debug)]
-struct Rod {
+struct Capsule {
     body: usize,
     /// Ends in the body's frame.
     ends: [DVec3; 2],
     radius: f64,
 }
 
-/// Two geoms that collide where they overlap.
+/// Two geoms that must not overlap.
 #[derive(Clone, Debug)]
-pub(crate) struct Couple {
-    a: Rod,
-    b: Rod,
+pub(crate) struct CapsulePair {
+    a: Capsule,
+    b: Capsule,
 }
 
-/// How two geoms lie to each other.
-pub(crate) struct Gap {
+/// How far two geoms are from each other.
+pub(crate) struct Separation {
     /// Distance between the surfaces, m; negative where they overlap.
     pub distance: f64,
     /// The bodies.
@@ -33,14 +34,15 @@ pub(crate) struct Gap {
     pub normal: DVec3,
 }
 
-impl Couple {
+impl CapsulePair {
     /// All pairs of moving geoms that collide by MuJoCo's rules, but for those that overlap in the reference pose.
-    pub fn all(model: &Model) -> Vec<Couple> {
-        let rods: Vec<(usize, Rod)> = (0..model.geoms.len()).filter_map(|i| Some((i, rod(model, i)?))).collect();
+    pub fn all(model: &Model) -> Vec<CapsulePair> {
+        let capsules: Vec<(usize, Capsule)> =
+            (0..model.geoms.len()).filter_map(|i| Some((i, capsule(model, i)?))).collect();
         let rest = Pose::of(model, &model.qpos0);
-        let mut couples = Vec::new();
-        for (k, (i, a)) in rods.iter().enumerate() {
-            for (j, b) in &rods[k + 1..] {
+        let mut pairs = Vec::new();
+        for (k, (i, a)) in capsules.iter().enumerate() {
+            for (j, b) in &capsules[k + 1..] {
                 let (g, h) = (&model.geoms[*i], &model.geoms[*j]);
                 let [p, q] = [g.body, h.body].map(|body| model.bodies[body].weld_id);
                 let parent = |body: usize| model.bodies[model.bodies[body].parent].weld_id;
@@ -50,28 +52,33 @@ impl Couple {
                 if related || !masks || model.excludes.contains(&bodies) {
                     continue;
                 }
-                let couple = Couple { a: a.clone(), b: b.clone() };
-                if couple.gap(&rest).distance > 0.0 {
-                    couples.push(couple);
+                let pair = CapsulePair { a: a.clone(), b: b.clone() };
+                if pair.separation(&rest).distance > 0.0 {
+                    pairs.push(pair);
                 }
             }
         }
-        couples
+        pairs
     }
 
-    /// How the two lie to each other in a pose.
-    pub fn gap(&self, pose: &Pose) -> Gap {
-        let line = |rod: &Rod| rod.ends.map(|end| pose.point(rod.body, end));
+    /// Separation of the two geoms in a pose.
+    pub fn separation(&self, pose: &Pose) -> Separation {
+        let line = |capsule: &Capsule| capsule.ends.map(|end| pose.point(capsule.body, end));
         let points = nearest(line(&self.a), line(&self.b));
         let apart = points[0] - points[1];
         let distance = apart.length();
         // lines that cross have no direction; any will part them
         let normal = if distance > 1e-9 { apart / distance } else { DVec3::Z };
-        Gap { distance: distance - self.a.radius - self.b.radius, bodies: [self.a.body, self.b.body], points, normal }
+        Separation {
+            distance: distance - self.a.radius - self.b.radius,
+            bodies: [self.a.body, self.b.body],
+            points,
+            normal,
+        }
     }
 }
 
-fn rod(model: &Model, geom: usize) -> Option<Rod> {
+fn capsule(model: &Model, geom: usize) -> Option<Capsule> {
     let geom = &model.geoms[geom];
     let half = match geom.kind {
         GeomType::Sphere => 0.0,
@@ -82,7 +89,7 @@ fn rod(model: &Model, geom: usize) -> Option<Rod> {
         return None;
     }
     let (pos, axis) = (DVec3::from_array(geom.pos), quat(&geom.quat) * DVec3::Z * half);
-    Some(Rod { body: geom.body, ends: [pos + axis, pos - axis], radius: geom.size[0] })
+    Some(Capsule { body: geom.body, ends: [pos + axis, pos - axis], radius: geom.size[0] })
 }
 
 /// The nearest points of two line segments (Ericson, Real-Time Collision Detection, 5.1.9).
