@@ -4,7 +4,7 @@ use crate::names::{Kind, Names, is_public};
 use crate::sources::{Source, Sources, is_test};
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use syn::visit::Visit;
 
 /// A file names something that another file of the crate defines.
@@ -30,9 +30,19 @@ impl Import {
 
     /// Whether the import leads from the file of a module to a file below that module.
     pub fn leads_inside(&self) -> bool {
-        let is_module = ["mod.rs", "lib.rs", "main.rs"].iter().any(|name| self.file.ends_with(name));
-        is_module && self.file.parent().is_some_and(|folder| self.target.starts_with(folder))
+        owns(&self.file, &self.target)
     }
+
+    /// Whether the import leads from a file to the file of a module above it.
+    pub fn leads_to_own_module(&self) -> bool {
+        owns(&self.target, &self.file)
+    }
+}
+
+/// Whether a file is that of a module which another file lies in.
+fn owns(module: &Path, file: &Path) -> bool {
+    let is_module = ["mod.rs", "lib.rs", "main.rs"].iter().any(|name| module.ends_with(name));
+    is_module && module.parent().is_some_and(|folder| file.starts_with(folder))
 }
 
 /// Every import that leaves its file, once for each line.
@@ -62,10 +72,10 @@ struct Reader<'n> {
 }
 
 /// The names of a path, with their lines.
-type Path = Vec<(String, usize)>;
+type Segments = Vec<(String, usize)>;
 
 impl Reader<'_> {
-    fn find(&mut self, path: &Path, kind: Kind) {
+    fn find(&mut self, path: &Segments, kind: Kind) {
         let names: Vec<String> = path.iter().map(|(name, _)| name.clone()).collect();
         let line = path.get(1).or(path.first()).map_or(0, |(_, line)| *line);
         self.found.extend(self.names.file(&self.module, &names, kind).map(|file| (file, line)));
@@ -73,7 +83,7 @@ impl Reader<'_> {
 
     /// Takes in a path in code. A single name is defined here or brought in by a `use`, which is read where it stands,
     /// unless it only passes the name on.
-    fn note(&mut self, path: &Path) {
+    fn note(&mut self, path: &Segments) {
         let single = |name: &str| self.names.re_exports(&self.module, name);
         match &path[..] {
             [] => {}
@@ -83,7 +93,7 @@ impl Reader<'_> {
     }
 
     /// Takes in a `use`.
-    fn note_tree(&mut self, tree: &syn::UseTree, public: bool, way: &mut Path) {
+    fn note_tree(&mut self, tree: &syn::UseTree, public: bool, way: &mut Segments) {
         let name = |ident: &syn::Ident| (ident.to_string(), ident.span().start().line);
         match tree {
             syn::UseTree::Path(path) => {
@@ -102,7 +112,7 @@ impl Reader<'_> {
         }
     }
 
-    fn note_leaf(&mut self, path: &Path, public: bool) {
+    fn note_leaf(&mut self, path: &Segments, public: bool) {
         // a folder's `mod.rs` passes on what its files define, and does not need it
         let below = path.first().is_some_and(|(name, _)| !matches!(name.as_str(), "crate" | "$crate" | "super"));
         if public && below {

@@ -124,11 +124,23 @@ impl Crate {
 
     /// Groups of files that import each other in circles, the largest first.
     ///
-    /// The file of a module (`mod.rs`, `lib.rs`) and the files below it do not count as a circle: they may use what it
-    /// shares with them, and it may call them.
+    /// The file of a module (`mod.rs`, `lib.rs`) and a file below it may use each other: it may call the file, and the file may
+    /// use what the module shares. So a circle needs at most one of these two directions.
     pub fn circles(&self) -> Vec<Vec<&Path>> {
+        let mut circles = self.circles_without(Import::leads_inside);
+        for circle in self.circles_without(Import::leads_to_own_module) {
+            if !circles.iter().any(|known| circle.iter().all(|file| known.contains(file))) {
+                circles.push(circle);
+            }
+        }
+        circles.sort_by_key(|circle| std::cmp::Reverse(circle.len()));
+        circles
+    }
+
+    /// The circles of all imports but some.
+    fn circles_without(&self, left_out: fn(&Import) -> bool) -> Vec<Vec<&Path>> {
         let mut next: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
-        for import in self.imports.iter().filter(|import| !import.leads_inside()) {
+        for import in self.imports.iter().filter(|import| !left_out(import)) {
             next.entry(&import.file).or_default().insert(&import.target);
         }
         let reach: BTreeMap<&Path, BTreeSet<&Path>> = next.keys().map(|file| (*file, reached(file, &next))).collect();
@@ -140,14 +152,13 @@ impl Crate {
             let back = |other: &&Path| reach.get(other).is_some_and(|from_there| from_there.contains(file));
             circles.push(there.iter().copied().filter(back).collect());
         }
-        circles.sort_by_key(|circle| std::cmp::Reverse(circle.len()));
         circles
     }
 
     /// Imports between files of a circle.
     pub fn imports_within(&self, circle: &[&Path]) -> impl Iterator<Item = &Import> {
         let inside = |path: &Path| circle.contains(&path);
-        self.imports.iter().filter(move |i| !i.leads_inside() && inside(&i.file) && inside(&i.target))
+        self.imports.iter().filter(move |i| inside(&i.file) && inside(&i.target))
     }
 
     /// The rooms in an order in which each imports only from those before it; those of a ring are left out, and all that

@@ -185,6 +185,15 @@ fn circles_of_files_are_found() {
         ("f/a.rs", "use super::B;\nuse crate::Shared;\npub struct A;\npub fn f() {}"),
     ];
     assert_eq!(circles(&module), [""; 0]);
+    // but folders must not use each other, whichever of their files does
+    let folders = [
+        ("lib.rs", "mod f;\nmod g;"),
+        ("f/mod.rs", "mod a;\npub struct F(a::A);"),
+        ("f/a.rs", "use crate::g::G;\npub struct A;"),
+        ("g/mod.rs", "mod b;\npub use b::G;"),
+        ("g/b.rs", "use crate::f::F;\npub struct G;"),
+    ];
+    assert_eq!(circles(&folders), ["f/a.rs f/mod.rs g/b.rs"]);
     // neither unit tests nor names of other crates and functions count
     let none = [
         ("lib.rs", "mod a;\nmod b;"),

@@ -119,11 +119,11 @@ impl SavedCommand {
         let (&[flag], rest) = bytes.split_first_chunk()?;
         let (due, rest) = rest.split_first_chunk()?;
         *bytes = rest;
-        let mut numbers = || numbers(bytes, n);
-        let (present, scheduled) = (numbers()?, numbers()?);
+        let mut next = || numbers(bytes, n);
+        let (present, scheduled) = (next()?, next()?);
         let given = match flag {
             0 => None,
-            1 => Some(numbers()?),
+            1 => Some(next()?),
             _ => return None,
         };
         Some(SavedCommand { present, told: Told { scheduled, due: u64::from_le_bytes(*due), given } })
