@@ -97,7 +97,7 @@ def test_all_agents_decide_in_the_window_and_with_the_bits_of_the_player(play, l
     env.reset()
     decisions, ends = env.get_steps(NAME)
     assert len(decisions) == AGENTS and len(ends) == 0 and not decisions.reward.any()
-    wait_for(lambda: any(f"on stage: {AGENTS} from outside" in line for line in said))
+    wait_for(lambda: any(f"loaded: {AGENTS} of another program" in line for line in said))
     env.close()
     assert game.wait(timeout=60) == 0, "".join(said)
     assert "panicked" not in "".join(said)

@@ -13,7 +13,7 @@ use bevy::window::PrimaryWindow;
 use clap::Parser;
 use marathon_envs::{Autoreset, VecEnvOptions};
 use marathon_game::app::{
-    Actor, Args, Bindings, Deed, GamePlugin, List, Mode, Place, Playback, Recording, Run, Runs, Show, Step, Table,
+    Action, Actor, Args, Bindings, GamePlugin, List, Mode, Place, Playback, Recording, Run, Runs, Scenario, Step, Table,
 };
 use marathon_game::prelude::*;
 use std::error::Error;
@@ -94,7 +94,7 @@ fn a_policy_runs_and_nobody_meddles() -> Result<(), Box<dyn Error>> {
     let table = folder.path().join("runs.sqlite");
     let words = ["--mode", "course", "--course", "boxes", "--difficulty", "0.8", "--seed", "4"];
     let mut app = game(&table, &words);
-    assert_eq!(app.world().resource::<Show>().agent, "TerrainWalker2d-v0", "the default");
+    assert_eq!(app.world().resource::<Scenario>().agent, "TerrainWalker2d-v0", "the default");
     let (run, place) = run_to_the_end(&mut app);
     assert_eq!((place.rank, place.of), (1, 1));
     assert!(run.distance > 5.0 && run.seconds > 1.0, "{run:?}");
@@ -122,7 +122,7 @@ fn a_policy_runs_and_nobody_meddles() -> Result<(), Box<dyn Error>> {
 fn the_replay_of_a_run_on_a_builders_course_is_the_run_to_the_bit() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let table = folder.path().join("runs.sqlite");
-    let mut app = game(&table, &["--mode", "course", "--part", "build", "--difficulty", "0.4", "--seed", "3"]);
+    let mut app = game(&table, &["--mode", "course", "--role", "build", "--difficulty", "0.4", "--seed", "3"]);
     // up and down, by the keys
     for (key, times) in [(KeyCode::PageUp, 4), (KeyCode::PageDown, 7), (KeyCode::Home, 1), (KeyCode::PageUp, 5)] {
         (0..times).for_each(|_| press(&mut app, key));
@@ -182,7 +182,7 @@ fn the_replay_of_a_run_on_a_builders_course_is_the_run_to_the_bit() -> Result<()
 fn the_mouse_builds() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let table = folder.path().join("runs.sqlite");
-    let mut app = game(&table, &["--mode", "course", "--part", "build", "--difficulty", "1"]);
+    let mut app = game(&table, &["--mode", "course", "--role", "build", "--difficulty", "1"]);
     frames(&mut app, 5);
     let step = |app: &App| app.world().resource::<Step>().0;
     // the runner's first meters are not yet made: the next one is from 6 to 7 m
@@ -237,9 +237,9 @@ fn the_mouse_builds() -> Result<(), Box<dyn Error>> {
 fn a_player_leads_a_runner_over_a_course() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let table = folder.path().join("runs.sqlite");
-    let words = ["--mode", "course", "--part", "run", "--course", "rubble", "--difficulty", "0.3", "--seed", "2"];
+    let words = ["--mode", "course", "--role", "run", "--course", "rubble", "--difficulty", "0.3", "--seed", "2"];
     let mut app = game(&table, &words);
-    assert_eq!(app.world().resource::<Show>().agent, "AntController-v0", "the default");
+    assert_eq!(app.world().resource::<Scenario>().agent, "AntController-v0", "the default");
     frames(&mut app, 100);
     let stands = episode(&mut app);
     assert!(stands.distance.abs() < 0.5 && stands.command == [0.0; 3], "{stands:?}");
@@ -275,23 +275,21 @@ fn the_list_starts_a_replay() -> Result<(), Box<dyn Error>> {
     // the next agent is one that can do the same
     press(&mut app, KeyCode::KeyN);
     frames(&mut app, 5);
-    assert_eq!(app.world().resource::<Show>().agent, "HopperController-v0");
+    assert_eq!(app.world().resource::<Scenario>().agent, "HopperController-v0");
     assert!(app.world().resource::<Runs>().last.is_none());
-    assert_eq!(app.world().resource::<Bindings>().key(Deed::Runs), "T");
+    assert_eq!(app.world().resource::<Bindings>().key(Action::Runs), "T");
     press(&mut app, KeyCode::KeyT);
     let list = app.world().resource::<List>();
     assert!(list.open && list.courses.len() == 1 && list.courses[0].1[0].distance == run.distance);
-    // nobody has run there with the agent on stage
+    // the table has no run of the present agent
     press(&mut app, KeyCode::Digit1);
     frames(&mut app, 2);
-    assert_eq!(app.world().resource::<Show>().mode, Mode::Course);
-    let mut show = app.world_mut().resource_mut::<Show>();
-    show.agent = "TerrainWalker2d-v0".into();
-    show.again();
+    assert_eq!(app.world().resource::<Scenario>().mode, Mode::Course);
+    windowless::load(&mut app, |scenario| scenario.agent = "TerrainWalker2d-v0".into());
     frames(&mut app, 3);
     press(&mut app, KeyCode::Digit1);
     frames(&mut app, 20);
-    assert_eq!(app.world().resource::<Show>().mode, Mode::Replay);
+    assert_eq!(app.world().resource::<Scenario>().mode, Mode::Replay);
     assert!(!app.world().resource::<List>().open);
     assert!(app.world().resource::<Playback>().at > 0.1);
     Ok(())
@@ -309,8 +307,8 @@ fn what_cannot_be_done_is_told() -> Result<(), Box<dyn Error>> {
         (&["--mode", "course", "--difficulty", "2"], &["--difficulty", "from 0 to 1"]),
         (&["--mode", "course", "--course", "stair"], &["stair", "stairs"]),
         (&["ant", "--mode", "course", "--course", "stair"], &["stair", "stairs"]),
-        (&["TerrainAnt", "--mode", "course", "--part", "run"], &["--part", "takes none", "AntController-v0 does"]),
-        (&["ant", "--mode", "course", "--part", "build"], &["--part", "TerrainWalker2d-v0 has"]),
+        (&["TerrainAnt", "--mode", "course", "--role", "run"], &["--role", "takes none", "AntController-v0 does"]),
+        (&["ant", "--mode", "course", "--role", "build"], &["--role", "TerrainWalker2d-v0 has"]),
         (&["ant", "--mode", "course", "--course", "adversary"], &["--course", "TerrainWalker2d-v0 has"]),
         (&["Swimmer-v5", "--mode", "course"], &["Swimmer-v5", "no level floor"]),
         (&["--mode", "course", "--table", &broken], &["broken.sqlite", "SQLite", "--table FILE"]),

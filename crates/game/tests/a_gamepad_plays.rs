@@ -1,4 +1,4 @@
-//! A gamepad does what keys do: raw events, as its driver sends them, become deeds. No pad, no window needed.
+//! A gamepad does what keys do: raw events, as its driver sends them, become actions. No pad, no window needed.
 #![cfg(feature = "render")]
 
 #[path = "common/devices.rs"]
@@ -8,16 +8,16 @@ use bevy::input::gamepad::GamepadButton;
 use bevy::input::{ButtonState, InputPlugin};
 use bevy::prelude::*;
 use devices::{key, pull};
-use marathon_game::app::{Bindings, Deed, Do, KeysPlugin};
+use marathon_game::app::{Action, ActionPressed, Bindings, KeysPlugin};
 
 #[derive(Resource, Default)]
-struct Done(Vec<Deed>);
+struct Done(Vec<Action>);
 
 fn app() -> (App, Entity) {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, InputPlugin, KeysPlugin)).init_resource::<Done>();
-    app.add_systems(Update, |mut done: ResMut<Done>, mut deeds: MessageReader<Do>| {
-        done.0.extend(deeds.read().map(|d| d.0));
+    app.add_systems(Update, |mut done: ResMut<Done>, mut actions: MessageReader<ActionPressed>| {
+        done.0.extend(actions.read().map(|d| d.0));
     });
     app.update();
     // whoever runs the tests may have keys of their own
@@ -27,7 +27,7 @@ fn app() -> (App, Entity) {
 }
 
 #[test]
-fn buttons_become_deeds_once_per_press() {
+fn buttons_become_actions_once_per_press() {
     let (mut app, pad) = app();
     pull(&mut app, pad, GamepadButton::South, 1.0);
     app.update();
@@ -35,14 +35,14 @@ fn buttons_become_deeds_once_per_press() {
     pull(&mut app, pad, GamepadButton::South, 0.0);
     pull(&mut app, pad, GamepadButton::East, 1.0);
     pull(&mut app, pad, GamepadButton::Start, 1.0);
-    assert_eq!(app.world().resource::<Done>().0, [Deed::Push, Deed::Throw, Deed::Menu]);
+    assert_eq!(app.world().resource::<Done>().0, [Action::Push, Action::Throw, Action::Menu]);
 }
 
 #[test]
 fn keys_can_be_changed() {
     let (mut app, _) = app();
-    app.world_mut().resource_mut::<Bindings>().bind(Deed::Push, KeyCode::KeyO);
+    app.world_mut().resource_mut::<Bindings>().bind(Action::Push, KeyCode::KeyO);
     key(&mut app, KeyCode::KeyO, ButtonState::Pressed);
     app.update();
-    assert_eq!(app.world().resource::<Done>().0, [Deed::Push]);
+    assert_eq!(app.world().resource::<Done>().0, [Action::Push]);
 }

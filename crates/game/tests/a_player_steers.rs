@@ -19,7 +19,7 @@ use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
 use clap::Parser;
 use devices::{key, pad, press, pull, push};
-use marathon_game::app::{Actor, Args, Bindings, Deed, Steering};
+use marathon_game::app::{Action, Actor, Args, Bindings, Steering};
 use marathon_game::prelude::*;
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -145,7 +145,7 @@ fn stick_and_arrow_keys_steer_the_character_in_focus() {
     frames(&mut app, 3);
     assert_eq!(commands(&mut app)[0], (0.0, true));
     // let go
-    assert_eq!(app.world().resource::<Bindings>().key(Deed::Release), "G");
+    assert_eq!(app.world().resource::<Bindings>().key(Action::Release), "G");
     press(&mut app, pad, GamepadButton::LeftThumb);
     frames(&mut app, 3);
     let told = commands(&mut app);
@@ -192,7 +192,7 @@ fn a_second_gamepad_leads_the_next_character() {
 #[test]
 fn held_keys_and_sticks_steer() {
     let holds = ["0.4-0.8:key:up", "0.8-1:key:down", "0.6-1.2:pad2:left-y=-0.56", "1.2-1.6:pad2:left-y"];
-    let mut app = game(&[&["--agents", "2"], &holds.map(|hold| ["--hold", hold]).concat()[..]].concat());
+    let mut app = game(&[&["--agents", "2"], &holds.map(|hold| ["--input", hold]).concat()[..]].concat());
     let mut told: [Vec<f64>; 2] = Default::default();
     for _ in 0..100 {
         frames(&mut app, 1);
@@ -267,9 +267,7 @@ fn a_mapping_that_makes_no_sense_is_refused() {
 fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
     LazyLock::force(&ROVER);
     let mut app = game(&[]);
-    let mut show = app.world_mut().resource_mut::<marathon_game::app::Show>();
-    show.agent = "Hopper-v0".into();
-    show.again();
+    windowless::load(&mut app, |scenario| scenario.agent = "Hopper-v0".into());
     frames(&mut app, 5);
     assert_eq!(*app.world().resource::<Steering>(), Steering::default());
     key(&mut app, KeyCode::ArrowUp, ButtonState::Pressed);

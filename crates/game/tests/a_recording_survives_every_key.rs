@@ -5,7 +5,7 @@
 mod windowless;
 
 use clap::ValueEnum;
-use marathon_game::app::{Deed, Lesson, Recording};
+use marathon_game::app::{Action, Recording, TrainingRun};
 use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
@@ -22,17 +22,17 @@ fn recordings(folder: &Path) -> Result<Vec<Recording>, Box<dyn Error>> {
 #[test]
 fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
     let home = std::env::current_dir()?;
-    for deed in Deed::value_variants() {
-        let name = deed.to_possible_value().ok_or("it has a name")?.get_name().to_string();
+    for action in Action::value_variants() {
+        let name = action.to_possible_value().ok_or("it has a name")?.get_name().to_string();
         let folder = tempfile::tempdir()?;
         std::env::set_current_dir(folder.path())?;
         let presses = ["0.3:record".to_string(), format!("1.2:{name}"), "2.5:record".into()];
-        let presses = presses.iter().flat_map(|press| ["--press", press.as_str()]);
+        let presses = presses.iter().flat_map(|press| ["--action", press.as_str()]);
         let words: Vec<&str> = ["hopper", "--agents", "2", "--threads", "1"].into_iter().chain(presses).collect();
         let mut app = windowless::game(&words, Duration::from_millis(20), |_| ());
         frames(&mut app, 150);
         // ends the trainer
-        app.world_mut().remove_resource::<Lesson>();
+        app.world_mut().remove_resource::<TrainingRun>();
         let all = recordings(folder.path()).map_err(|error| format!("{name}: {error}"))?;
         assert!(all.iter().all(|recording| recording.frames() > 1), "{name}");
         // the first recording lasts at least from its start to the key, apart from paused or fast time

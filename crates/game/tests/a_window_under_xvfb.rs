@@ -101,7 +101,7 @@ fn it_is_played() -> Result<(), Box<dyn Error>> {
         });
     }
     let mut words = Words(told, String::new());
-    words.wait("on stage: 1 of Hopper-v0", 120);
+    words.wait("loaded: 1 of Hopper-v0", 120);
 
     let run = |program: &str, args: &[&str]| -> Result<String, Box<dyn Error>> {
         let output = Command::new(program).args(args).env("DISPLAY", &display).output();
@@ -130,7 +130,7 @@ fn it_is_played() -> Result<(), Box<dyn Error>> {
         std::thread::sleep(Duration::from_millis(600));
     }
     key("n")?;
-    words.wait("on stage: 1 of Walker2d-v0", 60);
+    words.wait("loaded: 1 of Walker2d-v0", 60);
     shot("window-2-walker.png")?;
     key("l")?;
     words.wait("learning Walker2d-v0 from random weights", 60);
@@ -208,7 +208,7 @@ fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     for (number, signal) in ["TERM", "INT"].iter().enumerate() {
         let mut game = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
-        let words = ["hopper", "--quality", "low", "--size", "320x200", "--max-fps", "10", "--press", "0.5:record"];
+        let words = ["hopper", "--quality", "low", "--size", "320x200", "--max-fps", "10", "--action", "0.5:record"];
         game.args(words).current_dir(folder.path()).env("DISPLAY", &display);
         let mut game = start(game.stdout(Stdio::piped()).stderr(Stdio::piped()))?;
         let (tell, told) = channel();
@@ -236,7 +236,7 @@ fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     }
     let mut film = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
     film.args(["hopper", "--quality", "low", "--size", "320x200", "--seconds", "600", "--record", "a.mp4"]);
-    film.args(["--press", "0:record"]).current_dir(folder.path());
+    film.args(["--action", "0:record"]).current_dir(folder.path());
     let mut film = start(film.stdout(Stdio::null()).stderr(Stdio::piped()))?;
     let (tell, told) = channel();
     let lines = BufReader::new(film.0.stderr.take().ok_or("no errors")?).lines();

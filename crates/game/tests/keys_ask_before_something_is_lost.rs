@@ -9,7 +9,7 @@ mod windowless;
 
 use bevy::input::ButtonState;
 use bevy::prelude::*;
-use marathon_game::app::{Asked, Bindings, Deed, Lesson, Menu, Mode, Question, Rebinding, Show};
+use marathon_game::app::{Action, Asked, Bindings, Menu, Mode, Question, Rebinding, Scenario, TrainingRun};
 use std::error::Error;
 use std::time::{Duration, Instant};
 use windowless::frames;
@@ -33,7 +33,7 @@ fn quitting_asks_while_the_menu_is_open() {
     press(&mut app, KeyCode::Escape);
     assert!(app.world().resource::<Menu>().open);
     press(&mut app, KeyCode::KeyQ);
-    assert_eq!((asked(&app), app.should_exit()), (Some(Asked::Deed(Deed::Quit)), None));
+    assert_eq!((asked(&app), app.should_exit()), (Some(Asked::Action(Action::Quit)), None));
     // no
     press(&mut app, KeyCode::Escape);
     assert_eq!((asked(&app), app.should_exit(), app.world().resource::<Menu>().open), (None, None, true));
@@ -59,7 +59,7 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
     let learning = || {
         let mut app = app(&["hopper", "--mode", "learn", "--threads", "1"]);
         let begun = Instant::now();
-        while app.world().get_resource::<Lesson>().is_none_or(|lesson| lesson.unsaved().is_none()) {
+        while app.world().get_resource::<TrainingRun>().is_none_or(|run| run.unsaved().is_none()) {
             app.update();
             std::thread::sleep(Duration::from_millis(5));
             assert!(begun.elapsed() < Duration::from_secs(120), "no progress");
@@ -71,27 +71,25 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
         press(&mut app, key);
         assert!(asked(&app).is_some() && app.should_exit().is_none(), "{key:?}");
         press(&mut app, KeyCode::Escape);
-        assert!(asked(&app).is_none() && app.world().get_resource::<Lesson>().is_some(), "{key:?}");
+        assert!(asked(&app).is_none() && app.world().get_resource::<TrainingRun>().is_some(), "{key:?}");
         assert!(!app.world().resource::<Menu>().open, "{key:?}: Esc answers");
     }
     // yes, after saving
     press(&mut app, KeyCode::KeyL);
     press(&mut app, KeyCode::KeyS);
     frames(&mut app, 2);
-    assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
+    assert_eq!(app.world().resource::<Scenario>().mode, Mode::Watch);
     assert!(file("hopper-live-1.safetensors").exists());
     // yes, without saving
     let mut app = learning();
     press(&mut app, KeyCode::KeyL);
     press(&mut app, KeyCode::KeyL);
     frames(&mut app, 2);
-    assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
+    assert_eq!(app.world().resource::<Scenario>().mode, Mode::Watch);
     assert!(!file("hopper-live-2.safetensors").exists());
-    // ending a lesson in another way saves it
+    // ending a run in another way saves its policy
     let mut app = learning();
-    let mut show = app.world_mut().resource_mut::<Show>();
-    show.mode = Mode::Watch;
-    show.again();
+    windowless::load(&mut app, |scenario| scenario.mode = Mode::Watch);
     frames(&mut app, 2);
     assert!(file("hopper-live-2.safetensors").exists());
 
@@ -99,7 +97,7 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
     press(&mut app, KeyCode::KeyR);
     frames(&mut app, 30);
     press(&mut app, KeyCode::KeyQ);
-    assert_eq!(asked(&app), Some(Asked::Deed(Deed::Quit)));
+    assert_eq!(asked(&app), Some(Asked::Action(Action::Quit)));
     press(&mut app, KeyCode::Escape);
     assert!(!file("walker2d-1.replay").exists());
     press(&mut app, KeyCode::KeyQ);
@@ -113,12 +111,12 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
 fn esc_leaves_a_binding_as_it_is_and_a_closed_menu_mutes_no_key() {
     let mut app = app(&["hopper"]);
     press(&mut app, KeyCode::Escape);
-    app.world_mut().resource_mut::<Rebinding>().0 = Some(Deed::Push);
+    app.world_mut().resource_mut::<Rebinding>().0 = Some(Action::Push);
     press(&mut app, KeyCode::Escape);
     assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
     assert!(app.world().resource::<Rebinding>().0.is_none() && app.world().resource::<Menu>().open);
     // the menu's button closes it while it waits for a key
-    app.world_mut().resource_mut::<Rebinding>().0 = Some(Deed::Push);
+    app.world_mut().resource_mut::<Rebinding>().0 = Some(Action::Push);
     app.world_mut().resource_mut::<Menu>().open = false;
     frames(&mut app, 2);
     press(&mut app, KeyCode::Space);

@@ -102,7 +102,7 @@ fn a_ball_is_thrown_on_its_cue() -> Result<(), Box<dyn Error>> {
     };
     let words = ["hopper", "--mode", "push", "--no-hud"];
     let without = red(&draw(folder.path(), "hopper-alone.png", &words)?);
-    let with = red(&draw(folder.path(), "hopper-ball.png", &[&words[..], &["--press", "0.5:throw"]].concat())?);
+    let with = red(&draw(folder.path(), "hopper-ball.png", &[&words[..], &["--action", "0.5:throw"]].concat())?);
     assert!(with > without + 100, "red pixels: {without}, with a ball {with}");
     Ok(())
 }
@@ -118,11 +118,11 @@ fn a_ghost_errors_and_a_skin_are_drawn() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let words = ["MarathonManWalk", "--mode", "imitate", "--no-hud", "--option", "start=first"];
     let draw = |name: &str, more: &[&str]| draw(folder.path(), name, &[&words[..], more].concat());
-    let off = ["--press", "0:ghost", "--press", "0:ghost"];
-    let plain = draw("man.png", &[&off[..], &["--press", "0:errors"]].concat())?;
-    let beside = draw("man-ghost.png", &["--press", "0:ghost", "--press", "0:errors"])?;
+    let off = ["--action", "0:ghost", "--action", "0:ghost"];
+    let plain = draw("man.png", &[&off[..], &["--action", "0:errors"]].concat())?;
+    let beside = draw("man-ghost.png", &["--action", "0:ghost", "--action", "0:errors"])?;
     let errors = draw("man-errors.png", &off)?;
-    let skin = draw("man-skin.png", &[&off[..], &["--press", "0:errors", "--skin", "marathon_man"]].concat())?;
+    let skin = draw("man-skin.png", &[&off[..], &["--action", "0:errors", "--skin", "marathon_man"]].concat())?;
     for (what, image) in [("the ghost", &beside), ("errors", &errors), ("the skin", &skin)] {
         let share = differing(&plain, image);
         assert!((0.001..0.2).contains(&share), "{what}: {share} of the numbers differ");
@@ -144,9 +144,9 @@ fn without_text_and_bars_nothing_is_over_the_picture() -> Result<(), Box<dyn Err
     let watch = draw(folder.path(), "bare.png", &["hopper", "--no-hud"])?;
     let push = draw(folder.path(), "bare-push.png", &["hopper", "--mode", "push", "--no-hud"])?;
     assert!(differing(&watch, &push) < 0.002, "{}", differing(&watch, &push));
-    let recorded = ["hopper", "--press", "0.1:record", "--press", "0.6:record"];
+    let recorded = ["hopper", "--action", "0.1:record", "--action", "0.6:record"];
     draw(folder.path(), "recorded.png", &recorded)?;
-    let replay = ["--replay", "hopper-1.replay", "--press", "0:pause"];
+    let replay = ["--replay", "hopper-1.replay", "--action", "0:pause"];
     let shown = draw(folder.path(), "replay.png", &replay)?;
     let bare = draw(folder.path(), "bare-replay.png", &[&replay[..], &["--no-hud"]].concat())?;
     // the time line is in the lower half
@@ -208,7 +208,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (&["MarathonMan", "--skin", "half.glb", "--record", "a.png"], 1, &["half.glb cannot be worn"]),
         (&["hopper", "--skin", "marathon_man", "--record", "a.png"], 1, &["no mapping", "marathon_man, humanoid"]),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
-        (&["hopper", "--press", "1:thorw"], 2, &["--press", "did you mean 'throw'"]),
+        (&["hopper", "--action", "1:thorw"], 2, &["--action", "did you mean 'throw'"]),
         (&["hopper", "--record", "a.mov"], 1, &["a.mov", "mp4"]),
     ];
     for (words, code, parts) in cases {

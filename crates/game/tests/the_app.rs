@@ -9,8 +9,8 @@ use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy::window::FileDragAndDrop;
 use marathon_game::app::{
-    Actor, Ball, Bindings, Costume, Deed, Fitting, Focus, Lesson, Mode, Notes, Playback, Reading, Recorder, Recording,
-    Show,
+    Action, Actor, Ball, Bindings, Focus, Mode, Notifications, Playback, Reading, Recorder, Recording, Scenario,
+    SkinState, TrainingRun, WornSkin,
 };
 use marathon_game::axes::to_game;
 use marathon_game::look::{CameraMode, part_errors};
@@ -25,8 +25,8 @@ fn app(words: &[&str]) -> App {
 }
 
 /// Presses the key that does something, as a window would send it.
-fn press(app: &mut App, deed: Deed) {
-    let name = app.world().resource::<Bindings>().key(deed);
+fn press(app: &mut App, action: Action) {
+    let name = app.world().resource::<Bindings>().key(action);
     let key_code = match name {
         "Space" => KeyCode::Space,
         "Tab" => KeyCode::Tab,
@@ -72,13 +72,13 @@ fn a_row_runs_and_the_focus_moves() {
     let all = actors(&mut app);
     assert_eq!(all.len(), 5);
     assert!(all.iter().all(|(_, e)| e.distance > 2.0), "{all:?}");
-    press(&mut app, Deed::NextFocus);
+    press(&mut app, Action::NextFocus);
     assert_eq!(app.world().resource::<Focus>().0, 1);
     let mut cameras = app.world_mut().query::<&FollowCamera>();
     let target = cameras.single(app.world()).expect("one camera").target.expect("it follows somebody");
     assert_eq!(app.world().get::<Actor>(target).map(|a| a.0), Some(1));
     // one can look about while the time stands still
-    press(&mut app, Deed::Pause);
+    press(&mut app, Action::Pause);
     frames(&mut app, 5);
     let before = cameras.single(app.world()).expect("one camera").clone();
     let mut turned = app.world_mut().query::<&mut FollowCamera>();
@@ -91,12 +91,12 @@ fn a_row_runs_and_the_focus_moves() {
 #[test]
 fn agents_take_turns_and_time_stops() {
     let mut app = app(&["hopper"]);
-    press(&mut app, Deed::NextAgent);
+    press(&mut app, Action::NextAgent);
     frames(&mut app, 60);
-    assert_eq!(app.world().resource::<Show>().agent, "Walker2d-v0");
+    assert_eq!(app.world().resource::<Scenario>().agent, "Walker2d-v0");
     let (_, episode) = actors(&mut app)[0].clone();
     assert!(episode.distance > 0.5, "{episode:?}");
-    press(&mut app, Deed::Pause);
+    press(&mut app, Action::Pause);
     let before = actors(&mut app);
     frames(&mut app, 20);
     assert_eq!(actors(&mut app), before, "paused");
@@ -108,7 +108,7 @@ fn pushes_are_felt() {
     for app in [&mut alone, &mut struck] {
         frames(app, 50);
     }
-    press(&mut struck, Deed::Push);
+    press(&mut struck, Action::Push);
     frames(&mut alone, 2);
     for app in [&mut alone, &mut struck] {
         frames(app, 50);
@@ -149,7 +149,7 @@ fn a_thrown_ball_hits_from_any_distance_and_moves_whom_it_hits() {
             for app in [&mut alone, &mut struck] {
                 frames(app, 100);
             }
-            press(&mut struck, Deed::Throw);
+            press(&mut struck, Action::Throw);
             frames(&mut alone, 2);
             assert_eq!(center(&mut alone), center(&mut struck), "{case}: nothing has happened yet");
             // until it bounces off: its flight over the ground is straight before
@@ -182,7 +182,7 @@ fn learning_begins_from_random_weights_and_ends() {
     let mut app = app(&["hopper", "--mode", "learn", "--threads", "1"]);
     let begun = Instant::now();
     // a few iterations of the real trainer
-    while app.world().get_resource::<Lesson>().is_none_or(|l| l.progress().curve.len() < 3) {
+    while app.world().get_resource::<TrainingRun>().is_none_or(|l| l.progress().curve.len() < 3) {
         app.update();
         std::thread::sleep(Duration::from_millis(5));
         assert!(begun.elapsed() < Duration::from_secs(120), "no progress");
@@ -190,18 +190,18 @@ fn learning_begins_from_random_weights_and_ends() {
     frames(&mut app, 30);
     let (_, episode) = actors(&mut app)[0].clone();
     assert!(episode.action.iter().any(|a| *a != 0.0), "the newest policy acts");
-    press(&mut app, Deed::Pause);
+    press(&mut app, Action::Pause);
     std::thread::sleep(Duration::from_secs(2));
-    let waiting = app.world().resource::<Lesson>().progress();
+    let waiting = app.world().resource::<TrainingRun>().progress();
     std::thread::sleep(Duration::from_secs(1));
-    assert_eq!(app.world().resource::<Lesson>().progress().curve, waiting.curve, "the trainer waits");
+    assert_eq!(app.world().resource::<TrainingRun>().progress().curve, waiting.curve, "the trainer waits");
     // it asks whether to discard the policy
-    press(&mut app, Deed::Learn);
-    assert!(app.world().get_resource::<Lesson>().is_some());
-    press(&mut app, Deed::Learn);
+    press(&mut app, Action::Learn);
+    assert!(app.world().get_resource::<TrainingRun>().is_some());
+    press(&mut app, Action::Learn);
     frames(&mut app, 3);
-    assert!(app.world().get_resource::<Lesson>().is_none());
-    assert_eq!(app.world().resource::<Show>().mode, Mode::Watch);
+    assert!(app.world().get_resource::<TrainingRun>().is_none());
+    assert_eq!(app.world().resource::<Scenario>().mode, Mode::Watch);
 }
 
 #[test]
@@ -210,10 +210,10 @@ fn what_is_recorded_is_shown_again() -> Result<(), Box<dyn std::error::Error>> {
     // recordings go to the present folder; no other test here looks at it
     std::env::set_current_dir(folder.path())?;
     let mut app = app(&["hopper", "--agents", "2"]);
-    press(&mut app, Deed::Record);
+    press(&mut app, Action::Record);
     assert!(app.world().get_resource::<Recorder>().is_some());
     frames(&mut app, 100);
-    press(&mut app, Deed::Record);
+    press(&mut app, Action::Record);
     let path = Path::new("hopper-1.replay");
     let recording = Recording::load(path)?;
     assert!(recording.agents == 2 && (1.5..2.5).contains(&recording.seconds()), "{} s", recording.seconds());
@@ -226,13 +226,13 @@ fn what_is_recorded_is_shown_again() -> Result<(), Box<dyn std::error::Error>> {
     app.world_mut().resource_mut::<Playback>().at = 0.1;
     frames(&mut app, 1);
     assert!(actors(&mut app)[1].1.distance < half, "scrubbed back");
-    press(&mut app, Deed::Pause);
-    for (deed, expected) in
-        [(Deed::Ahead, 0.6), (Deed::Ahead, 1.1), (Deed::Back, 0.6), (Deed::Back, 0.1), (Deed::Back, 0.0)]
+    press(&mut app, Action::Pause);
+    for (action, expected) in
+        [(Action::Ahead, 0.6), (Action::Ahead, 1.1), (Action::Back, 0.6), (Action::Back, 0.1), (Action::Back, 0.0)]
     {
-        press(&mut app, deed);
+        press(&mut app, action);
         let at = app.world().resource::<Playback>().at;
-        assert!((at - expected).abs() < 0.1, "{deed:?}: {at} s, expected {expected}");
+        assert!((at - expected).abs() < 0.1, "{action:?}: {at} s, expected {expected}");
     }
     Ok(())
 }
@@ -303,17 +303,17 @@ fn a_ghost_moves_as_the_clip_does_and_keys_switch_it() -> Result<(), Box<dyn std
     assert!((-0.005..0.03).contains(&late), "the ghost is {late} s behind the decision");
 
     let inside = ghost[1].z;
-    press(&mut app, Deed::Ghost);
+    press(&mut app, Action::Ghost);
     frames(&mut app, 2);
     let [ghost, _] = ghost_and_body(&mut app).ok_or("a ghost beside the body")?;
     assert!((0.8..1.0).contains(&(inside - ghost[1].z)), "beside: it has moved from {inside} to {} m", ghost[1].z);
-    press(&mut app, Deed::Ghost);
+    press(&mut app, Action::Ghost);
     frames(&mut app, 2);
     assert!(ghost_and_body(&mut app).is_none(), "off");
 
     let mut colored = app.world_mut().query::<&ErrorColors>();
     assert_eq!(colored.iter(app.world()).count(), 1);
-    press(&mut app, Deed::Errors);
+    press(&mut app, Action::Errors);
     frames(&mut app, 2);
     assert_eq!(colored.iter(app.world()).count(), 0);
     Ok(())
@@ -323,7 +323,7 @@ fn a_ghost_moves_as_the_clip_does_and_keys_switch_it() -> Result<(), Box<dyn std
 fn an_agent_of_any_clip_goes_on_to_the_next() -> Result<(), Box<dyn std::error::Error>> {
     let mut app = app(&["MarathonMan", "--mode", "imitate", "--option", "clip=run", "--option", "control=torque"]);
     for clip in ["backflip", "spinkick"] {
-        press(&mut app, Deed::NextAgent);
+        press(&mut app, Action::NextAgent);
         frames(&mut app, 3);
         let mut specs = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
         let spec = specs.single(app.world())?.spec.clone().ok_or("a task")?;
@@ -374,12 +374,12 @@ fn parts_near_their_clip_are_green_and_far_ones_red() -> Result<(), Box<dyn std:
 fn agents_of_one_clip_take_turns_and_keep_to_it() {
     let mut app = app(&["--mode", "imitate"]);
     for agent in ["MarathonManWalk-v0", "MarathonManRun-v0", "MarathonManBackflip-v0", "MarathonManWalk-v0"] {
-        assert_eq!(app.world().resource::<Show>().agent, agent);
+        assert_eq!(app.world().resource::<Scenario>().agent, agent);
         frames(&mut app, 200);
         let (_, episode) = actors(&mut app)[0].clone();
         assert_eq!(episode.number, 1, "{agent} is still up after 4 s: {episode:?}");
         assert!(episode.info[1] < 0.2, "{agent} is near its clip: {:?}", episode.info);
-        press(&mut app, Deed::NextAgent);
+        press(&mut app, Action::NextAgent);
         frames(&mut app, 3);
     }
 }
@@ -407,22 +407,24 @@ fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box
     std::fs::write(&bad, "HIERARCHY nothing")?;
     let mut app = app(&["hopper"]);
     drop_file(&mut app, &bad);
-    let show = app.world().resource::<Show>();
-    assert_eq!((show.agent.as_str(), show.mode), ("Hopper-v0", Mode::Watch));
-    assert!(app.world().resource::<Notes>().0.iter().any(|note| note.error && note.text.contains("broken.bvh")));
+    let scenario = app.world().resource::<Scenario>();
+    assert_eq!((scenario.agent.as_str(), scenario.mode), ("Hopper-v0", Mode::Watch));
+    assert!(
+        app.world().resource::<Notifications>().0.iter().any(|note| note.error && note.text.contains("broken.bvh"))
+    );
     drop_file(&mut app, &good);
-    let show = app.world().resource::<Show>();
-    assert_eq!((show.agent.as_str(), show.mode), ("MarathonMan-v0", Mode::Imitate));
+    let scenario = app.world().resource::<Scenario>();
+    assert_eq!((scenario.agent.as_str(), scenario.mode), ("MarathonMan-v0", Mode::Imitate));
     let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
     let spec = anatomies.single(app.world())?.spec.clone().ok_or("a task")?;
     assert_eq!(spec.options.get("clip"), Some(&"mine.motion".into()));
     assert!(ghost_and_body(&mut app).is_some(), "its ghost is there");
     // L learns it
-    press(&mut app, Deed::Learn);
+    press(&mut app, Action::Learn);
     let begun = Instant::now();
     let newest = loop {
         app.update();
-        if let Some(newest) = app.world().get_resource::<Lesson>().and_then(Lesson::newest) {
+        if let Some(newest) = app.world().get_resource::<TrainingRun>().and_then(TrainingRun::newest) {
             break newest;
         }
         std::thread::sleep(Duration::from_millis(5));
@@ -437,12 +439,12 @@ fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box
 fn a_skin_follows_the_body() -> Result<(), Box<dyn std::error::Error>> {
     let mut app = app(&["MarathonManWalk", "--skin", "marathon_man"]);
     let begun = Instant::now();
-    while app.world().resource::<Costume>().fitting == Fitting::Waiting {
+    while app.world().resource::<WornSkin>().state == SkinState::Waiting {
         frames(&mut app, 1);
         std::thread::sleep(Duration::from_millis(5));
         assert!(begun.elapsed() < Duration::from_secs(60), "it is still being read");
     }
-    assert_eq!(app.world().resource::<Costume>().fitting, Fitting::Worn);
+    assert_eq!(app.world().resource::<WornSkin>().state, SkinState::Worn);
     let mut names = app.world_mut().query::<(&Name, &GlobalTransform)>();
     let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
     for _ in 0..3 {

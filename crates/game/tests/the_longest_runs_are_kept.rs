@@ -11,7 +11,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 fn course(kind: &str) -> Course {
-    Course { agent: "Hopper-v0".into(), kind: kind.into(), difficulty: 0.5, part: "watch".into() }
+    Course { agent: "Hopper-v0".into(), kind: kind.into(), difficulty: 0.5, role: "watch".into() }
 }
 
 fn run(kind: &str, episode: u64, distance: f64) -> Run {

@@ -28,7 +28,7 @@ pub fn requested() -> bool {
 }
 
 /// Quits the game after a signal.
-pub fn obey(mut exit: MessageWriter<AppExit>) {
+pub fn quit(mut exit: MessageWriter<AppExit>) {
     if requested() {
         exit.write(AppExit::from_code(CODE));
     }

@@ -7,11 +7,11 @@ use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use clap::Parser;
-use marathon_game::app::{Args, Bindings, GamePlugin};
+use marathon_game::app::{Args, Bindings, GamePlugin, LoadScenario, Scenario};
 use std::time::Duration;
 
 /// The game with these words on its command line, after its first frames, each of which is this long. `add` adds what a test
-/// needs before the first. Its keys are those that it comes with, whatever the user has bound.
+/// needs before the first frame. All keys have their defaults, whatever the user has bound.
 pub fn game(words: &[&str], frame: Duration, add: impl FnOnce(&mut App)) -> App {
     let args = Args::parse_from([&["marathon-game"], words].concat());
     let mut app = App::new();
@@ -27,6 +27,13 @@ pub fn game(words: &[&str], frame: Duration, add: impl FnOnce(&mut App)) -> App 
     app.insert_resource(Bindings::default());
     frames(&mut app, 3);
     app
+}
+
+/// Changes the scenario and loads it.
+#[allow(dead_code, reason = "not every test needs it")]
+pub fn load(app: &mut App, change: impl FnOnce(&mut Scenario)) {
+    change(&mut app.world_mut().resource_mut::<Scenario>());
+    app.world_mut().write_message(LoadScenario);
 }
 
 /// So many frames.

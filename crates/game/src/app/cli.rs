@@ -1,0 +1,411 @@
+//! The command line of `marathon-game`.
+
+use crate::app::error::GameError;
+use crate::app::files::exists;
+use crate::app::input::response::{Mapping, Mappings};
+use crate::app::input::scripted::{ScriptedAction, ScriptedInput};
+use crate::app::mode::Mode;
+use crate::app::pacing::FixedSettings;
+use crate::app::stage::clips::{FOLLOWER, follows_clip};
+use crate::app::stage::course::{self, CourseOptions, PlayerRole};
+use crate::app::stage::policies::ShippedPolicies;
+use crate::app::stage::scenario::{PolicySource, Scenario};
+use crate::ground::Ground;
+use crate::herd::part_of;
+use crate::look::{CameraMode, Quality};
+use clap::{Parser, ValueEnum};
+use marathon_envs::registry;
+use marathon_learn::EvalOptions;
+use marathon_physics::Model;
+use marathon_runs::folder::policy_path;
+use marathon_runs::{FilmOptions, LearnOptions, RunError, Setting, TaskOptions, policy_file};
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  marathon-game                                  a trained hopper; everything else is in the menu (Esc)
+  marathon-game humanoid --agents 16             a row of them
+  marathon-game runs/hopper-1                    the policy of a run, which is read again whenever training saves it
+  marathon-game hopper --mode learn              from random weights to a run, before your eyes
+  marathon-game --mode imitate                   a person walks, beside the clip that it follows; N: runs, flips
+  marathon-game MarathonMan --mode imitate --option clip=my.bvh   a clip of your own; L learns it
+  marathon-game walker --mode push               click to push, B to throw balls, sliders for gravity and friction
+  marathon-game --mode course                    an assault course, and the table of the longest runs (T)
+  marathon-game --mode course --role run         you steer the runner, by arrow keys or gamepad
+  marathon-game --mode course --role build       you build the ground ahead of it, with the mouse
+  marathon-game --mode testbed my-robot.xml      a slider per motor
+  marathon-game ant --ground stairs              or hills, or boards
+  marathon-game MarathonManRun --skin marathon_man   with the skin of a person; or with that of hero.glb
+  marathon-game hopper --record hop.mp4          a film, without a window (needs ffmpeg)
+  marathon-game hopper --mode push --action 1.5:throw --record ball.mp4   the same with a ball thrown at it
+  marathon-game --replay run.replay              what R recorded, with a time line
+  marathon-game hopper --agents 16 --mlagents-port 5004   mlagents-learn trains while you watch
+
+Keys are shown on the screen (F1) and can be changed in the menu.";
+
+/// Watch, push, teach and film physical characters.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
+pub struct Args {
+    /// Agent (such as hopper, walker, humanoid, MarathonManRun), policy file, folder of a run, or MJCF file (.xml) [with
+    /// --mode imitate: MarathonManWalk; with --mode course: TerrainWalker2d, or with --role run AntController].
+    #[arg(default_value = "hopper", default_value_ifs([
+        ("mode", "imitate", "MarathonManWalk"),
+        ("role", "run", "AntController"),
+        ("mode", "course", "TerrainWalker2d"),
+    ]))]
+    pub what: String,
+    /// Mode of the game.
+    #[arg(long, value_enum, default_value_t = Mode::Watch)]
+    pub mode: Mode,
+    /// Policy file, or folder of a run [default: the one that comes with the agent].
+    #[arg(long, value_name = "FILE")]
+    pub policy: Option<PathBuf>,
+    /// Agents side by side.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub agents: u16,
+    /// Ground.
+    #[arg(long, value_enum, default_value_t = GroundArg::Level)]
+    pub ground: GroundArg,
+    /// Options of the task [default: those that the policy was trained with].
+    #[command(flatten)]
+    pub task: TaskOptions,
+    /// Recording to replay; the key R makes one.
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// Skin of the characters: a .glb file with a skeleton, or marathon_man, which comes with Marathon.
+    #[arg(long, value_name = "FILE")]
+    pub skin: Option<PathBuf>,
+    /// Mapping from bones to bodies, for a skeleton with unknown names [default: the mapping that comes with Marathon for the
+    /// model].
+    #[arg(long, value_name = "F.json", requires = "skin")]
+    pub mapping: Option<PathBuf>,
+    /// Options of the trainer in --mode learn. The seed is that of everything random.
+    #[command(flatten)]
+    pub learn: LearnOptions,
+
+    /// Kind of the course of --mode course: flat, slopes, steps, stairs, gaps, rubble, boxes, mixed, meters, bumps, blocks or adversary
+    /// [default: mixed].
+    #[arg(long, value_name = "KIND")]
+    pub course: Option<String>,
+    /// Difficulty of the course, from 0 to 1 [default: 0.5].
+    #[arg(long, value_name = "D")]
+    pub difficulty: Option<f64>,
+    /// Your role on the course [default: watch].
+    #[arg(long, value_enum)]
+    pub role: Option<PlayerRole>,
+    /// Your name in the table of the longest runs [default: your user name].
+    #[arg(long, value_name = "NAME")]
+    pub player: Option<String>,
+    /// Table of the longest runs, an SQLite file [default: marathon/runs.sqlite in the folder for your data].
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
+    /// Print the table of the longest runs.
+    #[arg(long)]
+    pub runs: bool,
+
+    /// Port of mlagents-learn, which trains the agents while you watch; its default is 5004.
+    #[arg(long, value_name = "N", conflicts_with_all = ["mode", "policy", "replay", "record", "watch_stream"])]
+    pub mlagents_port: Option<u16>,
+    /// Show the states that arrive on the standard input; the Python package uses it for render_mode="human".
+    #[arg(long, conflicts_with_all = ["mode", "policy", "replay", "record"])]
+    pub watch_stream: bool,
+
+    /// Deflection below which sticks and triggers count as released, from 0 to below 1.
+    #[arg(long, value_name = "SHARE", default_value_t = Mappings::default().pad.dead_zone, value_parser = dead_zone)]
+    pub dead_zone: f32,
+    /// Response exponent of sticks and triggers; above 1 gives finer control near the center.
+    #[arg(long, value_name = "POWER", default_value_t = Mappings::default().pad.curve, value_parser = curve)]
+    pub curve: f32,
+    /// Smoothing time constant of sticks and triggers, s (63 % of a change).
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = smoothing)]
+    pub smoothing: f32,
+    /// Smoothing time constant of the keys that steer, s.
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = smoothing)]
+    pub key_smoothing: f32,
+
+    /// Run the action of a key at a time, s, such as 2.5:throw or 4:next-agent; repeatable.
+    #[arg(long, value_name = "S:ACTION")]
+    pub action: Vec<ScriptedAction>,
+    /// Hold a key, or a stick, trigger or button of a gamepad, from one time to another, s, such as 1-2.5:key:up,
+    /// 1-3:pad:left-y=0.5 or 2-2.2:pad2:a; repeatable.
+    #[arg(long, value_name = "S-S:DEVICE:CONTROL")]
+    pub input: Vec<ScriptedInput>,
+
+    /// Quality of the picture [default: medium, or low if a processor draws the window].
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    /// Size of the window or the film, pixels [default: 1280x720].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(u32, u32)>,
+    /// Place of the camera.
+    #[arg(long, value_enum, default_value_t = CameraArg::Side)]
+    pub camera: CameraArg,
+    /// Limit on the frames per second of the window; 0 for the rate of the screen.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub max_fps: u32,
+    /// Draw contacts and their forces.
+    #[arg(long)]
+    pub contacts: bool,
+    /// Draw joints and their limits.
+    #[arg(long)]
+    pub joints: bool,
+
+    /// Film to write instead of opening a window: .mp4 (needs ffmpeg), .png (one picture, of the last frame), or a folder for
+    /// a sequence of .png.
+    #[arg(long, value_name = "OUT")]
+    pub record: Option<PathBuf>,
+    /// Times of the film.
+    #[command(flatten)]
+    pub film: FilmOptions,
+    /// Film without text and bars.
+    #[arg(long)]
+    pub no_hud: bool,
+}
+
+/// Default size of a window or film, pixels.
+const SIZE: (u32, u32) = (1280, 720);
+/// Default length of a film, s, and its frames per second.
+const SECONDS: f64 = 8.0;
+const FPS: f64 = 30.0;
+
+/// A number of the command line within a range.
+fn within(text: &str, fits: impl Fn(f32) -> bool, expected: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x| fits(*x)).ok_or_else(|| format!("expected {expected}"))
+}
+
+fn dead_zone(text: &str) -> Result<f32, String> {
+    within(text, |x| (0.0..1.0).contains(&x), "a number from 0 to below 1")
+}
+
+fn curve(text: &str) -> Result<f32, String> {
+    within(text, |x| x > 0.0 && x <= 10.0, "a number above 0, up to 10")
+}
+
+fn smoothing(text: &str) -> Result<f32, String> {
+    within(text, |x| (0.0..=10.0).contains(&x), "seconds from 0 to 10")
+}
+
+impl Args {
+    /// The response to gamepads and keys.
+    pub fn mappings(&self) -> Mappings {
+        let Args { dead_zone, curve, smoothing, key_smoothing, .. } = *self;
+        let keys = Mapping { smoothing: key_smoothing, ..Mappings::default().keys };
+        Mappings { pad: Mapping { dead_zone, curve, smoothing }, keys }
+    }
+
+    /// Size of the window or film, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size.unwrap_or(SIZE)
+    }
+
+    /// Seed of everything random.
+    pub fn seed(&self) -> u64 {
+        self.learn.seed.unwrap_or(EvalOptions::default().seed)
+    }
+
+    /// Length of the film, seconds.
+    pub fn seconds(&self) -> f64 {
+        self.film.seconds.unwrap_or(SECONDS)
+    }
+
+    /// Frames per second of the film.
+    pub fn fps(&self) -> f64 {
+        self.film.fps.unwrap_or(FPS)
+    }
+
+    /// The settings that other programs must not change.
+    pub fn fixed_settings(&self) -> FixedSettings {
+        FixedSettings { quality: self.quality.is_some(), size: self.size.is_some(), rate: self.max_fps > 0 }
+    }
+
+    /// Quality of the picture.
+    pub fn quality(&self) -> Quality {
+        self.quality.map_or(Quality::Medium, Quality::from)
+    }
+}
+
+/// The scenario of a command line.
+///
+/// # Errors
+/// If there is no such agent, file or policy.
+pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, GameError> {
+    let mut scenario = Scenario {
+        mode: args.mode,
+        agent: String::new(),
+        chosen: Setting::default(),
+        source: PolicySource::Shipped,
+        agents: usize::from(args.agents),
+        ground: args.ground.into(),
+        course: course_options(args)?,
+        seed: args.seed(),
+        model: None,
+    };
+    let path = Path::new(&args.what);
+    let is_model = path.extension().is_some_and(|e| e == "xml" || e == "mjcf");
+    let given = match (&args.policy, registry::agent(&args.what)) {
+        (_, Ok(agent)) => {
+            scenario.agent = agent.facts().id;
+            args.policy.clone()
+        }
+        (_, Err(_)) if is_model => {
+            exists(path)?;
+            Model::from_xml_file(path).map_err(Box::new)?;
+            (scenario.mode, scenario.model, scenario.source) =
+                (Mode::Testbed, Some(path.into()), PolicySource::Nothing);
+            scenario.agent = "hopper".into();
+            if !args.task.given.is_empty() {
+                return Err(RunError::option("option", "is for tasks, and a model of the test bed has none").into());
+            }
+            return Ok(scenario);
+        }
+        (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => Some(path.to_path_buf()),
+        // neither an agent nor a file: the registry's message names the nearest agent
+        (_, Err(error)) => return Err(error.into()),
+    };
+    if let Some(given) = given {
+        if scenario.agent.is_empty() {
+            let name = match policy_file::task_of(&given)? {
+                Some(noted) => noted.agent,
+                None => policy_file::read(&given, None)?.meta().agent.clone(),
+            };
+            scenario.agent = registry::agent(&name)?.facts().id;
+        }
+        scenario.source = PolicySource::File(policy_path(&given)?);
+    }
+    if scenario.mode == Mode::Imitate && !follows_clip(&scenario.agent) {
+        let problem = format!(
+            "imitate is for agents that follow a motion clip, {} follows none; {FOLLOWER} does",
+            scenario.agent
+        );
+        return Err(RunError::option("mode", problem).into());
+    }
+    scenario.chosen = Setting::named(&scenario.agent)?.with(&args.task)?;
+    if scenario.mode == Mode::Course {
+        scenario.course.take_from(&scenario.chosen.options);
+    }
+    let setting = scenario.setting(shipped)?;
+    if scenario.mode == Mode::Course {
+        course::check(&scenario.course, &setting)?;
+    }
+    match &scenario.source {
+        PolicySource::File(path) => drop(policy_file::read(path, part_of(setting.factory()?.spec(), 0).as_ref())?),
+        _ if !args.task.given.is_empty() => drop(setting.factory()?),
+        _ => {}
+    }
+    if scenario.mode == Mode::Learn {
+        scenario.play(PolicySource::Trainer, shipped);
+    }
+    Ok(scenario)
+}
+
+/// The course of a command line.
+///
+/// # Errors
+/// If the mode is another one, or the difficulty is not from 0 to 1.
+fn course_options(args: &Args) -> Result<CourseOptions, GameError> {
+    let named =
+        [("course", args.course.is_some()), ("difficulty", args.difficulty.is_some()), ("role", args.role.is_some())];
+    if let Some((name, _)) = named.iter().find(|(_, given)| *given && args.mode != Mode::Course) {
+        let problem =
+            format!("goes with --mode course alone; a task that has such an argument takes --option {name}=VALUE");
+        return Err(RunError::option(name, problem).into());
+    }
+    let own = CourseOptions::default();
+    let difficulty = args.difficulty.unwrap_or(own.difficulty);
+    if !(0.0..=1.0).contains(&difficulty) {
+        return Err(RunError::option("difficulty", format!("is {difficulty}, expected a number from 0 to 1")).into());
+    }
+    Ok(CourseOptions { role: args.role.unwrap_or_default(), kind: args.course.clone().unwrap_or(own.kind), difficulty })
+}
+
+/// [`Ground`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum GroundArg {
+    /// Level, as in training.
+    Level,
+    /// Waves that grow to 60 cm.
+    Hills,
+    /// Flights of five steps, up and down.
+    Stairs,
+    /// Low boards across the track.
+    Boards,
+}
+
+impl From<GroundArg> for Ground {
+    fn from(ground: GroundArg) -> Self {
+        match ground {
+            GroundArg::Level => Ground::Level,
+            GroundArg::Hills => Ground::Hills,
+            GroundArg::Stairs => Ground::Stairs,
+            GroundArg::Boards => Ground::Boards,
+        }
+    }
+}
+
+/// [`Quality`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum QualityArg {
+    /// No shadows, no smoothed edges.
+    Low,
+    /// Shadows, edges smoothed.
+    Medium,
+    /// Larger shadow maps.
+    High,
+}
+
+impl From<QualityArg> for Quality {
+    fn from(quality: QualityArg) -> Self {
+        match quality {
+            QualityArg::Low => Quality::Low,
+            QualityArg::Medium => Quality::Medium,
+            QualityArg::High => Quality::High,
+        }
+    }
+}
+
+/// [`CameraMode`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CameraArg {
+    /// Beside the runner.
+    Side,
+    /// Behind it.
+    Chase,
+    /// Around it.
+    Orbit,
+}
+
+impl From<CameraArg> for CameraMode {
+    fn from(camera: CameraArg) -> Self {
+        match camera {
+            CameraArg::Side => CameraMode::Side,
+            CameraArg::Chase => CameraMode::Chase,
+            CameraArg::Orbit => CameraMode::Orbit,
+        }
+    }
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let number = |s: &str| s.parse::<u32>().ok().filter(|n| (16..=8192).contains(n));
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((number(w)?, number(h)?)));
+    sides.ok_or_else(|| "expected a width and a height from 16 to 8192, such as 1280x720".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!(parse_size("320x192"), Ok((320, 192)));
+        for text in ["320", "x", "0x10", "-5x100", "99999x99"] {
+            assert!(parse_size(text).is_err(), "{text}");
+        }
+    }
+}

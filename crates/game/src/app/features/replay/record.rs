@@ -1,0 +1,179 @@
+//! Recordings of runs.
+
+use crate::app::error::GameError;
+use crate::app::files::{file_stem, free_name};
+use crate::app::input::actions::{Action, ActionPressed};
+use crate::app::input::control::ControlSet;
+use crate::app::mode::{AppSet, Mode};
+use crate::app::notifications::Notifications;
+use crate::app::stage::actors::Actor;
+use crate::app::stage::loaded::LoadedPolicy;
+use crate::app::stage::recording::Recording;
+use crate::app::stage::scenario::{LoadScenario, Scenario};
+use crate::app::stage::spawn::{enter_mode, spawn};
+use crate::app::ui::question::{AtStake, ReportSet};
+use crate::app::ui::status::StatusLines;
+use crate::app::ui::theme::BAD;
+use crate::plugin::MarathonSystems;
+use crate::ragdoll::{Anatomy, Episode};
+use crate::simulate::{Marathon, Seat};
+use bevy::prelude::*;
+use marathon_physics::budget;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Longest recording, frames.
+const LONGEST: usize = 60_000;
+/// Share of the largest replay for states and actions. The rest is for grounds.
+const FILLED: f64 = 0.75;
+
+/// A recording that is being made.
+#[derive(Resource)]
+pub struct Recorder {
+    recording: Recording,
+    /// Time of the newest frame.
+    until: Duration,
+}
+
+impl Recorder {
+    /// Length so far, s.
+    pub fn seconds(&self) -> f64 {
+        self.recording.seconds()
+    }
+
+    /// Whether the replay has reached its maximum length.
+    fn is_full(&self) -> bool {
+        let most = budget::REPLAY_FILE.most().unwrap_or(0) as f64;
+        self.recording.frames() >= LONGEST || self.recording.bytes() as f64 > FILLED * most
+    }
+}
+
+pub(super) fn plugin(app: &mut App) {
+    app.add_systems(PreUpdate, report_at_stake.in_set(ReportSet))
+        .add_systems(
+            Update,
+            (
+                control.in_set(AppSet::Input).after(ControlSet),
+                (end_with_scenario.run_if(on_message::<LoadScenario>), end_when_full)
+                    .chain()
+                    .in_set(AppSet::Simulate)
+                    .after(enter_mode)
+                    .before(spawn),
+                report.in_set(AppSet::Present),
+            ),
+        )
+        .add_systems(FixedUpdate, record.after(MarathonSystems::Report))
+        .add_systems(Last, save_running.run_if(on_message::<AppExit>));
+}
+
+/// Starts and ends recordings.
+fn control(
+    mut commands: Commands,
+    mut actions: MessageReader<ActionPressed>,
+    (scenario, loaded): (Res<Scenario>, Res<LoadedPolicy>),
+    recorder: Option<Res<Recorder>>,
+    mut notes: ResMut<Notifications>,
+    actors: Query<(&Actor, &Anatomy, &Transform), With<Seat>>,
+) {
+    for _ in actions.read().filter(|action| action.0 == Action::Record) {
+        if let Some(recorder) = &recorder {
+            commands.remove_resource::<Recorder>();
+            finish(recorder, "", &mut notes);
+            continue;
+        }
+        if !scenario.mode.is_simulated() || scenario.mode == Mode::Testbed {
+            notes.say("only agents can be recorded");
+            continue;
+        }
+        let mut all: Vec<_> = actors.iter().collect();
+        all.sort_by_key(|(actor, ..)| actor.0);
+        let Some((_, anatomy, _)) = all.first() else { continue };
+        let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
+        let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, places);
+        commands.insert_resource(Recorder { recording, until: Duration::ZERO });
+        notes.say("recording; the same key ends it");
+    }
+}
+
+/// Ends a recording when other characters come. The recording is complete up to now.
+fn end_with_scenario(mut commands: Commands, recorder: Option<Res<Recorder>>, mut notes: ResMut<Notifications>) {
+    if let Some(recorder) = recorder {
+        commands.remove_resource::<Recorder>();
+        finish(&recorder, "other characters come: ", &mut notes);
+    }
+}
+
+/// Ends a recording that has reached its maximum length.
+fn end_when_full(mut commands: Commands, recorder: Option<Res<Recorder>>, mut notes: ResMut<Notifications>) {
+    if let Some(recorder) = recorder.filter(|recorder| recorder.is_full()) {
+        commands.remove_resource::<Recorder>();
+        finish(&recorder, "the recording has its maximum length: ", &mut notes);
+    }
+}
+
+/// Shows that a recording is being made.
+fn report(recorder: Option<Res<Recorder>>, mut lines: ResMut<StatusLines>) {
+    if let Some(recorder) = recorder {
+        lines.0.push((BAD, format!("recording {:.1} s", recorder.seconds())));
+    }
+}
+
+/// Reports what the end of the game would interrupt.
+fn report_at_stake(recorder: Option<Res<Recorder>>, mut at_stake: ResMut<AtStake>) {
+    at_stake.recording = recorder.map(|recorder| recorder.seconds());
+}
+
+/// Ends the current recording, if there is one, and saves it.
+pub fn save_running(world: &mut World) {
+    if let Some(recorder) = world.remove_resource::<Recorder>() {
+        world.resource_scope(|_, mut notes: Mut<Notifications>| finish(&recorder, "", &mut notes));
+    }
+}
+
+/// Saves a recording and shows a note.
+fn finish(recorder: &Recorder, why: &str, notes: &mut Notifications) {
+    if recorder.recording.frames() == 0 {
+        notes.say(format!("{why}nothing was recorded"));
+        return;
+    }
+    match keep(&recorder.recording) {
+        Ok(path) => {
+            let (path, film) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
+            notes.say(format!("{why}saved as {path}; a film of it: marathon-game --replay {path} --record {film}"));
+        }
+        Err(error) => notes.error(format!("{why}the recording cannot be saved: {error}")),
+    }
+}
+
+/// Saves under the first free name.
+fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
+    let path = free_name(&file_stem(&recording.setting.agent), "replay");
+    recording.save(&path)?;
+    Ok(path)
+}
+
+/// Appends the decisions since the last tick.
+fn record(
+    recorder: Option<ResMut<Recorder>>,
+    marathon: Res<Marathon>,
+    actors: Query<(&Actor, &Seat, &Episode, &Anatomy)>,
+) {
+    let Some(mut recorder) = recorder else { return };
+    let mut all: Vec<_> = actors.iter().collect();
+    all.sort_by_key(|(actor, ..)| actor.0);
+    let Recorder { recording, until, .. } = &mut *recorder;
+    if all.len() != recording.agents {
+        return;
+    }
+    let trails: Vec<_> = all.iter().filter_map(|(_, seat, ..)| marathon.resident(**seat)).map(|r| &r.trail).collect();
+    let Some(first) = trails.first() else { return };
+    let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > *until).collect();
+    for time in times {
+        let stills: Option<Vec<_>> = trails.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
+        let Some(stills) = stills else { continue };
+        *until = time;
+        for (still, (.., episode, anatomy)) in stills.iter().zip(&all) {
+            recording.push_state(still, episode, anatomy);
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! Sticks, triggers and keys command the character in focus, if its agent takes commands. The deflections of a device pass its
+//! [mapping](Mapping).
+
+use crate::app::input::actions::{Action, ActionPressed, COMMAND_BUTTONS, COMMAND_KEYS, STEERING_KEYS, Steering};
+use crate::app::input::bindings;
+use crate::app::input::key_names::{button_name, key_name};
+use crate::app::input::response::{Mapping, Mappings};
+use crate::app::mode::Mode;
+use crate::app::stage::actors::{Actor, Focus};
+use crate::app::stage::course::PlayerRole;
+use crate::app::stage::loaded::LoadedPolicy;
+use crate::app::stage::scenario::Scenario;
+use crate::ground::Ground;
+use crate::ragdoll::{AgentCommand, Anatomy, Restart};
+use crate::simulate::RagdollState;
+use bevy::input::InputSystems;
+use bevy::input::gamepad::{Gamepad, GamepadAxis};
+use bevy::prelude::*;
+use bevy_egui::input::EguiWantsInput;
+use marathon_envs::CommandRange;
+
+/// Deflection ahead, to the left, and aside to the left, in [-1, 1], and two buttons, 0 or 1.
+type Deflection = [f32; 5];
+/// The number of entries for sticks and triggers.
+const STICKS: usize = 3;
+/// No deflection.
+const REST: Deflection = [0.0; 5];
+
+/// The present deflections of the gamepads, in the order in which they were connected, and of the keyboard.
+#[derive(Default)]
+pub struct Deflections {
+    pads: Vec<(Entity, Deflection)>,
+    keys: Deflection,
+}
+
+impl Deflections {
+    /// Takes in the present state of the devices.
+    fn update(&mut self, pads: &Query<(Entity, &Gamepad)>, keys: Deflection, mappings: &Mappings, dt: f32) {
+        let update = |last: &mut Deflection, now: Deflection, mapping: &Mapping| {
+            *last = [0, 1, 2, 3, 4].map(|i| if i < STICKS { mapping.smooth(last[i], now[i], dt) } else { now[i] });
+        };
+        self.pads.retain(|(pad, _)| pads.contains(*pad));
+        for (entity, pad) in pads {
+            let at = self.pads.iter().position(|(known, _)| *known == entity).unwrap_or_else(|| {
+                self.pads.push((entity, REST));
+                self.pads.len() - 1
+            });
+            update(&mut self.pads[at].1, of_pad(pad, &mappings.pad), &mappings.pad);
+        }
+        update(&mut self.keys, keys, &mappings.keys);
+    }
+
+    /// Number of players.
+    fn players(&self) -> usize {
+        self.pads.len().max(1)
+    }
+
+    /// The deflection of a player. The first player has the keyboard and a gamepad, whichever is pushed farther; each other
+    /// player has a gamepad.
+    fn of(&self, player: usize) -> Deflection {
+        let pad = self.pads.get(player).map_or(REST, |(_, deflection)| *deflection);
+        if player > 0 { pad } else { [0, 1, 2, 3, 4].map(|i| farthest(pad[i], self.keys[i])) }
+    }
+}
+
+/// Describes a control that steers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Control {
+    /// The keys.
+    pub keys: &'static str,
+    /// The gamepad's controls.
+    pub pad: &'static str,
+    /// The name of the command value that the control sets.
+    pub does: String,
+}
+
+/// The controls for a command with these ranges, in the order in which [`command_of`] reads them.
+pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
+    let control = |keys, pad, i: usize| Control { keys, pad, does: ranges[i].name.replace('_', " ") };
+    let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
+    let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
+    match kinds {
+        [Some(speed), None, Some(button)] => {
+            vec![control("Left Right", "left stick", speed), control("Up", "left stick up", button)]
+        }
+        [Some(speed), None, None] => vec![control("arrows", "left stick", speed)],
+        [Some(speed), Some(turn), _] => {
+            let mut all = vec![control("Up Down", "left stick", speed), control("Left Right", "left stick", turn)];
+            if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
+                all.push(Control { does: "step aside".into(), ..control("A D", "triggers", speed + 1 + second) });
+            }
+            let names = COMMAND_KEYS.map(key_name).into_iter().zip(COMMAND_BUTTONS.map(button_name));
+            all.extend(buttons(ranges).zip(names).map(|(i, (key, pad))| control(key, pad, i)));
+            all
+        }
+        _ => {
+            let keys = [("Up Down", "left stick"), ("Left Right", "left stick")];
+            keys.into_iter().take(ranges.len()).enumerate().map(|(i, (keys, pad))| control(keys, pad, i)).collect()
+        }
+    }
+}
+
+pub(super) fn plugin(app: &mut App) {
+    app.init_resource::<Mappings>().add_systems(PreUpdate, steer.after(InputSystems).before(bindings::read));
+}
+
+/// Sends the command of the first gamepad and the keys to the character in focus, and those of other gamepads to the
+/// characters behind it. A character keeps its command until [`Action::Release`], or until no player controls it. While a
+/// character is steered, the task's time limit does not apply. On a course, runs end by the course's rules.
+#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+#[allow(clippy::type_complexity, reason = "a query names what it reads")]
+fn steer(
+    mut commands: Commands,
+    keys: Res<ButtonInput<KeyCode>>,
+    pads: Query<(Entity, &Gamepad)>,
+    wants: Option<Res<EguiWantsInput>>,
+    mut actions: MessageReader<ActionPressed>,
+    (scenario, loaded, focus): (Res<Scenario>, Res<LoadedPolicy>, Res<Focus>),
+    mut steering: ResMut<Steering>,
+    mappings: Res<Mappings>,
+    time: Res<Time<Real>>,
+    mut deflections: Local<Deflections>,
+    mut actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>, &mut Restart), With<RagdollState>>,
+) {
+    let on_course = scenario.mode == Mode::Course;
+    // on a course the runner stays under player control until the run ends
+    let released = actions.read().filter(|action| action.0 == Action::Release).count() > 0 && !on_course;
+    let spectator = on_course && scenario.course.role != PlayerRole::Run;
+    let typing = wants.is_some_and(|w| w.wants_keyboard_input());
+    deflections.update(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
+    let (mut own, count) = (Steering::default(), actors.iter().count());
+    for (entity, actor, anatomy, command, mut restart) in &mut actors {
+        let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
+        let player = (actor.0 + count).saturating_sub(focus.0) % count;
+        let led = (player < deflections.players() || on_course) && !ranges.is_empty() && !spectator;
+        let deflection = deflections.of(player);
+        if led && player == 0 {
+            own = Steering { on: true, buttons: buttons(ranges).next().is_some() };
+        }
+        let steered = led && !released && (command.is_some() || deflection != REST);
+        let timed = Restart { on_time_up: !steered && loaded.ground != Ground::Track, ..*restart };
+        if !on_course && *restart != timed {
+            *restart = timed;
+        }
+        if !led || released {
+            if command.is_some() {
+                commands.entity(entity).remove::<AgentCommand>();
+            }
+        } else if steered {
+            let wanted = AgentCommand(Some(command_of(ranges, deflection)));
+            if command != Some(&wanted) {
+                commands.entity(entity).insert(wanted);
+            }
+        }
+    }
+    steering.set_if_neq(own);
+}
+
+/// The number that is farther from 0.
+fn farthest(a: f32, b: f32) -> f32 {
+    if b.abs() > a.abs() { b } else { a }
+}
+
+/// The deflection of a gamepad.
+fn of_pad(pad: &Gamepad, mapping: &Mapping) -> Deflection {
+    let axis = |axis| mapping.map(pad.get(axis).unwrap_or(0.0));
+    let trigger = |button| mapping.map(pad.get(button).unwrap_or(0.0));
+    let [left, right] = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(trigger);
+    let [first, second] = COMMAND_BUTTONS.map(|button| f32::from(pad.pressed(button)));
+    [axis(GamepadAxis::LeftStickY), -axis(GamepadAxis::LeftStickX), left - right, first, second]
+}
+
+/// The deflection of the keyboard.
+fn of_keys(keys: Option<&ButtonInput<KeyCode>>) -> Deflection {
+    let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
+    let [up, down, left, right, aside_left, aside_right] = STEERING_KEYS.map(pressed);
+    let [first, second] = COMMAND_KEYS.map(pressed);
+    [up - down, left - right, aside_left - aside_right, first, second]
+}
+
+/// The entries of a command that buttons set, for characters that turn.
+fn buttons(ranges: &[CommandRange]) -> impl Iterator<Item = usize> {
+    let turns = ranges.iter().any(CommandRange::is_turn);
+    ranges.iter().enumerate().filter(move |(_, range)| turns && range.is_button()).map(|(i, _)| i)
+}
+
+/// The command of a deflection. A released stick means rest, and the ends of a stick are those of the range.
+///
+/// * For characters that turn, up and down are the speed, left and right the turn.
+/// * For characters that do not turn, such as a figure in a plane, right and left are the speed. Up is the button, if the command
+///   has one: a number from 0 to 1 without a unit. Otherwise up and down are the speed, too.
+/// * If no number is in m/s, up and down are the first number, left and right the second.
+/// * The second number in m/s of a character that turns is a step aside: the triggers, or A and D. The first two buttons of such
+///   a character, for example a jump, are A and B of a gamepad, or W and V.
+fn command_of(ranges: &[CommandRange], deflection: Deflection) -> Vec<f64> {
+    let [ahead, left, aside, pressed @ ..] = deflection.map(f64::from);
+    let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
+    let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
+    let mut pushed = vec![0.0; ranges.len()];
+    match kinds {
+        [Some(speed), None, Some(button)] => {
+            pushed[speed] = -left;
+            pushed[button] = f64::from(u8::from(ahead > 0.5));
+        }
+        [Some(speed), None, None] => pushed[speed] = if left.abs() > ahead.abs() { -left } else { ahead },
+        [Some(speed), Some(turn), _] => {
+            (pushed[speed], pushed[turn]) = (ahead, left);
+            if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
+                pushed[speed + 1 + second] = aside;
+            }
+            buttons(ranges).zip(pressed).for_each(|(i, x)| pushed[i] = x);
+        }
+        _ => pushed.iter_mut().zip([ahead, left]).for_each(|(number, x)| *number = x),
+    }
+    let number = |(range, x): (&CommandRange, f64)| {
+        let end = if x > 0.0 { range.high } else { range.low };
+        (range.rest() + (end - range.rest()) * x.abs()).clamp(range.low, range.high)
+    };
+    ranges.iter().zip(pushed).map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stick_reaches_the_whole_range_and_rests_at_its_rest() {
+        let ranges = [
+            CommandRange::new("speed", -1.0..=3.0, "m/s"),
+            CommandRange::new("turn", -2.0..=2.0, "rad/s"),
+            CommandRange::new("height", 0.5..=1.0, "m"),
+        ];
+        for (deflection, expected) in [
+            ([0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
+            ([1.0, -1.0, 0.0, 0.0, 0.0], [3.0, -2.0, 0.5]),
+            ([-1.0, 1.0, 0.0, 0.0, 0.0], [-1.0, 2.0, 0.5]),
+            ([0.5, 0.25, 1.0, 0.0, 0.0], [1.5, 0.5, 0.5]),
+            ([-0.5, 0.0, 0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]),
+        ] {
+            assert_eq!(command_of(&ranges, deflection), expected);
+        }
+        // a range without zero rests at its nearer end
+        assert_eq!(command_of(&ranges[2..], [-1.0, 0.0, 0.0, 0.0, 0.0]), [0.5]);
+        assert_eq!(command_of(&ranges[2..], [1.0, 0.0, 0.0, 0.0, 0.0]), [1.0]);
+    }
+
+    #[test]
+    fn a_figure_in_a_plane_goes_where_the_stick_points_and_jumps_when_it_is_up() {
+        let velocity = CommandRange::new("velocity", -4.0..=4.0, "m/s");
+        let jump = CommandRange::new("jump", 0.0..=1.0, "");
+        for (deflection, expected) in [
+            ([0.0, 0.0], [0.0, 0.0]),
+            // to the right is forward
+            ([0.0, -1.0], [4.0, 0.0]),
+            ([0.4, 0.5], [-2.0, 0.0]),
+            ([1.0, -0.5], [2.0, 1.0]),
+            ([-1.0, 0.0], [0.0, 0.0]),
+        ] {
+            let [ahead, left] = deflection;
+            let deflection = [ahead, left, 0.0, 0.0, 0.0];
+            assert_eq!(command_of(&[velocity.clone(), jump.clone()], deflection), expected, "{deflection:?}");
+        }
+        for (deflection, expected) in [([1.0, 0.0], 4.0), ([0.0, -1.0], 4.0), ([-0.5, 0.25], -2.0), ([0.25, 0.5], -2.0)]
+        {
+            let [ahead, left] = deflection;
+            let deflection = [ahead, left, 0.0, 0.0, 0.0];
+            assert_eq!(command_of(std::slice::from_ref(&velocity), deflection), [expected], "{deflection:?}");
+        }
+    }
+
+    #[test]
+    fn a_character_that_turns_may_step_aside() {
+        let ranges = [
+            CommandRange::new("speed", -3.0..=3.0, "m/s"),
+            CommandRange::new("left", -2.0..=2.0, "m/s"),
+            CommandRange::new("turn", -1.5..=1.5, "rad/s"),
+        ];
+        for (deflection, expected) in [
+            ([0.5, -1.0, 0.0, 0.0, 0.0], [1.5, 0.0, -1.5]),
+            ([0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            ([0.0, 0.0, -0.5, 0.0, 0.0], [0.0, -1.0, 0.0]),
+        ] {
+            assert_eq!(command_of(&ranges, deflection), expected, "{deflection:?}");
+        }
+    }
+
+    #[test]
+    fn a_character_that_turns_may_jump() {
+        let button = |name| CommandRange::new(name, 0.0..=1.0, "");
+        let mut ranges =
+            vec![CommandRange::new("speed", 0.0..=3.0, "m/s"), CommandRange::new("turn", -1.5..=1.5, "rad/s")];
+        ranges.extend(["jump", "backflip", "sing"].map(button));
+        assert_eq!(command_of(&ranges, [1.0, 0.0, 0.0, 1.0, 0.0]), [3.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(command_of(&ranges, [0.0, 0.0, 0.0, 0.0, 1.0]), [0.0, 0.0, 0.0, 1.0, 0.0]);
+        assert_eq!((buttons(&ranges).count(), buttons(&ranges[..2]).count(), buttons(&ranges[2..]).count()), (3, 0, 0));
+    }
+
+    #[test]
+    fn controls_have_the_names_of_what_they_set() {
+        let range = |name, unit| CommandRange::new(name, 0.0..=1.0, unit);
+        let names = |ranges: &[CommandRange]| {
+            controls(ranges).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
+        };
+        let all = [range("speed", "m/s"), range("left", "m/s"), range("turn", "rad/s"), range("jump", "")];
+        let with_all = [
+            "Up Down/left stick: speed",
+            "Left Right/left stick: turn",
+            "A D/triggers: step aside",
+            "W/A: jump",
+            "V/B: back flip",
+        ];
+        assert_eq!(names(&[&all[..], &[range("back_flip", "")]].concat()), with_all);
+        let planar = ["Left Right/left stick: speed", "Up/left stick up: jump"];
+        assert_eq!(names(&[all[0].clone(), all[3].clone()]), planar);
+        assert_eq!(names(&all[..1]), ["arrows/left stick: speed"]);
+        assert_eq!(names(&all[3..]), ["Up Down/left stick: jump"]);
+        assert!(names(&[]).is_empty());
+    }
+}

@@ -1,0 +1,107 @@
+//! The start of the app: from a command line to a window or a film.
+
+use crate::app::cli::Args;
+use crate::app::error::{self, GameError};
+use crate::app::features::course::leaderboard;
+use crate::app::features::remote::{mailbox, mlagents, pipe};
+use crate::app::game::GamePlugin;
+use crate::app::pacing::FramePace;
+use crate::app::ui::question;
+use crate::app::video::{self, Film};
+use crate::app::{display, interrupt};
+use crate::look::Quality;
+use bevy::app::{PluginGroupBuilder, TerminalCtrlCHandlerPlugin};
+use bevy::prelude::*;
+use bevy::window::{PresentMode, WindowResolution};
+use clap::Parser;
+use std::ffi::OsString;
+use std::io::{BufReader, Write};
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Runs the app with the words of a command line and returns its exit code: 0 after a normal end, 1 if the app cannot start,
+/// 2 for a wrong command line, 130 after Ctrl-C.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args = match Args::try_parse_from(words) {
+        Ok(args) => args,
+        Err(answer) => {
+            let _ = answer.print();
+            return ExitCode::from(answer.exit_code() as u8);
+        }
+    };
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let text = error::plain(&error.to_string());
+            if let GameError::Interrupted(_) = error {
+                eprintln!("{text}");
+                return ExitCode::from(interrupt::CODE);
+            }
+            eprintln!("error: {text}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs the app.
+///
+/// # Errors
+/// If the app cannot start; nothing has been drawn then.
+pub fn run(args: &Args) -> Result<(), GameError> {
+    if args.runs {
+        let path = args.table.clone().map_or_else(leaderboard::default_path, Ok)?;
+        // the reader of a pipe may have closed it
+        let _ = std::io::stdout().write_all(leaderboard::listing(&path)?.as_bytes());
+        return Ok(());
+    }
+    let mut game = GamePlugin::new(args)?;
+    if let Some(out) = &args.record {
+        args.film.validate()?;
+        let film = Film { out, size: args.size(), fps: args.fps(), start: args.film.start, seconds: args.seconds() };
+        return video::record(&film, game);
+    }
+    display::check_display()?;
+    if display::check_graphics()? && args.quality.is_none() {
+        game.set_quality(Quality::Low);
+    }
+    let remote = match args.mlagents_port {
+        Some(port) => {
+            let (setting, agents) = (game.setting()?, usize::from(args.agents));
+            Some(mlagents::serve(&setting, agents, port, args.learn.threads.unwrap_or(0))?)
+        }
+        None if args.watch_stream => Some(pipe::watch(BufReader::new(std::io::stdin()), std::io::stdout())?),
+        None => None,
+    };
+    interrupt::listen();
+    let mut app = App::new();
+    app.add_plugins(windowed(args.size())).add_plugins(game);
+    app.add_systems(Update, (question::close, interrupt::quit));
+    if args.max_fps > 0 {
+        app.insert_resource(FramePace(Duration::from_secs_f64(1.0 / f64::from(args.max_fps))));
+    }
+    let mailbox = remote.as_ref().map(|source| source.shared.clone());
+    if let Some(remote) = remote {
+        app.insert_resource(remote);
+    }
+    match (app.run(), mailbox.and_then(|shared| mailbox::open(&shared).end.take())) {
+        (_, Some(Err(text))) => Err(GameError::Outside(text)),
+        (AppExit::Success, _) => Ok(()),
+        _ if interrupt::requested() => Err(GameError::Interrupted(None)),
+        (AppExit::Error(_), _) => {
+            Err(GameError::System("the window system or the graphics driver has stopped the game; see above".into()))
+        }
+    }
+}
+
+/// Bevy's plugins for an app in a window.
+fn windowed((width, height): (u32, u32)) -> PluginGroupBuilder {
+    let window = Window {
+        title: "Marathon".into(),
+        resolution: WindowResolution::new(width, height),
+        present_mode: PresentMode::AutoVsync,
+        ..default()
+    };
+    // closing the window may ask first
+    let windows = WindowPlugin { primary_window: Some(window), close_when_requested: false, ..default() };
+    DefaultPlugins.set(windows).disable::<TerminalCtrlCHandlerPlugin>()
+}

@@ -1,0 +1,96 @@
+//! The scenario: which characters there are, what moves them, and what they stand on.
+
+use crate::app::mode::Mode;
+use crate::app::stage::course::{self, CourseOptions};
+use crate::app::stage::policies::ShippedPolicies;
+use crate::ground::Ground;
+use bevy::prelude::*;
+use marathon_runs::{RunError, Setting, policy_file};
+use std::path::PathBuf;
+
+/// The requested scenario. A change takes effect with a [`LoadScenario`].
+#[derive(Resource, Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// The mode. `State<Mode>` follows it when the scenario is loaded.
+    pub mode: Mode,
+    /// Registry name of the agent; unused by the test bed.
+    pub agent: String,
+    /// Options of the task that the user has chosen, which override those of the policy. Options of another agent are
+    /// ignored.
+    pub chosen: Setting,
+    /// What moves the characters.
+    pub source: PolicySource,
+    /// Number of characters.
+    pub agents: usize,
+    /// What they stand on; unused by the test bed and on assault courses.
+    pub ground: Ground,
+    /// The assault course, and the player's role.
+    pub course: CourseOptions,
+    /// Seed of their starts.
+    pub seed: u64,
+    /// Model of the test bed.
+    pub model: Option<PathBuf>,
+}
+
+/// Replaces the characters by those of [`Scenario`], in the frame of the message.
+#[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadScenario;
+
+/// What moves the characters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PolicySource {
+    /// The policy that comes with the agent.
+    Shipped,
+    /// A file, read again when it changes.
+    File(PathBuf),
+    /// The trainer in the window.
+    Trainer,
+    /// Nothing.
+    Nothing,
+}
+
+impl Scenario {
+    /// The task: the options of the policy, overridden by those that the user has chosen.
+    ///
+    /// # Errors
+    /// If there is no such agent, or the policy's file cannot be read.
+    pub fn setting(&self, shipped: &ShippedPolicies) -> Result<Setting, RunError> {
+        let named = Setting::named(&self.agent)?;
+        let noted = match &self.source {
+            PolicySource::File(path) => policy_file::task_of(path)?,
+            PolicySource::Shipped => shipped.policy(&self.agent).map(|policy| Setting::of(policy.0.meta())),
+            PolicySource::Trainer | PolicySource::Nothing => None,
+        };
+        let noted = noted.filter(|noted| noted.agent == named.agent).unwrap_or(named);
+        let chosen = Some(&self.chosen).filter(|chosen| chosen.agent == noted.agent);
+        let setting = chosen.map_or_else(|| noted.clone(), |chosen| noted.clone().overlaid(chosen));
+        Ok(match self.mode {
+            Mode::Course => self.course.applied(setting, chosen),
+            _ => setting,
+        })
+    }
+
+    /// What the characters stand on.
+    pub fn stands_on(&self) -> Ground {
+        match self.mode {
+            Mode::Course if course::has_own(&self.agent) => Ground::Level,
+            Mode::Course => Ground::Track,
+            _ => self.ground,
+        }
+    }
+
+    /// Whether the player builds the ground.
+    pub fn is_built(&self) -> bool {
+        self.mode == Mode::Course && self.course.role == course::PlayerRole::Build
+    }
+
+    /// Changes what moves the characters. A file brings its own task; anything else keeps the present one.
+    pub fn play(&mut self, source: PolicySource, shipped: &ShippedPolicies) {
+        self.chosen = match source {
+            PolicySource::File(_) => Setting::default(),
+            // a file that can no longer be read has no task to keep
+            _ => self.setting(shipped).unwrap_or_default(),
+        };
+        self.source = source;
+    }
+}
