@@ -41,6 +41,7 @@ pub use stage::actors::{Actor, Focus};
 pub use stage::course::{CourseOptions, PlayerRole};
 pub use stage::loaded::LoadedPolicy;
 pub use stage::policies::ShippedPolicies;
+pub use stage::puppets::Kind as PuppetKind;
 pub use stage::recording::{PlayRecording, Recording, Row};
 pub use stage::scenario::{LoadScenario, PolicySource, Scenario};
 pub use stage::selection::switch_mode;

@@ -30,7 +30,7 @@ const WARM_UP: usize = 4;
 const PATIENCE: usize = 200;
 
 /// Time between two lines about how far the film is.
-const TELL: Duration = Duration::from_secs(5);
+const REPORT: Duration = Duration::from_secs(5);
 
 /// Longest time that a skin takes to read.
 const LONGEST_FITTING: Duration = Duration::from_secs(120);
@@ -199,7 +199,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
 
     let mut frames = ((seconds * fps).round() as usize).max(1);
     let (mut drawn, mut taken, mut waited) = (0, 0, 0);
-    let mut told: Option<Instant> = None;
+    let mut reported: Option<Instant> = None;
     while taken < frames {
         if interrupt::requested() {
             save_running(app.world_mut());
@@ -226,8 +226,8 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
                 taken += 1;
             }
         }
-        if taken > 0 && told.is_none_or(|at| at.elapsed() > TELL) {
-            told = Some(Instant::now());
+        if taken > 0 && reported.is_none_or(|at| at.elapsed() > REPORT) {
+            reported = Some(Instant::now());
             let [done, all] = [taken, frames].map(|frames| frames as f64 / fps);
             eprintln!("{}: {done:.1} of {all:.1} s", out.display());
         }

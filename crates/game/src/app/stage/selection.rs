@@ -1,10 +1,13 @@
 //! Changes of a scenario that need a fitting agent: another mode, another role on a course, the next agent.
 
 use crate::app::mode::Mode;
-use crate::app::stage::clips::{FOLLOWER, follows_clip};
+use crate::app::stage::clips::follows_clip;
 use crate::app::stage::course::{self, BUILT_AGAINST, LED, PlayerRole};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
+
+/// The agent of the mode *imitate* by default. A policy comes with it.
+const FIRST_FOLLOWER: &str = "MarathonManWalk-v0";
 
 /// Switches to a mode, as the menu does. An agent that the mode is not possible with makes way for one that is.
 pub fn switch_mode(scenario: &mut Scenario, mode: Mode, shipped: &ShippedPolicies) {
@@ -16,7 +19,7 @@ pub fn switch_mode(scenario: &mut Scenario, mode: Mode, shipped: &ShippedPolicie
         _ => scenario.play(PolicySource::Shipped, shipped),
     }
     if mode == Mode::Imitate && !follows_clip(&scenario.agent) {
-        scenario.agent = FOLLOWER.into();
+        scenario.agent = FIRST_FOLLOWER.into();
     }
     if mode == Mode::Course {
         fit_to_course(scenario, shipped);

@@ -60,11 +60,14 @@ impl ModeKeys {
 
 /// The keys of the modes, as the features contribute them.
 #[derive(Resource, Default)]
-pub struct KeyHints(Vec<(fn(&Scenario) -> bool, &'static ModeKeys)>);
+pub struct KeyHints(Vec<(Condition, &'static ModeKeys)>);
+
+/// Whether keys are those of a scenario.
+type Condition = fn(&Scenario) -> bool;
 
 impl KeyHints {
     /// Adds the keys of the scenarios that a condition holds for. The first one that holds counts.
-    pub fn add(&mut self, holds: fn(&Scenario) -> bool, keys: &'static ModeKeys) {
+    pub fn add(&mut self, holds: Condition, keys: &'static ModeKeys) {
         self.0.push((holds, keys));
     }
 

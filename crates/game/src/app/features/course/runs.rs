@@ -114,15 +114,15 @@ impl Runs {
     /// Adds a run that has ended.
     fn finish(&mut self, run: Run, recording: &Recording, notes: &mut Notifications) {
         let added = self.path().and_then(|path| Table::open(&path)?.add(&run, recording));
-        let told = format!("{:.1} m in {:.1} s ({})", run.distance, run.seconds, run.ended);
+        let result = format!("{:.1} m in {:.1} s ({})", run.distance, run.seconds, run.ended);
         match added {
             Ok(place) => {
                 // the card tells it on the screen
-                info!("{told}: place {} of {}", place.rank, place.of);
+                info!("{result}: place {} of {}", place.rank, place.of);
                 self.standing = Some(place);
                 self.last = Some((run, place));
             }
-            Err(error) => notes.error(format!("{told} is not kept: {error}")),
+            Err(error) => notes.error(format!("{result} is not kept: {error}")),
         }
     }
 }
@@ -152,7 +152,6 @@ pub fn names(scenario: &Scenario, loaded: &LoadedPolicy, player: &str) -> [Strin
 }
 
 /// Records the runs, and adds those that have ended to the table.
-#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 fn follow(
     (mode, scenario, loaded): (Res<State<Mode>>, Res<Scenario>, Res<LoadedPolicy>),
     time: Res<Time<Virtual>>,
@@ -194,13 +193,13 @@ fn follow(
             let Some(run) = run.as_mut().filter(|run| !run.over && run.recording.frames() < LONGEST) else { continue };
             (run.until, run.slowest) = (still.time, run.slowest.min(pace));
             // an episode that begins has neither distance nor reward
-            let told = if still.fresh { &Episode::default() } else { episode };
-            run.recording.push_state(still, told, anatomy);
+            let so_far = if still.fresh { &Episode::default() } else { episode };
+            run.recording.push_state(still, so_far, anatomy);
         }
         if let Some(run) = &mut run {
-            let told = anatomy.spec.as_ref().and_then(|spec| spec.info.iter().position(|name| name == "distance"));
-            let told = told.and_then(|i| episode.info.get(i)).map(|x| f64::from(*x));
-            run.start = run.start.or(told);
+            let index = anatomy.spec.as_ref().and_then(|spec| spec.info.iter().position(|name| name == "distance"));
+            let distance = index.and_then(|i| episode.info.get(i)).map(|x| f64::from(*x));
+            run.start = run.start.or(distance);
         }
         for EpisodeEnded { end, episode, .. } in
             ended.iter().filter(|ended| ended.ragdoll == entity && ended.end != End::Broke)

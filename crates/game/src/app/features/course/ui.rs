@@ -148,9 +148,9 @@ fn draw(
         }
         if scenario.is_built() {
             let height = 0.1 * f64::from(step.0) * scenario.course.difficulty;
-            let told =
+            let words =
                 format!("next meter: {height:+.2} m   step {:+} of {MOST_STEPS}", step.0).replace('-', "\u{2212}");
-            line(ui, text(15.0, ACCENT, told));
+            line(ui, text(15.0, ACCENT, words));
         }
         if let Some((run, place)) = &runs.last {
             let color = if place.rank == 1 { ACCENT } else { TEXT };
@@ -159,8 +159,8 @@ fn draw(
             // the builder looks for the shortest run
             let least = course.role == PlayerRole::Build.name() && distance <= shortest && *of > 1;
             let least = if least { ", the shortest" } else { "" };
-            let told = format!("last: {distance:.1} m, {seconds:.1} s, {ended}: place {rank} of {of}{least}");
-            line(ui, text(13.0, color, told));
+            let words = format!("last: {distance:.1} m, {seconds:.1} s, {ended}: place {rank} of {of}{least}");
+            line(ui, text(13.0, color, words));
         }
     });
     Ok(())
@@ -216,9 +216,9 @@ fn row(ui: &mut Ui, place: usize, run: &Run) -> bool {
     let slow = if run.slowest < 1.0 { format!("   x{}", run.slowest) } else { String::new() };
     ui.label(text(13.0, FAINT, format!("{:.1} s{slow}", run.seconds)));
     ui.label(text(13.0, if run.ended == "fell" { BAD } else { FAINT }, &run.ended));
-    let who =
+    let names =
         if run.builder == "seed" { run.runner.clone() } else { format!("{} against {}", run.builder, run.runner) };
-    ui.label(text(13.0, TEXT, who));
+    ui.label(text(13.0, TEXT, names));
     ui.label(text(13.0, FAINT, format!("seed {}", run.draw[0])));
     ui.label(text(12.0, FAINT, run.date.get(..10).unwrap_or_default()));
     run.replay.is_some() && ui.button("replay").clicked()
