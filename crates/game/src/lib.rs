@@ -39,8 +39,8 @@
 pub mod app;
 pub mod asset;
 pub mod axes;
+mod characters;
 mod ground;
-mod herd;
 #[cfg(feature = "render")]
 pub mod look;
 pub mod plugin;

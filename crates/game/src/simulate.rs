@@ -2,8 +2,8 @@
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::axes::{to_game, to_physics};
+use crate::characters::{CharacterBatch, CharacterKind, Event, Shove, Slot, spec_of_role};
 use crate::ground::Ground;
-use crate::herd::{Event, Herd, Pen, Resident, Shove, part_of};
 use crate::ragdoll::Episode;
 use crate::ragdoll::{
     AgentCommand, Anatomy, Character, Controls, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent,
@@ -24,18 +24,18 @@ use std::time::{Duration, Instant};
 /// The simulation of all ragdolls.
 #[derive(Resource, Default)]
 pub struct Marathon {
-    pub(crate) herds: Vec<Herd>,
+    pub(crate) kinds: Vec<CharacterKind>,
     /// Start of the present tick.
     now: Duration,
     decisions: u64,
     spent: Duration,
 }
 
-/// Where a ragdoll lives in [`Marathon`].
+/// The place of a ragdoll in [`Marathon`].
 #[derive(Component, Clone, Copy, Debug)]
 pub(crate) struct Seat {
-    pub herd: usize,
-    pub pen: usize,
+    pub kind: usize,
+    pub batch: usize,
     pub lane: usize,
 }
 
@@ -52,8 +52,8 @@ impl Marathon {
 
     /// The newest state of a ragdoll, which is ahead of what a frame shows by up to a decision.
     pub fn state(&self, ragdoll: &RagdollState) -> Option<AgentState> {
-        let still = self.resident(ragdoll.0)?.trail.back()?;
-        Some(AgentState { qpos: still.qpos.clone(), qvel: still.qvel.clone() })
+        let sample = self.slot(ragdoll.0)?.history.back()?;
+        Some(AgentState { qpos: sample.qpos.clone(), qvel: sample.qvel.clone() })
     }
 
     /// Where the bodies of a ragdoll are at a time, in the order of its model, relative to the ragdoll. Known are the times
@@ -62,18 +62,18 @@ impl Marathon {
     /// Systems in [`FixedUpdate`] that follow a ragdoll ask here: the transforms of its [`crate::Part`]s are those of the last
     /// frame, in which there may have been many ticks or none.
     pub fn places(&self, ragdoll: &RagdollState, at: Duration) -> Option<Vec<Transform>> {
-        let Seat { herd, .. } = ragdoll.0;
-        let model = &self.herds.get(herd)?.model;
-        let (a, b, share) = self.resident(ragdoll.0)?.between(at)?;
+        let Seat { kind, .. } = ragdoll.0;
+        let model = &self.kinds.get(kind)?.model;
+        let (a, b, share) = self.slot(ragdoll.0)?.between(at)?;
         stage::places(model, &stage::mix(model, &a.qpos, &b.qpos, share))
     }
 
     /// Where the clip that a ragdoll follows has the bodies at a time, as [`Marathon::places`] has them. `None` if its task
     /// follows no clip.
     pub fn clip_places(&self, ragdoll: &RagdollState, at: Duration) -> Option<Vec<Transform>> {
-        let Seat { herd, .. } = ragdoll.0;
-        let model = &self.herds.get(herd)?.model;
-        let (a, b, share) = self.resident(ragdoll.0)?.between(at)?;
+        let Seat { kind, .. } = ragdoll.0;
+        let model = &self.kinds.get(kind)?.model;
+        let (a, b, share) = self.slot(ragdoll.0)?.between(at)?;
         stage::places(model, &stage::mix(model, a.reference.as_ref()?, b.reference.as_ref()?, share))
     }
 
@@ -82,9 +82,9 @@ impl Marathon {
     /// # Errors
     /// If lengths or numbers do not fit its model; the text says which.
     pub fn set_state(&mut self, ragdoll: &RagdollState, state: &AgentState) -> Result<(), String> {
-        let Seat { herd, pen, lane } = ragdoll.0;
-        let Some(herd) = self.herds.get_mut(herd) else { return Ok(()) };
-        for (what, given, expected) in [("qpos", &state.qpos, herd.model.nq), ("qvel", &state.qvel, herd.model.nv)] {
+        let Seat { kind, batch, lane } = ragdoll.0;
+        let Some(kind) = self.kinds.get_mut(kind) else { return Ok(()) };
+        for (what, given, expected) in [("qpos", &state.qpos, kind.model.nq), ("qvel", &state.qvel, kind.model.nv)] {
             if given.len() != expected {
                 return Err(format!("{what} has {} numbers, expected {expected}", given.len()));
             }
@@ -92,23 +92,23 @@ impl Marathon {
                 return Err(format!("{what} has a number that is {x}, expected finite ones"));
             }
         }
-        let time = herd.time;
-        if let Some(pen) = herd.pens.get_mut(pen) {
-            pen.put(lane, &state.qpos, &state.qvel, time);
+        let time = kind.time;
+        if let Some(batch) = kind.batches.get_mut(batch) {
+            batch.put(lane, &state.qpos, &state.qvel, time);
         }
         Ok(())
     }
 
-    pub(crate) fn resident(&self, seat: Seat) -> Option<&Resident> {
-        self.herds.get(seat.herd)?.pens.get(seat.pen)?.lanes.get(seat.lane)?.as_ref()
+    pub(crate) fn slot(&self, seat: Seat) -> Option<&Slot> {
+        self.kinds.get(seat.kind)?.batches.get(seat.batch)?.lanes.get(seat.lane)?.as_ref()
     }
 
-    fn pen(&mut self, seat: Seat) -> Option<&mut Pen> {
-        self.herds.get_mut(seat.herd)?.pens.get_mut(seat.pen)
+    fn batch(&mut self, seat: Seat) -> Option<&mut CharacterBatch> {
+        self.kinds.get_mut(seat.kind)?.batches.get_mut(seat.batch)
     }
 
-    fn resident_mut(&mut self, seat: Seat) -> Option<&mut Resident> {
-        self.pen(seat)?.lanes.get_mut(seat.lane)?.as_mut()
+    fn slot_mut(&mut self, seat: Seat) -> Option<&mut Slot> {
+        self.batch(seat)?.lanes.get_mut(seat.lane)?.as_mut()
     }
 }
 
@@ -135,7 +135,7 @@ pub(crate) fn admit(
             continue;
         }
         match enter(&mut marathon, &prefabs, ragdoll, meta, *restart) {
-            Ok(Some(seat)) => build(&mut commands, &marathon.herds[seat.herd], entity, seat),
+            Ok(Some(seat)) => build(&mut commands, &marathon.kinds[seat.kind], entity, seat),
             // a prefab that is still being loaded
             Ok(None) => {}
             Err(error) => {
@@ -159,29 +159,31 @@ fn enter(
         Character::Prefab(_) => Ground::Level,
     };
     let setting = setting(ragdoll, policy).map_err(|e| e.to_string())?;
-    let same = |h: &Herd| h.character == ragdoll.character && h.ground == ground && h.setting == setting;
-    let herd = match marathon.herds.iter().position(same) {
-        Some(herd) => herd,
+    let same = |h: &CharacterKind| h.character == ragdoll.character && h.ground == ground && h.setting == setting;
+    let number = match marathon.kinds.iter().position(same) {
+        Some(number) => number,
         None => {
-            let herd = match &ragdoll.character {
-                Character::Agent(name) => Herd::of_agent(name, &setting, ground, now).map_err(|e| e.to_string())?,
+            let kind = match &ragdoll.character {
+                Character::Agent(name) => {
+                    CharacterKind::of_agent(name, &setting, ground, now).map_err(|e| e.to_string())?
+                }
                 Character::Prefab(handle) => match prefabs.get(handle) {
-                    Some(prefab) => Herd::of_prefab(handle, prefab.model.clone(), now),
+                    Some(prefab) => CharacterKind::of_prefab(handle, prefab.model.clone(), now),
                     None => return Ok(None),
                 },
             };
-            marathon.herds.push(herd);
-            marathon.herds.len() - 1
+            marathon.kinds.push(kind);
+            marathon.kinds.len() - 1
         }
     };
-    let kind = &mut marathon.herds[herd];
-    // a herd that nobody lived in has stood still
-    if kind.pens.iter().all(Pen::is_empty) {
+    let kind = &mut marathon.kinds[number];
+    // the clock of a kind without characters has stopped
+    if kind.batches.iter().all(CharacterBatch::is_empty) {
         kind.time = now;
     }
-    let resident = Resident::new((ragdoll.seed, ragdoll.number), restart);
-    let (pen, lane) = kind.admit(resident).map_err(|e| e.to_string())?;
-    Ok(Some(Seat { herd, pen, lane }))
+    let slot = Slot::new((ragdoll.seed, ragdoll.number), restart);
+    let (batch, lane) = kind.admit(slot).map_err(|e| e.to_string())?;
+    Ok(Some(Seat { kind: number, batch, lane }))
 }
 
 /// The task of a ragdoll: its own, or else that of its policy, or else that of its agent's defaults.
@@ -196,19 +198,19 @@ fn setting(ragdoll: &Ragdoll, policy: Option<&PolicyMeta>) -> Result<Setting, Ru
 }
 
 /// Makes the entities of a ragdoll's bodies.
-fn build(commands: &mut Commands, herd: &Herd, entity: Entity, seat: Seat) {
-    let parts = stage::parts(commands, &herd.model, entity);
+fn build(commands: &mut Commands, kind: &CharacterKind, entity: Entity, seat: Seat) {
+    let parts = stage::parts(commands, &kind.model, entity);
     let anatomy =
-        Anatomy { model: herd.model.clone(), spec: herd.spec.clone(), parts, feet: herd.feet.clone(), dt: herd.dt };
+        Anatomy { model: kind.model.clone(), spec: kind.spec.clone(), parts, feet: kind.feet.clone(), dt: kind.dt };
     commands.entity(entity).insert((seat, RagdollState(seat), anatomy));
 }
 
 /// A ragdoll that is despawned leaves its lane.
 pub(crate) fn dismiss(left: On<Remove, Seat>, seats: Query<&Seat>, mut marathon: ResMut<Marathon>) {
     if let Ok(seat) = seats.get(left.entity)
-        && let Some(pen) = marathon.pen(*seat)
+        && let Some(batch) = marathon.batch(*seat)
     {
-        pen.dismiss(seat.lane);
+        batch.dismiss(seat.lane);
     }
 }
 
@@ -229,22 +231,22 @@ pub(crate) fn take_in(
     )>,
 ) {
     for (seat, anatomy, (policy, opponent), (controls, held), command, restart, physique, laid) in &ragdolls {
-        let Some(pen) = marathon.pen(*seat) else { continue };
+        let Some(batch) = marathon.batch(*seat) else { continue };
         if let Some(LaidGround(elevations)) = laid.filter(|laid| laid.is_changed()).as_deref()
-            && let Err(error) = pen.lay(seat.lane, elevations)
+            && let Err(error) = batch.lay(seat.lane, elevations)
         {
             error!("a LaidGround cannot be laid: {error}");
         }
         let wanted = command.and_then(|command| command.0.as_ref());
-        if pen.lanes[seat.lane].as_ref().is_some_and(|resident| resident.command.as_ref() != wanted)
-            && let Err(error) = pen.command(seat.lane, wanted.cloned())
+        if batch.lanes[seat.lane].as_ref().is_some_and(|slot| slot.command.as_ref() != wanted)
+            && let Err(error) = batch.command(seat.lane, wanted.cloned())
         {
             error!("an AgentCommand cannot be followed: {error}");
         }
         if let Some(physique) = physique.filter(|p| p.is_changed()) {
             let (v, model) = (&physique.0, &anatomy.model);
             if v.mass.len() == model.bodies.len() && v.strength.len() == model.nu {
-                pen.vary(seat.lane, v);
+                batch.vary(seat.lane, v);
             } else {
                 let (masses, strengths) = (v.mass.len(), v.strength.len());
                 error!(
@@ -254,21 +256,21 @@ pub(crate) fn take_in(
                 );
             }
         }
-        let Some(resident) = &mut pen.lanes[seat.lane] else { continue };
-        resident.restart = *restart;
-        resident.controls = controls.cloned();
-        resident.held = held.cloned();
+        let Some(slot) = &mut batch.lanes[seat.lane] else { continue };
+        slot.restart = *restart;
+        slot.controls = controls.cloned();
+        slot.held = held.cloned();
         let handles = [policy.map(|policy| &policy.0), opponent.map(|opponent| &opponent.0)];
         for (role, handle) in handles.into_iter().enumerate() {
             let wanted = handle.and_then(|handle| policies.get(handle));
-            let same = match (&resident.policies[role], wanted) {
+            let same = match (&slot.policies[role], wanted) {
                 (Some(old), Some(new)) => Arc::ptr_eq(old, &new.0),
                 (None, None) => true,
                 _ => false,
             };
             if !same {
                 let fitting = wanted.map(|p| p.0.clone()).filter(|policy| fits(policy, anatomy, role));
-                resident.policies[role] = fitting;
+                slot.policies[role] = fitting;
             }
         }
     }
@@ -279,7 +281,7 @@ fn fits(policy: &marathon_learn::Policy, anatomy: &Anatomy, role: usize) -> bool
         error_once!("a Policy was given to a ragdoll that is no agent; it observes nothing that a policy could act on");
         return false;
     };
-    let Some(part) = part_of(spec, role) else {
+    let Some(part) = spec_of_role(spec, role) else {
         error_once!("an Opponent was given to '{}', whose task has one role alone", spec.id);
         return false;
     };
@@ -316,23 +318,23 @@ pub(crate) fn push(
             None => [0.0; 3],
         };
         let decisions = (push.seconds / anatomy.dt).round().max(1.0) as u64;
-        if let Some(resident) = marathon.resident_mut(*seat) {
-            resident.push(Shove { body: push.body, force, torque, decisions });
+        if let Some(slot) = marathon.slot_mut(*seat) {
+            slot.push(Shove { body: push.body, force, torque, decisions });
         }
     }
     for restart in restarts.read() {
         if let Ok((seat, ..)) = ragdolls.get(restart.ragdoll)
-            && let Some(resident) = marathon.resident_mut(*seat)
+            && let Some(slot) = marathon.slot_mut(*seat)
         {
-            resident.begin_now();
+            slot.begin_now();
         }
     }
 }
 
 /// Center of mass of a body in the axes of the physics.
 fn center_of_mass(marathon: &Marathon, seat: Seat, anatomy: &Anatomy, body: usize) -> Option<[f64; 3]> {
-    let still = marathon.resident(seat)?.trail.back()?;
-    let frame = *stage::places(&anatomy.model, &still.qpos)?.get(body)?;
+    let sample = marathon.slot(seat)?.history.back()?;
+    let frame = *stage::places(&anatomy.model, &sample.qpos)?.get(body)?;
     Some(to_physics(frame.transform_point(to_game(anatomy.model.bodies[body].ipos))))
 }
 
@@ -343,21 +345,21 @@ pub(crate) fn simulate(mut marathon: ResMut<Marathon>, time: Res<Time<Fixed>>) {
     let mut decisions = 0;
     let pool = ComputeTaskPool::get();
     pool.scope(|scope| {
-        for herd in &mut marathon.herds {
-            let (first, period) = (herd.time, herd.period);
-            if period.is_zero() || herd.pens.iter().all(Pen::is_empty) {
+        for kind in &mut marathon.kinds {
+            let (first, period) = (kind.time, kind.period);
+            if period.is_zero() || kind.batches.iter().all(CharacterBatch::is_empty) {
                 continue;
             }
             let due = until.saturating_sub(first).as_nanos().div_ceil(period.as_nanos()) as u32;
-            herd.time += period * due;
-            let lanes = herd.pens.iter().flat_map(|pen| &pen.lanes).flatten().count();
+            kind.time += period * due;
+            let lanes = kind.batches.iter().flat_map(|batch| &batch.lanes).flatten().count();
             decisions += u64::from(due) * lanes as u64;
-            for pen in herd.pens.iter_mut().filter(|pen| !pen.is_empty()) {
+            for batch in kind.batches.iter_mut().filter(|batch| !batch.is_empty()) {
                 scope.spawn(async move {
                     for decision in 1..=due {
-                        pen.decide(first + period * decision);
+                        batch.decide(first + period * decision);
                     }
-                    pen.lanes.iter_mut().flatten().for_each(|resident| resident.forget(now));
+                    batch.lanes.iter_mut().flatten().for_each(|slot| slot.forget(now));
                 });
             }
         }
@@ -375,8 +377,8 @@ pub(crate) fn report(
     mut began: MessageWriter<EpisodeBegan>,
 ) {
     for (ragdoll, seat, mut episode, mut ground) in &mut ragdolls {
-        let Some(resident) = marathon.resident_mut(*seat) else { continue };
-        for event in resident.events.drain(..) {
+        let Some(slot) = marathon.slot_mut(*seat) else { continue };
+        for event in slot.events.drain(..) {
             match event {
                 Event::Foot { foot, down } => {
                     contacts.write(FootContact { ragdoll, foot, down });
@@ -389,11 +391,11 @@ pub(crate) fn report(
                 }
             }
         }
-        if *episode != resident.episode {
-            episode.clone_from(&resident.episode);
+        if *episode != slot.episode {
+            episode.clone_from(&slot.episode);
         }
-        if !Arc::ptr_eq(&ground.0, &resident.grounds) {
-            ground.0 = resident.grounds.clone();
+        if !Arc::ptr_eq(&ground.0, &slot.grounds) {
+            ground.0 = slot.grounds.clone();
         }
     }
 }
@@ -419,8 +421,8 @@ pub(crate) fn face_targets(
         if arrived.contains(&(entity, episode.number)) {
             continue;
         }
-        let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
-        let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &still.qpos) else { continue };
+        let Some(sample) = marathon.slot(*seat).and_then(|r| r.history.back()) else { continue };
+        let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &sample.qpos) else { continue };
         let place = track.transform_point(to_game(pose.com));
         if (place - target.place).xz().length() <= target.radius {
             arrived.retain(|(known, _)| *known != entity);

@@ -10,8 +10,8 @@ use crate::app::stage::clips::{FOLLOWER, follows_clip};
 use crate::app::stage::course::{self, CourseOptions, PlayerRole};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
+use crate::characters::spec_of_role;
 use crate::ground::Ground;
-use crate::herd::part_of;
 use crate::look::{CameraMode, Quality};
 use clap::{Parser, ValueEnum};
 use marathon_envs::registry;
@@ -289,7 +289,7 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         course::check(&scenario.course, &setting)?;
     }
     match &scenario.source {
-        PolicySource::File(path) => drop(policy_file::read(path, part_of(setting.factory()?.spec(), 0).as_ref())?),
+        PolicySource::File(path) => drop(policy_file::read(path, spec_of_role(setting.factory()?.spec(), 0).as_ref())?),
         _ if !args.task.given.is_empty() => drop(setting.factory()?),
         _ => {}
     }

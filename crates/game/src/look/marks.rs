@@ -96,9 +96,9 @@ fn contacts(
     ragdolls: Query<(&Seat, &Anatomy, &Marks, &GlobalTransform)>,
 ) {
     for (seat, anatomy, marks, track) in &ragdolls {
-        let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
+        let Some(sample) = marathon.slot(*seat).and_then(|r| r.history.back()) else { continue };
         if marks.ring
-            && let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &still.qpos)
+            && let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &sample.qpos)
         {
             let at = track.transform_point(to_game(pose.com) * Vec3::new(1.0, 0.0, 1.0)) + Vec3::Y * 0.01;
             gizmos.circle(Isometry3d::new(at, Quat::from_rotation_x(TAU / 4.0)), 0.55, Color::srgb(1.0, 1.0, 1.0));
@@ -113,7 +113,7 @@ fn contacts(
         }
         let Some((model, batch)) = &mut probe.0 else { continue };
         let batch = batch.get();
-        batch.reset(0, &still.qpos, &still.qvel);
+        batch.reset(0, &sample.qpos, &sample.qvel);
         let weight: f64 = model.bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
         for values in batch.sensors(0).chunks_exact(7) {
             let [found, force, place] = [&values[..1], &values[1..4], &values[4..7]];
@@ -137,7 +137,7 @@ fn joints(
     parts: Query<&GlobalTransform, With<Part>>,
 ) {
     for (seat, anatomy, ..) in ragdolls.iter().filter(|(.., marks)| marks.joints) {
-        let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
+        let Some(sample) = marathon.slot(*seat).and_then(|r| r.history.back()) else { continue };
         let model = &anatomy.model;
         let place = |body: usize| anatomy.parts.get(body).and_then(|p| parts.get(*p).ok());
         // the skeleton: lines from body to body
@@ -157,7 +157,7 @@ fn joints(
                 continue;
             }
             // the range is drawn where the body's present position is its middle line
-            let q = still.qpos[joint.qpos_adr] as f32;
+            let q = sample.qpos[joint.qpos_adr] as f32;
             let [low, high] = joint.range.map(|x| x as f32);
             let arm = axis.any_orthonormal_vector();
             let point = |angle: f32| at + Quat::from_axis_angle(axis, angle - q) * arm * size * 1.8;
@@ -188,9 +188,9 @@ fn told(
     for (seat, anatomy, _, episode, track) in ragdolls.iter().filter(|(_, _, marks, ..)| marks.command) {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let Some([ahead, left, turn]) = velocity_told(ranges, &episode.command) else { continue };
-        let Some(still) = marathon.resident(*seat).and_then(|r| r.trail.back()) else { continue };
-        let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &still.qpos) else { continue };
-        let heading = stage::heading(&anatomy.model, &still.qpos);
+        let Some(sample) = marathon.slot(*seat).and_then(|r| r.history.back()) else { continue };
+        let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &sample.qpos) else { continue };
+        let heading = stage::heading(&anatomy.model, &sample.qpos);
         let point = |[x, y]: [f64; 2]| {
             let at = to_game([pose.com[0] + x, pose.com[1] + y, 0.0]) * Vec3::new(1.0, 0.0, 1.0);
             track.transform_point(at) + Vec3::Y * 0.02
@@ -200,7 +200,7 @@ fn told(
             [ahead * cos - left * sin, ahead * sin + left * cos].map(|x| x * SPEED_ARROW)
         };
         let free = anatomy.model.joints.first().filter(|joint| joint.kind == JointType::Free);
-        let own = [still.qvel[0], free.map_or(0.0, |_| still.qvel[1])].map(|x| x * SPEED_ARROW);
+        let own = [sample.qvel[0], free.map_or(0.0, |_| sample.qvel[1])].map(|x| x * SPEED_ARROW);
         for (end, color) in [(own, OWN), (turned([ahead, left]), TOLD)] {
             if end[0].hypot(end[1]) > 0.05 {
                 gizmos.arrow(point([0.0; 2]), point(end), color).with_tip_length(0.12);

@@ -1,7 +1,7 @@
 //! The policies of the loaded scenario. A policy's file is read again when it changes.
 
 use crate::app::files::file_stem;
-use crate::app::mode::{AppSet, Mode};
+use crate::app::mode::Mode;
 use crate::app::notifications::Notifications;
 use crate::app::stage::course::PlayerRole;
 use crate::app::stage::policies::{ShippedPolicies, read_file};
@@ -34,7 +34,7 @@ pub struct LoadedPolicy {
 }
 
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<LoadedPolicy>().add_systems(Update, reload.in_set(AppSet::Present));
+    app.init_resource::<LoadedPolicy>();
 }
 
 /// Reads the policy of a scenario, and names it; the text of an error names the remedy.
@@ -80,7 +80,7 @@ pub fn written(path: &Path) -> Option<SystemTime> {
 }
 
 /// Reads the policy's file again when it has changed.
-fn reload(
+pub fn reload(
     time: Res<Time<Real>>,
     (scenario, shipped): (Res<Scenario>, Res<ShippedPolicies>),
     mut loaded: ResMut<LoadedPolicy>,

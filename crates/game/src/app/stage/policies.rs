@@ -1,7 +1,7 @@
 //! The policies that come with the game, and those of files.
 
 use crate::asset::PolicyAsset;
-use crate::herd::part_of;
+use crate::characters::spec_of_role;
 use bevy::prelude::*;
 use marathon_learn::{Policy as Net, checksum};
 use marathon_physics::budget;
@@ -80,7 +80,8 @@ fn name_of(path: &Path, bytes: &[u8]) -> String {
 /// # Errors
 /// The text names the remedy.
 pub fn read_file(path: &Path, setting: &Setting, role: usize) -> Result<(PolicyAsset, String), String> {
-    let policy = setting.factory().and_then(|factory| policy_file::read(path, part_of(factory.spec(), role).as_ref()));
+    let policy =
+        setting.factory().and_then(|factory| policy_file::read(path, spec_of_role(factory.spec(), role).as_ref()));
     let policy = policy.map_err(|e| e.to_string())?;
     let bytes = budget::read(path, &budget::POLICY_FILE).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok((policy.into(), name_of(path, &bytes)))

@@ -4,7 +4,7 @@ use crate::app::mode::{self, AppSet, Mode};
 use crate::app::notifications::Notifications;
 use crate::app::stage::actors::{Actor, Focus, ROW, place};
 use crate::app::stage::course;
-use crate::app::stage::loaded::{LoadedPolicy, read_opponent, read_policy, written};
+use crate::app::stage::loaded::{LoadedPolicy, read_opponent, read_policy, reload, written};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{LoadScenario, PolicySource, Scenario};
 use crate::asset::{PolicyAsset, RagdollPrefab};
@@ -22,9 +22,10 @@ use std::sync::Arc;
 const LIE: f64 = 1.2;
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_message::<LoadScenario>()
-        .add_systems(Startup, load_first)
-        .add_systems(Update, (enter_mode, spawn).chain().run_if(on_message::<LoadScenario>).in_set(AppSet::Simulate));
+    app.add_message::<LoadScenario>().add_systems(Startup, load_first).add_systems(
+        Update,
+        (reload, (enter_mode, spawn).chain().run_if(on_message::<LoadScenario>)).chain().in_set(AppSet::Simulate),
+    );
 }
 
 /// Loads the scenario of the command line.

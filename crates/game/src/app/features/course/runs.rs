@@ -168,19 +168,19 @@ fn follow(
     let ended: Vec<EpisodeEnded> = ended.read().cloned().collect();
     runs.under_way.retain(|run| actors.contains(run.ragdoll));
     for (entity, actor, seat, anatomy, track, episode) in &actors {
-        let Some(resident) = marathon.resident(*seat) else { continue };
+        let Some(slot) = marathon.slot(*seat) else { continue };
         let (mut finished, pace) = (None, f64::from(time.relative_speed()));
         let at = runs.under_way.iter().position(|run| run.ragdoll == entity);
         let mut run = at.map(|at| runs.under_way.swap_remove(at));
         let until = run.as_ref().map(|run| run.until);
-        for still in resident.trail.iter().filter(|still| until.is_none_or(|until| still.time > until)) {
-            if still.fresh {
+        for sample in slot.history.iter().filter(|sample| until.is_none_or(|until| sample.time > until)) {
+            if sample.fresh {
                 let place = track.translation.to_array().to_vec();
                 let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, place);
                 let begun = UnderWay {
                     ragdoll: entity,
                     recording,
-                    until: still.time,
+                    until: sample.time,
                     slowest: pace,
                     start: None,
                     meters: 0.0,
@@ -191,10 +191,10 @@ fn follow(
                 finished = run.replace(begun).filter(|run| !run.over);
             }
             let Some(run) = run.as_mut().filter(|run| !run.over && run.recording.frames() < LONGEST) else { continue };
-            (run.until, run.slowest) = (still.time, run.slowest.min(pace));
+            (run.until, run.slowest) = (sample.time, run.slowest.min(pace));
             // an episode that begins has neither distance nor reward
-            let so_far = if still.fresh { &Episode::default() } else { episode };
-            run.recording.push_state(still, so_far, anatomy);
+            let so_far = if sample.fresh { &Episode::default() } else { episode };
+            run.recording.push_state(sample, so_far, anatomy);
         }
         if let Some(run) = &mut run {
             let index = anatomy.spec.as_ref().and_then(|spec| spec.info.iter().position(|name| name == "distance"));
@@ -265,7 +265,7 @@ fn referee(
     }
     for run in runs.under_way.iter_mut().filter(|run| run.verdict.is_none() && !run.over) {
         let Ok((ragdoll, seat, episode)) = actors.get(run.ragdoll) else { continue };
-        let Some(newest) = marathon.resident(*seat).and_then(|resident| resident.trail.back()) else { continue };
+        let Some(newest) = marathon.slot(*seat).and_then(|slot| slot.history.back()) else { continue };
         if episode.farthest >= run.meters + 1.0 {
             (run.meters, run.since) = (episode.farthest.floor(), episode.seconds);
         }

@@ -165,15 +165,15 @@ fn record(
     if all.len() != recording.agents {
         return;
     }
-    let trails: Vec<_> = all.iter().filter_map(|(_, seat, ..)| marathon.resident(**seat)).map(|r| &r.trail).collect();
-    let Some(first) = trails.first() else { return };
+    let histories: Vec<_> = all.iter().filter_map(|(_, seat, ..)| marathon.slot(**seat)).map(|r| &r.history).collect();
+    let Some(first) = histories.first() else { return };
     let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > *until).collect();
     for time in times {
-        let stills: Option<Vec<_>> = trails.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
-        let Some(stills) = stills else { continue };
+        let samples: Option<Vec<_>> = histories.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
+        let Some(samples) = samples else { continue };
         *until = time;
-        for (still, (.., episode, anatomy)) in stills.iter().zip(&all) {
-            recording.push_state(still, episode, anatomy);
+        for (sample, (.., episode, anatomy)) in samples.iter().zip(&all) {
+            recording.push_state(sample, episode, anatomy);
         }
     }
 }

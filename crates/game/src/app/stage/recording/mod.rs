@@ -4,8 +4,8 @@
 
 mod file;
 
+use crate::characters::PoseSample;
 use crate::ground::Ground;
-use crate::herd::Still;
 use crate::ragdoll::{Anatomy, Episode};
 use crate::stage;
 use bevy::prelude::*;
@@ -113,17 +113,17 @@ impl Recording {
 
     /// Appends a state of the next agent. All rows of a recording have the same width, but an episode has no terms of the
     /// reward before its first decision.
-    pub(crate) fn push_state(&mut self, still: &Still, episode: &Episode, anatomy: &Anatomy) {
+    pub(crate) fn push_state(&mut self, sample: &PoseSample, episode: &Episode, anatomy: &Anatomy) {
         let mut terms = episode.terms.clone();
         terms.resize(anatomy.spec.as_ref().map_or(0, |spec| spec.reward_terms.len()), 0.0);
-        let fresh = if still.fresh { 1.0 } else { 0.0 };
+        let fresh = if sample.fresh { 1.0 } else { 0.0 };
         self.push(&Row {
-            qpos: &still.qpos,
+            qpos: &sample.qpos,
             numbers: [episode.distance as f32, episode.speed, episode.reward, episode.total as f32, fresh],
             terms: &terms,
-            action: &still.action,
-            command: &still.command,
-            grounds: &still.grounds,
+            action: &sample.action,
+            command: &sample.command,
+            grounds: &sample.grounds,
             untimed: episode.untimed,
         });
     }

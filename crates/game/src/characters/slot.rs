@@ -1,4 +1,4 @@
-//! A ragdoll in its lane: who decides for it, its episode, and the states that frames are drawn from.
+//! A ragdoll in its lane: its policies, its episode, and the states that frames are drawn from.
 
 use crate::ragdoll::{Controls, End, Episode, Held, Restart};
 use bevy::prelude::*;
@@ -9,40 +9,40 @@ use std::time::Duration;
 
 /// A ragdoll in its lane.
 #[derive(Debug)]
-pub(crate) struct Resident {
+pub(crate) struct Slot {
     pub seed: u64,
     pub number: u64,
-    /// Of the task's first role, and of its second.
+    /// The policies of the task's first and second role.
     pub policies: [Option<Arc<Policy>>; 2],
     pub controls: Option<Controls>,
     pub held: Option<Held>,
-    /// What it is told in place of its own schedule.
+    /// The command that replaces its own schedule.
     pub command: Option<Vec<f64>>,
     pub restart: Restart,
     pub episode: Episode,
     /// Elevations of its model's height fields.
     pub grounds: Arc<Vec<Vec<f32>>>,
     /// States that frames are drawn from, oldest first.
-    pub trail: VecDeque<Still>,
-    /// What has happened since it was last asked.
+    pub history: VecDeque<PoseSample>,
+    /// Events since the last report.
     pub events: Vec<Event>,
     pub(super) pushes: Vec<Shove>,
-    /// Decisions that it still lies limp; `None` if it is up.
+    /// Decisions for which it still lies without action; `None` if it is up.
     pub(super) lying: Option<u64>,
     pub(super) begin_now: bool,
 }
 
 /// A state at a time.
 #[derive(Clone, Debug)]
-pub(crate) struct Still {
+pub(crate) struct PoseSample {
     pub time: Duration,
     pub qpos: Vec<f64>,
     pub qvel: Vec<f64>,
-    /// Where the clip is that it follows, if it does.
+    /// The pose of its clip, if it follows one.
     pub reference: Option<Vec<f64>>,
-    /// It did not come out of the one before, but of a reset.
+    /// Whether it comes from a reset, and not from the state before.
     pub fresh: bool,
-    /// Action and command of the decision that has led here; a fresh one has the command alone.
+    /// Action and command of the decision that has led here; after a reset, the command alone.
     #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
     pub action: Vec<f32>,
     #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "the app's recordings have it"))]
@@ -57,11 +57,11 @@ pub(crate) struct Shove {
     pub body: usize,
     pub force: [f64; 3],
     pub torque: [f64; 3],
-    /// Decisions that it lasts.
+    /// Its duration in decisions.
     pub decisions: u64,
 }
 
-/// What happens to a ragdoll.
+/// An event of a ragdoll.
 #[derive(Clone, Debug)]
 pub(crate) enum Event {
     Foot { foot: usize, down: bool },
@@ -69,9 +69,9 @@ pub(crate) enum Event {
     Began(u64),
 }
 
-impl Resident {
+impl Slot {
     pub fn new((seed, number): (u64, u64), restart: Restart) -> Self {
-        Resident {
+        Slot {
             seed,
             number,
             restart,
@@ -81,7 +81,7 @@ impl Resident {
             command: None,
             episode: Episode::default(),
             grounds: Arc::default(),
-            trail: VecDeque::new(),
+            history: VecDeque::new(),
             events: Vec::new(),
             pushes: Vec::new(),
             lying: None,
@@ -99,20 +99,20 @@ impl Resident {
         self.begin_now = true;
     }
 
-    /// Its state at a time: the two between which it lies, and the share of the later one.
-    pub fn between(&self, time: Duration) -> Option<(&Still, &Still, f64)> {
-        let later = self.trail.iter().position(|s| s.time >= time).unwrap_or(self.trail.len().saturating_sub(1));
-        let b = self.trail.get(later)?;
-        let a = if b.fresh { b } else { self.trail.get(later.wrapping_sub(1)).unwrap_or(b) };
+    /// Its state at a time: the states before and after, and the share of the later one.
+    pub fn between(&self, time: Duration) -> Option<(&PoseSample, &PoseSample, f64)> {
+        let later = self.history.iter().position(|s| s.time >= time).unwrap_or(self.history.len().saturating_sub(1));
+        let b = self.history.get(later)?;
+        let a = if b.fresh { b } else { self.history.get(later.wrapping_sub(1)).unwrap_or(b) };
         let span = b.time.saturating_sub(a.time).as_secs_f64();
         let share = if span > 0.0 { (time.saturating_sub(a.time).as_secs_f64() / span).min(1.0) } else { 1.0 };
         Some((a, b, share))
     }
 
-    /// Forgets what no frame from this time on needs.
+    /// Removes states that no frame from this time on needs.
     pub fn forget(&mut self, before: Duration) {
-        while self.trail.len() > 2 && self.trail[1].time <= before {
-            self.trail.pop_front();
+        while self.history.len() > 2 && self.history[1].time <= before {
+            self.history.pop_front();
         }
     }
 

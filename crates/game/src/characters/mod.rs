@@ -1,13 +1,13 @@
-//! The simulation behind the ragdolls: pens of sixteen, stepped together in the lanes of the physics.
+//! The simulation behind the ragdolls: batches of sixteen, stepped together in the lanes of the physics.
 //!
-//! A ragdoll sits in a lane of a pen of its kind. Which lane, and who sits beside it, does not touch its bits. Every
-//! kind has its own clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
+//! Each ragdoll has a lane in a batch of its kind. Neither the lane nor the other ragdolls of the batch change its bits. Each
+//! kind has a clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
 
-mod pen;
-mod resident;
+mod batch;
+mod slot;
 
-pub(crate) use pen::Pen;
-pub(crate) use resident::{Event, Resident, Shove, Still};
+pub(crate) use batch::CharacterBatch;
+pub(crate) use slot::{Event, PoseSample, Shove, Slot};
 
 use crate::asset::RagdollPrefab;
 use crate::ground::Ground;
@@ -24,9 +24,9 @@ use thiserror::Error;
 /// Seconds that a prefab is simulated for at a time, about.
 const PREFAB_DT: f64 = 0.01;
 
-/// Why a character cannot be simulated, or told what to do.
+/// Why a character cannot be simulated or commanded.
 #[derive(Debug, Error)]
-pub(crate) enum HerdError {
+pub(crate) enum CharacterError {
     #[error(transparent)]
     Env(#[from] EnvError),
     #[error(transparent)]
@@ -40,13 +40,13 @@ pub(crate) enum HerdError {
 }
 
 /// A task as the policy of its role number `role` knows it. The first role's may be that of the task in which one has it all.
-pub(crate) fn part_of(spec: &Spec, role: usize) -> Option<Spec> {
+pub(crate) fn spec_of_role(spec: &Spec, role: usize) -> Option<Spec> {
     let part = spec.of_role(spec.deciders().get(role)?);
     Some(if role == 0 { Spec { id: spec.id.clone(), ..part } } else { part })
 }
 
 /// All ragdolls of one kind.
-pub(crate) struct Herd {
+pub(crate) struct CharacterKind {
     pub character: Character,
     /// The task of an agent.
     pub setting: Setting,
@@ -61,16 +61,16 @@ pub(crate) struct Herd {
     pub period: Duration,
     /// Time of the newest states.
     pub time: Duration,
-    pub pens: Vec<Pen>,
+    pub batches: Vec<CharacterBatch>,
 }
 
-impl Herd {
-    /// A herd of an agent of the registry, in a task of its, on a ground, without ragdolls yet.
-    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, HerdError> {
+impl CharacterKind {
+    /// The kind of an agent of the registry in a task and on a ground, without ragdolls yet.
+    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, CharacterError> {
         setting.with_clips(|| {
             let agent = ground.agent_with(&setting.agent, &setting.options)?;
             let spec = agent.clone().shards(Isa::best())?.spec().clone();
-            Ok(Herd {
+            Ok(CharacterKind {
                 character: Character::Agent(name.into()),
                 setting: setting.clone(),
                 ground,
@@ -81,16 +81,16 @@ impl Herd {
                 period: Duration::from_secs_f64(spec.dt),
                 spec: Some(Arc::new(spec)),
                 time,
-                pens: Vec::new(),
+                batches: Vec::new(),
             })
         })
     }
 
-    /// A herd of a body, without ragdolls yet.
+    /// The kind of a body, without ragdolls yet.
     pub fn of_prefab(prefab: &Handle<RagdollPrefab>, model: Arc<Model>, time: Duration) -> Self {
         let substeps = (PREFAB_DT / model.opt.timestep).round().max(1.0) as usize;
         let dt = substeps as f64 * model.opt.timestep;
-        Herd {
+        CharacterKind {
             character: Character::Prefab(prefab.clone()),
             setting: Setting::default(),
             ground: Ground::Level,
@@ -101,22 +101,22 @@ impl Herd {
             period: Duration::from_secs_f64(dt),
             spec: None,
             time,
-            pens: Vec::new(),
+            batches: Vec::new(),
         }
     }
 
     /// Gives a ragdoll a free lane.
-    pub fn admit(&mut self, resident: Resident) -> Result<(usize, usize), HerdError> {
-        let free = |pen: &Pen| pen.lanes.iter().position(Option::is_none);
-        let pen = match self.pens.iter().position(|pen| free(pen).is_some()) {
-            Some(pen) => pen,
+    pub fn admit(&mut self, slot: Slot) -> Result<(usize, usize), CharacterError> {
+        let free = |batch: &CharacterBatch| batch.lanes.iter().position(Option::is_none);
+        let batch = match self.batches.iter().position(|batch| free(batch).is_some()) {
+            Some(batch) => batch,
             None => {
-                self.pens.push(Pen::new(self)?);
-                self.pens.len() - 1
+                self.batches.push(CharacterBatch::new(self)?);
+                self.batches.len() - 1
             }
         };
-        let lane = free(&self.pens[pen]).unwrap_or_default();
-        self.pens[pen].admit(lane, resident, self.time);
-        Ok((pen, lane))
+        let lane = free(&self.batches[batch]).unwrap_or_default();
+        self.batches[batch].admit(lane, slot, self.time);
+        Ok((batch, lane))
     }
 }

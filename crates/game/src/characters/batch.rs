@@ -1,6 +1,6 @@
-//! Sixteen lanes that are stepped together: what the physics and the task do to those who live in them.
+//! Sixteen lanes that are stepped together by the physics and the task.
 
-use super::{Event, Herd, HerdError, Resident, Still};
+use super::{CharacterError, CharacterKind, Event, PoseSample, Slot};
 use crate::ragdoll::{Character, Controls, End, Held, Restart};
 use crate::stage;
 use bevy::platform::cell::SyncCell;
@@ -21,9 +21,9 @@ enum Engine {
 }
 
 /// Sixteen lanes.
-pub(crate) struct Pen {
+pub(crate) struct CharacterBatch {
     engine: SyncCell<Engine>,
-    pub lanes: Vec<Option<Resident>>,
+    pub lanes: Vec<Option<Slot>>,
     model: Arc<Model>,
     n_act: usize,
     dt: f64,
@@ -35,19 +35,19 @@ pub(crate) struct Pen {
     /// What a role sees, and what it chooses.
     seen: Vec<f32>,
     scratch: Vec<f32>,
-    /// The policies of those who live here, at work, each with the number of its role.
-    pilots: Vec<(usize, BlockPolicy<Arc<Policy>>)>,
+    /// The policies of the lanes, each with the number of its role.
+    policies: Vec<(usize, BlockPolicy<Arc<Policy>>)>,
     out: Step,
 }
 
-impl Pen {
+impl CharacterBatch {
     /// With sixteen free lanes.
-    pub(super) fn new(herd: &Herd) -> Result<Self, HerdError> {
-        let (engine, n_obs, out) = match &herd.character {
+    pub(super) fn new(kind: &CharacterKind) -> Result<Self, CharacterError> {
+        let (engine, n_obs, out) = match &kind.character {
             Character::Agent(name) => {
-                let (setting, id) = (&herd.setting, herd.spec.as_ref().map_or(name, |spec| &spec.id));
-                let mut env = setting.with_clips(|| -> Result<VecEnv, HerdError> {
-                    let (registry, options) = herd.ground.registry(id, &setting.options)?;
+                let (setting, id) = (&kind.setting, kind.spec.as_ref().map_or(name, |spec| &spec.id));
+                let mut env = setting.with_clips(|| -> Result<VecEnv, CharacterError> {
+                    let (registry, options) = kind.ground.registry(id, &setting.options)?;
                     let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
                     Ok(VecEnv::from_registry(&registry, id, &options)?)
                 })?;
@@ -57,39 +57,39 @@ impl Pen {
             }
             Character::Prefab(_) => {
                 let options = BatchOptions { agents: BLOCK, ..default() };
-                (Engine::Free(Box::new(Batch::new(&herd.model, &options)?), herd.substeps), 0, Step::default())
+                (Engine::Free(Box::new(Batch::new(&kind.model, &options)?), kind.substeps), 0, Step::default())
             }
         };
-        Ok(Pen {
+        Ok(CharacterBatch {
             engine: SyncCell::new(engine),
             lanes: (0..BLOCK).map(|_| None).collect(),
-            model: herd.model.clone(),
-            n_act: herd.model.nu,
-            dt: herd.dt,
+            model: kind.model.clone(),
+            n_act: kind.model.nu,
+            dt: kind.dt,
             obs: vec![0.0; n_obs * BLOCK],
-            action: vec![0.0; herd.model.nu * BLOCK],
-            last: vec![0.0; herd.model.nu * BLOCK],
-            roles: herd.spec.as_ref().map(|spec| spec.deciders()).unwrap_or_default(),
+            action: vec![0.0; kind.model.nu * BLOCK],
+            last: vec![0.0; kind.model.nu * BLOCK],
+            roles: kind.spec.as_ref().map(|spec| spec.deciders()).unwrap_or_default(),
             seen: Vec::new(),
-            scratch: vec![0.0; herd.model.nu * BLOCK],
-            pilots: Vec::new(),
+            scratch: vec![0.0; kind.model.nu * BLOCK],
+            policies: Vec::new(),
             out,
         })
     }
 
-    /// Whether nobody lives here.
+    /// Whether all lanes are free.
     pub fn is_empty(&self) -> bool {
         self.lanes.iter().all(Option::is_none)
     }
 
     /// Gives a ragdoll a lane that is free.
-    pub(super) fn admit(&mut self, lane: usize, mut resident: Resident, time: Duration) {
+    pub(super) fn admit(&mut self, lane: usize, mut slot: Slot, time: Duration) {
         if let Engine::Env(env) = self.engine.get() {
             // the lane exists, and so does its agent
-            let _ = env.reseed_agent(lane, resident.seed, resident.number as usize);
+            let _ = env.reseed_agent(lane, slot.seed, slot.number as usize);
         }
-        resident.begin();
-        self.lanes[lane] = Some(resident);
+        slot.begin();
+        self.lanes[lane] = Some(slot);
         self.reset(lane);
         self.record(lane, time, true);
     }
@@ -118,27 +118,27 @@ impl Pen {
         }
     }
 
-    /// Tells a ragdoll what to do, or gives it back to its own schedule. A body without a task can be told nothing.
-    pub fn command(&mut self, lane: usize, command: Option<Vec<f64>>) -> Result<(), HerdError> {
+    /// Sets the command of a ragdoll, or gives it back to its own schedule. A body without a task takes no command.
+    pub fn command(&mut self, lane: usize, command: Option<Vec<f64>>) -> Result<(), CharacterError> {
         let told = match self.engine.get() {
-            Engine::Env(env) => env.set_command(lane, command.as_deref()).map_err(HerdError::from),
-            Engine::Free(..) if command.is_some() => Err(HerdError::Command),
+            Engine::Env(env) => env.set_command(lane, command.as_deref()).map_err(CharacterError::from),
+            Engine::Free(..) if command.is_some() => Err(CharacterError::Command),
             Engine::Free(..) => Ok(()),
         };
-        if let Some(resident) = &mut self.lanes[lane] {
-            resident.command = command;
+        if let Some(slot) = &mut self.lanes[lane] {
+            slot.command = command;
         }
         told
     }
 
     /// Gives a ragdoll ground of its own, over all episodes.
-    pub fn lay(&mut self, lane: usize, elevations: &[f32]) -> Result<(), HerdError> {
-        let Engine::Env(env) = self.engine.get() else { return Err(HerdError::Ground) };
+    pub fn lay(&mut self, lane: usize, elevations: &[f32]) -> Result<(), CharacterError> {
+        let Engine::Env(env) = self.engine.get() else { return Err(CharacterError::Ground) };
         env.set_ground(lane, 0, elevations)?;
-        if let Some(resident) = &mut self.lanes[lane] {
-            resident.grounds = Arc::new(vec![elevations.to_vec()]);
-            if let Some(newest) = resident.trail.back_mut() {
-                newest.grounds = resident.grounds.clone();
+        if let Some(slot) = &mut self.lanes[lane] {
+            slot.grounds = Arc::new(vec![elevations.to_vec()]);
+            if let Some(newest) = slot.history.back_mut() {
+                newest.grounds = slot.grounds.clone();
             }
         }
         Ok(())
@@ -157,8 +157,8 @@ impl Pen {
             Engine::Free(batch, _) => batch.reset(lane, qpos, qvel),
         }
         // what was before it is not on the way there
-        if let Some(resident) = &mut self.lanes[lane] {
-            resident.trail.clear();
+        if let Some(slot) = &mut self.lanes[lane] {
+            slot.history.clear();
         }
         self.record(lane, time, true);
     }
@@ -178,7 +178,7 @@ impl Pen {
         }
     }
 
-    /// Appends the state of a lane to its trail, and notes what it is told.
+    /// Appends the state of a lane and its command to its history.
     fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
         let mut grounds = Vec::new();
         let (qpos, qvel, command, reference) = match self.engine.get() {
@@ -191,17 +191,17 @@ impl Pen {
             }
             Engine::Free(batch, _) => (batch.qpos(lane), batch.qvel(lane), Vec::new(), None),
         };
-        if let Some(resident) = &mut self.lanes[lane] {
-            let before = resident.trail.back().filter(|_| !fresh);
+        if let Some(slot) = &mut self.lanes[lane] {
+            let before = slot.history.back().filter(|_| !fresh);
             let own = before.and_then(|before| stage::own_velocity(&self.model, &before.qpos, &qpos, self.dt));
-            resident.episode.own_velocity = own.unwrap_or_default();
-            resident.episode.command.clone_from(&command);
-            if *resident.grounds != grounds {
-                resident.grounds = Arc::new(grounds);
+            slot.episode.own_velocity = own.unwrap_or_default();
+            slot.episode.command.clone_from(&command);
+            if *slot.grounds != grounds {
+                slot.grounds = Arc::new(grounds);
             }
-            let action = if fresh { vec![0.0; self.n_act] } else { resident.episode.action.clone() };
-            let grounds = resident.grounds.clone();
-            resident.trail.push_back(Still { time, qpos, qvel, reference, fresh, action, command, grounds });
+            let action = if fresh { vec![0.0; self.n_act] } else { slot.episode.action.clone() };
+            let grounds = slot.grounds.clone();
+            slot.history.push_back(PoseSample { time, qpos, qvel, reference, fresh, action, command, grounds });
         }
     }
 
@@ -234,33 +234,33 @@ impl Pen {
         std::mem::swap(&mut self.action, &mut self.last);
         self.action.fill(0.0);
         let n = self.n_act;
-        let Pen { engine, lanes, roles, pilots, obs, seen, action, last, scratch, .. } = self;
+        let CharacterBatch { engine, lanes, roles, policies, obs, seen, action, last, scratch, .. } = self;
         let n_obs = obs.len() / BLOCK;
-        let has = |lane: &Option<Resident>, role: usize, policy: &Arc<Policy>| {
+        let has = |lane: &Option<Slot>, role: usize, policy: &Arc<Policy>| {
             lane.as_ref().and_then(|r| r.policies[role].as_ref()).is_some_and(|own| Arc::ptr_eq(own, policy))
         };
-        pilots.retain(|(role, pilot)| lanes.iter().any(|lane| has(lane, *role, pilot.policy())));
-        for (role, policy) in lanes.iter().flatten().flat_map(|resident| resident.policies.iter().enumerate()) {
+        policies.retain(|(role, acting)| lanes.iter().any(|lane| has(lane, *role, acting.policy())));
+        for (role, policy) in lanes.iter().flatten().flat_map(|slot| slot.policies.iter().enumerate()) {
             let Some(policy) = policy else { continue };
-            if !pilots.iter().any(|(known, pilot)| *known == role && Arc::ptr_eq(pilot.policy(), policy)) {
-                pilots.push((role, BlockPolicy::new(policy.clone(), Isa::best())));
+            if !policies.iter().any(|(known, acting)| *known == role && Arc::ptr_eq(acting.policy(), policy)) {
+                policies.push((role, BlockPolicy::new(policy.clone(), Isa::best())));
             }
         }
-        for (number, pilot) in pilots {
+        for (number, acting) in policies {
             let Some(role) = roles.get(*number) else { continue };
             seen.clear();
             for row in obs.chunks_exact(n_obs.max(1)) {
                 seen.extend_from_slice(&row[role.obs.clone()]);
             }
-            // all of a pen at once: most often they share one policy
+            // the whole batch at once: most often its lanes share one policy
             let own = role.act.len();
             let mut decides = [true; BLOCK];
             if let Engine::Env(env) = engine.get() {
                 // one of its roles, and a place for each of its agents
                 let _ = env.decides(*number, &mut decides);
             }
-            pilot.act_rows(seen, None, &mut scratch[..own * BLOCK]);
-            for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], *number, pilot.policy())) {
+            acting.act_rows(seen, None, &mut scratch[..own * BLOCK]);
+            for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], *number, acting.policy())) {
                 let of_role = lane * n + role.act.start..lane * n + role.act.end;
                 action[of_role.clone()].copy_from_slice(match decides[lane] {
                     true => &scratch[lane * own..(lane + 1) * own],
@@ -268,24 +268,24 @@ impl Pen {
                 });
             }
         }
-        for (row, resident) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
-            let Some(resident) = resident else { continue };
-            if let Some(Controls(given)) = &resident.controls {
+        for (row, slot) in self.action.chunks_exact_mut(n.max(1)).zip(&mut self.lanes) {
+            let Some(slot) = slot else { continue };
+            if let Some(Controls(given)) = &slot.controls {
                 row.fill(0.0);
                 for (a, x) in row.iter_mut().zip(given).filter(|(_, x)| x.is_finite()) {
                     *a = *x;
                 }
             }
-            if let Some(Held(given)) = &resident.held {
+            if let Some(Held(given)) = &slot.held {
                 for (a, x) in row.iter_mut().zip(given) {
                     *a = x.filter(|x| x.is_finite()).unwrap_or(*a);
                 }
             }
-            if resident.lying.is_some() {
+            if slot.lying.is_some() {
                 row.fill(0.0);
             }
-            resident.episode.action.clear();
-            resident.episode.action.extend_from_slice(row);
+            slot.episode.action.clear();
+            slot.episode.action.extend_from_slice(row);
         }
     }
 
@@ -296,14 +296,14 @@ impl Pen {
             Engine::Env(env) => drop(env.push(lane, body, force, torque)),
             Engine::Free(batch, _) => batch.push(lane, body, force, torque),
         };
-        for (lane, resident) in self.lanes.iter_mut().enumerate() {
-            let Some(resident) = resident else { continue };
-            let mut bodies: Vec<usize> = resident.pushes.iter().map(|p| p.body).collect();
+        for (lane, slot) in self.lanes.iter_mut().enumerate() {
+            let Some(slot) = slot else { continue };
+            let mut bodies: Vec<usize> = slot.pushes.iter().map(|p| p.body).collect();
             bodies.sort_unstable();
             bodies.dedup();
             for body in bodies {
                 let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
-                for p in resident.pushes.iter().filter(|p| p.body == body && p.decisions > 0) {
+                for p in slot.pushes.iter().filter(|p| p.body == body && p.decisions > 0) {
                     (0..3).for_each(|k| {
                         force[k] += p.force[k];
                         torque[k] += p.torque[k];
@@ -311,7 +311,7 @@ impl Pen {
                 }
                 push(lane, body, force, torque);
             }
-            resident.pushes.retain_mut(|p| {
+            slot.pushes.retain_mut(|p| {
                 let lasts = p.decisions > 0;
                 p.decisions = p.decisions.saturating_sub(1);
                 lasts
@@ -331,24 +331,24 @@ impl Pen {
             true => (out.terminated[lane], out.truncated[lane], out.diverged[lane]),
             false => (false, false, false),
         };
-        let Some(resident) = &mut self.lanes[lane] else { return terminated || truncated || diverged };
-        let asked = resident.begin_now;
-        let episode = &mut resident.episode;
+        let Some(slot) = &mut self.lanes[lane] else { return terminated || truncated || diverged };
+        let asked = slot.begin_now;
+        let episode = &mut slot.episode;
         for foot in 0..32 {
             if (episode.feet ^ feet) >> foot & 1 == 1 {
-                resident.events.push(Event::Foot { foot, down: feet >> foot & 1 == 1 });
+                slot.events.push(Event::Foot { foot, down: feet >> foot & 1 == 1 });
             }
         }
         episode.feet = feet;
-        if let Some(rest) = &mut resident.lying {
+        if let Some(rest) = &mut slot.lying {
             *rest = rest.saturating_sub(1);
             let up = *rest == 0 || diverged || asked;
             if up {
-                resident.begin();
+                slot.begin();
             }
             return up;
         }
-        let Restart { after_fall, on_time_up } = resident.restart;
+        let Restart { after_fall, on_time_up } = slot.restart;
         episode.untimed |= !on_time_up;
         episode.decisions += 1;
         episode.seconds = episode.decisions as f64 * self.dt;
@@ -372,14 +372,14 @@ impl Pen {
             () if asked => End::Asked,
             () => return false,
         };
-        resident.events.push(Event::Ended(end, resident.episode.clone()));
+        slot.events.push(Event::Ended(end, slot.episode.clone()));
         if end == End::Fell && after_fall > 0.0 {
-            resident.episode.down = true;
+            slot.episode.down = true;
             // an infinite time is the longest there is
-            resident.lying = Some((after_fall / self.dt).ceil() as u64);
+            slot.lying = Some((after_fall / self.dt).ceil() as u64);
             return false;
         }
-        resident.begin();
+        slot.begin();
         true
     }
 }
