@@ -1,5 +1,5 @@
-//! Every mode of the menu can follow every mode. After each transition the characters, the policy and the panels are those of
-//! the new mode, there is no error on the screen, and nothing of the former mode is left.
+//! Every mode of the menu can follow every mode. After each transition, characters and policy are those of the new mode. The
+//! screen shows no error, and nothing of the former mode is left.
 #![cfg(feature = "render")]
 
 #[path = "common/devices.rs"]

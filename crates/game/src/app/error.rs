@@ -1,4 +1,4 @@
-//! What can keep the game from starting, with the remedy.
+//! Errors that keep the game from starting, with their remedies.
 
 use marathon_physics::hint::did_you_mean;
 use marathon_runs::text::printable;
@@ -9,10 +9,10 @@ use thiserror::Error;
 /// Why the game does not start.
 #[derive(Debug, Error)]
 pub enum GameError {
-    /// A file that is not there.
+    /// A missing file.
     #[error("{}: there is no such file or folder{}", .path.display(), did_you_mean(.nearest.as_ref()))]
     Missing {
-        /// Where it was looked for.
+        /// The path.
         path: PathBuf,
         /// Something beside it with a similar name.
         nearest: Option<String>,
@@ -22,7 +22,7 @@ pub enum GameError {
     Replay {
         /// The file.
         path: PathBuf,
-        /// What was found and what was expected.
+        /// The problem: found and expected.
         problem: String,
     },
     /// A table of the longest runs that cannot be used.
@@ -30,7 +30,7 @@ pub enum GameError {
     Table {
         /// The file.
         path: PathBuf,
-        /// What was found, and the remedy.
+        /// The problem, and the remedy.
         problem: String,
     },
     /// An agent that does not exist, or a model that is not valid.
@@ -39,31 +39,31 @@ pub enum GameError {
     /// A model file that is not valid.
     #[error(transparent)]
     Model(#[from] Box<marathon_physics::mjcf::MjcfError>),
-    /// A policy that is not there or for another agent, a run that cannot begin, options that make no sense.
+    /// A policy that is missing or for another agent, a run that cannot start, or wrong options.
     #[error("{}", .0.spelled(&Flags("marathon")))]
     Run(#[from] RunError),
-    /// The system refuses something.
+    /// An error of the system.
     #[error("{0}")]
     System(String),
-    /// No trainer of ML-Agents.
+    /// The trainer of ML-Agents was not found, or failed.
     #[error(transparent)]
     Player(#[from] marathon_mlagents::PlayerError),
-    /// What comes through the standard input is not what an environment sends.
+    /// The standard input does not have the states of an environment.
     #[error("the standard input: {0}; the Python package writes it, see render_mode=\"human\"")]
     Stream(String),
     /// Ctrl-C or SIGTERM ended the game.
     #[error("interrupted{}", .0.as_ref().map(|path| format!(": {} is not written", path.display())).unwrap_or_default())]
     Interrupted(Option<PathBuf>),
-    /// The other program is gone, or says what makes no sense.
+    /// The other program has failed, or sent wrong data.
     #[error("{0}")]
     Outside(String),
-    /// No screen.
+    /// There is no display.
     #[error(
         "there is no display to open a window on (DISPLAY is {0}); on a machine without a screen, film instead: \
          marathon-game hopper --record hop.mp4, or start a virtual one: xvfb-run marathon-game"
     )]
     NoDisplay(String),
-    /// No graphics.
+    /// There is no graphics adapter.
     #[error(
         "no graphics adapter was found: Marathon draws with Vulkan. Install your card's driver, or the software renderer: \
          apt install mesa-vulkan-drivers libvulkan1 (Debian, Ubuntu), dnf install mesa-vulkan-drivers vulkan-loader \
@@ -76,9 +76,9 @@ pub enum GameError {
     /// A file could not be written.
     #[error("cannot write {}: {source}", .path.display())]
     Write {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: std::io::Error,
     },
 }

@@ -23,7 +23,7 @@ pub fn exists(path: &Path) -> Result<(), GameError> {
     Err(GameError::Missing { path: path.into(), nearest })
 }
 
-/// What files about an agent are called: its name without the version.
+/// The stem of files about an agent: its name without the version.
 pub fn file_stem(agent: &str) -> String {
     agent.split("-v").next().unwrap_or(agent).to_lowercase()
 }

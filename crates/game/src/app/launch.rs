@@ -19,8 +19,9 @@ use std::io::{BufReader, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Runs the app with the words of a command line and returns its exit code: 0 after a normal end, 1 if the app cannot start,
-/// 2 for a wrong command line, 130 after Ctrl-C.
+/// Runs the app with the words of a command line.
+///
+/// Returns the exit code: 0 after a normal end, 1 if the app cannot start, 2 for a wrong command line, 130 after Ctrl-C.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = match Args::try_parse_from(words) {
         Ok(args) => args,

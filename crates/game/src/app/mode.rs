@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use clap::ValueEnum;
 
-/// What to do with the characters.
+/// The use of the characters.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, ValueEnum)]
 pub enum Mode {
     /// Watch a policy.

@@ -1,4 +1,4 @@
-//! How fast frames and ticks follow each other.
+//! The rates of frames and ticks.
 
 use bevy::prelude::*;
 use std::time::{Duration, Instant};

@@ -21,19 +21,19 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Offset of a ghost beside a character, m: behind it, as the camera at its side sees it.
 const BESIDE: Vec3 = Vec3::new(0.0, 0.0, -0.9);
 
-/// Where the ghost of a clip is drawn.
+/// The place of the ghost of a clip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GhostAt {
     /// Nowhere.
     #[default]
     Off,
-    /// Where the clip is.
+    /// At the pose of the clip.
     Inside,
     /// Beside the character.
     Beside,
 }
 
-/// What is drawn of the clip of the character in focus.
+/// The drawing of the clip of the character in focus.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Imitation {
     /// The ghost.

@@ -4,7 +4,7 @@ use bevy::input::gamepad::GamepadButton;
 use bevy::prelude::*;
 use clap::ValueEnum;
 
-/// What a key or button does.
+/// An action of a key or button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Action {
     /// Open or close the menu.

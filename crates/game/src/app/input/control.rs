@@ -55,7 +55,7 @@ fn control_time(
     }
 }
 
-/// Restarts the characters, or goes on to the next agent or clip.
+/// Restarts the characters, or switches to the next agent or clip.
 fn change_scenario(
     mut actions: MessageReader<ActionPressed>,
     mut scenario: ResMut<Scenario>,

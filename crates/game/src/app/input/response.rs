@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-/// How the deflections of a device become commands.
+/// The response to the deflections of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mapping {
     /// Deflection up to which a stick or trigger counts as released, 0 to 1. The response begins at 0 beyond it.

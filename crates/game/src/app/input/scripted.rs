@@ -103,7 +103,7 @@ pub struct ScriptedInput {
     control: Control,
     /// Gamepad, counted from 0.
     pad: usize,
-    /// How far the control is pushed: 1 for keys and buttons.
+    /// Deflection of the control: 1 for keys and buttons.
     amount: f32,
 }
 

@@ -18,7 +18,7 @@ pub struct Actor(pub usize);
 #[derive(Resource, Default)]
 pub struct Focus(pub usize);
 
-/// Which marks are drawn about the focus.
+/// The marks that are drawn about the focus.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct ShownMarks {
     /// Contacts and forces.
@@ -33,7 +33,7 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(Update, (follow_focus, show_marks).chain().in_set(AppSet::Present));
 }
 
-/// Where character `i` stands: in rows, or side by side on tracks that are not level.
+/// The place of character `i`: in rows, or side by side on tracks that are not level.
 pub fn place(i: usize, spacing: f32, level: bool) -> Vec3 {
     if !level {
         return Vec3::new(0.0, 0.0, -spacing * i as f32);

@@ -20,7 +20,7 @@ pub const BUILT: &str = "adversary";
 const KIND: &str = "mixed";
 const DIFFICULTY: f64 = 0.5;
 
-/// What the player does on an assault course.
+/// The role of the player on an assault course.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PlayerRole {
     /// Watch: the policy runs.
@@ -49,11 +49,11 @@ impl PlayerRole {
 /// An assault course, and the player's role.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CourseOptions {
-    /// What the player does.
+    /// The player's role.
     pub role: PlayerRole,
-    /// What the ground is made of, in the words of the tasks on courses. A builder's ground is made of steps.
+    /// The kind of the ground, in the words of the tasks on courses. A builder's ground is made of steps.
     pub kind: String,
-    /// How difficult it is, 0 to 1.
+    /// Difficulty, 0 to 1.
     pub difficulty: f64,
 }
 
@@ -63,7 +63,7 @@ impl Default for CourseOptions {
     }
 }
 
-/// What a character on a course needs besides its task.
+/// Components of a character on a course, besides its task.
 pub struct Equipment {
     /// The course, if the task has none.
     pub laid: Option<LaidGround>,
@@ -84,7 +84,7 @@ impl CourseOptions {
         }
     }
 
-    /// What the ground is made of.
+    /// The kind of the ground.
     pub fn kind(&self) -> &str {
         if self.role == PlayerRole::Build { BUILT } else { &self.kind }
     }
@@ -102,7 +102,7 @@ impl CourseOptions {
         setting
     }
 
-    /// How far ahead of the runner the camera looks, and its distance, m; `usual` is the distance in other modes. The player
+    /// The point ahead of the runner that the camera looks at, and its distance, m; `usual` is that of other modes. The player
     /// sees the ground ahead, or the site to build on.
     pub fn view(&self, usual: f32) -> (f32, f32) {
         match self.role {

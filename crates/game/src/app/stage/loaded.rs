@@ -23,7 +23,7 @@ pub struct LoadedPolicy {
     pub policy: Option<Handle<PolicyAsset>>,
     /// The task.
     pub setting: Setting,
-    /// What the characters stand on.
+    /// The ground.
     pub ground: Ground,
     /// The policies of the task's roles, by file and checksum.
     pub names: [Option<String>; 2],

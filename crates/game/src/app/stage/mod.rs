@@ -1,4 +1,4 @@
-//! What is simulated and shown: the scenario, its policies and its characters.
+//! The scenario, its policies and its characters.
 
 pub mod actors;
 pub mod clips;

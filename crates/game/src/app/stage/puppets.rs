@@ -10,7 +10,7 @@ use marathon_physics::Model;
 use marathon_render::Scene;
 use std::sync::Arc;
 
-/// What all puppets of a scenario share.
+/// The body and task that all puppets of a scenario share.
 #[derive(Clone)]
 pub struct Kind {
     /// The body.

@@ -18,11 +18,11 @@ pub struct Scenario {
     /// Options of the task that the user has chosen, which override those of the policy. Options of another agent are
     /// ignored.
     pub chosen: Setting,
-    /// What moves the characters.
+    /// The policy of the characters.
     pub source: PolicySource,
     /// Number of characters.
     pub agents: usize,
-    /// What they stand on; unused by the test bed and on assault courses.
+    /// The ground; unused by the test bed and on assault courses.
     pub ground: Ground,
     /// The assault course, and the player's role.
     pub course: CourseOptions,
@@ -36,7 +36,7 @@ pub struct Scenario {
 #[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoadScenario;
 
-/// What moves the characters.
+/// The origin of the policy that moves the characters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PolicySource {
     /// The policy that comes with the agent.
@@ -70,7 +70,7 @@ impl Scenario {
         })
     }
 
-    /// What the characters stand on.
+    /// The ground.
     pub fn stands_on(&self) -> Ground {
         match self.mode {
             Mode::Course if course::has_own(&self.agent) => Ground::Level,

@@ -41,7 +41,7 @@ fn fits_course(scenario: &Scenario, agent: &str, shipped: &ShippedPolicies) -> b
     other.setting(shipped).is_ok_and(|setting| course::check(&other.course, &setting).is_ok())
 }
 
-/// Goes on to the next agent that has a policy. Returns whether the scenario has changed.
+/// Switches to the next agent that has a policy. Returns whether the scenario has changed.
 pub fn next_agent(scenario: &mut Scenario, shipped: &ShippedPolicies) -> bool {
     let count = shipped.agents().count();
     let first = shipped.agents().position(|agent| agent == scenario.agent).map_or(0, |i| i + 1);

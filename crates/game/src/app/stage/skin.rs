@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 
 /// The skin that comes with Marathon, and its name.
 const SHIPPED: (&str, &[u8]) = ("marathon_man", include_bytes!("../../../../../assets/skins/marathon_man.glb"));
-/// Where its bytes are among the program's own assets.
+/// Path of its bytes among the program's own assets.
 const PLACE: &str = "skin.glb";
-/// How a .glb file begins.
+/// The first bytes of a .glb file.
 const MAGIC: &[u8] = b"glTF";
 
 /// The file of the skin that all characters wear.
@@ -48,7 +48,7 @@ pub struct WornSkin {
     mapping: Option<Mapping>,
 }
 
-/// How far the loading of a [`WornSkin`] is.
+/// The progress of a [`WornSkin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SkinState {
     /// The file is being read.

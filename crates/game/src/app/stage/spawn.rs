@@ -39,7 +39,7 @@ pub fn enter_mode(world: &mut World) {
     mode::enter(world, mode);
 }
 
-/// What the characters of a scenario are made of.
+/// The parts that the characters of a scenario have in common.
 struct Cast {
     model: Arc<Model>,
     ragdoll: Ragdoll,

@@ -35,7 +35,7 @@ pub struct ModeKeys {
     pub without: &'static [Action],
     /// Names of actions that differ in this mode.
     pub names: &'static [(Action, &'static str)],
-    /// What the mouse does, in a word and in full, if that differs in this mode.
+    /// The use of the mouse, in a word and in full, if it differs in this mode.
     pub mouse: Option<[&'static str; 2]>,
 }
 

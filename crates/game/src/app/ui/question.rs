@@ -24,7 +24,7 @@ pub enum Asked {
 #[derive(Resource, Default)]
 pub struct Question(pub Option<(Asked, String)>);
 
-/// What could be lost now. [`ReportSet`] updates it in each frame.
+/// Results that could be lost now. [`ReportSet`] updates them in each frame.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct AtStake {
     /// Seconds of training since the policy was saved.

@@ -21,7 +21,7 @@ const FULL: [f32; 2] = [1000.0, 600.0];
 /// Smallest scale at which text can be read.
 const SMALLEST: f32 = 0.66;
 
-/// What is drawn over the picture.
+/// The text and bars over the picture.
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct Hud {
     /// Anything at all.

@@ -51,14 +51,14 @@ fn reset(mut step: ResMut<Step>) {
     step.set_if_neq(Step::default());
 }
 
-/// Where the next meter will be built.
+/// The place of the next meter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {
-    /// Where it begins along the track, m.
+    /// Its start along the track, m.
     pub from: f64,
     /// Height there, m above the start.
     pub height: f64,
-    /// How high a step is, m.
+    /// Height of a step, m.
     pub step: f64,
 }
 
@@ -87,7 +87,7 @@ impl Site {
     }
 }
 
-/// Where a ray meets the vertical plane of a track, m above its start.
+/// Height at which a ray meets the vertical plane of a track, m above its start.
 fn height_at(ray: Ray3d, track: Vec3) -> Option<f64> {
     let distance = ray.intersect_plane(track, InfinitePlane3d::new(Vec3::Z))?;
     Some(f64::from((ray.get_point(distance) - track).y))

@@ -47,11 +47,11 @@ CREATE INDEX longest ON runs (agent, course, difficulty, part, distance DESC);
 pub struct Course {
     /// Registry name of the agent.
     pub agent: String,
-    /// What the course is made of.
+    /// The kind of the ground.
     pub kind: String,
-    /// How difficult it is, 0 to 1.
+    /// Difficulty, 0 to 1.
     pub difficulty: f64,
-    /// What the player did: `watch`, `run` or `build`.
+    /// The player's role: `watch`, `run` or `build`.
     pub role: String,
 }
 
@@ -68,13 +68,13 @@ pub struct Run {
     pub runner: String,
     /// The builder of the course: the same, or `seed`.
     pub builder: String,
-    /// Farthest that it came, m.
+    /// Largest distance, m.
     pub distance: f64,
-    /// How long it ran, s.
+    /// Duration, s.
     pub seconds: f64,
     /// The slowest time factor of the run; 1 is real time.
     pub slowest: f64,
-    /// How it ended.
+    /// The reason of its end.
     pub ended: String,
     /// Date and time of the end, UTC; the table writes it.
     pub date: String,
@@ -84,12 +84,12 @@ pub struct Run {
     pub replay: Option<PathBuf>,
 }
 
-/// How a run compares with the others on its course.
+/// The place of a run among the others on its course.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// 1 for the longest.
     pub rank: usize,
-    /// How many there are.
+    /// Number of runs.
     pub of: usize,
     /// The longest and the shortest, m.
     pub longest: f64,
@@ -103,7 +103,7 @@ pub struct Table {
     path: PathBuf,
 }
 
-/// Where the table is, if the command line names no other.
+/// The default path of the table.
 ///
 /// # Errors
 /// If the system names no folder for a user's data.
@@ -119,7 +119,7 @@ fn within(folder: &Path, name: &str) -> Option<PathBuf> {
     (Path::new(name).file_name() == Some(name.as_ref())).then(|| folder.join(name))
 }
 
-/// What is wrong with a table, and what to do about it.
+/// The error of a table, with a remedy.
 fn wrong(path: &Path, error: &rusqlite::Error) -> GameError {
     let remedy = "move it away, and a new one begins, or name another: --table FILE";
     let problem = match error.sqlite_error_code() {
@@ -247,7 +247,7 @@ impl Table {
         }
     }
 
-    /// How a distance would compare on a course, m; with an infinite one, how the course stands. None without runs.
+    /// The place of a distance on a course, m. An infinite distance yields the present record. `None` without runs.
     ///
     /// # Errors
     /// If the table cannot be read.

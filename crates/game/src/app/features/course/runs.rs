@@ -27,15 +27,15 @@ const EDGE: f64 = 0.2;
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
 
-/// The runs on stage, and how the last one compares with those of the table.
+/// The runs of the present characters, and the place of the last one in the table.
 #[derive(Resource)]
 pub struct Runs {
     table: Option<PathBuf>,
     player: String,
     under_way: Vec<UnderWay>,
-    /// How the course stands.
+    /// The present record of the course.
     pub standing: Option<Place>,
-    /// The run that has ended last, and its place.
+    /// The last run that has ended, and its place.
     pub last: Option<(Run, Place)>,
 }
 
@@ -47,12 +47,12 @@ struct UnderWay {
     until: Duration,
     /// The slowest time factor.
     slowest: f64,
-    /// Where it was at the first decision, as its task tells the distance, m.
+    /// Its distance at the first decision, as its task reports it, m.
     start: Option<f64>,
     /// Full meters made, and when the last one was, s.
     meters: f64,
     since: f64,
-    /// Why the referee has ended it.
+    /// The referee's reason to end it.
     verdict: Option<&'static str>,
     /// Whether it has ended, and the character lies.
     over: bool,
@@ -96,7 +96,7 @@ impl Runs {
         &self.player
     }
 
-    /// Looks up how the course on stage stands.
+    /// Looks up the present record of the course.
     fn enter(&mut self, scenario: &Scenario) {
         (self.last, self.standing) = (None, None);
         // an error of the table is shown when a run ends
@@ -106,7 +106,7 @@ impl Runs {
         }
     }
 
-    /// Where a character was at the first decision of its run, m.
+    /// Distance of a character at the first decision of its run, m.
     pub(super) fn start(&self, ragdoll: Entity) -> Option<f64> {
         self.under_way.iter().find(|run| run.ragdoll == ragdoll)?.start
     }
@@ -239,7 +239,7 @@ fn arguments(loaded: &LoadedPolicy) -> String {
     all.collect::<Vec<_>>().join(" ")
 }
 
-/// How a run has ended, in words.
+/// The reason of the end of a run, in words.
 fn verdict(end: End, episode: &Episode, anatomy: &Anatomy) -> &'static str {
     let most = anatomy.spec.as_ref().map_or(usize::MAX, |spec| spec.max_episode_steps);
     match end {

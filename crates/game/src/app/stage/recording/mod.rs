@@ -26,7 +26,7 @@ pub struct PlayRecording(pub PathBuf);
 pub struct Recording {
     /// The task.
     pub setting: Setting,
-    /// What the characters stand on.
+    /// The ground.
     pub ground: Ground,
     /// Seconds between frames.
     pub dt: f64,
