@@ -16,8 +16,8 @@ pub fn listen() {
             std::process::exit(CODE.into());
         }
     };
-    // without a handler, a signal ends the process
-    if let Err(error) = ctrlc::try_set_handler(handler) {
+    // a shell starts background jobs with Ctrl-C ignored, which counts as a handler: take its place
+    if let Err(error) = ctrlc::set_handler(handler) {
         warn!("Ctrl-C will end the game without saving recordings: {error}");
     }
 }

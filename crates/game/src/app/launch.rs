@@ -1,7 +1,7 @@
 //! The start of the app: from a command line to a window or a film.
 
 use crate::app::cli::Args;
-use crate::app::error::{self, GameError};
+use crate::app::error::GameError;
 use crate::app::features::course::leaderboard;
 use crate::app::features::remote::{mailbox, mlagents, pipe};
 use crate::app::game::GamePlugin;
@@ -14,6 +14,7 @@ use bevy::app::{PluginGroupBuilder, TerminalCtrlCHandlerPlugin};
 use bevy::prelude::*;
 use bevy::window::{PresentMode, WindowResolution};
 use clap::Parser;
+use marathon_runs::text::printable;
 use std::ffi::OsString;
 use std::io::{BufReader, Write};
 use std::process::ExitCode;
@@ -33,7 +34,8 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let text = error::plain(&error.to_string());
+            let text = error.to_string();
+            let text = printable(&text);
             if let GameError::Interrupted(_) = error {
                 eprintln!("{text}");
                 return ExitCode::from(interrupt::CODE);

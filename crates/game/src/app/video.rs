@@ -21,6 +21,7 @@ use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use marathon_render::{Format, Image as Picture, Recorder};
 use std::collections::VecDeque;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -233,7 +234,10 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
         }
     }
     save_running(app.world_mut());
-    sink.finish()
+    sink.finish()?;
+    // the reader of a pipe may have closed it
+    let _ = writeln!(std::io::stdout(), "wrote {}", out.display());
+    Ok(())
 }
 
 /// Removes the padding of rows to 256 bytes, and alpha.

@@ -188,28 +188,28 @@ fn window(
         .id(Id::new(TITLE))
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .collapsible(false)
-        .resizable(false)
+        .auto_sized()
         .open(&mut picked.open)
-        .max_height(room.y)
-        .vscroll(true)
         .show(ctx, |ui| {
             ui.set_width(WIDTH.min(room.x));
-            let before = draft.scenario.agent.clone();
-            choose(ui, draft, shipped);
-            if draft.scenario.agent != before {
-                draft.runs = runs(&draft.scenario.agent);
-                if matches!(draft.scenario.source, PolicySource::File(_)) {
-                    draft.scenario.source = PolicySource::Shipped;
+            egui::ScrollArea::vertical().max_height(room.y).show(ui, |ui| {
+                let before = draft.scenario.agent.clone();
+                choose(ui, draft, shipped);
+                if draft.scenario.agent != before {
+                    draft.runs = runs(&draft.scenario.agent);
+                    if matches!(draft.scenario.source, PolicySource::File(_)) {
+                        draft.scenario.source = PolicySource::Shipped;
+                    }
                 }
-            }
-            ui.add_space(8.0);
-            ui.horizontal(|ui| {
-                picked.start = ui.button(RichText::new("  Start  ").size(17.0).strong()).clicked();
-                picked.quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
-            });
-            ui.add_space(6.0);
-            egui::CollapsingHeader::new("Keys").open(unfold).show(ui, |ui| {
-                picked.reset = keys(ui, bindings, rebinding);
+                ui.add_space(8.0);
+                ui.horizontal(|ui| {
+                    picked.start = ui.button(RichText::new("  Start  ").size(17.0).strong()).clicked();
+                    picked.quit = ui.button(RichText::new("  Quit  ").size(17.0)).clicked();
+                });
+                ui.add_space(6.0);
+                egui::CollapsingHeader::new("Keys").open(unfold).show(ui, |ui| {
+                    picked.reset = keys(ui, bindings, rebinding);
+                });
             });
         });
     picked

@@ -1,6 +1,6 @@
 //! The table of the longest runs: a SQLite database in the user's folder for data, with the best replays beside it.
 
-use crate::app::error::{GameError, plain_line};
+use crate::app::error::{GameError, printable_line};
 use crate::app::stage::recording::Recording;
 use etcetera::BaseStrategy;
 use marathon_physics::budget;
@@ -370,7 +370,7 @@ pub fn listing(path: &Path) -> Result<String, GameError> {
     let mut text = format!("{}\n", path.display());
     for course in table.courses()? {
         let Course { agent, kind, difficulty, role } = &course;
-        text += &format!("\n{}\n", plain_line(&format!("{agent}   {kind}, difficulty {difficulty}   {role}")));
+        text += &format!("\n{}\n", printable_line(&format!("{agent}   {kind}, difficulty {difficulty}   {role}")));
         for (i, run) in table.longest(&course, KEPT)?.iter().enumerate() {
             let Run { distance, seconds, ended, date, runner, builder, .. } = run;
             let replay = run.replay.as_ref().map(|path| format!("   {}", path.display())).unwrap_or_default();
@@ -379,7 +379,7 @@ pub fn listing(path: &Path) -> Result<String, GameError> {
                 "{:>4}  {distance:>6.2} m  {seconds:>6.2} s  {ended:<10}  {date}  {runner} on {builder}, seed {seed}:{number}:{episode}{replay}",
                 i + 1
             );
-            text += &format!("{}\n", plain_line(&row));
+            text += &format!("{}\n", printable_line(&row));
         }
     }
     Ok(text)

@@ -66,33 +66,39 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(Last, save_running.run_if(on_message::<AppExit>));
 }
 
-/// Starts and ends recordings.
+/// Starts and ends recordings. One that is requested before the characters are on stage starts with them.
 fn control(
     mut commands: Commands,
     mut actions: MessageReader<ActionPressed>,
     (scenario, loaded): (Res<Scenario>, Res<LoadedPolicy>),
     recorder: Option<Res<Recorder>>,
     mut notes: ResMut<Notifications>,
+    mut requested: Local<bool>,
     actors: Query<(&Actor, &Anatomy, &Transform), With<Seat>>,
 ) {
+    let recordable = scenario.mode.is_simulated() && scenario.mode != Mode::Testbed;
+    *requested &= recordable;
     for _ in actions.read().filter(|action| action.0 == Action::Record) {
         if let Some(recorder) = &recorder {
             commands.remove_resource::<Recorder>();
             finish(recorder, "", &mut notes);
-            continue;
-        }
-        if !scenario.mode.is_simulated() || scenario.mode == Mode::Testbed {
+        } else if !recordable {
             notes.say("only agents can be recorded");
-            continue;
+        } else {
+            *requested = !*requested;
         }
-        let mut all: Vec<_> = actors.iter().collect();
-        all.sort_by_key(|(actor, ..)| actor.0);
-        let Some((_, anatomy, _)) = all.first() else { continue };
-        let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
-        let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, places);
-        commands.insert_resource(Recorder { recording, until: Duration::ZERO });
-        notes.say("recording; the same key ends it");
     }
+    if !*requested {
+        return;
+    }
+    let mut all: Vec<_> = actors.iter().collect();
+    all.sort_by_key(|(actor, ..)| actor.0);
+    let Some((_, anatomy, _)) = all.first() else { return };
+    *requested = false;
+    let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
+    let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, places);
+    commands.insert_resource(Recorder { recording, until: Duration::ZERO });
+    notes.say("recording; the same key ends it");
 }
 
 /// Ends a recording when other characters come. The recording is complete up to now.

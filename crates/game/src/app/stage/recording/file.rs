@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 /// Kind of file: the key of the JSON document in its header.
 const FORMAT: &str = "marathon-replay";
+/// Version of the format, which the document states.
+const VERSION: u32 = 1;
 /// Limit on the agents of a recording, the same as on the command line.
 const MOST_AGENTS: usize = 256;
 /// Limit on the time between two frames, s.
@@ -54,7 +56,7 @@ impl Recording {
         }
         // one entry, because several would be written in any order
         let about = serde_json::json!({
-            "agent": self.setting.agent, "ground": self.ground.name(), "dt": self.dt, "task": self.setting,
+            "version": VERSION, "ground": self.ground.name(), "dt": self.dt, "task": self.setting,
         });
         let meta = HashMap::from([(FORMAT.to_string(), about.to_string())]);
         let file = safetensors::serialize(views, Some(meta)).map_err(|e| broken(e.to_string()))?;
@@ -115,12 +117,13 @@ impl Recording {
         let Some(about) = meta.get(FORMAT).and_then(|text| serde_json::from_str::<Value>(text).ok()) else {
             return Err(bad("not a recording of the game, which writes such files by the key R".into()));
         };
+        if about["version"] != VERSION {
+            let found = about.get("version").map_or("none".into(), Value::to_string);
+            return Err(bad(format!("its version is {found}, expected {VERSION}")));
+        }
         let tensors = Tensors { file: SafeTensors::deserialize(&bytes).map_err(|e| no_recording(&e))?, bad: &bad };
-        // older recordings have the agent alone
-        let setting = match &about["task"] {
-            Value::Null => Setting::named(about["agent"].as_str().unwrap_or_default())?,
-            task => serde_json::from_value(task.clone()).map_err(|e| bad(format!("its task cannot be read: {e}")))?,
-        };
+        let setting: Setting =
+            serde_json::from_value(about["task"].clone()).map_err(|e| bad(format!("its task cannot be read: {e}")))?;
         let spec = setting.factory()?.spec().clone();
         let found = about["ground"].as_str().unwrap_or_default();
         let ground = Ground::named(found).ok_or_else(|| {
@@ -133,46 +136,34 @@ impl Recording {
         let dt = dt.ok_or_else(|| bad(expected()))?;
         let (_, agents, places) = tensors.read("places", 3)?;
         let (frames, with_poses, qpos) = tensors.read("qpos", spec.nq)?;
-        let (others, with_numbers, numbers) = tensors.read("numbers", NUMBERS)?;
-        let (more, with_terms, terms) = tensors.read("terms", spec.reward_terms.len())?;
-        if frames == 0
-            || agents == 0
-            || [with_poses, with_numbers, with_terms] != [agents; 3]
-            || [others, more] != [frames; 2]
-        {
-            return Err(bad("its tensors are about different numbers of agents or frames".into()));
+        let uneven = || bad("its tensors are about different numbers of agents or frames".into());
+        if frames == 0 || agents == 0 || with_poses != agents {
+            return Err(uneven());
         }
+        let rows = |name: &str, columns: usize| {
+            let (frames_here, agents_here, numbers) = tensors.read(name, columns)?;
+            if (frames_here, agents_here) == (frames, agents) { Ok(numbers) } else { Err(uneven()) }
+        };
+        let (numbers, terms) = (rows("numbers", NUMBERS)?, rows("terms", spec.reward_terms.len())?);
+        let (actions, commands) = (rows("actions", spec.act)?, rows("commands", spec.command.len())?);
+        let untimed = rows("untimed", 1)?;
         if agents > MOST_AGENTS {
             return Err(bad(format!("it has {agents} agents, expected up to {MOST_AGENTS}")));
         }
         if let Some(i) = qpos.iter().position(|x| x.abs() > FARTHEST) {
             return Err(bad(format!("tensor 'qpos', number {i} is {}, expected up to {FARTHEST:e}", qpos[i])));
         }
-        let (numbers, terms, places) = (narrow(&numbers), narrow(&terms), narrow(&places));
-        let mut recording = Recording { agents, qpos, numbers, terms, ..Recording::new(setting, ground, dt, places) };
-        // recordings of earlier versions end here
-        if tensors.has("actions") {
-            let (a, b, actions) = tensors.read("actions", spec.act)?;
-            let (c, d, commands) = tensors.read("commands", spec.command.len())?;
-            if [a, c] != [frames; 2] || [b, d] != [agents; 2] {
-                return Err(bad("its tensors are about different numbers of agents or frames".into()));
-            }
-            (recording.actions, recording.commands) = (narrow(&actions), commands);
-            let (lies, elevations) = (tensors.read("lies", LIE)?.2, tensors.read("elevations", 2)?.2);
-            let points: f64 = elevations.as_chunks::<2>().0.iter().map(|[_, times]| times.max(0.0)).sum();
-            budget::MEMORY.check(4.0 * points).map_err(|e| bad(e.to_string()))?;
-            recording.grounds = unpacked(&lies, &narrow(&elevations), &recording)
-                .ok_or_else(|| bad("its tensors 'lies' and 'elevations' do not fit each other".into()))?;
-            if let Some(problem) = recording.wrong_ground()? {
-                return Err(bad(problem));
-            }
-        }
-        if tensors.has("untimed") {
-            let (a, b, untimed) = tensors.read("untimed", 1)?;
-            if (a, b) != (frames, agents) {
-                return Err(bad("its tensors are about different numbers of agents or frames".into()));
-            }
-            recording.untimed = narrow(&untimed);
+        let [numbers, terms, places, actions, untimed] =
+            [numbers, terms, places, actions, untimed].map(|tensor| narrow(&tensor));
+        let empty = Recording::new(setting, ground, dt, places);
+        let mut recording = Recording { agents, qpos, numbers, terms, actions, commands, untimed, ..empty };
+        let (lies, elevations) = (tensors.read("lies", LIE)?.2, tensors.read("elevations", 2)?.2);
+        let points: f64 = elevations.as_chunks::<2>().0.iter().map(|[_, times]| times.max(0.0)).sum();
+        budget::MEMORY.check(4.0 * points).map_err(|e| bad(e.to_string()))?;
+        recording.grounds = unpacked(&lies, &narrow(&elevations), &recording)
+            .ok_or_else(|| bad("its tensors 'lies' and 'elevations' do not fit each other".into()))?;
+        if let Some(problem) = recording.wrong_ground()? {
+            return Err(bad(problem));
         }
         Ok(recording)
     }
@@ -213,10 +204,6 @@ struct Tensors<'a> {
 }
 
 impl Tensors<'_> {
-    fn has(&self, name: &str) -> bool {
-        self.file.tensor(name).is_ok()
-    }
-
     /// A tensor of so many columns, in single or double precision: frames, agents, numbers.
     fn read(&self, name: &str, columns: usize) -> Result<(usize, usize, Vec<f64>), GameError> {
         let tensor = self.file.tensor(name).map_err(|e| (self.bad)(e.to_string()))?;
@@ -300,29 +287,35 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_of_an_earlier_version_is_read() -> Result<(), Box<dyn std::error::Error>> {
-        let recording = sample()?;
+    fn a_recording_of_another_version_is_refused() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("old.replay");
-        // coordinates in single precision, neither actions nor ground
-        let (nq, terms) = (recording.qpos.len() / 10, recording.terms.len() / 10);
-        let bytes = |x: &[f32]| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-        let (places, qpos) = (bytes(&recording.places), bytes(&narrow(&recording.qpos)));
-        let (numbers, earned) = (bytes(&recording.numbers), bytes(&recording.terms));
-        let views = [
-            ("places", TensorView::new(Dtype::F32, vec![2, 3], &places)?),
-            ("qpos", TensorView::new(Dtype::F32, vec![5, 2, nq], &qpos)?),
-            ("numbers", TensorView::new(Dtype::F32, vec![5, 2, NUMBERS], &numbers)?),
-            ("terms", TensorView::new(Dtype::F32, vec![5, 2, terms], &earned)?),
-        ];
-        let about = serde_json::json!({ "agent": "Hopper-v0", "ground": "hills", "dt": recording.dt }).to_string();
-        let meta = HashMap::from([(FORMAT.to_string(), about)]);
-        std::fs::write(&path, safetensors::serialize(views, Some(meta))?)?;
-        let read = Recording::load(&path)?;
-        assert_eq!((read.frames(), read.agents, read.ground), (5, 2, Ground::Hills));
-        assert_eq!(read.qpos(4, 1)[0], 140.0);
-        assert!(read.action(4, 1).is_empty() && read.command(4, 1).is_empty() && read.grounds(4, 1).is_none());
-        assert!(!read.untimed(4, 1));
+        sample()?.save(&path)?;
+        let whole = std::fs::read(&path)?;
+        let (_, header) = SafeTensors::read_metadata(&whole)?;
+        let read = SafeTensors::deserialize(&whole)?;
+        let meta = header.metadata().clone().ok_or("metadata")?;
+        let refusal = |about: &Value, without: &str| -> Result<String, Box<dyn std::error::Error>> {
+            let tensors = read.tensors().into_iter().filter(|(name, _)| name != without);
+            let meta = HashMap::from([(FORMAT.to_string(), about.to_string())]);
+            std::fs::write(&path, safetensors::serialize(tensors, Some(meta))?)?;
+            Ok(Recording::load(&path).map(|_| ()).expect_err("it is refused").to_string())
+        };
+        let about: Value = serde_json::from_str(&meta[FORMAT])?;
+        let mut unversioned = about.clone();
+        unversioned.as_object_mut().ok_or("an object")?.remove("version");
+        let error = refusal(&unversioned, "")?;
+        assert!(error.ends_with("old.replay: its version is none, expected 1"), "{error}");
+        for version in [0, 2] {
+            let mut other = about.clone();
+            other["version"] = version.into();
+            let error = refusal(&other, "")?;
+            assert!(error.ends_with(&format!("old.replay: its version is {version}, expected 1")), "{error}");
+        }
+        for name in ["actions", "commands", "untimed", "lies", "elevations"] {
+            let error = refusal(&about, name)?;
+            assert!(error.contains("old.replay") && error.contains(name), "{error}");
+        }
         Ok(())
     }
 
@@ -403,7 +396,7 @@ mod tests {
             (vec![0_u8; 300 * columns * size], shape)
         };
         let mut many = Vec::new();
-        for name in ["places", "qpos", "numbers", "terms"] {
+        for name in ["places", "qpos", "numbers", "terms", "actions", "commands", "untimed"] {
             let columns = *read.tensor(name)?.shape().last().ok_or("a shape")?;
             let (data, shape) = nothing(name, columns);
             many.push((name, shape, data));

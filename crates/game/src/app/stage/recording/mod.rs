@@ -40,11 +40,11 @@ pub struct Recording {
     numbers: Vec<f32>,
     /// Terms of the reward, `[frames][agents][terms]`.
     terms: Vec<f32>,
-    /// Actions of the decisions that led to the frames, `[frames][agents][act]`; files of earlier versions have none.
+    /// Actions of the decisions that led to the frames, `[frames][agents][act]`.
     actions: Vec<f32>,
     /// Commands, `[frames][agents][numbers]`.
     commands: Vec<f64>,
-    /// 1 in episodes without a time limit, `[frames][agents]`. Empty in files of earlier versions.
+    /// 1 in episodes without a time limit, `[frames][agents]`.
     untimed: Vec<f32>,
     /// Grounds, in the order of their frames.
     grounds: Vec<Lie>,
@@ -149,7 +149,7 @@ impl Recording {
         self.row(&self.terms, frame, agent)
     }
 
-    /// Action of the decision that led to a frame; empty in recordings of earlier versions.
+    /// Action of the decision that led to a frame.
     pub fn action(&self, frame: usize, agent: usize) -> &[f32] {
         self.row(&self.actions, frame, agent)
     }
@@ -159,9 +159,9 @@ impl Recording {
         self.row(&self.commands, frame, agent)
     }
 
-    /// Whether an agent's episode in a frame has no time limit; false in recordings of earlier versions.
+    /// Whether an agent's episode in a frame has no time limit.
     pub fn untimed(&self, frame: usize, agent: usize) -> bool {
-        self.row(&self.untimed, frame, agent).first().is_some_and(|untimed| *untimed > 0.5)
+        self.row(&self.untimed, frame, agent)[0] > 0.5
     }
 
     /// Memory of the recording without its grounds, bytes.
@@ -170,7 +170,7 @@ impl Recording {
         4 * singles + 8 * (self.qpos.len() + self.commands.len())
     }
 
-    /// Elevations of an agent's height fields in a frame, m above their zero; none in recordings of earlier versions.
+    /// Elevations of an agent's height fields in a frame, m above their zero; none if its model has no height fields.
     pub fn grounds(&self, frame: usize, agent: usize) -> Option<&Arc<Vec<Vec<f32>>>> {
         let lie = self.grounds.iter().rfind(|lie| lie.agent == agent && lie.frame <= frame);
         lie.map(|lie| &lie.fields)
