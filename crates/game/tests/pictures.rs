@@ -174,11 +174,12 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         folder.path().join("wrong.json"),
         r#"{"mapping": 1, "model": "hero", "hips": ["a", "b"], "parts": {}}"#,
     )?;
-    let cases: [(&[&str], i32, &[&str]); 23] = [
+    let cases: [(&[&str], i32, &[&str]); 24] = [
         (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
         (&["broken.safetensors"], 1, &["broken.safetensors"]),
+        (&["half.glb"], 1, &["half.glb: this is a motion", "MarathonMan --mode imitate --option clip=half.glb"]),
         (&["empty"], 1, &["no policy.safetensors", "the folder of a run"]),
         (&["broken.xml"], 1, &["broken.xml:1", "sphere"]),
         (&["--replay", "broken.safetensors"], 1, &["broken.safetensors", "not a recording"]),

@@ -259,7 +259,11 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
             }
             return Ok(scenario);
         }
-        (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => Some(path.to_path_buf()),
+        (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => {
+            exists(path)?;
+            check_is_policy(path)?;
+            Some(path.to_path_buf())
+        }
         // neither an agent nor a file: the registry's message names the nearest agent
         (_, Err(error)) => return Err(error.into()),
     };
@@ -389,6 +393,17 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let number = |s: &str| s.parse::<u32>().ok().filter(|n| (16..=8192).contains(n));
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((number(w)?, number(h)?)));
     sides.ok_or_else(|| "expected a width and a height from 16 to 8192, such as 1280x720".into())
+}
+
+/// Names the option for a file that is not a policy.
+fn check_is_policy(path: &Path) -> Result<(), GameError> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    let (kind, words) = match extension.as_str() {
+        "bvh" | "glb" | "gltf" | "vrm" | "vrma" | "motion" => ("a motion", "MarathonMan --mode imitate --option clip="),
+        "replay" => ("a recording of the game", "--replay "),
+        _ => return Ok(()),
+    };
+    Err(GameError::Kind { path: path.into(), kind, words })
 }
 
 #[cfg(test)]

@@ -17,6 +17,16 @@ pub enum GameError {
         /// Something beside it with a similar name.
         nearest: Option<String>,
     },
+    /// A file of another kind than a policy.
+    #[error("{0}: this is {kind}, expected a policy; show it with: marathon-game {words}{0}", .path.display())]
+    Kind {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+        /// The words of the command line before the path.
+        words: &'static str,
+    },
     /// A recording of another agent, or none.
     #[error("{}: {problem}", .path.display())]
     Replay {
