@@ -27,10 +27,14 @@ pub struct Report {
     pub depth: Peak,
     /// Deepest overlap of two bodies that collide, m.
     pub overlap: Peak,
-    /// Highest speed of a hinge, rad/s.
+    /// Highest speed of a hinge or of a free body's rotation, rad/s.
     pub speed: Peak,
+    /// Highest speed of a slide or of a free body, m/s.
+    pub travel: Peak,
     /// Largest change of a hinge's speed from frame to frame, rad/s.
     pub jump: Peak,
+    /// Height of the lowest point in the frame where it is lowest, m.
+    pub height: f64,
     /// Furthest that a sole slides while it stands, m.
     pub slide: Peak,
     /// Mean speed along the ground of what stands, m/s.
@@ -53,6 +57,10 @@ mod bound {
     pub const OVERLAP: f64 = 5e-3;
     /// rad/s.
     pub const SPEED: f64 = 30.0;
+    /// m/s; sprinters reach 12.
+    pub const TRAVEL: f64 = 15.0;
+    /// m.
+    pub const HEIGHT: f64 = 0.05;
     /// rad/s in a sixtieth of a second.
     pub const JUMP: f64 = 25.0;
     /// m; a step's, as people notice it.
@@ -84,7 +92,9 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
         depth: Peak::default(),
         overlap: Peak::default(),
         speed: Peak::default(),
+        travel: Peak::default(),
         jump: Peak::default(),
+        height: f64::INFINITY,
         slide: Peak::default(),
         slide_speed: 0.0,
         standing: 0.0,
@@ -98,7 +108,9 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
             let beyond = (joint.range[0] - at).max(at - joint.range[1]);
             report.limit.update(beyond, i, || joint.name.clone());
         }
-        report.depth.update(-clearance(&touches, pose), i, || {
+        let clearance = clearance(&touches, pose);
+        report.height = report.height.min(clearance);
+        report.depth.update(-clearance, i, || {
             let lowest = touches.iter().min_by(|a, b| a.lowest(pose).z.total_cmp(&b.lowest(pose).z));
             lowest.map_or(String::new(), |touch| body(touch.body))
         });
@@ -107,6 +119,20 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
             report.overlap.update(-separation.distance, i, || {
                 format!("{} and {}", body(separation.bodies[0]), body(separation.bodies[1]))
             });
+        }
+    }
+    for joint in model.joints.iter().filter(|joint| matches!(joint.kind, JointType::Free | JointType::Slide)) {
+        for (i, pair) in frames.windows(2).enumerate() {
+            let [from, to] = [&pair[0], &pair[1]].map(|frame| &frame[joint.qpos_adr..]);
+            if joint.kind == JointType::Slide {
+                report.travel.update((to[0] - from[0]).abs() / clip.dt(), i, || joint.name.clone());
+                continue;
+            }
+            let way = DVec3::from_slice(to) - DVec3::from_slice(from);
+            report.travel.update(way.length() / clip.dt(), i, || joint.name.clone());
+            let same: f64 = from[3..7].iter().zip(&to[3..7]).map(|(a, b)| a * b).sum();
+            let turn = 2.0 * same.abs().min(1.0).acos();
+            report.speed.update(turn / clip.dt(), i, || joint.name.clone());
         }
     }
     for joint in model.joints.iter().filter(|joint| joint.kind == JointType::Hinge) {
@@ -157,14 +183,18 @@ impl Report {
                 out.push(format!("frame {}: {text}", peak.frame));
             }
         };
-        let Report { limit, depth, overlap, speed, jump, slide, .. } = self;
+        let Report { limit, depth, overlap, speed, travel, jump, slide, .. } = self;
         warn(limit, bound::LIMIT, format!("{} is {:.3} rad beyond its limit", limit.name, limit.value));
         warn(depth, bound::DEPTH, format!("{} is {:.1} mm below the ground", depth.name, 1e3 * depth.value));
         warn(overlap, bound::OVERLAP, format!("{} overlap by {:.1} mm", overlap.name, 1e3 * overlap.value));
         warn(speed, bound::SPEED, format!("{} turns at {:.0} rad/s", speed.name, speed.value));
+        warn(travel, bound::TRAVEL, format!("{} moves at {:.0} m/s", travel.name, travel.value));
         warn(jump, bound::JUMP, format!("{} jumps by {:.0} rad/s", jump.name, jump.value));
         let far = self.fit.and_then(|fit| fit.warning());
         warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
+        if self.height > bound::HEIGHT {
+            out.push(format!("no frame is on the ground: the lowest point is {:.1} cm above it", 1e2 * self.height));
+        }
         out.extend(
             far.map(|text| format!("{text}: it is another motion, or the recording was read in a wrong direction")),
         );

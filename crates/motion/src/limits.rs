@@ -23,6 +23,11 @@ pub(crate) fn check_memory(path: &Path, bytes: f64) -> Result<(), MotionError> {
     MEMORY.check(bytes).map_err(over(path, "the motion"))
 }
 
+/// A text without the byte order mark that some programs write first.
+pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// Checks the memory for a JSON document of rows of numbers. Each bracket may start a row, and each comma may add a
 /// number.
 pub(crate) fn check_json(path: &Path, bytes: &[u8]) -> Result<(), MotionError> {

@@ -171,6 +171,8 @@ fn of_bvh() {
         ("OFFSET 0 -80 0", "OFFSET 0 x 0", "m.bvh:8:14: found \"x\", expected a number"),
         ("Xrotation", "Wrotation", "m.bvh:9:16: found \"Wrotation\", expected a channel such as"),
         ("CHANNELS 1 X", "CHANNELS 9 X", "m.bvh:9:14: found 9 channels, expected 0 to 6"),
+        ("Yposition", "Xposition", "m.bvh:5:"),
+        ("3 Xposition Yposition Z", "3 Xposition Zrotation Z", "m.bvh:5:"),
         ("  JOINT", "  JOIN", "m.bvh:6:3: found \"JOIN\", expected OFFSET, CHANNELS, JOINT, End Site or }"),
         ("Frames: 2", "Frames: 3", "m.bvh: frame 2: the file ends; expected 3 frames"),
         ("Frames: 2", "Frames: 0", "m.bvh:17:9: found 0 frames, expected two or more"),

@@ -33,6 +33,44 @@ fn shipped_clips_have_nothing_to_warn_of() {
 }
 
 #[test]
+fn leaps_of_the_whole_figure_and_floating_are_warned_of() {
+    let model = model("marathon_man");
+    let whole: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(file("assets/motions/marathon_man/walk.motion")).unwrap()).unwrap();
+    let warnings = |edit: &dyn Fn(usize, &mut Vec<serde_json::Value>)| {
+        let mut edited = whole.clone();
+        edited.as_object_mut().unwrap().remove("checksum");
+        for (i, frame) in edited["frames"].as_array_mut().unwrap().iter_mut().enumerate() {
+            edit(i, frame.as_array_mut().unwrap());
+        }
+        let clip = Clip::parse_without_checksum("edited".as_ref(), edited.to_string().as_bytes()).unwrap();
+        check("edited".as_ref(), &clip, &model, &soles(&model)).unwrap().warnings().join("\n")
+    };
+    let add = |frame: &mut Vec<serde_json::Value>, axis: usize, way: f64| {
+        frame[axis] = (frame[axis].as_f64().unwrap() + way).into();
+    };
+    assert_eq!(warnings(&|_, _| ()), "");
+    let leap = warnings(&|i, frame| {
+        if i >= 20 {
+            add(frame, 0, 3.0)
+        }
+    });
+    assert!(leap.contains("root moves at") && leap.contains("m/s"), "{leap}");
+    let floats = warnings(&|_, frame| add(frame, 2, 0.5));
+    assert!(floats.contains("no frame is on the ground: the lowest point is"), "{floats}");
+    // half a turn about the vertical axis
+    let turned = warnings(&|i, frame| {
+        if i >= 20 {
+            let [w, x, y, z] = [3, 4, 5, 6].map(|k| frame[k].as_f64().unwrap());
+            for (k, value) in [-z, -y, x, w].into_iter().enumerate() {
+                frame[3 + k] = value.into();
+            }
+        }
+    });
+    assert!(turned.contains("root turns at"), "{turned}");
+}
+
+#[test]
 fn a_clip_onto_its_own_model_is_the_clip_again() {
     let model = model("marathon_man");
     for name in ["walk", "run", "backflip", "kick", "spin", "cartwheel"] {

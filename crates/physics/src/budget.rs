@@ -5,6 +5,7 @@
 //! explains them. The environment variable `MARATHON_LIMITS` raises them:
 //! `MARATHON_LIMITS=memory=8GB,recording_seconds=7200`.
 
+use std::env::VarError;
 use std::fmt;
 use std::io::{self, Read};
 use std::path::Path;
@@ -125,7 +126,11 @@ impl Limit {
     /// If [`VARIABLE`] is invalid.
     pub fn most(&self) -> Result<u64, OverBudget> {
         static RAISED: OnceLock<Result<Vec<(String, u64)>, OverBudget>> = OnceLock::new();
-        let raised = RAISED.get_or_init(|| parse(&std::env::var(VARIABLE).unwrap_or_default()));
+        let raised = RAISED.get_or_init(|| match std::env::var(VARIABLE) {
+            Ok(text) => parse(&text),
+            Err(VarError::NotPresent) => Ok(Vec::new()),
+            Err(VarError::NotUnicode(text)) => Err(OverBudget(format!("{VARIABLE}: found {text:?}, expected UTF-8"))),
+        });
         let raised = raised.as_ref().map_err(Clone::clone)?;
         Ok(raised.iter().rev().find(|(name, _)| name == self.name).map_or(self.default, |(_, most)| *most))
     }

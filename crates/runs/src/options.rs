@@ -154,6 +154,8 @@ pub struct FilmOptions {
 impl FilmOptions {
     /// Most frames per second.
     pub const MOST_FPS: f64 = 1000.0;
+    /// Fewest frames per second. A film has one frame at least, however long that is.
+    pub const LEAST_FPS: f64 = 0.1;
 
     /// Refuses times that no film has.
     ///
@@ -163,8 +165,8 @@ impl FilmOptions {
         let wrong = |name, x: f64, expected: &str| Err(RunError::option(name, format!("is {x}, expected {expected}")));
         match (self.seconds, self.fps) {
             (Some(x), _) if x.is_nan() || x <= 0.0 => return wrong("seconds", x, "a number above 0"),
-            (_, Some(x)) if !(x > 0.0 && x <= Self::MOST_FPS) => {
-                return wrong("fps", x, &format!("a number above 0 and up to {}", Self::MOST_FPS));
+            (_, Some(x)) if !(Self::LEAST_FPS..=Self::MOST_FPS).contains(&x) => {
+                return wrong("fps", x, &format!("a number from {} to {}", Self::LEAST_FPS, Self::MOST_FPS));
             }
             _ if self.start.is_nan() || self.start < 0.0 => return wrong("start", self.start, "0 or more"),
             _ => {}

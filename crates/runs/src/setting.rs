@@ -23,9 +23,6 @@ pub(crate) const FIRST: &str = "first";
 /// The argument that names a model file, which replaces the one that comes with Marathon.
 const XML: &str = "xml_file";
 
-/// Limit on the clips of a task, because finding a name searches all of them.
-const MOST_CLIPS: usize = 1000;
-
 /// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
 static NAMING: Mutex<()> = Mutex::new(());
 
@@ -172,8 +169,12 @@ impl Setting {
     /// # Errors
     /// If a clip is damaged, or those of `make`.
     pub fn with_clips<T, E: From<RunError>>(&self, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
-        if self.clips.len() > MOST_CLIPS {
-            let problem = format!("has {} clips, expected at most {MOST_CLIPS}", self.clips.len());
+        if self.clips.len() > marathon_envs::agents::marathon::marathon_man::clips::MOST {
+            let problem = format!(
+                "has {} clips, expected at most {}",
+                self.clips.len(),
+                marathon_envs::agents::marathon::marathon_man::clips::MOST
+            );
             return Err(RunError::option("option", problem).into());
         }
         // an untrusted policy may name a device or a pipe, which never end

@@ -105,10 +105,11 @@ pub struct Film<'a> {
 /// If there are no graphics, or the film cannot be written.
 pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
     let Film { out, size: (width, height), fps, start, seconds } = *film;
+    // before there is a file that a signal would leave behind
+    interrupt::listen();
     let mut sink = Sink::new(out, fps)?;
     check_graphics()?;
     let frame = Duration::from_secs_f64(1.0 / fps);
-    interrupt::listen();
     let mut app = App::new();
     let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     let render = RenderPlugin { synchronous_pipeline_compilation: true, ..default() };

@@ -71,7 +71,8 @@ impl Clip {
 
     fn read(path: &Path, bytes: &[u8], strict: bool) -> Result<Self, MotionError> {
         limits::check_json(path, bytes)?;
-        let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
+        let file: Document =
+            serde_json::from_slice(limits::without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
         if file.motion != VERSION {
             return Err(MotionError::value(path, "motion", file.motion, format!("version {VERSION} of the format")));
         }

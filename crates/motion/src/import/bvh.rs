@@ -25,6 +25,16 @@ enum Channel {
     Rotation(usize),
 }
 
+impl Channel {
+    fn name(self) -> String {
+        let (axis, kind) = match self {
+            Channel::Position(axis) => (axis, "position"),
+            Channel::Rotation(axis) => (axis, "rotation"),
+        };
+        format!("{}{kind}", ["X", "Y", "Z"][axis])
+    }
+}
+
 /// A joint of the file, in the file's axes and unit.
 struct Node {
     name: String,
@@ -219,7 +229,7 @@ fn channels(words: &mut Words) -> Result<Vec<Channel>, MotionError> {
     if !(0.0..=6.0).contains(&count) || count != count.trunc() {
         return Err(words.wrong(line, format!("found {count} channels, expected 0 to 6")));
     }
-    (0..count as usize)
+    let channels: Vec<Channel> = (0..count as usize)
         .map(|_| {
             let word = words.word()?;
             let line = words.line;
@@ -237,7 +247,16 @@ fn channels(words: &mut Words) -> Result<Vec<Channel>, MotionError> {
                 }
             }
         })
-        .collect()
+        .collect::<Result<_, _>>()?;
+    // rotations such as Z, X, Z are in use; the same one twice in a row or two positions on one axis mean nothing
+    let repeated = |i: usize| match channels[i] {
+        Channel::Position(_) => channels[..i].contains(&channels[i]),
+        Channel::Rotation(_) => i > 0 && channels[i - 1] == channels[i],
+    };
+    match (1..channels.len()).find(|i| repeated(*i)) {
+        Some(i) => Err(words.wrong(line, format!("found channel {} again, expected each once", channels[i].name()))),
+        None => Ok(channels),
+    }
 }
 
 /// Positions of the joints at rest, with all angles 0.

@@ -67,7 +67,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
         return Err(MotionError::value(path, "up", up, "y, which points up in all files of DeepMimic"));
     }
     limits::check_json(path, bytes)?;
-    let file: Document = serde_json::from_slice(bytes).map_err(|error| MotionError::json(path, &error))?;
+    let file: Document =
+        serde_json::from_slice(limits::without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
     let looping = match file.looping.as_deref() {
         Some("wrap") => true,
         None | Some("none") => false,

@@ -101,6 +101,9 @@ pub struct ClipNames(pub String);
 /// What stands for all clips that come with the crate, but for the one that does not move.
 pub const ALL: &str = "all";
 
+/// Most clips of a task. A clip may be named several times.
+pub const MOST: usize = 1000;
+
 /// The clip that does not move.
 pub const STAND: &str = "stand";
 
@@ -144,6 +147,10 @@ impl ClipNames {
     /// # Errors
     /// If one is not; the text names the nearest.
     pub fn check_among<S: AsRef<str>>(&self, known: &[S]) -> Result<(), String> {
+        let count = self.names().len();
+        if count > MOST {
+            return Err(format!("option clip has {count} clips, expected at most {MOST}"));
+        }
         let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
         let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
         let Some(missing) = missing else { return Ok(()) };
@@ -154,6 +161,13 @@ impl ClipNames {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_task_has_a_bounded_number_of_clips() {
+        let named = |count: usize| ClipNames(vec!["walk"; count].join(",")).check();
+        assert_eq!(named(MOST), Ok(()));
+        assert_eq!(named(MOST + 1), Err("option clip has 1001 clips, expected at most 1000".into()));
+    }
 
     #[test]
     fn the_oldest_clips_are_forgotten() {
