@@ -1,7 +1,6 @@
 //! A camera that follows a ragdoll, smoothly, or circles it.
 
-use crate::look::Quality;
-use crate::look::scenery::HORIZON;
+use crate::look::quality::{HORIZON, Quality};
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::{Anatomy, Episode, Part};
 use bevy::core_pipeline::tonemapping::Tonemapping;

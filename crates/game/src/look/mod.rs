@@ -7,6 +7,7 @@ mod ghost;
 mod ground;
 mod marks;
 mod meters;
+mod quality;
 mod scenery;
 mod skin;
 
@@ -15,7 +16,8 @@ pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
 pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub(crate) use marks::velocity_told;
 pub use marks::{Marks, MarksPlugin};
-pub use scenery::{Quality, SceneryPlugin};
+pub use quality::Quality;
+pub use scenery::SceneryPlugin;
 pub use skin::{Dressed, Skin, SkinPlugin, UnfitSkin};
 
 /// Colors of a row of ragdolls, one after the other.

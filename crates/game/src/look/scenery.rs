@@ -1,5 +1,6 @@
 //! Ground, sky and sun.
 
+use crate::look::quality::{HORIZON, Quality};
 use crate::look::{FollowCamera, ground, meters};
 use crate::ragdoll::Anatomy;
 use bevy::asset::RenderAssetUsages;
@@ -13,27 +14,6 @@ use bevy::render::renderer::RenderAdapterInfo;
 use marathon_physics::model::GeomType;
 use std::f32::consts::PI;
 
-/// How much a frame may cost.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quality {
-    /// For software rendering: no shadows, no smoothed edges.
-    Low,
-    /// Shadows, edges smoothed.
-    #[default]
-    Medium,
-    /// Larger shadow maps, seen farther.
-    High,
-}
-
-impl Quality {
-    /// How edges are smoothed.
-    pub(crate) fn msaa(self) -> Msaa {
-        if self == Quality::Low { Msaa::Off } else { Msaa::Sample4 }
-    }
-}
-
-/// Color of the sky at the horizon, which the far ground fades into; sRGB.
-pub(crate) const HORIZON: [f32; 3] = [0.80, 0.87, 0.93];
 /// Color of the sky overhead.
 const ZENITH: [f32; 3] = [0.25, 0.48, 0.78];
 /// Where the sun stands.

@@ -1,6 +1,5 @@
 //! The trainer's configuration.
 
-use super::flat::{self, FlatConfig};
 use crate::algorithms::a2c::A2c;
 use crate::algorithms::acktr::Acktr;
 use crate::algorithms::sac::Sac;
@@ -14,7 +13,6 @@ use crate::rollout::statistics::StatisticsConfig;
 use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -163,26 +161,6 @@ impl TrainConfig {
     pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
         change(&mut self);
         self
-    }
-
-    /// A configuration from settings by name without their sections, such as `total_steps`, `gamma` or `actor_hidden`.
-    /// Settings that change during a run end at the value of their second name, such as `final_min_std` for `min_std`.
-    /// Other settings have PPO's defaults.
-    ///
-    /// # Errors
-    /// If there is no such setting, its value is of the wrong kind, or it means nothing to the algorithm.
-    pub fn from_settings(settings: Value) -> Result<Self, Error> {
-        let names: Vec<String> = settings.as_object().map(|keys| keys.keys().cloned().collect()).unwrap_or_default();
-        let flat: FlatConfig = serde_path_to_error::deserialize(settings)
-            .map_err(|e| Error::Settings { place: e.path().to_string(), why: e.into_inner().to_string() })?;
-        let config = TrainConfig::from(&flat);
-        match names.iter().find(|name| flat::is_foreign(name, &config.algorithm)) {
-            Some(name) => Err(Error::Settings {
-                place: name.clone(),
-                why: format!("{} has no such setting", config.algorithm.name()),
-            }),
-            None => Ok(config),
-        }
     }
 
     /// The settings of a role.

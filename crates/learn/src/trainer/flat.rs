@@ -5,6 +5,7 @@ use super::config::{RunConfig, TrainConfig};
 use crate::algorithms::actor_critic::Deviations;
 use crate::algorithms::schedule::{Moving, Schedule};
 use crate::algorithms::{a2c, acktr, ppo, sac};
+use crate::error::Error;
 use crate::nets::NetworkConfig;
 use crate::nets::activation::Activation;
 use crate::nets::gaussian::Ratio;
@@ -12,6 +13,7 @@ use crate::nets::init::Init;
 use crate::rewards::{Novelty, RewardConfig, RewardKind};
 use crate::rollout::statistics::StatisticsConfig;
 use serde::Deserialize;
+use serde_json::Value;
 
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -336,4 +338,26 @@ pub fn is_foreign(setting: &str, algorithm: &crate::algorithms::Algorithm) -> bo
         crate::algorithms::Algorithm::Sac(_) => &[&OF_PPO, &ON_POLICY, &BOUND],
     };
     foreign.concat().contains(&setting)
+}
+
+impl TrainConfig {
+    /// A configuration from settings by name without their sections, such as `total_steps`, `gamma` or `actor_hidden`.
+    /// Settings that change during a run end at the value of their second name, such as `final_min_std` for `min_std`.
+    /// Other settings have PPO's defaults.
+    ///
+    /// # Errors
+    /// If there is no such setting, its value is of the wrong kind, or it means nothing to the algorithm.
+    pub fn from_settings(settings: Value) -> Result<Self, Error> {
+        let names: Vec<String> = settings.as_object().map(|keys| keys.keys().cloned().collect()).unwrap_or_default();
+        let flat: FlatConfig = serde_path_to_error::deserialize(settings)
+            .map_err(|e| Error::Settings { place: e.path().to_string(), why: e.into_inner().to_string() })?;
+        let config = TrainConfig::from(&flat);
+        match names.iter().find(|name| is_foreign(name, &config.algorithm)) {
+            Some(name) => Err(Error::Settings {
+                place: name.clone(),
+                why: format!("{} has no such setting", config.algorithm.name()),
+            }),
+            None => Ok(config),
+        }
+    }
 }
