@@ -156,6 +156,8 @@ fn a_strangers_table_does_no_harm() -> Result<(), Box<dyn Error>> {
     let text = String::from_utf8(output.stdout)?;
     assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
     assert!(text.contains("\\u{1b}]0;title") && text.contains("\\n  1  99 m"), "{text}");
+    change("UPDATE runs SET runner = ?1, course = 'boxes'", &"long".repeat(100_000))?;
+    assert_eq!(table.longest(&course("boxes"), 1)?[0].runner.len(), 100);
     drop(table);
     rusqlite::Connection::open(&path)?
         .execute_batch("CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END")?;

@@ -262,8 +262,10 @@ impl Table {
     /// If the table cannot be read.
     pub fn longest(&self, course: &Course, most: usize) -> Result<Vec<Run>, GameError> {
         let read = || -> rusqlite::Result<Vec<_>> {
+            // a stranger's table may hold texts of any length, and the screen shows all of them in every frame
             let mut query = self.connection.prepare(
-                "SELECT options, seed, number, episode, runner, builder, distance, seconds, slowest, ended, date, version, replay
+                "SELECT options, seed, number, episode, substr(runner, 1, 100), substr(builder, 1, 100), distance, seconds,
+                        slowest, substr(ended, 1, 100), substr(date, 1, 100), substr(version, 1, 100), replay
                  FROM runs WHERE agent = :agent AND course = :kind AND difficulty = :difficulty AND part = :part
                  ORDER BY distance DESC, id LIMIT :most",
             )?;
