@@ -39,7 +39,7 @@ pub struct AtStake {
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ReportSet;
 
-/// Discards the unsaved policy: the user has agreed.
+/// Discards the policies that are not saved: the user has agreed.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiscardPolicy;
 
@@ -114,10 +114,10 @@ impl Answers<'_> {
             Answer::Save => {
                 self.actions.write(ActionPressed(Action::Save));
             }
-            Answer::Yes => {
-                self.discards.write(DiscardPolicy);
-            }
+            Answer::Yes => {}
         }
+        // the trainer goes on: a policy that it makes after the answer is not saved
+        self.discards.write(DiscardPolicy);
         match asked {
             Asked::Action(action) => {
                 self.actions.write(ActionPressed(action));

@@ -183,7 +183,11 @@ impl TrainingRun {
                 lock(&self.shared).settled = (Some(policy), now);
                 notes.say(format!("{why}saved as {}", path.display()));
             }
-            Err(error) => notes.error(format!("{why}{error}")),
+            Err(error) => {
+                // the end of the run tries again
+                lock(&self.shared).discarded = false;
+                notes.error(format!("{why}{error}"));
+            }
         }
     }
 
