@@ -1,7 +1,7 @@
 //! The `marathon-game` app: an app around the plugin.
 //!
-//! Read it from the bottom. [`mode`] has the states and the order of a frame, [`stage`] the characters, [`input`] the actions.
-//! [`ui`] has text and menu, [`features`] the modes. [`cli`] and [`launch`] start the app.
+//! Read it from the bottom. `mode` has the states and the order of a frame, `stage` the characters, `input` the actions.
+//! `ui` has text and menu, `features` the modes. `cli` and `launch` start the app.
 
 mod cli;
 mod display;

@@ -87,9 +87,9 @@ pub const COMMAND_BUTTONS: [GamepadButton; 2] = [GamepadButton::South, GamepadBu
 /// The devices that steer the character in focus.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steering {
-    /// The left stick and the [`STEERING_KEYS`].
+    /// The left stick and the `STEERING_KEYS`.
     pub on: bool,
-    /// The [`COMMAND_KEYS`] and [`COMMAND_BUTTONS`].
+    /// The `COMMAND_KEYS` and `COMMAND_BUTTONS`.
     pub buttons: bool,
 }
 
