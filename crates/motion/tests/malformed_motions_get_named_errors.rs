@@ -158,6 +158,11 @@ fn of_deepmimic() {
         let error = import::deepmimic("m.txt".as_ref(), &changed(&good, from, to)).unwrap_err().to_string();
         assert!(error.starts_with(expected), "{from} -> {to}: {error}");
     }
+    for (count, frames) in [(0, String::new()), (1, frame(0.1))] {
+        let short = format!("{{\"Loop\": \"none\", \"Frames\": [{frames}]}}");
+        let error = import::deepmimic("m.txt".as_ref(), short.as_bytes()).unwrap_err().to_string();
+        assert_eq!(error, format!("m.txt: Frames: found {count} frames, expected two or more"));
+    }
 }
 
 #[test]

@@ -74,7 +74,11 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
         None | Some("none") => false,
         Some(other) => return Err(MotionError::value(path, "Loop", format!("{other:?}"), "\"wrap\" or \"none\"")),
     };
-    let between = &file.frames[..file.frames.len().saturating_sub(1)];
+    let count = file.frames.len();
+    if count < 2 {
+        return Err(MotionError::value(path, "Frames", format!("{count} frames"), "two or more"));
+    }
+    let between = &file.frames[..count - 1];
     limits::check_seconds(path, between.iter().filter_map(|frame| frame.first()).sum())?;
     let keyframes: Vec<Keyframe> =
         file.frames.iter().enumerate().map(|(i, frame)| keyframe(path, i, frame)).collect::<Result<_, _>>()?;

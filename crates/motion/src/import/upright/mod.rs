@@ -121,7 +121,7 @@ fn lowered(
     keyframes: &mut [Keyframe],
     reading: &Reading,
 ) -> Option<String> {
-    let seconds = dt * (keyframes.len() - 1) as f64;
+    let seconds = dt * keyframes.len().saturating_sub(1) as f64;
     let found = || marks.map_or(0.0, |marks| floor::estimate(marks, moments, stature, dt, seconds));
     let floor = reading.floor.unwrap_or_else(found);
     if floor != 0.0 {
