@@ -2,6 +2,7 @@
 //! own checksum.
 
 use crate::error::Error;
+use fnv::FnvHasher;
 use marathon_physics::budget;
 pub use safetensors::tensor::Dtype;
 use safetensors::tensor::{SafeTensors, TensorView};
@@ -9,6 +10,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::fs::File;
+use std::hash::Hasher;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -357,7 +359,7 @@ pub fn checksum(bytes: &[u8]) -> String {
 
 /// The checksum of bytes in several parts.
 fn checksum_of_parts(parts: &[&[u8]]) -> String {
-    let bytes = parts.iter().copied().flatten();
-    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ *b as u64).wrapping_mul(0x100_0000_01b3));
-    format!("{hash:016x}")
+    let mut hash = FnvHasher::default();
+    parts.iter().for_each(|part| hash.write(part));
+    format!("{:016x}", hash.finish())
 }

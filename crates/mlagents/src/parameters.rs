@@ -4,11 +4,13 @@
 //! parameter's name, the agent and its episode alone, so a training run is the same whenever it is repeated.
 
 use crate::channels::Sampler;
+use fnv::FnvHasher;
 use marathon_envs::{CommandRange, VecEnvOptions};
 use marathon_physics::{Model, Variation};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
+use std::hash::Hasher;
 
 /// What a parameter changes.
 #[derive(Clone, Debug, PartialEq)]
@@ -208,7 +210,9 @@ fn draw(sampler: &Sampler, name: &str, agent: u64, episode: u64) -> f32 {
 
 /// Tells the streams of parameters with the same seed apart.
 fn fnv1a(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    let mut hash = FnvHasher::default();
+    hash.write(text.as_bytes());
+    hash.finish()
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::error::MotionError;
 use marathon_physics::budget::{MEMORY, OverBudget, RECORDING_SECONDS};
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 fn over(path: &Path, what: &str) -> impl FnOnce(OverBudget) -> MotionError {
@@ -23,14 +24,16 @@ pub(crate) fn check_memory(path: &Path, bytes: f64) -> Result<(), MotionError> {
     MEMORY.check(bytes).map_err(over(path, "the motion"))
 }
 
-/// A text without the byte order mark that some programs write first.
-pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+/// Reads a JSON document within the limits, with or without the byte order mark that some programs write first.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, MotionError> {
+    check_json(path, bytes)?;
+    let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    serde_json::from_slice(json).map_err(|error| MotionError::json(path, &error))
 }
 
 /// Checks the memory for a JSON document of rows of numbers. Each bracket may start a row, and each comma may add a
 /// number.
-pub(crate) fn check_json(path: &Path, bytes: &[u8]) -> Result<(), MotionError> {
+fn check_json(path: &Path, bytes: &[u8]) -> Result<(), MotionError> {
     let (rows, numbers) = bytes.iter().fold((0usize, 0usize), |(rows, numbers), byte| match byte {
         b'[' => (rows + 1, numbers),
         b',' => (rows, numbers + 1),

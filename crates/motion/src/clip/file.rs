@@ -16,8 +16,10 @@ use super::{About, Clip, Cycle, Nearness};
 use crate::error::MotionError;
 use crate::layout::{JointKind, Layout};
 use crate::limits;
+use fnv::FnvHasher;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
+use std::hash::Hasher;
 use std::path::Path;
 
 /// The version that is written.
@@ -70,9 +72,7 @@ impl Clip {
     }
 
     fn read(path: &Path, bytes: &[u8], strict: bool) -> Result<Self, MotionError> {
-        limits::check_json(path, bytes)?;
-        let file: Document =
-            serde_json::from_slice(limits::without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
+        let file: Document = limits::read_json(path, bytes)?;
         if file.motion != VERSION {
             return Err(MotionError::value(path, "motion", file.motion, format!("version {VERSION} of the format")));
         }
@@ -172,17 +172,12 @@ impl Clip {
 
 /// FNV-1a hash of values. The length of each value is hashed before it, so that different documents hash different
 /// bytes.
-struct Checksum(u64);
-
-impl Default for Checksum {
-    fn default() -> Self {
-        Checksum(0xcbf2_9ce4_8422_2325)
-    }
-}
+#[derive(Default)]
+struct Checksum(FnvHasher);
 
 impl Checksum {
     fn bytes(&mut self, bytes: &[u8]) {
-        self.0 = bytes.iter().fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3));
+        self.0.write(bytes);
     }
 
     fn text(&mut self, text: &str) {
@@ -201,7 +196,7 @@ impl Checksum {
     }
 
     fn hex(&self) -> String {
-        format!("{:016x}", self.0)
+        format!("{:016x}", self.0.finish())
     }
 }
 

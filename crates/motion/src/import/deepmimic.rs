@@ -66,9 +66,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     if let Some(up) = reading.up.filter(|up| *up != Up::Y) {
         return Err(MotionError::value(path, "up", up, "y, which points up in all files of DeepMimic"));
     }
-    limits::check_json(path, bytes)?;
-    let file: Document =
-        serde_json::from_slice(limits::without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
+    let file: Document = limits::read_json(path, bytes)?;
     let looping = match file.looping.as_deref() {
         Some("wrap") => true,
         None | Some("none") => false,

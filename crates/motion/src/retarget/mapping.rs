@@ -20,7 +20,7 @@
 //! | `rest` | `[w, x, y, z]`, a turn of the part's reference orientation, in the model's axes, that makes it fit the skeleton's rest pose. If absent, the part is turned so that the bone to the next part points as in the skeleton |
 
 use crate::error::MotionError;
-use crate::limits::without_mark;
+use crate::limits;
 use crate::roles;
 use crate::skeleton::Skeleton;
 use marathon_physics::Model;
@@ -147,8 +147,7 @@ impl Mapping {
     /// # Errors
     /// If the text is malformed.
     pub fn known_as(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, String>, MotionError> {
-        let file: Document =
-            serde_json::from_slice(without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
+        let file: Document = limits::read_json(path, bytes)?;
         let mut names = BTreeMap::new();
         for (body, row) in file.parts.into_iter().filter(|(_, row)| row.toward.is_none()) {
             names.entry(row.joint).or_insert(body);
@@ -173,8 +172,7 @@ impl Mapping {
     /// # Errors
     /// If the text is malformed, or names what the skeleton or the model lacks.
     pub fn parse(path: &Path, bytes: &[u8], skeleton: &Skeleton, model: &Model) -> Result<Self, MotionError> {
-        let file: Document =
-            serde_json::from_slice(without_mark(bytes)).map_err(|error| MotionError::json(path, &error))?;
+        let file: Document = limits::read_json(path, bytes)?;
         if file.mapping != 1 {
             return Err(MotionError::value(path, "mapping", file.mapping, "version 1 of the format"));
         }

@@ -2,7 +2,7 @@
 
 use super::weld::BodyMount;
 use crate::model::{Geom, Model, Pair};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Smallest friction coefficient (MuJoCo's `mjMINMU`).
 const LEAST_FRICTION: f64 = 1e-5;
@@ -19,9 +19,9 @@ pub(super) struct ContactParams {
 }
 
 impl ContactParams {
-    /// Parameters of the contacts of geoms `i` and `j`, which collide.
-    pub fn of(model: &Model, i: usize, j: usize) -> Self {
-        let mut params = match declared(model, i, j) {
+    /// Parameters of the contacts of geoms `i` and `j`, which collide, by their declaration if they have one.
+    pub fn of(model: &Model, i: usize, j: usize, declared: Option<&Pair>) -> Self {
+        let mut params = match declared {
             Some(pair) => ContactParams::declared(pair),
             None => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
         };
@@ -84,9 +84,15 @@ fn spread(f: &[f64; 3]) -> [f64; 5] {
     [f[0], f[0], f[1], f[2], f[2]]
 }
 
-/// The declaration of a pair, which holds whatever the filters say.
-pub(super) fn declared(model: &Model, i: usize, j: usize) -> Option<&Pair> {
-    model.pairs.iter().find(|p| p.geoms == [i, j] || p.geoms == [j, i])
+/// The declared pairs by their geoms, the lower number first. Filters do not apply to them; of two declarations of one
+/// pair, the first counts.
+pub(super) fn declared(model: &Model) -> BTreeMap<[usize; 2], &Pair> {
+    let mut pairs = BTreeMap::new();
+    for pair in &model.pairs {
+        let [i, j] = pair.geoms;
+        pairs.entry([i.min(j), i.max(j)]).or_insert(pair);
+    }
+    pairs
 }
 
 /// MuJoCo's filters: masks, same body, parent and child, `excluded` bodies.

@@ -4,7 +4,7 @@
 //! ([`floor_points`]); everything else is listed by [`pairs`].
 
 use super::broad::Broad;
-use super::contact_params::{ContactParams, label, may_collide};
+use super::contact_params::{ContactParams, declared, label, may_collide};
 use super::floor_points::{self, FloorPoint};
 use super::link::Mount;
 use super::options::{SimError, SimOptions};
@@ -87,13 +87,13 @@ pub(super) fn contacts<T: Real>(
     };
     let link = |g: usize| link_of[mounts[model.geoms[g].body].body];
     let excluded: BTreeSet<[usize; 2]> = model.excludes.iter().copied().collect();
-    let declared: BTreeSet<[usize; 2]> = model.pairs.iter().map(|p| ordered(p.geoms)).collect();
+    let declared = declared(model);
     let kinds = kinds(model, mounts, link);
     // what pairs of two kinds have in common; the geoms of a crowd are of few kinds
     let mut known: BTreeMap<[usize; 2], u32> = BTreeMap::new();
     // visual geoms collide with nothing
     let mut able: Vec<bool> = model.geoms.iter().map(|g| g.contype != 0 || g.conaffinity != 0).collect();
-    declared.iter().flatten().for_each(|g| able[*g] = true);
+    declared.keys().flatten().for_each(|g| able[*g] = true);
     let able: Vec<usize> = (0..able.len()).filter(|g| able[*g]).collect();
     if able.len() > MOST_GEOMS {
         return refuse(
@@ -103,8 +103,8 @@ pub(super) fn contacts<T: Real>(
     }
     for (at, i) in able.iter().copied().enumerate() {
         for j in able[at + 1..].iter().copied() {
-            let declared = declared.contains(&[i, j]);
-            if !declared && !may_collide(model, mounts, &excluded, i, j) {
+            let declared = declared.get(&[i, j]).copied();
+            if declared.is_none() && !may_collide(model, mounts, &excluded, i, j) {
                 continue;
             }
             match (link(i), link(j)) {
@@ -118,11 +118,11 @@ pub(super) fn contacts<T: Real>(
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
             let geoms = [a as u32, b as u32];
             out.check().map_err(|over| SimError::Budget { model: model.name.clone(), over })?;
-            if let (false, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
+            if let (None, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
                 out.pairs.push(GeomPair { geoms, spec: *spec });
                 continue;
             }
-            let params = ContactParams::of(model, i, j);
+            let params = ContactParams::of(model, i, j, declared);
             if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor, &mut out.hard) {
                 continue;
             }
@@ -135,7 +135,7 @@ pub(super) fn contacts<T: Real>(
             }
             let spec = out.specs.len() as u32 - 1;
             out.pairs.push(GeomPair { geoms, spec });
-            if !declared {
+            if declared.is_none() {
                 known.insert([kinds[a], kinds[b]], spec);
             }
         }
@@ -152,11 +152,6 @@ pub(super) fn contacts<T: Real>(
     let group = |g: usize| link(g).map(|l| tree_of[l]);
     out.broad = Broad::of(&out.paired, &out.pairs, &out.specs, tree_of.iter().max().map_or(0, |t| t + 1), group);
     Ok(out)
-}
-
-/// Numbers of two geoms, the lower first.
-fn ordered([i, j]: [usize; 2]) -> [usize; 2] {
-    [i.min(j), i.max(j)]
 }
 
 /// Geoms from which on a model is a crowd.
