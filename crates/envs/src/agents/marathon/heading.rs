@@ -1,11 +1,12 @@
-//! Where a figure in space is told to face: a direction along the ground that turns as commanded, and waits for who cannot follow.
+//! The commanded direction of a character in space. It turns as commanded and stops when the character falls too far
+//! behind.
 
 use marathon_physics::lanes::Real;
 
 use crate::agent::senses::clamp;
 
-/// How far a vector along the ground points to the left of a heading, cosine and sine, and along it; of a direction, the sine and
-/// cosine of its angle from the heading.
+/// Components of a ground vector to the left of a heading (given as cosine and sine) and along it. For a unit vector,
+/// these are the sine and cosine of its angle from the heading.
 #[inline(always)]
 pub(super) fn beside<T: Real>([c, d]: [T; 2], [x, y]: [T; 2]) -> [T; 2] {
     [c.mul_add(y, -(d * x)), c.mul_add(x, d * y)]
@@ -18,7 +19,8 @@ pub(super) fn off<T: Real>(heading: [T; 2], direction: [T; 2]) -> T {
     sin.atan2(cos)
 }
 
-/// The direction after a decision: turned by an angle, but no farther off the heading than `most`, rad.
+/// The direction one decision later. `by` maps its angle from the heading to the new one, which is limited to `most`,
+/// rad.
 #[inline(always)]
 pub(super) fn turned<T: Real>(heading: [T; 2], direction: [T; 2], by: impl FnOnce(T) -> T, most: f64) -> [T; 2] {
     let angle = clamp(by(off(heading, direction)), -most, most);

@@ -1,8 +1,8 @@
-//! Actuators that move nothing: the actions of a role without a body.
+//! Actuators that apply no force: the actions of a role without a body.
 
 use std::fmt::Write;
 
-/// MJCF of motors of these names, behind a model's own, on a tendon that does not pull at one of its joints.
+/// MJCF of motors with these names. They act on a tendon that exerts no force on `joint`.
 pub(super) fn actuators(joint: &str, names: &[&str]) -> String {
     let mut out =
         format!("<tendon><fixed name=\"idle\"><joint joint=\"{joint}\" coef=\"0\"/></fixed></tendon>\n<actuator>");
@@ -13,7 +13,7 @@ pub(super) fn actuators(joint: &str, names: &[&str]) -> String {
     out + "</actuator>\n"
 }
 
-/// A model with more elements.
+/// The model with additional elements.
 pub(super) fn extended(model: &str, elements: &str) -> String {
     format!("{}{elements}</mujoco>\n", model.trim_end().trim_end_matches("</mujoco>"))
 }

@@ -1,7 +1,7 @@
 //! The Marathon Environments.
 //!
-//! `-v0` is the paper's text and its code at release (31, 41, 88, 53 observations); `-v1` is the paper's Table 1, the
-//! code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
+//! `-v0` follows the paper's text and its code at release (31, 41, 88, 53 observations). `-v1` follows the paper's
+//! Table 1, which is the code four months later (31, 43, 92, 54 observations, rewards between 0 and 1).
 
 pub mod ant;
 pub mod controller;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use crate::any_agent::AnyAgent;
 
-/// All of them, in the order of listings.
+/// All agents of this module, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let mut out: Vec<Arc<dyn AnyAgent>> = vec![
         Arc::new(hopper::HopperV0),
@@ -44,9 +44,10 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     out
 }
 
-/// Names besides the registered ones, which are the ids without their version. `(alias, id)`.
+/// Extra names of tasks, `(alias, id)`. Each id without its version is a name already.
 pub const ALIASES: [(&str, &str); 3] =
     [("walker", "Walker2d-v0"), ("walker-v0", "Walker2d-v0"), ("walker-v1", "Walker2d-v1")];
 
-/// Speed that the `-v1` rewards call 1, m/s: the track's length over the episode's duration in the original.
+/// Speed at which the speed term of the `-v1` rewards is 1, m/s: the original's track length divided by its episode
+/// duration.
 const FASTEST: f64 = 8.0;

@@ -1,51 +1,54 @@
-//! Falls lived again. Falls of an agent that falls once in ten minutes are too rare to learn from. So it keeps states that it has
-//! been in, and a share of its later episodes start in one from before its last fall.
+//! Replay of falls in training. An agent that falls once in ten minutes sees too few falls to learn from them. The
+//! agent therefore stores earlier states of its episode. After a fall, a fraction of its episodes starts from a state
+//! that was stored before it.
 
 use marathon_physics::lanes::Real;
 
 use crate::agent::{Senses, Start};
 
-/// Time from one state that is kept to the next, s. The older of two is this long before a fall, or up to twice as long.
+/// Time between two stored states, s. The older one is 0.75 to 1.5 s old when the character falls.
 const APART: f64 = 0.75;
 
-/// The variables for it of an agent.
+/// The memory slots that hold the stored states of an agent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Relive {
-    /// The first of them.
+    /// The first slot.
     pub slot: usize,
-    /// Share of the episodes.
+    /// Fraction of the episodes that start before the last fall.
     pub share: f64,
-    /// Numbers of the configuration and of the velocity.
+    /// Sizes of `qpos` and `qvel`.
     pub joints: [usize; 2],
-    /// How many of the configuration's are places along the ground, which is the same everywhere.
+    /// How many leading entries of `qpos` are positions along the ground. They are set to 0 at a start, because flat
+    /// ground is the same everywhere.
     pub places: usize,
-    /// Another variable of the agent that belongs to a state.
+    /// Another slot of the agent that belongs to the state.
     pub also: Option<usize>,
 }
 
 impl Relive {
-    /// Number of all variables of an agent that has these behind its others; those alone without such episodes.
+    /// Memory size of an agent whose last slots are these. If no falls are replayed, only the slots before them count.
     pub fn memory(self) -> usize {
         self.slot + if self.share > 0.0 { 3 + 3 * self.state() } else { 0 }
     }
 
-    /// Numbers of a state: angles and velocities of all joints, and the other variable.
+    /// Size of a stored state: `qpos`, `qvel` and the other slot.
     fn state(self) -> usize {
         self.joints[0] + self.joints[1] + usize::from(self.also.is_some())
     }
 
-    /// Decisions since a state was kept, how many were kept in a row, and whether there is one from before a fall.
+    /// Slots of three numbers: decisions since the last stored state, states stored in a row, and whether a state from
+    /// before a fall exists.
     const fn counts(self) -> [usize; 3] {
         [self.slot, self.slot + 1, self.slot + 2]
     }
 
-    /// The state from before a fall, the newest and the one before.
+    /// First slots of three states: the one from before a fall, the newest one and the one before it.
     fn states(self) -> [usize; 3] {
         let first = self.slot + 3;
         [first, first + self.state(), first + 2 * self.state()]
     }
 
-    /// The next episode may start in the state from before the last fall.
+    /// Keeps the state from before the last fall for the next episode.
     pub fn carry(self, start: &mut Start) {
         if self.share > 0.0 {
             let ([.., has], [lived, ..]) = (self.counts(), self.states());
@@ -54,7 +57,7 @@ impl Relive {
         }
     }
 
-    /// Starts there, some of the time.
+    /// Starts a fraction of the episodes from that state.
     pub fn start(self, start: &mut Start) {
         let [.., has] = self.counts();
         if self.share == 0.0 || start.memory[has] == 0.0 || start.random.uniform(0.0, 1.0) >= self.share {
@@ -72,8 +75,9 @@ impl Relive {
         }
     }
 
-    /// A decision has been made. `fate`, given the agent's variables, tells where it goes on, and where the decision has felled it: there
-    /// it does not go on. Nobody asks without such episodes.
+    /// Stores states after a decision. `fate` takes the agent's memory and returns two masks: lanes in which the
+    /// character can continue, and lanes in which this decision made it fall. `fate` is not called if no falls are
+    /// replayed.
     #[inline(always)]
     pub fn remember<T: Real>(self, s: &Senses<T>, memory: &mut [T], fate: impl FnOnce(&[T]) -> [T::Mask; 2]) {
         if self.share == 0.0 {

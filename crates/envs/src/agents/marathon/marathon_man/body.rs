@@ -1,4 +1,4 @@
-//! The figure: its parts, joints and motors, and its model for each way to move.
+//! The character's parts, joints and motors, and its model for each kind of control.
 
 use marathon_physics::Model;
 
@@ -6,12 +6,12 @@ use super::super::imitation::Anatomy;
 use crate::agent::Part;
 use crate::agent::options::Choice;
 
-/// The figure with motors.
+/// The model with motors.
 const MODEL: &str = include_str!("../../../../../../assets/agents/marathon_man.xml");
-/// The original's drive, which stands by the motors, as the model's defaults have it.
+/// The original's drive in the defaults of the model, in addition to the motors.
 const DRIVE: &str = r#"damping="1" stiffness="1" "#;
 
-/// The tracked parts of the original, in its order.
+/// The tracked parts, in the original's order.
 pub const PARTS: [&str; 17] = [
     "butt",
     "lower_waist",
@@ -31,7 +31,7 @@ pub const PARTS: [&str; 17] = [
     "left_larm",
     "left_hand",
 ];
-/// The root of observations.
+/// The root part of observations.
 pub const BUTT: Part = Part::named(&PARTS, "butt");
 const TORSO: Part = Part::named(&PARTS, "torso");
 const HEAD: Part = Part::named(&PARTS, "head");
@@ -62,9 +62,9 @@ pub const TOUCH: [&str; 6] =
 pub struct Joint {
     /// Name of the joint and of its motor.
     pub name: &'static str,
-    /// Share of the joint in DeepMimic's pose and velocity errors, before they are normalized.
+    /// Weight of the joint in DeepMimic's pose and velocity errors, before normalization.
     pub weight: f64,
-    /// Stiffness of the servo, N m/rad. A tenth of it is the damping, N m s/rad.
+    /// Stiffness of the servo, N m/rad. Its damping, N m s/rad, is a tenth of this number.
     pub stiffness: f64,
     /// Strength of the motor, N m.
     pub strength: f64,
@@ -76,8 +76,10 @@ const fn joint(name: &'static str, weight: f64, stiffness: f64, strength: f64, o
     Joint { name, weight, stiffness, strength, original }
 }
 
-/// The hinges in the order of `qpos`, behind the free joint. Weights are DeepMimic's; its stiffness, as its strength, is
-/// scaled by the mass, 82 kg for 45 (1000 in the chest, 500 in hip and knee, 400 in ankle and shoulder, 300 in the elbow).
+/// The hinges in the order of `qpos`, after the free joint.
+///
+/// The weights are DeepMimic's. So are stiffness and strength, scaled by the mass from 45 to 82 kg (DeepMimic: 1000 in
+/// the chest, 500 in hip and knee, 400 in ankle and shoulder, 300 in the elbow).
 pub const JOINTS: [Joint; 21] = [
     joint("abdomen_z", 0.5, 1820.0, 180.0, 40.0),
     joint("abdomen_y", 0.5, 1820.0, 360.0, 40.0),
@@ -101,7 +103,7 @@ pub const JOINTS: [Joint; 21] = [
     joint("left_shoulder_x", 0.3, 730.0, 180.0, 20.0),
     joint("left_elbow", 0.2, 550.0, 110.0, 40.0),
 ];
-/// What the reward has to know.
+/// The data that the reward needs.
 pub const ANATOMY: Anatomy = Anatomy {
     root: BUTT,
     parts: PARTS.len(),
@@ -113,7 +115,7 @@ pub const ANATOMY: Anatomy = Anatomy {
     qvel: FIRST_QVEL,
 };
 
-/// The weights of the table.
+/// Weights of the joints.
 const WEIGHTS: [f64; JOINTS.len()] = {
     let (mut weights, mut i) = ([0.0; JOINTS.len()], 0);
     while i < JOINTS.len() {
@@ -123,26 +125,26 @@ const WEIGHTS: [f64; JOINTS.len()] = {
     weights
 };
 
-/// Damping of a servo for its stiffness, s: DeepMimic's.
+/// Ratio of a servo's damping to its stiffness, s (DeepMimic's).
 pub const DAMPING_TIME: f64 = 0.1;
-/// Where the hinges begin in `qpos`.
+/// Index of the first hinge in `qpos`.
 pub const FIRST_QPOS: usize = 7;
-/// Where they begin in `qvel`.
+/// Index of the first hinge in `qvel`.
 pub const FIRST_QVEL: usize = 6;
 
-/// The motors in the original's order: joints by number.
+/// The motors in the original's order, as indices into [`JOINTS`].
 pub const ACTIONS: [usize; 21] = [2, 1, 0, 3, 5, 4, 6, 7, 8, 9, 11, 10, 12, 13, 14, 16, 15, 17, 19, 18, 20];
 
-/// What an action does.
+/// Meaning of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
-    /// It moves the target of a servo away from the clip's next pose.
+    /// Offset of a servo's target from the clip's next pose.
     Pd,
-    /// It is the target of a servo: the range of the joint.
+    /// Target of a servo, within the joint's range.
     PdRange,
-    /// It is a share of the motor's strength.
+    /// Fraction of the motor's strength.
     Torque,
-    /// It is the target velocity of the original's weak drive.
+    /// Target velocity of the original's weak drive.
     Servo,
 }
 
@@ -152,7 +154,7 @@ impl Choice for Control {
         &[(Control::Pd, "pd"), (Control::PdRange, "pd_range"), (Control::Torque, "torque"), (Control::Servo, "servo")];
 }
 
-/// The model with the actuators of a way to move.
+/// The model with the actuators for a kind of control.
 pub fn model(control: Control) -> String {
     if control == Control::Torque {
         return MODEL.into();
@@ -166,7 +168,7 @@ pub fn model(control: Control) -> String {
         let Joint { name, stiffness, strength, original, .. } = &JOINTS[i];
         let damping = DAMPING_TIME * stiffness;
         let law = match control {
-            // the drive's spring and damper of 1, its forces bounded at the author's 2.5 times the strength
+            // the drive has a spring and a damper of 1; its force limit is the author's 2.5 times the strength
             Control::Servo => {
                 let bound = 2.5 * original;
                 format!(r#"gainprm="{original}" biasprm="0 -1 -1" forcerange="-{bound} {bound}""#)
@@ -184,7 +186,7 @@ pub fn model(control: Control) -> String {
     text + "  </actuator>" + tail
 }
 
-/// Middle of each joint's range and half of its width, rad.
+/// Middle of each joint's range and half its width, rad.
 fn middles_and_halves() -> [[f64; 2]; 21] {
     let model = Model::from_xml_str(MODEL, "marathon_man").expect("the model is valid");
     std::array::from_fn(|i| {
@@ -197,7 +199,7 @@ fn middles_and_halves() -> [[f64; 2]; 21] {
 mod tests {
     use super::*;
 
-    /// The tables above are those of the model.
+    /// The tables above match the model.
     #[test]
     fn joints_and_motors_are_the_models() {
         for control in [Control::Pd, Control::PdRange, Control::Torque, Control::Servo] {

@@ -1,18 +1,22 @@
-//! Marathon Man in a player's hands: what [`Steer`] does, a step aside, a jump and a backflip on a button, and he gets up when he
-//! has fallen.
+//! Marathon Man under a player's control. It does what [`Steer`] does, steps aside, jumps and does backflips on a
+//! button, and gets up after a fall.
 //!
 //! | observation | content |
 //! |---|---|
-//! | 0..103 | what he observes in `MarathonManSteer-v0`; with a [skill](super::skills) on, vectors are seen from the clip's heading, and `next_pose` is the clip's |
-//! | 103..107 | with a skill: sine and cosine of the clip's phase as an angle, and of twice the angle |
-//! | 107..110 | with a skill: from his butt to where the clip has it, m |
+//! | 0..103 | the observation of `MarathonManSteer-v0`; in a [skill](super::skills), vectors are expressed in the clip's heading, and `next_pose` is the clip's |
+//! | 103..107 | in a skill: sine and cosine of the clip's phase as an angle, and of twice the angle |
+//! | 107..110 | in a skill: from the character's butt to the clip's, m |
 //! | 110..113 | commanded velocity to the left, m/s; jump; backflip |
-//! | 113..117 | which skill is on: jump, backflip, getting up from the belly, from the back |
-//! | 117..124 | with a skill: how far the clip's butt is above his at the next decision, m, its forward and up axis |
-//! | 124..152 | the same and the clip's angles less his own, four decisions later |
+//! | 113..117 | active skill: jump, backflip, getting up from the belly, from the back |
+//! | 117..124 | in a skill, one decision ahead: height of the clip's butt above the character's, m, its forward and up axis |
+//! | 124..152 | the same four decisions ahead, and the clip's joint angles minus the character's |
 //!
-//! Without a skill, the reward is that of `MarathonManSteer-v0` for the commanded velocity, direction and gait. With one it is
-//! DeepMimic's; to get up, he is also paid for the height of his butt.
+//! # Mechanism
+//!
+//! Two controllers share the action, which always offsets servo targets. Outside skills, the targets come from the gait
+//! of `Steer`, and the reward is that of `MarathonManSteer-v0`. In a skill, they come from the skill's clip, and the
+//! reward is DeepMimic's. Getting up also earns a term for the height of the butt. The memory decides which of the two
+//! is active, so one policy covers both.
 
 use std::f64::consts::PI;
 
@@ -37,86 +41,93 @@ use crate::agent::{
 };
 use crate::episode_rng::EpisodeRng;
 
-/// Fastest that he is told to step aside, m/s.
+/// Highest commanded speed to a side, m/s.
 const ASIDE: f64 = 0.8;
-/// What leads him: faster than what leads the steered figure, but a run that ends at once fells him.
+/// Rates and limits of the reference signals. They are higher than in the steered task, except for slowing down: a run
+/// that ends abruptly makes the character fall.
 const HASTE: Haste =
     Haste { speeding: 5.0, slowing: 3.0, urging: 0.5, lead: 1.2, quick: true, turning: 0.6, least: 0.8 };
-/// Decisions of the clip ahead that he sees.
+/// How far ahead the clip is observed, decisions.
 const AHEAD: usize = 4;
-/// His skills, behind the variables of the steered figure.
+/// The skills' memory slots, after those of the steered task.
 const SKILL: Skills = Skills { slot: BEGUN + 1 };
-/// Slot of whether a fall ends the episode, and number of all slots but those of [falls lived again](super::relive).
+/// Slot that holds whether a fall ends the episode.
 const MORTAL: usize = SKILL.slot + SLOTS;
+/// Number of slots without those of [replayed falls](super::relive).
 const MEMORY: usize = MORTAL + 1;
-/// Share of the episodes that start in the midst of a skill.
+/// Fraction of the episodes that start within a skill.
 const SKILLED: f64 = 0.45;
-/// Mean distance of the parts from the clip's that ends an episode of skills alone, m.
+/// Mean distance of the parts from the clip that ends an episode without locomotion, m.
 const TOO_FAR: f64 = 0.5;
-/// Height of a foot's center that is on the ground, worth of a jump's height, 1/m, and height that is worth no more, m.
+/// Height of the center of a foot on the ground, m.
 const STANDING_FOOT: f64 = 0.06;
+/// Reward per meter of jump height, 1/m.
 const LEAP: f64 = 5.0;
+/// Jump height above which the reward stays constant, m.
 const HIGH: f64 = 0.3;
-/// Worth of a butt that is as high as that of someone who has got up.
+/// Reward for a butt as high as that of a character that is up.
 const RISE: f64 = 0.3;
-/// Shares of the commands that jump, turn over, and step aside.
+/// Fractions of the commands that are jumps, backflips and side steps.
 const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
 const STEPPING: f64 = 0.15;
-/// Change of his velocity by a push over, m/s.
+/// Smallest and largest velocity change by the push at the start of an episode, m/s.
 const KNOCK: [f64; 2] = [2.0, 5.0];
 
 crate::options! {
-    /// Arguments of Marathon Man in a player's hands.
+    /// Arguments of Marathon Man under a player's control.
     pub struct ControllerArguments {
-        /// Most that an action moves a servo's target, rad.
+        /// Largest offset of a servo's target by an action, rad.
         reach: Scale = Scale(1.0),
-        /// Where an episode starts: at `random` decisions of the clips and skills, standing: `first`, or `adaptive`: as the steered
-        /// figure's.
+        /// Start of an episode: `random` decisions of the clips and skills, `first` (standing), or `adaptive` (as in
+        /// the steered task).
         start: StartAt = StartAt::Random,
-        /// What he is told where nobody commands: anything, `even`, or half of the time the extremes, `sharp`.
+        /// Commands that are drawn when no caller sets them: `even` (uniform), or `sharp` (half of them extreme).
         commands: Commands = Commands::Even,
-        /// Clips of what he does, `all` or some of them: where episodes start, what commands ask for where nobody commands. Without
-        /// those of getting up, a fall ends the episode; without those of the gait, the end of a skill.
+        /// Clips to use, `all` or some of them. They set where episodes start and which commands are drawn. Without
+        /// getting-up clips, a fall ends the episode. Without locomotion clips, the end of a skill ends it.
         clip: ClipNames = ClipNames(ALL.into()),
-        /// Share of the episodes that a fall ends: learners need not lie so long. Those that start lying are not among them.
+        /// Fraction of training episodes that end at a fall instead of waiting until the character is up (0 to 1).
+        /// Episodes that start lying never do.
         mortal: Share = Share(0.0),
-        /// Share of the episodes of the gait that begin with a push over, which no fall ends: learners come to lie as they fall.
+        /// Fraction of the locomotion episodes that start with a push that makes the character fall (0 to 1). These
+        /// episodes continue after falls, so the policy sees how falls end.
         knocked: Share = Share(0.0),
-        /// What an episode's end costs that is a failure.
+        /// Penalty of a failure that ends the episode.
         price: Scale = Scale(0.0),
-        /// Share of the episodes of the gait that start 0.75 to 1.5 s before the last fall from it, once there is one.
+        /// Fraction of the locomotion episodes that start 0.75 to 1.5 s before the last fall, once there is one (0 to
+        /// 1).
         relive: Share = Share(0.0),
     }
 }
 
-/// Clips of the gait, then those of the skills.
+/// Clips of the locomotion, then those of the skills.
 fn known_clips() -> Vec<&'static str> {
     CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip)).collect()
 }
 
-/// What he does.
+/// What the task includes, by the clips in use.
 #[derive(Clone, Copy, Debug)]
 struct Does {
-    /// He goes and stands.
+    /// Locomotion: walking, running and standing.
     gait: bool,
-    /// His skills.
+    /// Which skills.
     skills: [bool; SKILLS.len()],
 }
 
 impl Does {
-    /// He gets up, at least in one way; else a fall is the end.
+    /// Whether at least one way of getting up is included. If not, a fall ends the episode.
     fn rises(self) -> bool {
         self.skills[FROM_A_STAND..].contains(&true)
     }
 }
 
-/// Marathon Man in a player's hands.
+/// Marathon Man under a player's control.
 #[derive(Clone, Debug)]
 pub struct Controller {
     arguments: ControllerArguments,
     does: Does,
-    /// The steered figure within.
+    /// The steered task, used for locomotion.
     steer: Steer,
 }
 
@@ -140,8 +151,9 @@ impl Agent for Controller {
     fn facts(&self) -> Facts {
         Facts {
             id: "MarathonManController-v0".into(),
-            summary: "a figure of 21 motors: go as told, jump, turn over backward, and get up, in the style of clips"
-                .into(),
+            summary:
+                "a figure of 21 motors: walk and run as commanded, jump, backflip and get up, in the style of clips"
+                    .into(),
             model: model(Control::Pd).into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: decisions(Seconds(SECONDS)),
@@ -221,7 +233,7 @@ impl Agent for Controller {
             (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
         } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
             (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
-            // a player rather steps straight aside
+            // players mostly step straight to a side
             if self.arguments.commands == Commands::Sharp && random.whole(0, 1) == 0 {
                 going[0] = 0.0;
             }
@@ -263,7 +275,8 @@ impl Agent for Controller {
         let rose = SKILL.rises(memory);
         let was_on = SKILL.remember(s, memory, [jump, backflip]);
         let on = SKILL.on(memory);
-        // the direction outlasts a skill, and a jump the velocity, but who has risen goes where he faces
+        // the direction survives a skill, and the target velocity survives a jump; after getting up, the direction is
+        // the heading
         let (heading, [x, y, _]) = (s.heading(BUTT), s.center_of_mass_velocity());
         let risen = T::and(rose, T::not(on));
         let led = T::or(T::not(on), SKILL.is(memory, JUMP));
@@ -326,14 +339,13 @@ impl Agent for Controller {
         let [speed, left, turn, ..] = told(s);
         let moved = left.abs() + turn.abs() + speed;
         let (jumps, gait) = (SKILL.is(&all, JUMP), T::not(SKILL.on(&all)));
-        // a jump need not stand where the clip's does
-        // whoever turns on one point falls
+        // a jump may land elsewhere than the clip; rewarding `drift` in a turn taught turning on one point, and falling
         let moves = T::or(gait, jumps);
         let straight = turn.abs().lt(T::lit(0.01));
         Steer::add_terms(s, [moves, T::and(moves, straight), gait], moved, terms);
         let [similar, posture] = imitation::similarity(s, &ANATOMY);
         terms.add("skill", 1.0, SKILL.worth(&all) * T::select(jumps, posture, similar));
-        // a hop looks much like a jump
+        // the pose of a small hop scores almost like a jump, so reward height
         let [right, left] = FEET.map(|foot| s.height(foot));
         let high = clamp(right.min(left) - T::lit(STANDING_FOOT), 0.0, HIGH);
         terms.add("leap", LEAP, T::masked(SKILL.jumps(&all), high));
@@ -346,7 +358,7 @@ impl Agent for Controller {
         let all = memory(s);
         let rises = SKILL.rises(&all);
         let mut over = SKILL.stuck(&all);
-        // the fall has made him rise
+        // getting up began in this decision, so the character just fell
         let mortal =
             T::or(T::lit(0.5).lt(s.memory(MORTAL)), if self.does.rises() { T::none() } else { T::not(T::none()) });
         over = T::or(over, T::and(mortal, T::and(rises, T::not(T::lit(0.5).lt(s.memory(SKILL.slot + 1))))));
@@ -375,9 +387,9 @@ impl Agent for Controller {
     }
 }
 
-/// The part of the command that applies now: speed, left, turn, jump, backflip. A backflip needs a standing start. So
-/// while a backflip is commanded, speed, step, turn and jump count as 0, also in the observation. The policy was
-/// trained on such commands.
+/// The part of the command that applies now: speed, left, turn, jump, backflip. A backflip needs a standing start.
+/// While a backflip is commanded, speed, step, turn and jump therefore count as 0, also in the observation. The policy
+/// was trained on such commands.
 #[inline(always)]
 fn told<T: Real>(s: &Senses<T>) -> [T; 5] {
     let backflip = s.command(4);
@@ -386,7 +398,7 @@ fn told<T: Real>(s: &Senses<T>) -> [T; 5] {
     [speed, left, turn, jump, backflip]
 }
 
-/// His variables.
+/// The agent's memory.
 #[inline(always)]
 fn memory<T: Real>(s: &Senses<T>) -> [T; MEMORY] {
     std::array::from_fn(|i| s.memory(i))

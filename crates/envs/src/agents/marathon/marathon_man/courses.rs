@@ -1,4 +1,5 @@
-//! Marathon Man on assault courses: the [steered figure](super::steer) with ground of its own, which he sees.
+//! Marathon Man on assault courses: the [steered task](super::steer) on uneven ground that the character observes. Each
+//! agent has its own ground.
 
 use marathon_physics::lanes::Real;
 
@@ -8,17 +9,17 @@ use super::steer::{BEGUN, DIRECTION, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
 use crate::agent::{Agent, Obs, Part, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
-/// Slowest that he is told to run, m/s.
+/// Lowest commanded speed, m/s.
 const SLOWEST: f64 = 1.0;
 
-/// Marathon Man on courses, told where to go.
+/// The steered Marathon Man on courses.
 pub type TerrainMarathonMan = Terrain<Steer>;
 
-/// He runs ahead, at a speed that changes now and then, and a player may lead him elsewhere.
+/// Drawn commands are straight ahead, at a speed that changes every 1 to 6 s. Other callers may command any direction.
 impl Runner for Steer {
     const ID: &'static str = "TerrainMarathonMan-v0";
     const SUMMARY: &'static str =
-        "a figure of 21 motors: run as told over slopes, steps, gaps and boxes that it sees coming";
+        "a figure of 21 motors: run as commanded over slopes, steps, gaps and boxes that it sees ahead";
     const TORSO: Part = BUTT;
     const EYES: Part = BUTT;
     const SOLES: &'static [Part] = &FEET;
@@ -36,14 +37,14 @@ impl Runner for Steer {
         Steer::observe_along(s, out);
     }
 
-    // as in his clips, but at the course's beginning, with the root facing along it
+    // start from the clips as in the steered task, but at the beginning of the course, facing along it
     fn place(&self, start: &mut Start) {
         self.reset(start);
         let [w, x, y, z] = [3, 4, 5, 6].map(|i| start.qpos[i]);
         let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
         let (sin, cos) = libm::sincos(-0.5 * yaw);
         start.qpos[..2].fill(0.0);
-        // the turn about z, times what he has
+        // rotation about z, times the current orientation
         start.qpos[3..7].copy_from_slice(&[cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]);
         let ((sin, cos), [vx, vy]) = (libm::sincos(-yaw), [start.qvel[0], start.qvel[1]]);
         start.qvel[..2].copy_from_slice(&[cos * vx - sin * vy, sin * vx + cos * vy]);

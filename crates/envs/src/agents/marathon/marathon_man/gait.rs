@@ -1,9 +1,11 @@
-//! Gaits by speed: what joints do when he stands, walks, runs, or goes at a speed between.
+//! Reference gaits for every speed, from standing through walking to running.
 //!
-//! Over a cycle of the walk and of the run, each joint's angle is a Fourier series. Both series begin at the same moment of
-//! their cycles, that in which the right hip is farthest ahead of the left one, so angles between those of the walk and those
-//! of the run are a gait, too: strides grow evenly from one to the other, and cycles take as long as the speed asks for.
-//! Slower than the walk, its swings shrink towards the stance.
+//! # Mechanism
+//!
+//! The joint angles of the walking and the running clip are Fourier series over the gait cycle. Both series start at
+//! the same event: the right hip is farthest ahead of the left one. Interpolating the coefficients therefore gives a
+//! valid gait in between. The stride length is interpolated too, and speed divided by stride length gives the cycle
+//! frequency. Below walking speed, the amplitudes of the walk shrink toward the standing pose.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -14,40 +16,40 @@ use marathon_physics::lanes::Real;
 use super::body::{FIRST_QPOS, JOINTS};
 use super::clips::{self, STAND};
 
-/// Waves in a cycle that the series know.
+/// Harmonics of a series.
 const HARMONICS: usize = 6;
-/// Numbers of a series: its mean, then cosine and sine of each wave.
+/// Coefficients of a series: the mean, then cosine and sine of each harmonic.
 const TERMS: usize = 1 + 2 * HARMONICS;
-/// Moments of a cycle that the series are made of.
+/// Samples per cycle that the series are computed from.
 const SAMPLES: usize = 64;
 
-/// A cycle of a gait.
+/// A gait cycle of a clip.
 struct Stride {
     /// Series of each hinge, in the order of `qpos`.
     series: [[f64; TERMS]; JOINTS.len()],
-    /// Way of a cycle, m.
+    /// Stride length: distance per cycle, m.
     length: f64,
-    /// Way of a second, m/s.
+    /// Speed, m/s.
     speed: f64,
 }
 
-/// The gaits of all speeds.
+/// Gaits for all speeds.
 pub struct Gaits {
-    /// Angles of the stance, rad.
+    /// Angles of the standing pose, rad.
     stand: [f64; JOINTS.len()],
     walk: Stride,
     run: Stride,
 }
 
-/// A moment of the cycle at a speed, for each lane.
+/// A phase of the gait at a speed, for each lane.
 pub struct Moment<T> {
-    /// Cosine and sine of each wave.
+    /// Cosine and sine of each harmonic.
     waves: [T; 2 * HARMONICS],
-    /// Shares of the stance, the walk and the run.
+    /// Blending weights of standing, walking and running.
     shares: [T; 3],
 }
 
-/// The gaits of the clips that come with the crate.
+/// The gaits of the clips that ship with the crate.
 pub fn gaits() -> &'static Gaits {
     static GAITS: LazyLock<Gaits> = LazyLock::new(|| {
         let clip = |name| clips::shipped(name).expect("the clip comes with the crate");
@@ -59,16 +61,16 @@ pub fn gaits() -> &'static Gaits {
     &GAITS
 }
 
-/// Share of a looping clip's cycle that is over when the right hip is farthest ahead of the left one.
+/// Phase of a looping clip at which the right hip is farthest ahead of the left one.
 pub fn beginning(clip: &Clip) -> f64 {
-    let hip = |name: &str| JOINTS.iter().position(|joint| joint.name == name).expect("he has hips");
+    let hip = |name: &str| JOINTS.iter().position(|joint| joint.name == name).expect("the character has hips");
     let (right, left) = (series(clip, 0.0, hip("right_hip_y")), series(clip, 0.0, hip("left_hip_y")));
     let [cos, sin] = [1, 2].map(|i| right[i] - left[i]);
-    // someone who stands has no first wave to speak of
+    // a standing clip has no first harmonic
     if cos.hypot(sin) < 0.05 { 0.0 } else { libm::atan2(sin, cos) / TAU }
 }
 
-/// The Fourier series of a hinge over a clip's cycle, from a share of the cycle on.
+/// The Fourier series of a hinge over a clip's cycle that starts at the phase `from`.
 fn series(clip: &Clip, from: f64, hinge: usize) -> [f64; TERMS] {
     let mut pose = vec![0.0; clip.layout().nq()];
     let mut out = [0.0; TERMS];
@@ -97,7 +99,7 @@ impl Stride {
 }
 
 impl Gaits {
-    /// How much of a gait at a speed is the stance, the walk and the run.
+    /// Blending weights of standing, walking and running at a speed.
     #[inline(always)]
     fn shares<T: Real>(&self, speed: T) -> [T; 3] {
         let (walk, run) = (self.walk.speed, self.run.speed);
@@ -107,8 +109,8 @@ impl Gaits {
         [one - moving, moving - running, running]
     }
 
-    /// Cycles per second at a speed, m/s: those of the walk for whoever is slower, or else as many as strides ask for that
-    /// are between those of walk and run.
+    /// Cycles per second at a speed, m/s. Below walking speed, the frequency is that of the walk. Above it, the stride
+    /// length is between those of walk and run.
     #[inline(always)]
     pub fn frequency<T: Real>(&self, speed: T) -> T {
         let [_, _, running] = self.shares(speed);
@@ -116,7 +118,7 @@ impl Gaits {
         speed.max(T::lit(self.walk.speed)).div(length)
     }
 
-    /// The cycle's share `phase` at a speed, m/s. Angles lead by `lead` seconds, at the velocity that they have.
+    /// The gait at a phase (0 to 1) and a speed, m/s. Angles are extrapolated by `lead` seconds at their velocities.
     #[inline(always)]
     pub fn moment<T: Real>(&self, phase: T, speed: T, lead: f64) -> Moment<T> {
         let (sin, cos) = (phase * T::lit(TAU)).sin_cos();
@@ -150,7 +152,7 @@ impl Gaits {
 mod tests {
     use super::*;
 
-    /// At the speeds of the clips the gaits are the clips, as far as six waves can tell.
+    /// At the clips' speeds, the gaits match the clips up to the error of six harmonics.
     #[test]
     fn the_walk_and_the_run_are_those_of_the_clips() {
         let gaits = gaits();
@@ -173,12 +175,12 @@ mod tests {
                     worst[1] = worst[1].max((gaits.angle(&soon, hinge) - led).abs());
                 }
             }
-            // a heel that strikes is quicker than six waves
+            // six harmonics cannot follow a heel strike
             assert!(worst[0] < 0.08 && worst[1] < 0.45, "{name}: {worst:?} rad");
         }
     }
 
-    /// Between them they pass from one to the other without a jump; who does not move stands.
+    /// Gaits change continuously with the speed, and the gait at 0 m/s is the standing pose.
     #[test]
     fn gaits_change_evenly_with_the_speed() {
         let gaits = gaits();

@@ -1,4 +1,4 @@
-//! Marathon Man: a figure of 82 kg and 21 motors that moves like the person in a motion clip.
+//! Marathon Man: a character of 82 kg with 21 motors that imitates a motion clip.
 //!
 //! | observation | content |
 //! |---|---|
@@ -7,14 +7,21 @@
 //! | 5..11 | forward and up axis of the butt |
 //! | 11..17 | velocity of the butt, m/s, and its angular velocity, rad/s |
 //! | 17..38, 38..59 | angles of the 21 joints, rad, and their velocities, rad/s |
-//! | 59..65 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
-//! | 65..68 | how far the clip's butt is from the agent's own, m |
-//! | 68..89 | how far the clip's next angles are from the agent's own, rad |
-//! | 30 each | later frames: the clip's butt as seen from the agent's, m, its forward and up axis, angles less the agent's own |
+//! | 59..65 | ground contact of toe, toe and heel of the right and of the left foot, 0 or 1 |
+//! | 65..68 | from the character's butt to the clip's, m |
+//! | 68..89 | the clip's next joint angles minus the character's, rad |
+//! | 30 each | later frames: the clip's butt relative to the character's, m, its forward and up axis, joint angles minus the character's |
 //!
-//! Vectors are in the clip's [direction of travel](crate::Frame::facing). Rewards: [`reward`]; what an action does:
-//! [`Control`]. The agent fails when its trunk touches the ground, unless the clip has it there, and when it is too far
-//! from the clip. The end of a clip that does not loop truncates the episode.
+//! Vectors are expressed in the clip's [direction of travel](crate::Frame::facing).
+//!
+//! # Mechanism
+//!
+//! An episode starts at a frame of the clip, with the clip's pose and velocities (reference state initialization). From
+//! then on the clip advances by one decision at a time. With the default [`Control::Pd`], an action offsets servo
+//! targets from the clip's next pose. The [`reward`] compares the character with the clip.
+//!
+//! An episode is terminated when the trunk touches the ground, unless the clip's trunk does, and when the character is
+//! too far from the clip. It is truncated at the end of a clip that does not loop.
 
 mod body;
 pub mod clips;
@@ -48,38 +55,39 @@ pub use reward::Reward;
 const FRAME_SKIP: usize = 5;
 /// Seconds between decisions.
 const DECISION: f64 = 1.0 / 40.0;
-/// How long an episode is at most, s, unless an option says otherwise.
+/// Longest episode, s, unless an option overrides it.
 const SECONDS: f64 = 20.0;
-/// How far ahead later frames of the clip are, decisions, and what their observations are called.
+/// Later frames of the clip in the observation: how far ahead, decisions, and the name of the group.
 const FUTURE: [(usize, &str); 3] = [(4, "in_4"), (8, "in_8"), (16, "in_16")];
-/// Numbers of such a frame.
+/// Size of one such frame.
 const FUTURE_FRAME: usize = 9 + JOINTS.len();
 crate::options! {
     /// Arguments of Marathon Man.
     pub struct Arguments {
-        /// Motion to follow: a clip's name; several, with commas between them, or `all` that are shipped: an episode has one.
+        /// Motion to imitate: the name of a clip, several names separated by commas, or `all` that ship with the crate.
+        /// Each episode uses one of them.
         clip: ClipNames = ClipNames("walk".into()),
-        /// Reward: `deepmimic` (Peng et al., 2018), `paper` (Booth and Booth, 2019), or `sparse`: how far the feet have come, at
-        /// the episode's end.
+        /// Reward: `deepmimic` (Peng et al., 2018), `paper` (Booth and Booth, 2019), or `sparse` (distance covered by
+        /// the feet, at the end of the episode).
         reward: Reward = Reward::DeepMimic,
-        /// What an action does: `pd` moves the target of a servo away from the clip's next pose, `pd_range` is the target
-        /// within the joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's
-        /// drive.
+        /// Meaning of an action: `pd` offsets a servo's target from the clip's next pose; `pd_range` sets the target
+        /// within the joint's range; `torque` is a fraction of the motor's strength; `servo` sets the target velocity
+        /// of the original's drive.
         control: Control = Control::Pd,
-        /// Where an episode starts: at `random` decisions of the clip, at its `first`, or more often where it fails: `adaptive`.
+        /// Start of an episode: `random` decisions of the clip, its `first`, or `adaptive` (more often where episodes
+        /// fail).
         start: StartAt = StartAt::Random,
-        /// Mean distance of the parts from where the clip has them that ends an episode, m. With the reward `paper`, a sum of
-        /// its first five terms below 0.334 ends it instead; with `sparse`, only a fall does.
+        /// Mean distance of the parts from the clip that ends an episode, m. With the reward `paper`, a sum of its
+        /// first five terms below 0.334 ends it instead. With `sparse`, only a fall does.
         distance: Scale = Scale(0.5),
-        /// What the scales of the terms `pose` and `end_effectors` of `deepmimic` are multiplied by: the more, the closer the pose
-        /// has to be.
+        /// Factor of the scales of the `deepmimic` terms `pose` and `end_effectors`. A higher value demands a closer
+        /// pose.
         sharpness: Scale = Scale(1.0),
-        /// Most that an action of `pd` moves a target, rad.
+        /// Largest offset of a servo's target by an action of `pd`, rad.
         reach: Scale = Scale(1.0),
-        /// How many later frames of the clip are observed: up to three, 4, 8 and 16 decisions ahead.
+        /// Number of later clip frames in the observation, 0 to 3: 4, 8 and 16 decisions ahead.
         future: usize = 0,
-        /// How long an episode is at most, s. Of several clips, those that are mastered take the less of the training, the
-        /// shorter it is.
+        /// Longest episode, s. With several clips, shorter episodes give mastered clips a smaller part of the training.
         seconds: Seconds = Seconds(SECONDS),
     }
 }
@@ -89,12 +97,12 @@ crate::options! {
 pub struct MarathonMan {
     id: &'static str,
     summary: &'static str,
-    /// Whether the clip is an argument.
+    /// Whether the task has the option `clip`.
     any_clip: bool,
     arguments: Arguments,
 }
 
-/// Tasks with a clip of their own: id, clip, and what the figure is to do.
+/// Tasks with a fixed clip: id, clip and summary.
 const TASKS: [(&str, &str, &str); 16] = [
     ("MarathonManWalk-v0", "walk", "a figure of 21 motors: walk as a person does"),
     ("MarathonManWalkLeft-v0", "walk_left", "a figure of 21 motors: walk on a circle to the left"),
@@ -114,7 +122,7 @@ const TASKS: [(&str, &str, &str); 16] = [
     ("MarathonManGetUpFaceUp-v0", "getup_faceup", "a figure of 21 motors: get up, lying on the back"),
 ];
 
-/// Marathon Man with any clip, and with each that comes with the crate.
+/// The task for any clip, those with a fixed clip, the sparse task, and the two that take commands.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let any = ("MarathonMan-v0", "walk", "a figure of 21 motors: move as a motion clip does");
     let sparse = ("MarathonManSparse-v0", "walk", "a figure of 21 motors: walk for one reward at the end");
@@ -128,7 +136,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     tasks.map(agent).chain(told).collect()
 }
 
-/// Whether a model has the figure's joints.
+/// Checks that a model has the character's joints.
 fn has_joints(model: &Model) -> Result<(), String> {
     let expected = JOINTS.each_ref().map(|joint| joint.name);
     let found: Vec<&str> = model.joints.iter().skip(1).map(|joint| joint.name.as_str()).collect();
@@ -138,13 +146,13 @@ fn has_joints(model: &Model) -> Result<(), String> {
     }
 }
 
-/// Decisions in so many seconds, one at least.
+/// Number of decisions in a time, at least one.
 fn decisions(seconds: Seconds) -> usize {
     (seconds.0 / DECISION).round().max(1.0) as usize
 }
 
 impl MarathonMan {
-    /// Decisions after which an episode is truncated.
+    /// Number of decisions after which an episode is truncated.
     fn max_episode_steps(&self) -> usize {
         decisions(self.arguments.seconds)
     }
@@ -205,7 +213,7 @@ impl Agent for MarathonMan {
                 let reach = T::lit(self.arguments.reach.0);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
                     let clip = c.reference(1);
-                    // the servo's damping, which slows every motion, is not to slow the clip's own
+                    // compensate the servo's damping, which would slow the clip's motion
                     let target =
                         clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
                     c.ctrl[i] = c.action[i].mul_add(reach, target);
@@ -287,7 +295,7 @@ impl Agent for MarathonMan {
     }
 }
 
-/// Which toes and heels are on the ground.
+/// Writes which toes and heels touch the ground.
 #[inline(always)]
 fn observe_soles<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.group("touch");

@@ -1,11 +1,9 @@
 //! Rewards for following a clip.
 //!
-//! `deepmimic`: that of all figures that move like a clip (`imitation.rs`).
-//!
-//! `paper`: ActiveRagdollStyleTransfer 0.002.124, in which a distance `d` of at most `n` is worth `((n - d)/n)^n`. Its
-//! velocities were 5 times too large, on both sides; these are true.
-//!
-//! `sparse`: how far the feet have come, once, at the episode's end.
+//! - `deepmimic`: the reward of all characters that imitate a clip (`imitation.rs`).
+//! - `paper`: the reward of ActiveRagdollStyleTransfer 0.002.124. A distance `d` of at most `n` earns `((n - d)/n)^n`.
+//!   The original's velocities were 5 times too large on both sides; here they are correct.
+//! - `sparse`: the distance covered by the feet, paid once at the end of the episode.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -18,14 +16,14 @@ use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
 use crate::agent::{Senses, Terms};
 
-/// Which reward.
+/// Selects the reward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reward {
-    /// DeepMimic's (Peng et al., 2018).
+    /// The reward of DeepMimic (Peng et al., 2018).
     DeepMimic,
-    /// The paper's.
+    /// The reward of the paper.
     Paper,
-    /// How far the feet have come, at the end.
+    /// Distance covered by the feet, at the end of the episode.
     Sparse,
 }
 
@@ -35,16 +33,16 @@ impl Choice for Reward {
         &[(Reward::DeepMimic, "deepmimic"), (Reward::Paper, "paper"), (Reward::Sparse, "sparse")];
 }
 
-/// Terms of the paper's reward that a distance makes: name, weight, most of the distance.
+/// Terms of the paper's reward that depend on a distance: name, weight, distance at which the term is 0.
 const PAPER: [(&str, f64, i32); 4] = [
     ("rotation", 0.585, 17),
     ("center_of_mass_velocity", 0.09, 3),
     ("end_effectors", 0.135, 8),
     ("center_of_mass", 0.09, 5),
 ];
-/// Weight of the touch sensors, and of the motors that are not at their limit.
+/// Weight of each of the other two terms: touch sensors that match the clip, and motors below their limit.
 const PAPER_REST: f64 = 0.09;
-/// The paper's sum of terms below which an episode ends.
+/// An episode ends when the paper's terms sum to less than this.
 const PAPER_LEAST: f64 = 0.334;
 
 impl Reward {
@@ -57,7 +55,7 @@ impl Reward {
         }
     }
 
-    /// Adds the terms; `sharpness` is for `deepmimic`.
+    /// Adds the terms. `sharpness` applies to `deepmimic` only.
     #[inline(always)]
     pub fn add<T: Real>(self, s: &Senses<T>, sharpness: f64, terms: &mut Terms<T>) {
         match self {
@@ -78,13 +76,13 @@ impl Reward {
     }
 }
 
-/// What the paper's distances are worth.
+/// Values of the paper's distance terms.
 #[inline(always)]
 fn paper_worths<T: Real>(s: &Senses<T>) -> [T; 4] {
     let clip = s.reference(0);
     let mut rotation = T::zero();
     for part in parts() {
-        // in half turns
+        // squared angle in units of half turns
         rotation = angle2(s, part).mul_add(T::lit(FRAC_1_PI * FRAC_1_PI), rotation);
     }
     let gap = sub(s.position(BUTT), clip.position(BUTT));
@@ -105,7 +103,7 @@ fn paper_worths<T: Real>(s: &Senses<T>) -> [T; 4] {
     worths
 }
 
-/// Share of the touch sensors that feel what they would in the clip.
+/// Fraction of the touch sensors that agree with the clip.
 #[inline(always)]
 fn touch_alike<T: Real>(s: &Senses<T>) -> T {
     let clip = s.reference(0);
@@ -117,7 +115,7 @@ fn touch_alike<T: Real>(s: &Senses<T>) -> T {
     alike
 }
 
-/// Lanes whose agent the paper gives up.
+/// Lanes in which the paper ends the episode.
 #[inline(always)]
 pub(super) fn too_far<T: Real>(s: &Senses<T>) -> T::Mask {
     let mut sum = touch_alike(s) * T::lit(PAPER_REST);

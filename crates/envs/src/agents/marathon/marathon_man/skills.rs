@@ -1,8 +1,21 @@
-//! What Marathon Man does beside going: he jumps and turns over backward on a button, and gets up after a fall.
+//! Skills of Marathon Man besides locomotion: jump and backflip on a button, and getting up after a fall.
 //!
-//! A skill is a piece of a clip. It begins where he is and as he faces; its place follows him. To get up or to turn over, he first
-//! becomes as the clip is at its beginning, for as long as he needs, up to [`SETTLING`]. A jump on the run is no piece of a clip,
-//! whose person crouches first and lands in a crouch: it is a leap, in which his gait goes on.
+//! # Mechanism
+//!
+//! A skill follows a section of a motion clip. When the skill begins, the clip is placed at the character's position
+//! and turned to its heading. The clip's position then follows the character.
+//!
+//! The memory holds the number of the active skill and a counter of decisions. `Skills::remember` ends and begins
+//! skills after each decision:
+//!
+//! - *Jump* begins on its button while the character stands. Faster than [`RUNNING`], the button starts a *leap*
+//!   instead. The jump clip crouches before and after the jump, so a leap follows no clip: the gait continues.
+//! - *Backflip* begins on its button once the character is slow enough.
+//! - *Getting up* begins when the trunk touches the ground in a skill, or any part but the feet outside one. The
+//!   direction in which the butt faces selects the clip.
+//!
+//! A backflip and getting up first wait at the start of their clip until the body is close to the clip's pose, up to
+//! [`SETTLING`].
 
 use marathon_physics::lanes::Real;
 
@@ -11,118 +24,126 @@ use super::body::{ANATOMY, BUTT, TRUNK};
 use super::steer::{CLIPS, Steer, on_the_ground};
 use crate::agent::{Following, Frame, Senses};
 
-/// A piece of a clip.
+/// A section of a clip.
 pub struct Skill {
-    /// The clip.
+    /// Name of the clip.
     pub clip: &'static str,
-    /// Decisions of the clip from its beginning, at which the skill begins and ends; it ends at the clip's end if that is first.
+    /// Decisions of the clip at which the skill begins and ends. It also ends at the end of the clip.
     pub rows: [usize; 2],
-    /// Part of the reward.
+    /// Weight of the `skill` term of the reward.
     pub worth: f64,
 }
 
-/// All of them. The jump leaves the ground 10 decisions after its beginning, 0.25 s, and is back on it after 28; the backflip
-/// after 28 and 46, and what he waits. Who lies earns less than who stands. The person of the clips first lies for a while, and
-/// stands for another at the end.
+/// All skills.
+///
+/// The jump leaves the ground 10 decisions (0.25 s) after its start and lands after 28. The backflip leaves it after 28
+/// and lands after 46, plus the wait. Getting up has a lower weight, so lying earns less than standing. In both of its
+/// clips, the person lies still at first and stands still at the end; the sections leave this out.
 pub const SKILLS: [Skill; 4] = [
     Skill { clip: "jump", rows: [21, 60], worth: 1.0 },
     Skill { clip: "backflip", rows: [0, 66], worth: 1.0 },
     Skill { clip: "getup_facedown", rows: [8, 100], worth: 0.5 },
     Skill { clip: "getup_faceup", rows: [48, 142], worth: 0.5 },
 ];
-/// How many of them, the first, begin in a stand.
+/// How many skills, at the front of the list, start from standing.
 pub const FROM_A_STAND: usize = 2;
-/// Number of the jump.
+/// Index of the jump.
 pub const JUMP: usize = 0;
-/// Number of the backflip.
+/// Index of the backflip.
 pub const BACKFLIP: usize = 1;
 const FACE_DOWN: usize = FROM_A_STAND;
 const FACE_UP: usize = 3;
 
-/// Slots of the memory that the skills have: which one, counted from 1, or 0; and for how many decisions it has lasted, or
-/// for how many there has been none.
+/// Memory slots of the skills. The first holds the number of the active skill, counted from 1, or 0. The second counts
+/// the decisions since the skill began, or since the last one ended.
 pub const SLOTS: usize = 2;
-/// Shortest and longest that he takes to be as the clip is at its beginning, decisions; he comes to a stop for longer than he lies.
+/// Shortest and longest wait at the start of a backflip's clip, decisions. The longest wait covers coming to a stop.
 const SETTLING: [f64; 2] = [12.0, 80.0];
+/// Longest wait at the start of a getting-up clip, decisions.
 const LYING: f64 = 20.0;
-/// If his butt faces elsewhere than the clip's in the clip's first second, he lies on another side and begins again: cosine between
-/// the forward axes, and decisions of the clip.
+/// Cosine between the forward axes of the butt and the clip's below which the character lies on another side. Getting
+/// up then begins again.
 const ON_THAT_SIDE: f64 = 0.2;
+/// The side is checked in this many decisions at the start of a clip.
 const BEGINNING: f64 = 40.0;
-/// Mean distance of the parts from the clip's at which an attempt to get up has failed and he begins again, m.
+/// Mean distance of the parts from the clip at which an attempt to get up fails and begins again, m.
 const LOST: f64 = 0.5;
-/// Who is faster than this leaps when told to jump, m/s, and for how long, decisions.
+/// Speed above which the jump button starts a leap, m/s.
 const RUNNING: f64 = 1.0;
+/// Duration of a leap, decisions.
 const LEAPING: f64 = 20.0;
-/// What the first slot says of a leap: the number behind those of the skills.
+/// Value of the first slot in a leap: the number after those of the skills.
 const LEAP: f64 = 1.0 + SKILLS.len() as f64;
-/// Decisions from one skill to the next.
+/// Shortest pause between two skills, decisions.
 const PAUSE: f64 = 10.0;
-/// Fastest that he begins a backflip, m/s, and lowest that his butt is when he stands, m.
+/// Highest speed at which a backflip begins, m/s.
 const SLOW: f64 = 0.4;
+/// Lowest height of the butt of a standing character, m.
 const UPRIGHT: f64 = 0.55;
-/// He has got up before the clip has: height of his butt, m, and cosine between its up axis and the vertical.
+/// Height of the butt above which the character counts as up, even before the clip ends, m.
 pub const RISEN: f64 = 0.75;
+/// Cosine between the butt's up axis and the vertical that this needs.
 const ERECT: f64 = 0.8;
-/// Whoever is higher when the clip is over goes on getting up, m.
+/// An attempt to get up fails if the butt is lower than this when the clip is over, m. Otherwise it continues.
 const LOW: f64 = 0.4;
-/// How nearly he is as the clip is: cosine between the forward axes of the butt, and difference of its heights, m.
+/// Conditions for being close to the clip's pose: cosine between the forward axes of the butt, and height difference of
+/// the butt, m.
 const AS_THE_CLIP: [f64; 2] = [0.8, 0.12];
-/// Who takes so many decisions cannot get up.
+/// Longest attempt to get up, decisions. After it, the character is stuck and has failed.
 const STUCK: f64 = 320.0;
 
-/// The skills' variables of an agent, `slot` being the first of them.
+/// Access to the skills' memory slots of an agent.
 #[derive(Clone, Copy, Debug)]
 pub struct Skills {
-    /// Its slot.
+    /// The first slot.
     pub slot: usize,
 }
 
 impl Skills {
-    /// Lanes in which a skill is on that is a piece of a clip.
+    /// Lanes with an active skill that follows a clip (all but the leap).
     #[inline(always)]
     pub fn on<T: Real>(&self, memory: &[T]) -> T::Mask {
         T::and(T::lit(0.5).lt(memory[self.slot]), T::not(self.leaps(memory)))
     }
 
-    /// Lanes in which he jumps on the run.
+    /// Lanes in which the character leaps.
     #[inline(always)]
     pub fn leaps<T: Real>(&self, memory: &[T]) -> T::Mask {
         T::lit(LEAP - 0.5).lt(memory[self.slot])
     }
 
-    /// Lanes in which he jumps, standing or on the run.
+    /// Lanes in which the character jumps or leaps.
     #[inline(always)]
     pub fn jumps<T: Real>(&self, memory: &[T]) -> T::Mask {
         T::or(self.is(memory, JUMP), self.leaps(memory))
     }
 
-    /// Number of the skill, counted from 1, or 0.
+    /// Number of the active skill, counted from 1, or 0. A leap counts as a jump.
     #[inline(always)]
     pub fn number<T: Real>(&self, memory: &[T]) -> T {
         T::select(self.leaps(memory), T::lit(1.0 + JUMP as f64), memory[self.slot])
     }
 
-    /// Lanes in which skill number `i` is on.
+    /// Lanes in which skill `i` is active.
     #[inline(always)]
     pub fn is<T: Real>(&self, memory: &[T], i: usize) -> T::Mask {
         let (low, high) = (T::lit(i as f64 + 0.5), T::lit(i as f64 + 1.5));
         T::and(low.lt(memory[self.slot]), memory[self.slot].lt(high))
     }
 
-    /// Lanes in which he gets up.
+    /// Lanes in which the character is getting up.
     #[inline(always)]
     pub fn rises<T: Real>(&self, memory: &[T]) -> T::Mask {
         T::and(T::lit(FACE_DOWN as f64 + 0.5).lt(memory[self.slot]), T::not(self.leaps(memory)))
     }
 
-    /// Lanes in which he cannot get up.
+    /// Lanes in which getting up has taken too long.
     #[inline(always)]
     pub fn stuck<T: Real>(&self, memory: &[T]) -> T::Mask {
         T::and(self.rises(memory), T::lit(STUCK).lt(memory[self.slot + 1]))
     }
 
-    /// What the present skill's part of the reward is.
+    /// Weight of the active skill in the reward.
     #[inline(always)]
     pub fn worth<T: Real>(&self, memory: &[T]) -> T {
         let mut worth = T::zero();
@@ -132,7 +153,8 @@ impl Skills {
         worth
     }
 
-    /// A decision has been made, under a command with these buttons, 0 or 1. Returns the lanes in which a skill was on.
+    /// Updates the skills after a decision, given the buttons of the command, 0 or 1. Returns the lanes in which a
+    /// skill was active.
     #[inline(always)]
     pub fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T], [jump, backflip]: [T; 2]) -> T::Mask {
         let (slot, half) = (self.slot, T::lit(0.5));
@@ -141,7 +163,7 @@ impl Skills {
         memory[slot + 1] += T::lit(1.0);
         let lasted = memory[slot + 1];
 
-        // the clip goes on, half as fast again for who gets up, but not before he lies as it does
+        // advance the clip, 1.5 times as fast for getting up; hold it at its start while waiting
         s.follow(memory);
         let once: [T; Following::SLOTS] = std::array::from_fn(|i| memory[i]);
         s.follow(memory);
@@ -162,7 +184,7 @@ impl Skills {
             memory[i] = T::select(T::or(waits, T::not(on)), kept, memory[i]);
         }
 
-        // what ends
+        // skills that end
         let (mut over, mut past) = (T::none(), T::none());
         for (i, skill) in SKILLS.iter().enumerate() {
             let rows = s.clip_rows(CLIPS.len() + i);
@@ -171,7 +193,7 @@ impl Skills {
                 |row: usize| T::and(self.is(memory, i), T::not(memory[Following::ROW].lt(T::lit(row as f64))));
             (over, past) = (T::or(over, reached(end)), T::or(past, reached(rows.end - 1)));
         }
-        // hands may touch the ground in a skill
+        // in a skill, hands may touch the ground
         let lies = TRUNK.into_iter().fold(T::none(), |lies, part| T::or(lies, s.touched_ground(part)));
         let grounded = T::or(lies, T::and(T::not(on), on_the_ground(s)));
         let height = s.height(BUTT);
@@ -183,7 +205,7 @@ impl Skills {
         let landed = T::and(leaps, T::not(lasted.lt(T::lit(LEAPING))));
         let ended = T::or(landed, T::and(on, T::or(risen, T::and(over, upright))));
 
-        // what begins
+        // skills that begin
         let clip = s.reference_of(memory, 0);
         let lost = T::lit(LOST).lt(imitation::distance_from(s, &clip, &ANATOMY, true));
         let failed = T::or(T::and(past, height.lt(T::lit(LOW))), T::and(lost, T::not(waits)));
@@ -200,7 +222,7 @@ impl Skills {
         let wanted = T::select(jumps, jump, T::lit(1.0 + BACKFLIP as f64));
         let rising = T::select(on_the_back, T::lit(1.0 + FACE_UP as f64), T::lit(1.0 + FACE_DOWN as f64));
         let (next, enters) = (T::select(fallen, rising, wanted), T::or(fallen, T::or(jumps, turns)));
-        // an attempt after a failed one counts on
+        // a repeated attempt to get up keeps its counter
         let again = T::and(rises, fallen);
         memory[slot] = T::select(enters, next, T::select(ended, T::zero(), memory[slot]));
         memory[slot + 1] = T::select(T::or(T::and(enters, T::not(again)), ended), T::zero(), memory[slot + 1]);
@@ -213,7 +235,8 @@ impl Skills {
         on
     }
 
-    /// Puts the clip where he is, facing as he does; who lies faces where his head is.
+    /// Places the clip at the character's position and heading. For getting up, the heading is the direction of the
+    /// head.
     #[inline(always)]
     fn enter<T: Real>(&self, s: &Senses<T>, memory: &mut [T], row: T, enters: T::Mask) {
         let there = [row, T::zero(), T::zero(), T::zero()];
@@ -229,7 +252,7 @@ impl Skills {
         }
     }
 
-    /// Lets the clip's place follow him.
+    /// Moves the clip's position to the character's.
     #[inline(always)]
     fn stay<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let on = self.on(memory);
@@ -238,7 +261,7 @@ impl Skills {
         memory[Following::Y] += T::masked(on, y - v);
     }
 
-    /// Whether he is as a clip is.
+    /// Whether the butt's orientation and height are close to the clip's.
     #[inline(always)]
     fn is_as<T: Real>(&self, s: &Senses<T>, following: &[T]) -> T::Mask {
         let clip = s.reference_of(following, 0);
@@ -246,7 +269,8 @@ impl Skills {
         T::and(T::lit(AS_THE_CLIP[0]).lt(facing_alike(s, &clip)), apart.lt(T::lit(AS_THE_CLIP[1])))
     }
 
-    /// The direction along the ground that vectors of a skill are seen from: cosine and sine.
+    /// Ground direction in which vectors are expressed (cosine and sine): the clip's heading in a skill, otherwise the
+    /// character's.
     #[inline(always)]
     pub fn facing<T: Real>(&self, s: &Senses<T>, memory: &[T]) -> [T; 2] {
         let (sin, cos) = memory[Following::YAW].sin_cos();
@@ -255,14 +279,14 @@ impl Skills {
     }
 }
 
-/// Cosine between the forward axis of his butt and a clip's.
+/// Cosine between the forward axes of the butt and the clip's butt.
 #[inline(always)]
 fn facing_alike<T: Real>(s: &Senses<T>, clip: &Frame<'_, T>) -> T {
     let (own, [forward, ..]) = (s.forward(BUTT), clip.axes(BUTT));
     own[0].mul_add(forward[0], own[1].mul_add(forward[1], own[2] * forward[2]))
 }
 
-/// How a clip holds the butt: its height, forward axis and up axis.
+/// Forward axis, up axis and height of a clip's butt.
 #[inline(always)]
 pub fn carriage<T: Real>(clip: &Frame<'_, T>) -> ([T; 3], [T; 3], T) {
     let [forward, _, up] = clip.axes(BUTT);

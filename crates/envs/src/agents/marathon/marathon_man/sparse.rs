@@ -1,7 +1,8 @@
-//! One reward at the end of an episode: how far the feet have come (`MarathonManSparse` of the Marathon Environments 2).
+//! A single reward at the end of an episode: the distance covered by the feet (`MarathonManSparse` of the Marathon
+//! Environments 2).
 //!
-//! The original pays the normalized x of the foot's last contact and does not tell by what. Here 20 m earn 1, the way of a
-//! walk of 1 m/s in 20 s.
+//! The original pays the normalized x of the foot's last contact and does not state the normalization. Here 20 m earn
+//! 1, which is a walk of 1 m/s for 20 s.
 
 use std::ops::Range;
 
@@ -13,17 +14,18 @@ use crate::agent::{Senses, Terms};
 
 /// Name of the only term.
 pub(super) const TERM: &str = "distance";
-/// Way that earns 1, m.
+/// Distance that earns 1, m.
 const WAY: f64 = 20.0;
-/// Touch sensors of the right foot, and of the left.
+/// Touch sensors of the right and of the left foot.
 const SENSORS: [Range<usize>; 2] = [0..TOUCH.len() / 2, TOUCH.len() / 2..TOUCH.len()];
-/// Slots of the memory: where the episode began, and where a foot has touched the ground last, along x, m.
+/// Slot of the memory: x of the butt at the start of the episode, m.
 const FROM: usize = imitation::MEMORY;
+/// Slot of the memory: x of the last foot contact, m.
 const STEP: usize = FROM + 1;
-/// Memory with this reward.
+/// Memory size with this reward.
 pub(super) const MEMORY: usize = STEP + 1;
 
-/// An episode begins.
+/// Initializes the slots at the start of an episode.
 #[inline(always)]
 pub(super) fn begin<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     let [x, ..] = s.position(BUTT);
@@ -31,7 +33,7 @@ pub(super) fn begin<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     memory[STEP] = x;
 }
 
-/// A decision has been made. Of two feet on the ground, the one in front counts.
+/// Updates the last foot contact after a decision. If both feet are on the ground, the one in front counts.
 #[inline(always)]
 pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     let nowhere = T::lit(-1e9);
@@ -47,7 +49,7 @@ pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     memory[STEP] = T::select(nowhere.lt(front), front, memory[STEP]);
 }
 
-/// Pays at the episode's end, whatever ends it.
+/// Adds the term at the end of the episode, however it ends.
 #[inline(always)]
 pub(super) fn add<T: Real>(s: &Senses<T>, terms: &mut Terms<T>) {
     let over = T::or(T::or(s.time_is_up(), s.clip_over()), imitation::fallen(s, &TRUNK));

@@ -1,28 +1,38 @@
-//! Marathon Man told where to go: he walks, runs, turns and stands at a commanded speed and turn, in the style of clips.
+//! Marathon Man steered: it walks, runs, turns and stands at a commanded speed and turn rate, in the style of motion
+//! clips.
 //!
 //! | observation | content |
 //! |---|---|
-//! | 0..2 | commanded speed, m/s, and turn, rad/s |
-//! | 2..4 | sine and cosine of the angle from his heading to the commanded direction |
+//! | 0..2 | commanded speed, m/s, and turn rate, rad/s |
+//! | 2..4 | sine and cosine of the angle from the heading to the commanded direction |
 //! | 4..6 | target velocity, m/s |
 //! | 6 | height of the butt, m |
 //! | 7..13 | forward and up axis of the butt |
 //! | 13..19 | velocity of the butt, m/s, and its angular velocity, rad/s |
 //! | 19..40, 40..61 | angles of the 21 joints, rad, and their velocities, rad/s |
-//! | 61..73 | feet and hands as seen from the butt, m |
-//! | 73..79 | toe, toe and heel of the right and of the left foot on the ground, 0 or 1 |
+//! | 61..73 | feet and hands relative to the butt, m |
+//! | 73..79 | ground contact of toe, toe and heel of the right and of the left foot, 0 or 1 |
 //! | 79..82 | pace, m/s, cosine and sine of the gait's phase |
-//! | 82..103 | how far the gait's next angles are from his own, rad |
+//! | 82..103 | the gait's next joint angles minus the character's own, rad |
 //!
-//! Vectors are in his heading, the direction along the ground in which the butt faces. The commanded direction turns as the
-//! command says; where he cannot follow, it stays within [`MOST_BEHIND`] of his heading. The target velocity follows the commanded
-//! one as fast as a person can.
+//! Vectors are expressed in the heading: the ground direction in which the butt faces.
 //!
-//! No clip leads him through the world. His [gait](super::gait) goes round as fast as his pace asks for, and the pace follows the
-//! target velocity. An action of `pd` is a deviation from the gait.
+//! # Mechanism
 //!
-//! The task's reward is for velocity, heading and the gait. The style comes from a discriminator that learns from his clips
-//! ([`STYLE`]): the task's [demonstrations](crate::ShardFactory::demonstrations) are what he would observe in them.
+//! A command passes through three reference signals, updated once per decision by `Steer::lead`:
+//!
+//! 1. The *commanded direction* turns at the commanded rate. It stays within [`MOST_BEHIND`] of the heading, so it
+//!   waits for a character that cannot follow.
+//! 2. The *target velocity* moves toward the commanded velocity with a limited acceleration.
+//! 3. The *pace* is the speed for which the [gait](super::gait) is generated. It follows the target speed and stays
+//!   near the body's own speed. The pace sets how fast the gait's phase advances.
+//!
+//! The gait is a periodic reference pose. No clip prescribes where the character is. An action of `pd` is a deviation
+//! from the gait's next pose.
+//!
+//! The task's reward covers velocity, heading and gait. The style comes from a discriminator trained on the clips (AMP;
+//! [`STYLE`]). The task's [demonstrations](crate::ShardFactory::demonstrations) are the observations that the clips
+//! would produce.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::LazyLock;
@@ -48,12 +58,12 @@ use crate::agent::{
 };
 use crate::episode_rng::EpisodeRng;
 
-/// Parts of the observation that tell style.
+/// Parts of the observation that the style discriminator uses.
 pub const STYLE: [&str; 7] =
     ["height", "orientation", "velocity", "angular_velocity", "joint_positions", "joint_velocities", "ends"];
-/// What he moves like.
+/// Clips that define the style.
 pub(super) const CLIPS: [&str; 5] = ["walk", "walk_left", "walk_right", "run", STAND];
-/// Parts of the observation, in their order.
+/// Parts of the observation, in order.
 pub(super) const OBSERVED: [&str; 11] = [
     "command",
     "height",
@@ -69,78 +79,89 @@ pub(super) const OBSERVED: [&str; 11] = [
 ];
 /// Terms of the reward.
 pub(super) const TERMS: [&str; 7] = ["velocity", "pace", "drift", "heading", "gait", "tempo", "still"];
-/// Number of the clip in which he stands.
+/// Index of the standing clip.
 const STANDS: usize = 4;
-/// Numbers that he observes.
+/// Size of the observation.
 pub(super) const OBSERVATION: usize = 82 + JOINTS.len();
-/// Fastest that he is told to go, m/s.
+/// Highest commanded speed, m/s.
 pub(super) const FASTEST: f64 = 3.0;
-/// Sharpest that he is told to turn, rad/s.
+/// Highest commanded turn rate, rad/s.
 pub(super) const SHARPEST: f64 = FRAC_PI_2;
-/// Most that the commanded direction is off his heading, rad.
+/// Largest angle between the commanded direction and the heading, rad.
 pub const MOST_BEHIND: f64 = 1.0;
-/// How long a command holds, decisions.
+/// Shortest and longest duration of a command, decisions.
 pub(super) const HOLDS: [usize; 2] = [40, 240];
-/// Share of `sharp` commands that are to rest, and how long they hold, decisions: who is told to stand for a second only never comes
-/// to rest.
+/// Fraction of `sharp` commands that are to stand, and their shortest and longest duration, decisions. After a stop
+/// command of only a second, the character would never come to rest.
 const RESTING: f64 = 0.2;
 const RESTS: [usize; 2] = [80, 240];
-/// Share of commands that are to stand, and of those that are to go straight on.
+/// Fraction of commands that are to stand.
 const STANDING: f64 = 0.15;
+/// Fraction of commands without a turn.
 const STRAIGHT: f64 = 0.4;
-/// Speeds from this share of the fastest on are extremes.
+/// Extreme speeds start at this fraction of the highest one.
 const EXTREME: f64 = 0.7;
 
 /// Slots of the memory: cosine and sine of the commanded direction.
 pub(super) const DIRECTION: usize = Following::SLOTS;
-/// Slots of the velocity along the ground that he is to have now, m/s.
+/// Slots of the target velocity along the ground, m/s.
 pub(super) const TARGET: usize = DIRECTION + 2;
-/// Slots of the gait: the share of its cycle that is over, and the speed that it is for, m/s.
+/// Slot of the gait's phase, the completed fraction of its cycle.
 pub(super) const PHASE: usize = TARGET + 2;
+/// Slot of the pace, the speed for which the gait is generated, m/s.
 pub(super) const PACE: usize = PHASE + 1;
-/// Slots that count the episode's decisions, and that hold the row of the clips where it started.
+/// Slot that counts the episode's decisions.
 const MADE: usize = PACE + 1;
+/// Slot of the clip row in which the episode started.
 pub(super) const BEGUN: usize = MADE + 1;
-/// What leads the steered figure.
+/// Rates and limits of the steered task.
 const HASTE: Haste =
     Haste { speeding: 4.0, slowing: 4.0, urging: 0.0, lead: 0.8, quick: false, turning: 0.4, least: 0.0 };
-/// He slows down where he is told to be slower than his target by more than this, m/s: a turn bends the target, too.
+/// The deceleration limit applies when the command is slower than the target by more than this, m/s. Turning changes
+/// the target velocity too.
 const SLOWER: f64 = 0.3;
-/// Most that a turn accelerates the target to the side, m/s^2: who turns sharply, runs slowly.
+/// Largest lateral acceleration of the target in a turn, m/s^2. It caps the target speed in sharp turns.
 const SIDEWAYS: f64 = 2.5;
-/// Most that the commanded direction asks him to accelerate to the side, m/s^2, while he is still faster than that.
+/// Largest lateral acceleration that a turning commanded direction implies at the body's own speed, m/s^2. It slows the
+/// turn down while the body is still too fast.
 const LEANING: f64 = 3.0;
-/// Mean squares of the parts' velocities at which each half of what standing still is worth is down to 1/e, m^2/s^2: who shuffles is
-/// to come to rest, and who rests to keep quite still.
+/// Mean squares of the parts' velocities at which the two halves of the `still` term drop to 1/e, m^2/s^2. The first
+/// half rewards coming to rest, the second rewards keeping still.
 const RESTLESS: [f64; 2] = [0.1, 0.01];
-/// Most that the target aims beyond the command, m/s, and the least command for which it does.
+/// Largest overshoot of the target beyond the command, m/s.
 const URGED: f64 = 0.5;
+/// Smallest command that is overshot, m/s.
 const URGES: f64 = 0.05;
-/// The least pace is at most this many times the velocity that he is told, so that it fades where he is told hardly anything.
+/// Upper limit of the least pace, as a multiple of the commanded velocity. The least pace fades out with small
+/// commands.
 const LEAST_OF_TOLD: f64 = 4.0;
 
-/// How fast what leads him changes.
+/// Rates and limits of the reference signals: target velocity, pace and gait.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Haste {
-    /// Most that the target velocity and the pace change, m/s^2.
+    /// Largest rate of change of the target velocity and the pace, m/s^2.
     pub speeding: f64,
-    /// The same while he slows down.
+    /// The same while slowing down, m/s^2.
     pub slowing: f64,
-    /// Where he is told to go, the target aims beyond the command by this share of what his velocity lacks, but by [`URGED`] at most, and
-    /// never beyond [`FASTEST`]: he comes near a command at once, and takes as long again for the rest.
+    /// Overshoot of the target beyond a command to move, as a fraction of the velocity error. It is at most [`URGED`],
+    /// and the target never exceeds [`FASTEST`]. Without it, the body gets close to a command quickly and takes as long
+    /// again for the rest.
     pub urging: f64,
-    /// Most that the pace is off his speed, m/s: a run does not lead who stands.
+    /// Largest difference between the pace and the body's speed, m/s. A standing body must not be driven by a running
+    /// gait.
     pub lead: f64,
-    /// The gait goes round as fast as for the target velocity, if that is faster than the pace: he starts with short, quick steps.
+    /// Whether the gait cycles at the rate of the target speed if that exceeds the pace. The character then starts with
+    /// short, quick steps.
     pub quick: bool,
-    /// Pace for a turn on the spot: that of a walk on a circle of this radius, m.
+    /// Pace of a turn on the spot, given as the radius of a circle that is walked at the same turn rate, m.
     pub turning: f64,
-    /// Least pace where he is told to go or turn, m/s: the feet of a slower gait hardly leave the ground, and he stumbles over them.
+    /// Least pace under a command to move or turn, m/s. A slower gait hardly lifts the feet, and the character
+    /// stumbles.
     pub least: f64,
 }
 
 impl Haste {
-    /// The speed whose steps are as quick as his are to be, m/s.
+    /// The speed whose step frequency the gait uses, m/s.
     #[inline(always)]
     pub fn cadence<T: Real>(self, memory: impl Fn(usize) -> T) -> T {
         let pace = memory(PACE);
@@ -148,12 +169,12 @@ impl Haste {
     }
 }
 
-/// What Marathon Man is told where nobody commands.
+/// How commands are drawn when no caller sets them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Commands {
-    /// Speeds and turns, each as likely.
+    /// Speeds and turns are drawn uniformly.
     Even,
-    /// Half of the time, shorter, the extremes: to stand, to run, and the sharpest turns; and rests.
+    /// Adds long stops. Half of the other commands are shorter and extreme: stand, run, and the sharpest turns.
     Sharp,
 }
 
@@ -163,36 +184,38 @@ impl Choice for Commands {
 }
 
 crate::options! {
-    /// Arguments of Marathon Man told where to go.
+    /// Arguments of the steered task.
     pub struct SteerArguments {
-        /// What an action does: `pd` moves the target of a servo away from the gait's next pose, `pd_range` is the target within
-        /// the joint's range, `torque` a share of the motor's strength, `servo` the target velocity of the original's drive.
+        /// Meaning of an action: `pd` offsets a servo's target from the gait's next pose; `pd_range` sets the target
+        /// within the joint's range; `torque` is a fraction of the motor's strength; `servo` sets the target velocity
+        /// of the original's drive.
         control: Control = Control::Pd,
-        /// Most that an action of `pd` moves a target, rad.
+        /// Largest offset of a servo's target by an action of `pd`, rad.
         reach: Scale = Scale(1.0),
-        /// Where an episode starts: at `random` decisions of the clips, standing: `first`, or `adaptive`: half of those that
-        /// follow an early failure where that episode did, half of the others in a clip that fits the command.
+        /// Start of an episode: `random` decisions of the clips, `first` (standing), or `adaptive`. With `adaptive`,
+        /// half of the episodes after an early failure start where the failed one did. Half of the others start in a
+        /// clip that fits the command.
         start: StartAt = StartAt::Random,
-        /// What he is told where nobody commands: anything, `even`, or half of the time the extremes, `sharp`.
+        /// Commands that are drawn when no caller sets them: `even` (uniform), or `sharp` (half of them extreme).
         commands: Commands = Commands::Even,
-        /// What a fall costs.
+        /// Penalty of a fall.
         price: Scale = Scale(0.0),
-        /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one: learners come to do better what
-        /// felled them.
+        /// Fraction of training episodes that start 0.75 to 1.5 s before the last fall, once there is one. They let the
+        /// policy practice what made it fall.
         relive: Share = Share(0.0),
-        /// How long an episode is at most, s: the shorter, the more of them follow a fall.
+        /// Longest episode, s. With shorter episodes, more of them follow a fall.
         seconds: Seconds = Seconds(SECONDS),
     }
 }
 
-/// Where in the cycle of each clip the gait begins.
+/// Phase of each clip's cycle at which the gait's cycle begins.
 fn beginnings() -> &'static [f64; CLIPS.len()] {
     static BEGINNINGS: LazyLock<[f64; CLIPS.len()]> =
         LazyLock::new(|| CLIPS.map(|name| clips::shipped(name).map_or(0.0, |clip| beginning(&clip))));
     &BEGINNINGS
 }
 
-/// The clip in which someone moves most nearly as told.
+/// The clip whose motion is closest to a command.
 fn fitting_clip(command: &[f64]) -> usize {
     let name = match (command[0], command[1]) {
         (speed, _) if speed > 2.0 => "run",
@@ -204,7 +227,7 @@ fn fitting_clip(command: &[f64]) -> usize {
     CLIPS.iter().position(|clip| *clip == name).unwrap_or(0)
 }
 
-/// Marathon Man told where to go.
+/// The steered Marathon Man.
 #[derive(Clone, Debug)]
 pub struct Steer {
     pub(super) arguments: SteerArguments,
@@ -218,7 +241,7 @@ impl Default for Steer {
 }
 
 impl Steer {
-    /// `relived`: the first variable of the falls that are lived again.
+    /// `relived`: the first memory slot of the replayed falls.
     pub(super) fn of(arguments: SteerArguments, relived: usize) -> Self {
         let relive = Relive {
             slot: relived,
@@ -230,7 +253,7 @@ impl Steer {
         Steer { arguments, relive }
     }
 
-    /// Angle from his heading to a direction, rad.
+    /// Angle from the heading to a direction, rad.
     #[inline(always)]
     pub(super) fn off<T: Real>(s: &Senses<T>, direction: [T; 2]) -> T {
         heading::off(s.heading(BUTT), direction)
@@ -242,20 +265,20 @@ impl Steer {
         [s.memory(DIRECTION), s.memory(DIRECTION + 1)]
     }
 
-    /// How fast the center of mass moves along the ground, m/s.
+    /// Speed of the center of mass along the ground, m/s.
     #[inline(always)]
     pub(super) fn speed<T: Real>(s: &Senses<T>) -> T {
         let [x, y, _] = s.center_of_mass_velocity();
         hypot(x, y)
     }
 
-    /// Mean squares of the joints' distances from the gait, rad^2, and of the differences of their velocities from the gait's,
-    /// rad^2/s^2, by DeepMimic's weights.
+    /// Weighted mean squared errors of the joint angles, rad^2, and the joint velocities, rad^2/s^2, against the gait.
+    /// The weights are DeepMimic's.
     #[inline(always)]
     fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
         let (gaits, r) = (gaits(), s.readings());
         let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
-        // angles lead by their velocity times the lead, so a lead of 1 s gives the velocity
+        // a lead shifts angles by velocity times lead, so a lead of 1 s yields the velocity
         let (now, led) = (gaits.moment(phase, pace, 0.0), gaits.moment(phase, pace, 1.0));
         let (mut sums, mut total) = ([T::zero(); 2], 0.0);
         for (i, joint) in JOINTS.iter().enumerate() {
@@ -269,19 +292,19 @@ impl Steer {
         sums.map(|sum| sum * T::lit(1.0 / total))
     }
 
-    /// Where the gait will be after `dt` seconds.
+    /// The gait's phase after `dt` seconds.
     #[inline(always)]
     fn next_phase<T: Real>(phase: T, cadence: T, dt: f64) -> T {
         let next = gaits().frequency(cadence).mul_add(T::lit(dt), phase);
         next - next.floor()
     }
 
-    /// Moves the commanded direction, the target velocity and the gait on by a decision, for velocities ahead and to the left, and
-    /// a turn.
+    /// Advances the commanded direction, the target velocity and the gait by one decision. The command is a velocity
+    /// ahead and to the left, and a turn rate.
     #[inline(always)]
     pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], [told, left]: [T; 2], turn: T, haste: Haste) {
         let speed = Self::speed(s);
-        // the direction turns no faster than someone of his speed can
+        // limit the turn rate to what a body of this speed can follow
         let sharpest = T::lit(LEANING).div(speed.max(T::lit(LEANING / SHARPEST)));
         let led = turn.max(-sharpest).min(sharpest);
         let by = |angle: T| led.mul_add(T::lit(s.dt()), angle);
@@ -290,7 +313,7 @@ impl Steer {
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
         memory[PHASE] = Self::next_phase(memory[PHASE], haste.cadence(|slot| memory[slot]), s.dt());
         memory[MADE] += T::lit(1.0);
-        // nobody changes a velocity of 3 m/s at once, or turns sharply at it
+        // limit the target's acceleration, and its speed in sharp turns
         let [speeding, slowing] = [haste.speeding, haste.slowing].map(|rate| T::lit(rate * s.dt()));
         let sharpest = T::lit(SIDEWAYS).div(turn.abs().max(T::lit(SIDEWAYS / FASTEST)));
         let told = told.min(sharpest);
@@ -300,7 +323,7 @@ impl Steer {
         let short_of_told = |i: usize, velocity: T| told.mul_add(direction[i], -velocity) + beside[i];
         let [x, y, _] = s.center_of_mass_velocity();
         let lacks = [short_of_told(0, x), short_of_told(1, y)];
-        // nobody is urged to go faster than he knows, and whoever stands is left in peace
+        // cap the overshoot at `FASTEST`; a stop command has none
         let asked = hypot(told, left);
         let most_urged = clamp(T::lit(FASTEST) - asked, 1e-6, URGED);
         let urging = T::masked(T::lit(URGES).lt(asked), T::lit(haste.urging));
@@ -317,8 +340,8 @@ impl Steer {
         memory[PACE] += (pace - memory[PACE]).max(-slowing).min(speeding);
     }
 
-    /// Adds the terms of the reward for the velocity where `moves`, for none beside it where `holds`, and for the direction, the gait and
-    /// stillness where `goes`. `told`: how much he is told to go or turn, 0 if he is to stand.
+    /// Adds the reward's terms. `moves` masks the lanes of `velocity` and `pace`, `holds` those of `drift`, and `goes`
+    /// those of all other terms. `told` is the size of the command, 0 for standing.
     #[inline(always)]
     pub(super) fn add_terms<T: Real>(s: &Senses<T>, [moves, holds, goes]: [T::Mask; 3], told: T, terms: &mut Terms<T>) {
         let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
@@ -336,9 +359,9 @@ impl Steer {
         terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 
-    /// What he observes of the command, of himself and of what leads him, with vectors seen from a direction along the ground.
-    /// `told`: the commanded speed and turn. `next`: the next angle of a hinge, given the gait's.
-    /// `haste`: what leads him.
+    /// Writes the observation of the command, the body and the reference signals. Vectors are expressed in the
+    /// direction `facing`. `told` is the commanded speed and turn rate. `next` maps a hinge and its next angle in the
+    /// gait to the angle to observe. `haste` holds the limits of the reference signals.
     #[inline(always)]
     pub(super) fn observe_going<T: Real>(
         s: &Senses<T>,
@@ -378,20 +401,20 @@ impl Steer {
         }
     }
 
-    /// How much he is told to go and turn.
+    /// Size of the command.
     #[inline(always)]
     pub(super) fn told<T: Real>(s: &Senses<T>) -> T {
         s.command(0).abs() + s.command(1).abs()
     }
 
-    /// What he observes where nothing but the gait leads him: vectors are in his heading.
+    /// Writes the observation of a character that follows the gait alone. Vectors are expressed in its heading.
     #[inline(always)]
     pub(super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         let told = [s.command(0), s.command(1)];
         Self::observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, HASTE, out);
     }
 
-    /// Angles of the gait's next pose, led by some seconds.
+    /// Angles of the gait's next pose, shifted by `lead` seconds at their velocities.
     #[inline(always)]
     pub(super) fn next_pose<T: Real>(
         memory: impl Fn(usize) -> T,
@@ -405,7 +428,7 @@ impl Steer {
         move |joint| gaits.angle(&next, joint)
     }
 
-    /// How far the velocity of the center of mass along the ground is from another, m/s.
+    /// Distance between the center of mass's velocity along the ground and another velocity, m/s.
     #[inline(always)]
     pub(super) fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
         let [vx, vy, _] = s.center_of_mass_velocity();
@@ -417,7 +440,7 @@ impl Agent for Steer {
     fn facts(&self) -> Facts {
         Facts {
             id: "MarathonManSteer-v0".into(),
-            summary: "a figure of 21 motors: walk, run, turn and stand as told, in the style of clips".into(),
+            summary: "a figure of 21 motors: walk, run, turn and stand as commanded, in the style of clips".into(),
             model: model(self.arguments.control).into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: decisions(self.arguments.seconds),
@@ -499,7 +522,7 @@ impl Agent for Steer {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
                 let reach = T::lit(self.arguments.reach.0);
-                // the servo's damping, which slows every motion, is not to slow the gait
+                // compensate the servo's damping, which would slow the gait
                 let next = Self::next_pose(|slot| c.memory[slot], HASTE, c.dt, DAMPING_TIME);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
                     c.ctrl[i] = c.action[i].mul_add(reach, next(joint));
@@ -549,7 +572,7 @@ impl Agent for Steer {
     }
 }
 
-/// Lanes in which anything but his feet touched the ground.
+/// Lanes in which any part but the feet touched the ground.
 #[inline(always)]
 pub(super) fn on_the_ground<T: Real>(s: &Senses<T>) -> T::Mask {
     let mut fallen = T::none();
