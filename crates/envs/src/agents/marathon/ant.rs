@@ -11,7 +11,8 @@
 //!
 //! `Ant-v0`: r = v/4 - 0.5 effort - 4 (joints at limit).
 //! `Ant-v1`: r = V + (1 - mean effort) min(V, 0.3), V = 0.7 v / 8 m/s.
-//! Fails when it faces more than 54 degrees away from +x, or lies on its back. Any part may touch the ground.
+//! An episode is terminated when the Ant faces more than 54 degrees away from +x or lies on its back. Any part may touch
+//! the ground.
 
 use marathon_physics::lanes::Real;
 
@@ -37,16 +38,16 @@ pub(super) const SOLES: [Part; 4] = [
 ];
 const FEET: [&str; 4] = ["left_ankle_geom", "right_ankle_geom", "third_ankle_geom", "fourth_ankle_geom"];
 
-/// Price of the effort.
+/// Weight of the effort.
 const EFFORT: f64 = -0.5;
-/// Price of the joints driven at their limit.
+/// Weight of the joints driven at their limit.
 const JOINTS_AT_LIMIT: f64 = -4.0;
 /// Forward bonus below which the ant has failed: 0.2 is 54 degrees away from +x.
 const LEAST_FORWARD_BONUS: f64 = 0.2;
 
-/// Share of the speed in the `-v1` reward.
+/// Weight of the speed in the `-v1` reward.
 const V1_VELOCITY: f64 = 0.7;
-/// Largest share of the saved effort, which is never more than that of the speed.
+/// Largest weight of the saved effort. It never exceeds the speed's term.
 const V1_EFFORT: f64 = 0.3;
 
 /// The paper's Ant.
@@ -97,13 +98,13 @@ impl Agent for AntV0 {
     #[inline(always)]
     fn terminated<T: Real>(&self, s: &Senses<T>) -> T::Mask {
         let astray = s.forward_bonus(TORSO).lt(T::lit(LEAST_FORWARD_BONUS));
-        // the forward bonus is blind to roll
+        // the forward bonus does not detect roll
         let on_its_back = s.up(TORSO)[2].lt(T::zero());
         T::or(astray, on_its_back)
     }
 }
 
-/// Ant as of the paper's Table 1: it also sees its height; a reward between 0 and 1.
+/// Ant of the paper's Table 1. It also observes its height, and its reward is between 0 and 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntV1;
 

@@ -11,7 +11,7 @@
 //!
 //! `Hopper-v0`: r = v/4 + forward bonus - 0.3 effort - 4 (joints at limit), all of the torso.
 //! `Hopper-v1`: r = V + 0.05 upright + (1 - mean effort) min(V, 0.25), V = 0.7 v / 8 m/s.
-//! Fails when anything but foot and calf touches the ground.
+//! An episode is terminated when any part but foot and calf touches the ground.
 
 use marathon_physics::lanes::Real;
 
@@ -28,22 +28,22 @@ const MAX_EPISODE_STEPS: usize = 1000;
 
 const ACTIONS: [&str; 4] = ["waist", "hip", "knee", "ankle"];
 const PARTS: [&str; 2] = ["torso", "foot"];
-/// The original calls it "pelvis" and maps it to the torso.
+/// The root part. The original calls it "pelvis" and maps it to the torso.
 pub(super) const TORSO: Part = Part::named(&PARTS, "torso");
 pub(super) const FOOT: Part = Part::named(&PARTS, "foot");
-/// The calf counts as foot because it pokes through the sole's capsule at the ankle.
+/// The calf counts as a foot because it protrudes through the sole's capsule at the ankle.
 const FEET: [&str; 2] = ["foot", "calf"];
 
-/// Price of the effort.
+/// Weight of the effort.
 const EFFORT: f64 = -0.3;
-/// Price of the joints driven at their limit.
+/// Weight of the joints driven at their limit.
 const JOINTS_AT_LIMIT: f64 = -4.0;
 
-/// Share of the speed in the `-v1` reward.
+/// Weight of the speed in the `-v1` reward.
 const V1_VELOCITY: f64 = 0.7;
-/// Share of the posture.
+/// Weight of the posture.
 const V1_UPRIGHT: f64 = 0.05;
-/// Largest share of the saved effort, which is never more than that of the speed.
+/// Largest weight of the saved effort. It never exceeds the speed's term.
 const V1_EFFORT: f64 = 0.25;
 
 /// The paper's Hopper.
@@ -89,7 +89,7 @@ impl Agent for HopperV0 {
     }
 }
 
-/// Writes what the Hopper observes but for the height of its foot.
+/// Writes the Hopper's observation without the height of its foot.
 #[inline(always)]
 pub(super) fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.group("velocity");
@@ -106,7 +106,7 @@ pub(super) fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.joint_velocities(s);
 }
 
-/// Hopper as of the paper's Table 1: the same senses, a reward between 0 and 1.
+/// Hopper of the paper's Table 1: the same observation, and a reward between 0 and 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HopperV1;
 

@@ -15,7 +15,7 @@
 //! torso's; hip flexion and knees are free of effort.
 //! `Humanoid-v1`: r = V + 0.02 (upright + forward + phase + height + limbs) + (1 - mean effort) min(V, 0.4),
 //! V = 0.4 v / 10 m/s.
-//! Fails when anything but feet and shins touches the ground.
+//! An episode is terminated when any part but feet and shins touches the ground.
 
 use marathon_physics::lanes::Real;
 
@@ -53,7 +53,7 @@ const ACTIONS: [&str; 21] = [
     "left_shoulder2",
     "left_elbow",
 ];
-/// The motors of a stride, which cost no effort.
+/// The motors of a stride. Their effort costs nothing.
 const STRIDE: Motors = Motors::named(&ACTIONS, &["right_hip_y", "right_knee", "left_hip_y", "left_knee"]);
 
 const PARTS: [&str; 9] = [
@@ -73,7 +73,7 @@ const WAIST: Part = Part::named(&PARTS, "lower_waist");
 const BUTT: Part = Part::named(&PARTS, "butt");
 const LEFT_THIGH: Part = Part::named(&PARTS, "left_thigh");
 const RIGHT_THIGH: Part = Part::named(&PARTS, "right_thigh");
-/// In the order of the touch sensors.
+/// The soles, in the order of the touch sensors.
 const SOLES: [Part; 4] = [
     Part::named(&PARTS, "left_left_foot"),
     Part::named(&PARTS, "right_left_foot"),
@@ -81,26 +81,26 @@ const SOLES: [Part; 4] = [
     Part::named(&PARTS, "left_right_foot"),
 ];
 const TOUCH: [&str; 4] = ["left_left_foot", "right_left_foot", "right_right_foot", "left_right_foot"];
-/// The shins count as feet because they poke through the feet's capsules at the ankles.
+/// The shins count as feet because they protrude through the feet's capsules at the ankles.
 const FEET: [&str; 6] =
     ["left_left_foot", "right_left_foot", "right_right_foot", "left_right_foot", "left_shin", "right_shin"];
 
-/// Height of the torso's center below which the humanoid pays, m; standing it is 1.285.
+/// Height of the torso's center below which there is a penalty, m. Standing, it is 1.285.
 const HEIGHT: f64 = 1.2;
-/// Price of the effort.
+/// Weight of the effort.
 const EFFORT: f64 = -0.05;
-/// Price of the joints driven at their limit.
+/// Weight of the joints driven at their limit.
 const JOINTS_AT_LIMIT: f64 = -4.0;
-/// Most that turned out thighs cost.
+/// Largest penalty for thighs turned outward.
 const LARGEST_LIMB_PENALTY: f64 = 0.5;
 
-/// Speed that the `-v1` reward calls 1, m/s: the 250 m of its track in 25 s.
+/// Speed at which the speed term of the `-v1` reward is full, m/s: the original's track of 250 m in 25 s.
 const V1_FASTEST: f64 = 10.0;
-/// Share of the speed in the `-v1` reward.
+/// Weight of the speed in the `-v1` reward.
 const V1_VELOCITY: f64 = 0.4;
-/// Share of each of the five bonuses of posture and gait.
+/// Weight of each of the five bonuses of posture and gait.
 const V1_BONUS: f64 = 0.02;
-/// Largest share of the saved effort, which is never more than that of the speed.
+/// Largest weight of the saved effort. It never exceeds the speed's term.
 const V1_EFFORT: f64 = 0.4;
 
 /// The paper's Humanoid.
@@ -181,8 +181,8 @@ impl Agent for HumanoidV0 {
     }
 }
 
-/// Humanoid as of the paper's Table 1: it also sees the height of its feet; a reward between 0 and 1, whose phase bonus
-/// wants the feet to alternate.
+/// Humanoid of the paper's Table 1. It also observes the heights of its feet, its reward is between 0 and 1, and its
+/// phase bonus requires alternating feet.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HumanoidV1;
 
@@ -236,13 +236,13 @@ impl Agent for HumanoidV1 {
     }
 }
 
-/// How far the thighs are turned in or out, both sides together.
+/// Rotation of the thighs inward or outward, summed over both sides.
 #[inline(always)]
 fn turned_out<T: Real>(s: &Senses<T>) -> T {
     s.left_bonus(LEFT_THIGH).abs() + s.right_bonus(RIGHT_THIGH).abs()
 }
 
-/// The gait as the phase bonus sees it.
+/// Inputs of the phase bonus.
 #[inline(always)]
 fn stride<T: Real>(s: &Senses<T>) -> Stride<T> {
     Stride {

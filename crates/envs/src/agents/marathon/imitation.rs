@@ -1,33 +1,37 @@
-//! What every figure that moves like a clip has in common: where episodes start, DeepMimic's reward, and how far the figure
-//! is from the clip.
+//! Shared code of all characters that imitate a clip: start states, DeepMimic's reward, and the distance from the clip.
 //!
-//! The reward adds `0.5 pose + 0.05 velocity + 0.15 end_effectors + 0.2 root + 0.1 center_of_mass`, each `exp(-scale error)`
-//! with the scales 2, 0.1, 10, 5 and 10 (DeepMimicCore/scenes/SceneImitate.cpp). Errors: sum of the joints' squared angles and
-//! of their squared velocities by DeepMimic's weights; mean squared distance of feet and hands from the root; squared
-//! distance of the root, a tenth of its squared angle, a hundredth of its squared velocity, a thousandth of its squared angular
-//! velocity; a tenth of the squared velocity of the center of mass. A ball joint of DeepMimic's is two or three hinges here,
-//! whose squares add up to that of its angle as long as it is small. The mean over the end effectors is DeepMimic's.
+//! The reward is `0.5 pose + 0.05 velocity + 0.15 end_effectors + 0.2 root + 0.1 center_of_mass`. Each term is
+//! `exp(-scale error)` with the scales 2, 0.1, 10, 5 and 10 (DeepMimicCore/scenes/SceneImitate.cpp). The errors are:
+//!
+//! - `pose`, `velocity`: weighted sum of squared joint angles and of squared joint velocities, with DeepMimic's
+//!   weights.
+//! - `end_effectors`: mean squared distance of feet and hands, relative to the root.
+//! - `root`: squared distance + 0.1 squared angle + 0.01 squared velocity + 0.001 squared angular velocity.
+//! - `center_of_mass`: 0.1 squared velocity.
+//!
+//! A ball joint of DeepMimic is two or three hinges here. For small angles, their squares add up to the square of its
+//! angle. The mean over the end effectors is DeepMimic's.
 
 use marathon_physics::lanes::Real;
 
 use crate::agent::options::Choice;
 use crate::agent::{Following, Frame, Obs, Part, Senses, Start, Terms};
 
-/// Memory of a figure that follows a clip.
+/// Memory size of a character that follows a clip.
 pub(super) const MEMORY: usize = BEGUN + 1;
 /// Slot of the memory that counts the episode's decisions.
 const MADE: usize = Following::SLOTS;
-/// Slot of the memory that holds the row where the episode started.
+/// Slot of the memory that holds the clip row in which the episode started.
 const BEGUN: usize = MADE + 1;
-/// How far the center of a part of the trunk may be above the ground in a clip that has it there, m.
+/// Largest height of the center of a trunk part that lies on the ground in a clip, m.
 const LYING: f64 = 0.16;
-/// An episode that fails in less time has failed because of where it started, s.
+/// A failure before this time is attributed to the start of the episode, s.
 pub(super) const EARLY: f64 = 2.0;
-/// How long before a later failure episodes start, s.
+/// After a later failure, an episode starts up to this long before it, s.
 const BEFORE: f64 = 1.0;
 
-/// Terms of DeepMimic's reward: name, weight, scale, and whether it is for the pose, without regard to where the figure is and
-/// how fast it moves.
+/// Terms of DeepMimic's reward: name, weight, scale, and whether the term covers the pose only (not position and
+/// speed).
 pub(super) const TERMS: [(&str, f64, f64, bool); 5] = [
     ("pose", 0.5, 2.0, true),
     ("velocity", 0.05, 0.1, false),
@@ -36,34 +40,34 @@ pub(super) const TERMS: [(&str, f64, f64, bool); 5] = [
     ("center_of_mass", 0.1, 10.0, false),
 ];
 
-/// What a reward has to know of a figure.
+/// The data that the reward needs about a character.
 pub(super) struct Anatomy {
-    /// The part from which others are seen.
+    /// The root part, to which others are relative.
     pub root: Part,
-    /// How many parts it has; the first ones that the facts name.
+    /// Number of parts. They are the first ones in the facts.
     pub parts: usize,
-    /// Feet, and hands.
+    /// Feet and hands.
     pub ends: &'static [Part],
-    /// DeepMimic's weight of each hinge in the order of `qpos`, behind the root's joints.
+    /// DeepMimic's weight of each hinge, in the order of `qpos` after the root's joints.
     pub weights: &'static [f64],
-    /// What DeepMimic's weights of root and joints add up to, whatever the number of hinges of a joint.
+    /// Sum of DeepMimic's weights of root and joints. A joint counts once, however many hinges it has.
     pub total: f64,
-    /// Where the hinges begin in `qpos`.
+    /// Index of the first hinge in `qpos`.
     pub qpos: usize,
-    /// Where they begin in `qvel`.
+    /// Index of the first hinge in `qvel`.
     pub qvel: usize,
 }
 
-/// Where an episode starts.
+/// Start of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartAt {
-    /// At any decision of the clip.
+    /// A random decision of the clip.
     Random,
-    /// At its beginning.
+    /// The beginning of the clip.
     First,
-    /// Where it fails most: half of the episodes that follow a failure start where that episode did, if it failed early, or
-    /// in the second before it failed. A quarter of the others start at the clip's beginning, where every use of a policy
-    /// starts, the rest at random.
+    /// More often where episodes fail. Half of the episodes after a failure start where the failed one did, if it
+    /// failed early, or in the second before it failed. A quarter of the others start at the clip's beginning, where a
+    /// deployed policy starts. The rest are random.
     Adaptive,
 }
 
@@ -74,8 +78,8 @@ impl Choice for StartAt {
 }
 
 impl StartAt {
-    /// Puts the figure into its clip, or into one of them. `dt`: seconds between decisions. `limit`: decisions after which an
-    /// episode is truncated.
+    /// Puts the character into its clip, or into one of several clips. `dt` is the time between decisions, s. `limit`
+    /// is the number of decisions after which an episode is truncated.
     pub(super) fn begin(self, start: &mut Start, dt: f64, limit: usize) {
         let again = (self == StartAt::Adaptive).then(|| try_again(start, dt, limit)).flatten();
         let row = again.unwrap_or_else(|| {
@@ -93,7 +97,7 @@ impl StartAt {
     }
 }
 
-/// Where to start in half of the episodes that follow a failure.
+/// The row to start from in half of the episodes after a failure.
 fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
     let [row, made, begun] = [Following::ROW, MADE, BEGUN].map(|slot| start.previous[slot] as usize);
     let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
@@ -101,7 +105,7 @@ fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
     if !failed || start.random.whole(0, 1) == 0 {
         return None;
     }
-    // the lap of a run is shorter than a second: what is before a failure need not be what led to it
+    // a run cycle is shorter than a second, so an earlier row of the clip need not have led to the failure
     match (made as f64) * dt < EARLY {
         true => Some(begun),
         false => {
@@ -111,14 +115,14 @@ fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
     }
 }
 
-/// A decision has been made.
+/// Updates the memory after a decision.
 #[inline(always)]
 pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     s.follow(memory);
     memory[MADE] += T::lit(1.0);
 }
 
-/// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of those that are for the pose; DeepMimic's is 1.
+/// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of the pose terms; it is 1 in DeepMimic.
 #[inline(always)]
 pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64, terms: &mut Terms<T>) {
     for ((name, weight, ..), value) in TERMS.into_iter().zip(values(s, anatomy, sharpness)) {
@@ -126,7 +130,7 @@ pub(super) fn add_terms<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f6
     }
 }
 
-/// What the terms add up to, and those that are for the pose alone.
+/// The weighted sum of all terms, and that of the pose terms.
 #[inline(always)]
 pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 2] {
     let [mut all, mut posture] = [T::zero(); 2];
@@ -139,7 +143,7 @@ pub(super) fn similarity<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 2] {
     [all, posture]
 }
 
-/// The values of the terms, without their weights.
+/// Values of the terms, without their weights.
 #[inline(always)]
 fn values<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64) -> [T; TERMS.len()] {
     let mut values = errors(s, anatomy);
@@ -150,7 +154,7 @@ fn values<T: Real>(s: &Senses<T>, anatomy: &Anatomy, sharpness: f64) -> [T; TERM
     values
 }
 
-/// The errors of the terms.
+/// Errors of the terms.
 #[inline(always)]
 fn errors<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 5] {
     let Anatomy { root, ends, weights, total, .. } = *anatomy;
@@ -167,7 +171,7 @@ fn errors<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 5] {
     }
     let mut apart = T::zero();
     for part in ends {
-        // heights are above the ground
+        // heights are compared above the ground, not relative to the root
         let [x, y, z] = sub(sub(s.position(*part), clip.position(*part)), gap);
         apart += norm2([x, y, z + gap[2]]);
     }
@@ -179,11 +183,11 @@ fn errors<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> [T; 5] {
     [pose * share, velocity * share, apart * T::lit(1.0 / ends.len() as f64), place, drift * T::lit(0.1)]
 }
 
-/// Square of the angle between a part and where the clip has it, rad^2.
+/// Squared angle between a part and the clip's, rad^2.
 #[inline(always)]
 pub(super) fn angle2<T: Real>(s: &Senses<T>, part: Part) -> T {
     let (a, b) = (s.axes(part), s.reference(0).axes(part));
-    // of the rotation from one to the other, twice the cosine plus 1, and the axis times twice the sine
+    // for the rotation between them: trace = 2 cos + 1, axis = 2 sin times the unit axis
     let mut trace = T::zero();
     let mut axis = [T::zero(); 3];
     for k in 0..3 {
@@ -198,13 +202,14 @@ pub(super) fn angle2<T: Real>(s: &Senses<T>, part: Part) -> T {
     angle * angle
 }
 
-/// Mean distance of the parts from where the clip has them, m; from the root's own place, or in the world.
+/// Mean distance of the parts from the clip's, m. The distances are relative to the root if `from_root`, otherwise in
+/// the world.
 #[inline(always)]
 pub(super) fn distance<T: Real>(s: &Senses<T>, anatomy: &Anatomy, from_root: bool) -> T {
     distance_from(s, &s.reference(0), anatomy, from_root)
 }
 
-/// The same from a moment of the clip.
+/// The same for a frame of the clip.
 #[inline(always)]
 pub(super) fn distance_from<T: Real>(s: &Senses<T>, clip: &Frame<'_, T>, anatomy: &Anatomy, from_root: bool) -> T {
     let mut gap = [T::zero(); 3];
@@ -218,7 +223,7 @@ pub(super) fn distance_from<T: Real>(s: &Senses<T>, clip: &Frame<'_, T>, anatomy
     sum * T::lit(1.0 / anatomy.parts as f64)
 }
 
-/// Mean absolute difference of the hinges' angles, rad.
+/// Mean absolute error of the hinges' angles, rad.
 #[inline(always)]
 pub(super) fn joint_error<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
     let (clip, r, mut error) = (s.reference(0), s.readings(), T::zero());
@@ -228,7 +233,7 @@ pub(super) fn joint_error<T: Real>(s: &Senses<T>, anatomy: &Anatomy) -> T {
     error * T::lit(1.0 / anatomy.weights.len() as f64)
 }
 
-/// Lanes in which a part of the trunk touched the ground although the clip does not have it there.
+/// Lanes in which a trunk part touched the ground while the clip's does not.
 #[inline(always)]
 pub(super) fn fallen<T: Real>(s: &Senses<T>, trunk: &[Part]) -> T::Mask {
     let (mut fallen, clip) = (T::none(), s.reference(0));
@@ -239,7 +244,7 @@ pub(super) fn fallen<T: Real>(s: &Senses<T>, trunk: &[Part]) -> T::Mask {
     fallen
 }
 
-/// Where the root part is and how the joints are, with velocities: what every such figure observes of itself.
+/// Writes the observation of the body: the root's height, orientation and velocities, then joint angles and velocities.
 #[inline(always)]
 pub(super) fn observe_body<T: Real>(
     s: &Senses<T>,
@@ -268,7 +273,7 @@ pub(super) fn observe_body<T: Real>(
     }
 }
 
-/// Puts vectors into axes of which x is a direction along the ground, cosine and sine of its angle, and z is up.
+/// Returns a map of vectors into axes with x along a ground direction (cosine and sine of its angle) and z up.
 #[inline(always)]
 pub(super) fn turned_to<T: Real>([cos, sin]: [T; 2]) -> impl Fn([T; 3]) -> [T; 3] {
     move |[x, y, z]| [sin.mul_add(y, cos * x), sin.neg_mul_add(x, cos * y), z]
@@ -279,7 +284,7 @@ pub(super) fn sub<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Square of a vector's length.
+/// Squared length of a vector.
 #[inline(always)]
 pub(super) fn norm2<T: Real>([x, y, z]: [T; 3]) -> T {
     x.mul_add(x, y.mul_add(y, z * z))

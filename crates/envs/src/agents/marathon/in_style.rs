@@ -1,4 +1,4 @@
-//! The paper's Humanoid and Walker, with their own motors, moving like the person in a motion clip.
+//! The paper's Humanoid and Walker, with their own motors, imitating a motion clip of a person.
 //!
 //! | observation | content |
 //! |---|---|
@@ -7,13 +7,14 @@
 //! | 5..11 | forward and up axis of the root part |
 //! | 11..17 | velocity of the root part, m/s, and its angular velocity, rad/s |
 //! | n, n | angles of the n joints, rad, and their velocities, rad/s |
-//! | 4 or 2 | feet on the ground, 0 or 1, in the order of the agent's own touch sensors |
-//! | 3 | how far the clip's root part is from the agent's own, m |
-//! | n | how far the clip's next angles are from the agent's own, rad |
+//! | 4 or 2 | ground contact of the feet, 0 or 1, in the order of the agent's touch sensors |
+//! | 3 | from the agent's root part to the clip's, m |
+//! | n | the clip's next joint angles minus the agent's, rad |
 //!
-//! Vectors are in the clip's [direction of travel](crate::Frame::facing). An action is what it is in `Humanoid-v0` and
-//! `Walker2d-v0`: a share of each motor's torque. The reward is DeepMimic's, as Marathon Man's (`imitation.rs`). The agent fails
-//! when its trunk touches the ground, and when the mean distance of its parts from the clip exceeds 0.5 m.
+//! Vectors are expressed in the clip's [direction of travel](crate::Frame::facing). As in `Humanoid-v0` and
+//! `Walker2d-v0`, an action is a fraction of each motor's torque. The reward is DeepMimic's, as for Marathon Man
+//! (`imitation.rs`). An episode is terminated when the trunk touches the ground, or when the mean distance of the parts
+//! from the clip exceeds 0.5 m.
 
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
@@ -29,10 +30,10 @@ use crate::any_agent::AnyAgent;
 
 /// Length of an episode, s.
 const SECONDS: f64 = 20.0;
-/// Mean distance of the parts from where the clip has them that ends an episode, m.
+/// Mean distance of the parts from the clip that ends an episode, m.
 const FAR: f64 = 0.5;
 
-/// A figure whose own task is another one.
+/// A character of another task.
 struct Figure {
     facts: fn() -> Facts,
     parts: &'static [&'static str],
@@ -114,12 +115,13 @@ const WALKER_FIGURE: Figure = Figure {
 crate::options! {
     /// Arguments of the tasks.
     pub struct Arguments {
-        /// Where an episode starts: at `random` decisions of the clip, at its `first`, or more often where it fails: `adaptive`.
+        /// Start of an episode: `random` decisions of the clip, its `first`, or `adaptive` (more often where episodes
+        /// fail).
         start: StartAt = StartAt::Random,
     }
 }
 
-/// A figure of the paper's with a clip.
+/// One of the paper's characters with a clip.
 #[derive(Clone)]
 pub struct InStyle {
     id: &'static str,
@@ -143,7 +145,7 @@ clip!(HUMANOID_RUN, "humanoid/run.motion");
 clip!(WALKER_WALK, "walker2d/walk.motion");
 clip!(WALKER_RUN, "walker2d/run.motion");
 
-/// All of them.
+/// All tasks of this module.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let tasks: [(_, _, _, &'static LazyLock<Arc<Clip>>); 4] = [
         ("HumanoidStyleWalk-v0", "the humanoid: walk as a person does", &HUMANOID_FIGURE, &HUMANOID_WALK),

@@ -11,7 +11,7 @@
 //!
 //! `Walker2d-v0`: r = v/4 + forward bonus - (1.1 m - height) - 0.1 effort, all of the torso.
 //! `Walker2d-v1`: r = V + 0.05 upright + 0.05 (1 - (1.1 m - height)) + (1 - mean effort) min(V, 0.4), V = 0.4 v / 8 m/s.
-//! Fails when anything but feet and lower legs touches the ground.
+//! An episode is terminated when any part but feet and lower legs touches the ground.
 
 use marathon_physics::lanes::Real;
 
@@ -31,21 +31,21 @@ const PARTS: [&str; 3] = ["torso", "left_foot", "right_foot"];
 pub(super) const TORSO: Part = Part::named(&PARTS, "torso");
 pub(super) const LEFT_FOOT: Part = Part::named(&PARTS, "left_foot");
 pub(super) const RIGHT_FOOT: Part = Part::named(&PARTS, "right_foot");
-/// The lower legs count as feet because they poke through the feet's capsules at the ankles.
+/// The lower legs count as feet because they protrude through the feet's capsules at the ankles.
 const FEET: [&str; 4] = ["right_leg", "left_leg", "right_foot", "left_foot"];
 
-/// Height of the torso's center below which the walker pays, m; standing it is 1.3.
+/// Height of the torso's center below which there is a penalty, m. Standing, it is 1.3.
 pub(super) const HEIGHT: f64 = 1.1;
-/// Price of the effort.
+/// Weight of the effort.
 const EFFORT: f64 = -0.1;
 
-/// Share of the speed in the `-v1` reward.
+/// Weight of the speed in the `-v1` reward.
 const V1_VELOCITY: f64 = 0.4;
-/// Share of the posture.
+/// Weight of the posture.
 const V1_UPRIGHT: f64 = 0.05;
-/// Share of the height.
+/// Weight of the height.
 const V1_HEIGHT: f64 = 0.05;
-/// Largest share of the saved effort, which is never more than that of the speed.
+/// Largest weight of the saved effort. It never exceeds the speed's term.
 const V1_EFFORT: f64 = 0.4;
 
 /// The paper's Walker.
@@ -100,7 +100,7 @@ impl Agent for Walker2dV0 {
     }
 }
 
-/// Walker as of the paper's Table 1: it also sees the height of its feet; a reward between 0 and 1.
+/// Walker of the paper's Table 1. It also observes the heights of its feet, and its reward is between 0 and 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Walker2dV1;
 

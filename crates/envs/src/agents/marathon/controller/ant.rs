@@ -1,20 +1,22 @@
-//! The Ant told where to go: forward and to the side, and to turn.
+//! The Ant with a commanded velocity (ahead and to the left) and turn rate.
 //!
-//! Vectors are in axes of which x is the heading of the torso and z is up.
+//! Vectors are in axes with x along the heading of the torso and z up.
 //!
 //! | observation | content |
 //! |---|---|
-//! | 0..3 | commanded speed and speed to the left, m/s, and turn, rad/s |
+//! | 0..3 | commanded speed ahead and to the left, m/s, and turn rate, rad/s |
 //! | 3, 4 | sine and cosine of the angle from the heading to the commanded direction |
 //! | 5 | height of the torso, m |
 //! | 6..9 | up axis of the torso |
 //! | 9..12, 12..15 | velocity of the torso, m/s, and its angular velocity, rad/s |
-//! | 15..19 | feet on the ground, 0 or 1 |
+//! | 15..19 | ground contact of the feet, 0 or 1 |
 //! | 19..27, 27..35 | angles of the joints, rad, and their velocities, rad/s |
 //!
-//! The commanded direction is the heading at the start, and turns as told; where the Ant cannot follow, it waits. With e the
-//! distance of the velocity from the commanded one, and a the angle to the commanded direction:
-//! r = exp(-4 e^2) - 0.5 e + 0.5 exp(-4 a^2) - 0.5 abs(a) + 0.5 still - 0.05 effort. Lying on the back is a failure.
+//! The commanded direction is the heading at the start, and turns at the commanded rate. It waits when the Ant cannot
+//! follow.
+//!
+//! With e the velocity error and a the angle to the commanded direction: r = exp(-4 e^2) - 0.5 e + 0.5 exp(-4 a^2) -
+//! 0.5 abs(a) + 0.3 still - 0.05 effort. An episode is terminated when the Ant lies on its back.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -27,7 +29,7 @@ use crate::agent::senses::hypot;
 use crate::agent::{Agent, CommandRange, Facts, Motors, Obs, Part, Senses, Terms, names};
 use crate::episode_rng::EpisodeRng;
 
-/// All geoms, the torso and the feet as the Ant's own task has them.
+/// All geoms. The torso and the feet come first, as in the Ant's own task.
 const PARTS: [&str; 13] = [
     "torso_geom",
     "left_ankle_geom",
@@ -44,33 +46,38 @@ const PARTS: [&str; 13] = [
     "rightback_leg_geom",
 ];
 const TORSO: Part = Part::named(&PARTS, "torso_geom");
-/// Where the hinges begin in `qpos` and in `qvel`, and how many there are.
+/// Index of the first hinge in `qpos`.
 const QPOS: usize = 7;
+/// Index of the first hinge in `qvel`.
 const QVEL: usize = 6;
 const HINGES: usize = 8;
-/// Numbers that it observes.
+/// Size of the observation.
 const OBSERVATION: usize = 19 + 2 * HINGES;
 /// 20 seconds.
 const MAX_EPISODE_STEPS: usize = 2000;
-/// Fastest that it is told to go ahead or back, and to a side, m/s, and sharpest that it is told to turn, rad/s.
+/// Highest commanded speed ahead or back, m/s.
 const FASTEST: f64 = 3.0;
+/// Highest commanded speed to a side, m/s.
 const SIDEWAYS: f64 = 2.0;
+/// Highest commanded turn rate, rad/s.
 const SHARPEST: f64 = FRAC_PI_2;
-/// Most that the commanded direction is off the heading, rad.
+/// Largest angle between the commanded direction and the heading, rad.
 const MOST_BEHIND: f64 = 1.0;
-/// How long a command holds, decisions.
+/// Shortest and longest duration of a command, decisions.
 const HOLDS: [usize; 2] = [100, 400];
-/// Shares of commands: to stand; of the others, to go straight ahead or back, and not to turn.
+/// Fraction of commands that are to stand.
 const STANDING: f64 = 0.15;
+/// Of the other commands, the fraction without a side step, and the fraction without a turn.
 const STRAIGHT: f64 = 0.4;
-/// How long it is told to stand, decisions.
+/// Shortest and longest duration of a command to stand, decisions.
 const RESTS: [usize; 2] = [200, 800];
-/// Worth of each part of standing still, and the mean squares of the parts' velocities at which each is down to 1/e, m^2/s^2: one that
-/// fidgets is to come to rest, and one that rests to keep quite still.
+/// Reward of each part of standing still.
 const STILL: f64 = 0.3;
+/// Mean squares of the parts' velocities at which each part drops to 1/e, m^2/s^2. The first part rewards coming to
+/// rest, the last keeping still.
 const RESTLESS: [f64; 3] = [0.4, 0.04, 0.004];
 
-/// The Ant told where to go.
+/// The Ant with commands.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntController;
 
@@ -81,7 +88,7 @@ impl AntController {
         [s.memory(0), s.memory(1)]
     }
 
-    /// Velocity of the center of mass along the ground less the commanded one, m/s.
+    /// Distance of the center of mass's velocity along the ground from the commanded one, m/s.
     #[inline(always)]
     fn slip<T: Real>(s: &Senses<T>) -> T {
         let [x, y, _] = s.center_of_mass_velocity();
@@ -100,7 +107,7 @@ impl Agent for AntController {
     fn facts(&self) -> Facts {
         Facts {
             id: "AntController-v0".into(),
-            summary: "four legs: go ahead, back and sideways, and turn, as told".into(),
+            summary: "four legs: go ahead, back and sideways, and turn, as commanded".into(),
             max_episode_steps: MAX_EPISODE_STEPS,
             observation: Some(OBSERVATION),
             reward_terms: names(["velocity", "pace", "heading", "off", "still", "effort"]),
@@ -177,7 +184,7 @@ impl Agent for AntController {
         terms.add("pace", -0.5, slip);
         terms.add("heading", 0.5, (angle * angle * T::lit(-4.0)).exp());
         terms.add("off", -0.5, angle.abs());
-        // told to go nowhere and not to turn
+        // commanded to stand without a turn
         let told = s.command(0).abs().max(s.command(1).abs()).max(s.command(2).abs());
         let rest = told.neg_mul_add(T::lit(10.0), T::lit(1.0)).max(T::zero());
         let [fidgets, rests, stirs] = super::stillness(s, PARTS.len(), RESTLESS);

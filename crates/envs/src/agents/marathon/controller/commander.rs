@@ -1,8 +1,9 @@
-//! The adversary of a figure that obeys: a second role that chooses the commands, and earns what the figure does not do.
+//! The adversary of a controlled figure: a second role that chooses the commands and earns the velocity error.
 //!
-//! It is the original's experiment 003. It decides every 100 decisions, 400 physics steps, and its command is observed a decision
-//! later. It earns abs(T - C) / (4 m/s) at every decision, and 10 for a fall. The original's saw T and C alone; a command is hard to
-//! obey for a figure that is in the midst of something, so this one sees the torso and the feet, too.
+//! This is the original's experiment 003. The adversary acts every 100 decisions (400 physics steps), and its command
+//! is observed one decision later. It earns abs(T - C) / (4 m/s) at every decision, and 10 for a fall, where T is the
+//! commanded and C the mean velocity. The original's adversary observed T and C only. A command is harder to follow in
+//! the middle of a movement, so this one also observes the torso and the feet.
 
 use marathon_physics::lanes::Real;
 
@@ -12,21 +13,24 @@ use crate::agent::{Obs, RoleFacts, Senses, Terms, names};
 /// Names of the roles.
 const RUNNER: &str = "runner";
 const COMMANDER: &str = "commander";
-/// Actuators of the commander, its part of the observation, and its terms of the reward.
+/// Actuators of the commander.
 const ACTIONS: [&str; 2] = ["told_velocity", "told_jump"];
+/// The commander's group of the observation.
 const SEEN: &str = "obedience";
+/// The commander's terms of the reward.
 pub(super) const TERMS: [&str; 2] = ["disobedience", "felled"];
-/// Decisions for which a command holds.
+/// Duration of a command, decisions.
 const HOLDS: usize = 100;
-/// Action from which on a button is pressed.
+/// Action above which a button counts as pressed.
 const PRESSED: f64 = 0.2;
-/// Worth of a fall.
+/// Reward for a fall.
 const FELLED: f64 = 10.0;
 
-/// Slots of the memory behind the velocities: the command that the figure has observed, the one that it observes next, and
-/// decisions until the commander decides again.
+/// Slots of the memory after the controller's: the command that the figure has observed.
 pub(super) const PRESENT: usize = super::MEMORY;
+/// Slots of the command that the figure observes next.
 pub(super) const NEXT: usize = PRESENT + 2;
+/// Slot of the decisions until the commander acts again.
 const LEFT: usize = NEXT + 2;
 pub(super) const MEMORY: usize = LEFT + 1;
 
@@ -38,7 +42,7 @@ pub(super) fn actions(input: Input) -> &'static [&'static str] {
     }
 }
 
-/// The two roles, with the actions, observations and terms of the figure.
+/// The two roles. The figure keeps its actions, observations and terms.
 pub(super) fn roles(input: Input, own: Vec<String>, observations: &[&str], terms: &[&str]) -> Vec<RoleFacts> {
     let runner = RoleFacts {
         name: RUNNER.into(),
@@ -57,7 +61,8 @@ pub(super) fn roles(input: Input, own: Vec<String>, observations: &[&str], terms
     vec![runner, commander]
 }
 
-/// A decision has been made: what was told becomes what is obeyed, and the commander's action what is told.
+/// Updates the memory after a decision: the next command becomes the present one, and the commander's action becomes
+/// the next one.
 #[inline(always)]
 pub(super) fn remember<F: Figure, T: Real>(controller: &Controller<F>, s: &Senses<T>, memory: &mut [T]) {
     let (zero, one) = (T::zero(), T::lit(1.0));
@@ -78,20 +83,20 @@ pub(super) fn remember<F: Figure, T: Real>(controller: &Controller<F>, s: &Sense
     memory[LEFT] = T::select(due, T::lit(HOLDS as f64), memory[LEFT] - one);
 }
 
-/// An episode begins: the figure is told nothing as yet, and the commander decides at once.
+/// Initializes the memory at the start of an episode: there is no command yet, and the commander acts at once.
 #[inline(always)]
 pub(super) fn begin<T: Real>(memory: &mut [T]) {
     memory[LEFT] = T::lit(HOLDS as f64);
 }
 
-/// Lanes in which the commander decides now.
+/// Lanes in which the commander acts now.
 #[inline(always)]
 pub(super) fn decides<T: Real>(s: &Senses<T>) -> T::Mask {
     T::lit(HOLDS as f64 - 0.5).lt(s.memory(LEFT))
 }
 
-/// What the commander sees: the command, the mean velocity, m/s; height of the torso, m, its velocity along z, m/s, its forward
-/// axis; whether each foot touches the ground.
+/// Writes the commander's observation: command; mean velocity, m/s; height of the torso, m; its velocity along z, m/s;
+/// its forward axis; ground contact of each foot.
 #[inline(always)]
 pub(super) fn observe<F: Figure, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     let ([fx, _, fz], [_, _, vz]) = (s.forward(F::TORSO), s.linear_velocity(F::TORSO));
@@ -102,7 +107,7 @@ pub(super) fn observe<F: Figure, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.touch_sensors(s);
 }
 
-/// What the commander earns: for how far the velocity is off, m/s, and for a fall.
+/// Adds the commander's reward for the velocity error `off`, m/s, and for a fall.
 #[inline(always)]
 pub(super) fn add_terms<T: Real>(off: T, fallen: T::Mask, terms: &mut Terms<T>) {
     terms.add(TERMS[0], 1.0 / FASTEST, off);

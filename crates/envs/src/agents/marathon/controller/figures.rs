@@ -1,4 +1,4 @@
-//! What the controllers of the figures differ in.
+//! Properties in which the controlled figures differ.
 
 use marathon_physics::lanes::Real;
 
@@ -6,7 +6,7 @@ use super::super::hopper::{self, FOOT, HopperV0};
 use super::super::walker2d::{self, HEIGHT, LEFT_FOOT, RIGHT_FOOT, Walker2dV1};
 use crate::agent::{Agent, Part, Senses};
 
-/// A figure whose task the controller is made of.
+/// A figure whose task the controller extends.
 pub trait Figure: Agent + Clone + Default {
     /// Registry name of the controller.
     const ID: &'static str;
@@ -16,27 +16,29 @@ pub trait Figure: Agent + Clone + Default {
     const PARTS: &'static [&'static str];
     /// The torso.
     const TORSO: Part;
-    /// How many motors it has.
+    /// Number of motors.
     const MOTORS: usize;
-    /// What it observes in its own task, by name.
+    /// Groups of the observation in its own task.
     const OBSERVED: &'static [&'static str];
-    /// Price of the effort; the original takes 0.3.
+    /// Weight of the effort; 0.3 in the original.
     const EFFORT: f64;
-    /// Speed at which the center of mass rises when a jump leaves the ground, m/s, at least. Gravity takes 0.5 m/s away in half of
-    /// the tenth of a second that makes a jump: a figure that draws up its legs is off the ground for as long, too, but falls.
+    /// Lowest upward speed of the center of mass at the take-off of a jump, m/s. A jump lasts at least 0.1 s, and
+    /// gravity takes 0.5 m/s in half of that. A figure that only pulls up its legs leaves the ground for as long, but
+    /// its body falls.
     const THROWN: f64;
-    /// Whether it is easier to draw up the legs than to jump. Nothing is paid for that while it stands, then; on the run, steps are
-    /// flights.
+    /// Whether pulling up the legs is easier than jumping. While such a figure stands, only flights after a take-off
+    /// count as a jump. While it runs, every flight counts.
     const DRAWS_UP: bool;
-    /// What a jump is worth now: nothing while a foot is on the ground, or else 1 and the height of the lowest foot, m.
+    /// Value of the present state as a jump: 0 with a foot on the ground, otherwise 1 plus the height of the lowest
+    /// foot, m.
     fn leap<T: Real>(s: &Senses<T>) -> T;
-    /// How far the torso is lower than it may be, m.
+    /// How far the torso is below its lowest allowed height, m.
     fn low<T: Real>(s: &Senses<T>) -> T;
 }
 
 impl Figure for HopperV0 {
     const ID: &'static str = "HopperController-v0";
-    const SUMMARY: &'static str = "one leg in a plane: go left and right as told, jump, stand still";
+    const SUMMARY: &'static str = "one leg in a plane: go left and right as commanded, jump, stand still";
     const PARTS: &'static [&'static str] = &["torso", "foot", "nose", "pelvis", "thigh", "calf"];
     const TORSO: Part = hopper::TORSO;
     const MOTORS: usize = 4;
@@ -59,7 +61,7 @@ impl Figure for HopperV0 {
 
 impl Figure for Walker2dV1 {
     const ID: &'static str = "WalkerController-v0";
-    const SUMMARY: &'static str = "two legs in a plane: go left and right as told, jump, stand still";
+    const SUMMARY: &'static str = "two legs in a plane: go left and right as commanded, jump, stand still";
     const PARTS: &'static [&'static str] =
         &["torso", "left_foot", "right_foot", "left_thigh", "left_leg", "right_thigh", "right_leg"];
     const TORSO: Part = walker2d::TORSO;
@@ -68,7 +70,7 @@ impl Figure for Walker2dV1 {
         &["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities", "foot_heights"];
     // at 0.3, walking costs more than it earns
     const EFFORT: f64 = -0.05;
-    // with something to spare
+    // includes a margin
     const THROWN: f64 = 0.7;
     const DRAWS_UP: bool = false;
 
@@ -78,7 +80,7 @@ impl Figure for Walker2dV1 {
         T::select(T::or(s.touch(0), s.touch(1)), T::zero(), T::lit(1.0) + height)
     }
 
-    // the original lets it crouch, and it runs until its thighs touch the ground
+    // the original allows crouching, and the Walker then runs until its thighs touch the ground
     #[inline(always)]
     fn low<T: Real>(s: &Senses<T>) -> T {
         s.height_penalty(walker2d::TORSO, HEIGHT)

@@ -1,20 +1,23 @@
-//! Figures in a plane that are told how fast to go, and to jump: the paper's player controllers. And the [Ant](AntController), which
-//! is told where to go in space.
+//! The paper's player controllers: characters in a plane that follow a commanded velocity and jump, and the
+//! [Ant](AntController), which follows a velocity and a turn rate in space.
 //!
-//! A command is a velocity from -4 to 4 m/s, and with the input `discrete` also a jump, 0 or 1. `input` says what a player has
-//! in hand: buttons for left, right and jump, or a stick. What nobody commands, the task's own [schedule] does.
+//! A command is a velocity from -4 to 4 m/s. With `input=discrete`, it also has a jump, 0 or 1. `input` is the player's
+//! device: buttons for left, right and jump, or a stick. If no caller sets commands, the task draws them from its
+//! [schedule].
 //!
 //! | observation | content |
 //! |---|---|
-//! | what the figure's own task observes | |
+//! | the observation of the figure's own task | |
 //! | `command` | commanded velocity, m/s; with `discrete` also the jump, 0 or 1 |
-//! | `mean_velocity` | mean of the torso's velocity along x at this decision and the two before, m/s |
-//! | `target_velocity` | what the velocity should be by now: it follows the command by 5 m/s^2, m/s |
-//! | `awaited` | with `discrete`: whether it has been told to jump and has yet to do it, 0 or 1 |
+//! | `mean_velocity` | mean of the torso's velocity along x over this decision and the two before, m/s |
+//! | `target_velocity` | follows the command at 5 m/s^2, m/s |
+//! | `awaited` | with `discrete`: whether a commanded jump has not happened yet, 0 or 1 |
 //!
-//! r = exp(-4 e^2) + 4 - e + forward bonus + jump - late - effort + still, with e = abs(target - mean velocity). The forms of bonus, jump
-//! and effort are those of the original's controllers 001 to 004. `still` is ours: the original's figures would not stand still. The
-//! Walker also pays for a low torso. Standing is worth something whatever is told, so that a fall is never a way out.
+//! r = exp(-4 e^2) + 4 - e + forward bonus + jump - late - effort + still, with e = abs(target - mean velocity).
+//!
+//! Bonus, jump and effort have the form of the original's controllers 001 to 004. `still` is ours, because the
+//! original's figures would not stand still. The Walker also pays for a low torso. Every state earns more than a fall,
+//! whatever the command, so falling never pays off.
 
 mod ant;
 mod commander;
@@ -39,50 +42,53 @@ use crate::agent::{
 use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
 
-/// Fastest that a figure is told to go, m/s: what the original calls 1.
+/// Highest commanded speed, m/s. The original calls it 1.
 pub const FASTEST: f64 = 4.0;
-/// Slots of the memory: the torso's velocity along x at the last three decisions, m/s. The original takes the mean of nine
+/// Slots of the memory: the torso's velocity along x at the last three decisions, m/s. The original averages nine
 /// physics steps.
 const VELOCITIES: usize = 3;
-/// The target velocity, m/s.
+/// Slot of the target velocity, m/s.
 const TARGET: usize = VELOCITIES;
-/// For how many decisions it has been in the air since it rose by [`Figure::THROWN`]; whether it was told to jump, and has yet to do it,
-/// 0 or 1.
+/// Slot of the decisions in the air since the center of mass rose at [`Figure::THROWN`].
 const ALOFT: usize = TARGET + 1;
+/// Slot of whether the last command had a jump, 0 or 1.
 const TOLD: usize = ALOFT + 1;
+/// Slot of whether a commanded jump has not happened yet, 0 or 1.
 const WAITS: usize = TOLD + 1;
-/// Fastest that the center of mass has risen since it was told to jump, m/s.
+/// Slot of the fastest rise of the center of mass since the jump was commanded, m/s.
 const ROSE: usize = WAITS + 1;
 const MEMORY: usize = ROSE + 1;
-/// Time off the ground that makes a jump, s: whoever steps from foot to foot has none on the ground now and then.
+/// Shortest flight that counts as a jump, s. Steps leave the ground for moments too.
 const JUMPED: f64 = 0.1;
-/// How fast the target velocity follows the command, m/s^2. Friction allows 9.8.
+/// Rate at which the target velocity follows the command, m/s^2. Friction allows 9.8.
 const RAMP: f64 = 5.0;
-/// What it observes besides its own task's numbers, the last with `discrete`.
+/// Groups of the observation after those of the figure's own task. The last one needs `discrete`.
 const OBSERVED: [&str; 4] = ["command", "mean_velocity", "target_velocity", "awaited"];
 /// Terms of the reward.
 const TERMS: [&str; 8] = ["velocity", "pace", "uprightness", "jump", "late", "still", "height", "effort"];
-/// Sharpness of the worth of the right velocity, s^2/m^2.
+/// Sharpness of the `velocity` term, s^2/m^2.
 const SHARPNESS: f64 = 4.0;
-/// Price of a difference of 1 m/s, and the difference at which a decision is worth nothing, m/s: that of a figure that stands while it
-/// is told to run.
+/// Cost of a velocity error of 1 m/s.
 const PRICE: f64 = 1.0;
+/// Velocity error at which the `pace` term is 0, m/s: standing under a command to run.
 const WORTHLESS: f64 = FASTEST;
-/// Worth of each decision until a figure that stands has jumped as told, and the part of it that one is spared that has risen by 1 m/s: a
-/// figure that has never jumped finds out by pushing off harder.
+/// The `late` term per decision, until a standing figure has performed a commanded jump.
 const LATE: f64 = -6.0;
+/// Fraction of the `late` term that is waived once the center of mass has risen at 1 m/s. It rewards pushing off before
+/// the policy has found the jump.
 const RISEN: f64 = 0.6;
-/// Worth of each half of standing still as told, and the mean squares of the parts' velocities at which each is down to 1/e, m^2/s^2: who
-/// fidgets is to come to rest, and who rests to keep quite still.
+/// Reward of each half of standing still under a stop command.
 const STILL: f64 = 1.5;
+/// Mean squares of the parts' velocities at which the two halves drop to 1/e, m^2/s^2. The first half rewards coming to
+/// rest, the second keeping still.
 const RESTLESS: [f64; 2] = [0.4, 0.04];
 
-/// The Hopper told how fast to go.
+/// The Hopper with a commanded velocity.
 pub type HopperController = Controller<HopperV0>;
-/// The Walker told how fast to go.
+/// The Walker with a commanded velocity.
 pub type WalkerController = Controller<Walker2dV1>;
 
-/// What a player has in hand.
+/// Input device of the player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
     /// Buttons: left, right, jump.
@@ -96,12 +102,12 @@ impl Choice for Input {
     const NAMED: &'static [(Self, &'static str)] = &[(Input::Discrete, "discrete"), (Input::Continuous, "continuous")];
 }
 
-/// Who commands where no caller does.
+/// Source of the commands if no caller sets them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Commander {
     /// The task's own schedule.
     Schedule,
-    /// A second role, which earns what the figure does not obey.
+    /// A second role, which earns the runner's velocity error.
     Adversary,
 }
 
@@ -112,22 +118,22 @@ impl Choice for Commander {
 }
 
 crate::options! {
-    /// Arguments of a figure in a plane that is told how fast to go.
+    /// Arguments of a figure in a plane with a commanded velocity.
     pub struct ControllerArguments {
-        /// What a player has in hand: `discrete` buttons for left, right and jump, or a `continuous` stick.
+        /// Input device of the player: `discrete` buttons for left, right and jump, or a `continuous` stick.
         input: Input = Input::Discrete,
-        /// What it is told where nobody commands: `repeats`, `anew`, `thirds`, `toggle` or `uniform`.
+        /// Schedule of the commands if no caller sets them: `repeats`, `anew`, `thirds`, `toggle` or `uniform`.
         schedule: Schedule = Schedule::Repeats,
-        /// Who commands where no caller does: the `schedule`, or an `adversary` that learns, too.
+        /// Source of the commands if no caller sets them: the `schedule`, or an `adversary` that learns too.
         commander: Commander = Commander::Schedule,
-        /// What a fall costs, in place of all other terms of that decision.
+        /// Penalty of a fall. It replaces all other terms of that decision.
         price: Scale = Scale(40.0),
-        /// Share of the episodes that start 0.75 to 1.5 s before the last fall, once there is one.
+        /// Fraction of the episodes that start 0.75 to 1.5 s before the last fall, once there is one (0 to 1).
         relive: Share = Share(0.0),
     }
 }
 
-/// A figure in a plane that is told how fast to go.
+/// A figure in a plane with a commanded velocity.
 #[derive(Clone, Debug, Default)]
 pub struct Controller<F> {
     figure: F,
@@ -135,21 +141,21 @@ pub struct Controller<F> {
 }
 
 impl<F: Figure> Controller<F> {
-    /// Whether an adversary commands.
+    /// Whether an adversary sets the commands.
     #[inline(always)]
     fn is_opposed(&self) -> bool {
         self.arguments.commander == Commander::Adversary
     }
 
-    /// The states before its falls.
+    /// The stored states from before a fall.
     #[inline(always)]
     fn relive(&self) -> Relive {
         let slot = if self.is_opposed() { commander::MEMORY } else { MEMORY };
         Relive { slot, share: self.arguments.relive.0, joints: [3 + F::MOTORS; 2], places: 1, also: None }
     }
 
-    /// Number `i` of the command: to an observation, the one to obey from now on; otherwise the one that the decision was made
-    /// under.
+    /// Number `i` of the command. With `observing`, it is the command that applies from now on. Otherwise it is the one
+    /// under which the last decision was made.
     #[inline(always)]
     fn told<T: Real>(&self, s: &Senses<T>, i: usize, observing: bool) -> T {
         match (self.is_opposed(), observing) {
@@ -159,7 +165,7 @@ impl<F: Figure> Controller<F> {
         }
     }
 
-    /// Whether it is told to jump, 0 or 1.
+    /// Whether a jump is commanded, 0 or 1.
     #[inline(always)]
     fn jump<T: Real>(&self, s: &Senses<T>) -> T {
         match self.arguments.input {
@@ -169,8 +175,8 @@ impl<F: Figure> Controller<F> {
     }
 }
 
-/// Worths of standing still, 0 to 1 each: 1/e where the mean square of the velocities of the first `parts` parts is that of `restless`,
-/// m^2/s^2.
+/// Rewards for standing still, 0 to 1 each. Each drops to 1/e when the mean square velocity of the first `parts` parts
+/// reaches its value of `restless`, m^2/s^2.
 #[inline(always)]
 pub(super) fn stillness<T: Real, const N: usize>(s: &Senses<T>, parts: usize, restless: [f64; N]) -> [T; N] {
     let mut speed2 = T::zero();
@@ -264,7 +270,7 @@ impl<F: Figure> Agent for Controller<F> {
         let thrown = T::or(T::zero().lt(memory[ALOFT]), T::lit(F::THROWN).lt(rises));
         memory[ALOFT] = T::masked(T::and(T::zero().lt(F::leap(s)), thrown), memory[ALOFT] + one);
         let jumped = T::lit(JUMPED / s.dt() - 0.5).lt(memory[ALOFT]);
-        // a jump that is told anew is waited for anew
+        // a new jump command starts a new wait
         let waits = memory[WAITS].max(one - memory[TOLD]);
         memory[WAITS] = T::select(jumped, T::zero(), jump * waits);
         let rose = memory[ROSE] * memory[TOLD];
@@ -315,12 +321,12 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("jump", 1.0, flies);
         let rose = clamp(s.memory(ROSE), 0.0, 1.0);
         terms.add("late", LATE, s.memory(WAITS) * stands * (one - rose * T::lit(RISEN)));
-        // told to go nowhere and not to jump
+        // commanded to stand, without a jump
         let rest = stands * (one - jump);
         let [fidgets, stirs] = stillness(s, F::PARTS.len(), RESTLESS);
         terms.add("still", STILL, rest * (fidgets + stirs));
         terms.add("height", -1.0, F::low(s));
-        // what an adversary does is no effort of the figure's
+        // the adversary's actions cost the figure no effort
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));
         if self.is_opposed() {
             let fallen = self.figure.terminated(s);
@@ -351,7 +357,7 @@ impl<F: Figure> Agent for Controller<F> {
     }
 }
 
-/// Mean velocity of the torso along x at this decision and the two before, m/s.
+/// Mean velocity of the torso along x over this decision and the two before, m/s.
 #[inline(always)]
 fn mean_velocity<T: Real>(s: &Senses<T>) -> T {
     (s.memory(0) + s.memory(1) + s.memory(2)) * T::lit(1.0 / 3.0)

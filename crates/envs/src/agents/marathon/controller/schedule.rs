@@ -1,36 +1,37 @@
-//! What a figure in a plane is told where nobody commands: the schedules of the original's experiments 001 to 004, and one
-//! for sticks, and to learn by.
+//! Schedules of commands for figures in a plane: those of the original's experiments 001 to 004, and one of any
+//! velocity for sticks and for training.
 //!
-//! A command holds for 40 to 239 decisions, each as likely; with `toggle`, for 100.
+//! A command holds for 40 to 239 decisions, uniformly distributed. With `toggle`, it holds for 100.
 
 use super::{FASTEST, Input};
 use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
-/// Decisions for which a command holds, at least and at most.
+/// Shortest and longest duration of a command, decisions.
 const HOLDS: [usize; 2] = [40, 239];
-/// Decisions of a toggle: 400 physics steps.
+/// Duration of a `toggle` command, decisions: 400 physics steps.
 const TOGGLE: usize = 100;
-/// Share of commands that are to jump, too.
+/// Fraction of commands with a jump.
 const JUMPS: f64 = 0.25;
-/// Of any velocity: share of the commands that are to rest, and share of those that are to jump, which takes practice.
+/// With `uniform`: fraction of commands to rest.
 const RESTS: f64 = 0.3;
+/// With `uniform`: fraction of the commands to rest that have a jump, which needs practice.
 const RESTING_JUMPS: f64 = 0.5;
 
-/// What a figure is told where nobody commands.
+/// How commands are drawn if no caller sets them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Schedule {
-    /// Experiment 004: whoever moves is told the same again in 40 % of the draws. All other draws: right in 40 %, left in 40 %,
-    /// stand in 20 %; a jump in 25 %.
+    /// Experiment 004. While a movement is commanded, 40 % of the draws repeat the command. All other draws: right in
+    /// 40 %, left in 40 %, stand in 20 %; a jump in 25 %.
     Repeats,
-    /// The same without telling anything again.
+    /// The same without repeated commands.
     Anew,
-    /// Experiment 002: from rest, to either side in 45 % each, rest again in 10 %. From a side, the same in 60 %, the other side
+    /// Experiment 002. From rest: each side in 45 %, rest in 10 %. From a side: the same side in 60 %, the other side
     /// in 20 %, rest in 20 %. No jumps.
     Thirds,
-    /// Experiment 001: from one side to the other, every 100 decisions. No jumps.
+    /// Experiment 001. The side alternates every 100 decisions. No jumps.
     Toggle,
-    /// Any velocity, each as likely, with a jump in 25 %; rest in 30 %, half of it with a jump.
+    /// Any velocity, uniformly distributed, with a jump in 25 %. Rest in 30 %, half of it with a jump.
     Uniform,
 }
 
@@ -46,7 +47,7 @@ impl Choice for Schedule {
 }
 
 impl Schedule {
-    /// Draws a command in place of the one before, at rest to begin with. Returns for how many decisions it holds.
+    /// Draws a command that replaces the one in `out`, which is at rest at first. Returns its duration in decisions.
     pub(super) fn draw(self, input: Input, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
         let before = out[0];
         let luck = random.uniform(0.0, 1.0);
@@ -91,7 +92,7 @@ mod tests {
     use super::*;
     use crate::episode_rng::EpisodeId;
 
-    /// Shares of commands: right, left, stand, jump, and the same as before of those after which something moved.
+    /// Fractions of commands: right, left, stand, jump, and repeats of a command that moved.
     fn shares(schedule: Schedule, input: Input) -> ([f64; 5], Vec<usize>) {
         let mut random = EpisodeRng::new(EpisodeId { seed: 1, agent: 2, episode: 3 });
         let mut out = vec![0.0; if input == Input::Discrete { 2 } else { 1 }];
@@ -120,16 +121,16 @@ mod tests {
     #[test]
     fn commands_come_as_often_as_in_the_original() {
         let ([right, left, stand, jump, same], holds) = shares(Schedule::Repeats, Input::Discrete);
-        // of what is drawn anew, a quarter jumps; rest is never told again, so that it is rarer
+        // a quarter of the new draws have a jump; rest never repeats, so it is rarer
         assert!(near(right, left) && stand < 0.2 && jump > 0.25, "{right} {left} {stand} {jump}");
-        // 40 %, and of the other draws those that find the same: 0.3 of those after a side, 0.1 with a jump, 0.05 after a jump alone
+        // 40 %, plus the new draws that happen to be equal: 0.3 after a side, 0.1 with a jump, 0.05 after a jump alone
         let found = (2.0 * 0.3 * 0.3 + 2.0 * 0.1 * 0.1 + 0.05 * 0.05) / 0.85;
         assert!(near(same, 0.4 + 0.6 * found), "{same}");
         assert_eq!((holds.iter().min(), holds.iter().max()), (Some(&40), Some(&239)));
         let ([right, left, stand, jump, _], _) = shares(Schedule::Anew, Input::Discrete);
         assert!(near(right, 0.4) && near(left, 0.4) && near(stand, 0.2) && near(jump, 0.25));
         let ([right, left, stand, jump, same], _) = shares(Schedule::Thirds, Input::Continuous);
-        // the stationary shares of the chain: stand = 0.2 moving + 0.1 stand
+        // stationary distribution of the chain: stand = 0.2 moving + 0.1 stand
         assert!(near(right, left) && near(stand, 2.0 / 11.0) && jump == 0.0 && near(same, 0.6), "{stand} {same}");
         let ([right, left, stand, ..], holds) = shares(Schedule::Toggle, Input::Discrete);
         assert!(near(right, 0.5) && near(left, 0.5) && stand == 0.0 && holds.iter().all(|hold| *hold == TOGGLE));

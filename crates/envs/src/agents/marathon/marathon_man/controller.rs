@@ -53,7 +53,7 @@ const AHEAD: usize = 4;
 const SKILL: Skills = Skills { slot: BEGUN + 1 };
 /// Slot that holds whether a fall ends the episode.
 const MORTAL: usize = SKILL.slot + SLOTS;
-/// Number of slots without those of [replayed falls](super::relive).
+/// Number of slots without those of [replayed falls](super::super::relive).
 const MEMORY: usize = MORTAL + 1;
 /// Fraction of the episodes that start within a skill.
 const SKILLED: f64 = 0.45;

@@ -1,17 +1,17 @@
-//! Arguments of figures that run over uneven ground.
+//! Arguments of figures that run on uneven ground.
 
 use super::course::Kind;
 use crate::agent::Share;
 use crate::agent::options::Choice;
 
-/// What a figure is rewarded for.
+/// Selects the reward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reward {
-    /// Speed and posture less effort.
+    /// Speed and posture minus effort.
     Full,
     /// Speed.
     Velocity,
-    /// The way, at the end.
+    /// Distance covered, at the end of the episode.
     Sparse,
 }
 
@@ -21,12 +21,12 @@ impl Choice for Reward {
         &[(Reward::Full, "full"), (Reward::Velocity, "velocity"), (Reward::Sparse, "sparse")];
 }
 
-/// What a fall does.
+/// Consequence of a fall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Falls {
-    /// It ends the episode.
+    /// The episode ends.
     End,
-    /// It hurts, and from then on neither posture nor effort counts.
+    /// A penalty. After it, neither posture nor effort counts.
     Hurt,
 }
 
@@ -35,14 +35,14 @@ impl Choice for Falls {
     const NAMED: &'static [(Self, &'static str)] = &[(Falls::End, "end"), (Falls::Hurt, "hurt")];
 }
 
-/// How difficult each course is.
+/// How the difficulty of each course is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Levels {
-    /// As difficult as the option says.
+    /// The option `difficulty`.
     Fixed,
-    /// Anything up to that.
+    /// Uniformly up to that.
     Random,
-    /// At first level, then harder after a long way and easier after a short one.
+    /// A level that starts at 0, rises after a long run and falls after a short one.
     Curriculum,
 }
 
@@ -52,12 +52,12 @@ impl Choice for Levels {
         &[(Levels::Fixed, "fixed"), (Levels::Random, "random"), (Levels::Curriculum, "curriculum")];
 }
 
-/// What an adversary earns.
+/// Reward of the adversary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Earns {
-    /// What the runner loses.
+    /// The runner's reward with the opposite sign.
     Inverse,
-    /// What a reference runner earns more on the same ground.
+    /// How much more a reference runner earns on the same ground.
     Regret,
 }
 
@@ -67,24 +67,24 @@ impl Choice for Earns {
 }
 
 crate::options! {
-    /// Arguments of a figure that runs over uneven ground.
+    /// Arguments of a figure that runs on uneven ground.
     pub struct TerrainArguments {
-        /// What the ground is made of: `flat`, `slopes`, `steps`, `stairs`, `gaps`, `rubble`, `boxes`, `mixed` of these, the
-        /// original's `meters`, made by hand: `bumps`, `blocks`, or built by an `adversary` that learns, too.
+        /// Kind of ground: `flat`, `slopes`, `steps`, `stairs`, `gaps`, `rubble`, `boxes`, `mixed` (all of these), the
+        /// original's `meters`, its handmade `bumps` and `blocks`, or `adversary` (built by a second role that learns).
         course: Kind = Kind::Mixed,
-        /// How difficult the most difficult courses are, from 0 to 1.
+        /// Difficulty of the hardest courses (0 to 1).
         difficulty: Share = Share(0.5),
-        /// How difficult each course is: `fixed`, `random` up to the difficulty, or `curriculum`: 5 % harder after 16 m, 5 %
-        /// easier after less than 8 m.
+        /// Difficulty of each course: `fixed`, `random` up to `difficulty`, or `curriculum` (5 % harder after 16 m, 5 %
+        /// easier after less than 8 m).
         levels: Levels = Levels::Fixed,
-        /// Whether it sees the ground ahead.
+        /// Whether the figure observes the ground ahead.
         heights: bool = true,
-        /// What a fall does: `end` the episode, or `hurt`.
+        /// Consequence of a fall: `end` the episode, or `hurt` (a penalty).
         falls: Falls = Falls::End,
-        /// What it is rewarded for: `full`, `velocity`, or `sparse`.
+        /// Reward: `full`, `velocity` or `sparse`.
         reward: Reward = Reward::Full,
-        /// What an adversary earns: the `inverse` of the runner's reward, or its `regret`: what a reference runner, who learns, too,
-        /// earns more on the same ground.
+        /// Reward of the adversary: `inverse` of the runner's reward, or `regret`, how much more a reference runner
+        /// earns on the same ground. The reference learns too.
         builder: Earns = Earns::Inverse,
     }
 }

@@ -1,7 +1,8 @@
-//! The adversary: a second role that builds the ground ahead of the runner, a meter at a time, and earns what the runner loses.
+//! The adversary: a second role that builds the ground ahead of the runner meter by meter, and earns the runner's
+//! reward with the opposite sign.
 //!
-//! It decides whenever the runner reaches a new meter, and its action is one of the original's 21 steps: the next meter is up to
-//! 1 m times the difficulty higher or lower than the last.
+//! It acts whenever the runner reaches a new meter. Its action is one of the original's 21 steps: the next meter is up
+//! to 1 m times the difficulty higher or lower than the last one.
 
 use marathon_physics::lanes::Real;
 
@@ -14,18 +15,21 @@ use crate::agent::{Obs, RoleFacts, Senses, Site, names};
 /// Names of the roles.
 pub(super) const RUNNER: &str = "runner";
 pub(super) const BUILDER: &str = "builder";
-/// The builder's actuator, part of the observation, and term of the reward.
+/// The builder's actuator.
 pub(super) const ACTION: &str = "ground";
+/// The builder's group of the observation.
 pub(super) const SEEN: &str = "site";
+/// The builder's term of the reward.
 pub(super) const EARNED: &str = "inverse";
-/// Steps up, and as many down.
+/// Number of possible heights of a step up, and of a step down.
 const STEPS: f64 = 10.0;
-/// How many points of the ground the builder sees, and how far one is from the next and the first from the torso, m.
+/// Number of ground points that the builder observes.
 const POINTS_SEEN: usize = 12;
+/// Distance between these points, and of the first one from the torso, m.
 const SPACING: f64 = 0.5;
 
-/// The roles: the figure with its own actions, observations and terms; the builder, whose action is the last of the others; and,
-/// where it earns `regret`, a reference, which has the rest of them.
+/// The roles. The figure has its own actions, observations and terms. The builder's action is the last of `others`.
+/// With `regret`, a reference has the rest of them.
 pub(super) fn roles(
     [actions, others]: [&[String]; 2],
     observations: &[&str],
@@ -55,9 +59,12 @@ pub(super) fn roles(
     [runner, builder].into_iter().chain(regret.then_some(reference)).collect()
 }
 
-/// What the builder sees: the ground from the torso to the end of what is built, as seen from the ground below the torso; the
-/// torso's height above it, velocity, forward axis; the last step, m; seconds since the last meter. If it earns regret, whether
-/// the reference runs, too.
+/// Writes the builder's observation:
+///
+/// - heights of the ground ahead of the torso, relative to the ground below it, m
+/// - height above the ground, velocity and forward axis of the torso
+/// - the last step, m, and the time since the last meter, s
+/// - with regret, whether the reference runs
 #[inline(always)]
 pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, regrets: bool, out: &mut Obs<T>) {
     let ([x, y, z], [vx, _, vz], [fx, _, fz]) =
@@ -75,12 +82,12 @@ pub(super) fn observe<F: Runner, T: Real>(s: &Senses<T>, regrets: bool, out: &mu
     }
 }
 
-/// Builds the next meter, and goes on level behind it. `first`: the course's first variable in the memory.
+/// Builds the next meter and continues level after it. `first` is the index of the course's first slot.
 pub(super) fn build(site: &mut Site, first: usize) {
     let memory = &mut site.memory[first..];
     let difficulty = memory[DIFFICULTY];
     let wanted = site.action.last().copied().unwrap_or(0.0);
-    // the runner reaches its next meter before it sees what is not built yet
+    // the runner reaches its next meter before it observes ground that is not built yet
     let start = ((LEVEL_TO + memory[BUILT] - FROM) / CELL).round() as usize;
     let per_meter = (1.0 / CELL).round() as usize;
     for ground in site.grounds.iter_mut().take(1) {
@@ -104,7 +111,7 @@ mod tests {
     use super::super::MEMORY;
     use super::*;
 
-    /// Variables of the figure.
+    /// Number of the figure's own slots.
     const FIRST: usize = 3;
 
     fn after(actions: &[f64], difficulty: f64) -> (Vec<f64>, Vec<Vec<f32>>) {

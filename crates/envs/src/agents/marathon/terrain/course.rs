@@ -1,35 +1,38 @@
-//! Courses: profiles of the ground along x, the same at every y. A figure in space has a field, made of a course.
+//! Courses: height profiles of the ground along x, constant along y. For a figure in space, a course is extended to a
+//! height field.
 //!
-//! A course is level for some meters around the start. What follows comes in pieces, each with chance of its own, until the end.
-//! Everything that makes a piece hard grows with the difficulty, 0 to 1: at 0, every course is level.
+//! A course is level near the start and then consists of random pieces. Everything that makes a piece hard scales with
+//! the difficulty, 0 to 1. At 0, every course is level.
 
 use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
 /// Distance between the points of a course, m.
 pub const CELL: f64 = 0.1;
-/// Where it begins, m.
+/// Start of a course, m.
 pub const FROM: f64 = -6.0;
-/// Where it ends, m.
+/// End of a course, m.
 pub const TO: f64 = 106.0;
 /// Points of a course.
 pub const POINTS: usize = ((TO - FROM) / CELL) as usize + 1;
-/// Where the level ground of the start ends, m. The original's first six meters are level.
+/// End of the level ground around the start, m. The original's first six meters are level.
 pub const LEVEL_TO: f64 = 5.0;
-/// Farthest from the start's height that the ground gets, but for gaps and single obstacles, m.
+/// Largest height difference from the start, without gaps and single obstacles, m.
 pub const FARTHEST: f64 = 4.0;
 /// Depth of a gap, m.
 const DEPTH: f64 = 0.6;
 /// Distance between the rows of a field, m.
 pub const ROW: f64 = 0.5;
-/// How oblique the pieces of a field are at most: m along x for each m to the side. The way on which a field becomes oblique, m.
+/// Largest obliqueness of the pieces of a field: m along x per m to the side.
 const OBLIQUE: f64 = 0.3;
+/// Distance over which a field becomes oblique, m.
 const BECOMES: f64 = 8.0;
-/// Greatest height of a field's bumps, m, and points along x from one to the next.
+/// Largest height of a field's bumps, m.
 const UNEVEN: f64 = 0.08;
+/// Points along x from one bump to the next.
 const KNOT: usize = 5;
 
-/// What a course is made of.
+/// Kind of ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Level ground.
@@ -40,19 +43,20 @@ pub enum Kind {
     Steps,
     /// Flights of three to eight stairs up to 16 cm high, up and down again.
     Stairs,
-    /// Gaps of up to 90 cm.
+    /// Gaps up to 90 cm wide.
     Gaps,
-    /// Fields of stones of up to 12 cm, one every 20 cm.
+    /// Stones up to 12 cm high, one every 20 cm.
     Rubble,
-    /// Boxes across the way, up to 35 cm high.
+    /// Boxes across the track, up to 35 cm high.
     Boxes,
     /// Pieces of all those above.
     Mixed,
-    /// The original's: each meter is up to 1 m higher or lower than the one before, by one of 21 steps of 0.1 m.
+    /// The original's ground: each meter is up to 1 m higher or lower than the one before, in steps of 0.1 m (21
+    /// choices).
     Meters,
-    /// Made by hand for experiment 001: bumps of up to 77 cm.
+    /// Handmade for experiment 001: bumps up to 77 cm high.
     Bumps,
-    /// Made by hand for experiment 002: blocks.
+    /// Handmade for experiment 002: blocks.
     Blocks,
     /// Built by an adversary while the figure runs.
     Adversary,
@@ -77,13 +81,13 @@ impl Choice for Kind {
     ];
 }
 
-/// Kinds of the pieces of a mixed course.
+/// Kinds of the pieces in a mixed course.
 const MIX: [Kind; 6] = [Kind::Slopes, Kind::Steps, Kind::Stairs, Kind::Gaps, Kind::Rubble, Kind::Boxes];
-/// Lengths of the bumps, their heights, and the ways to the next ones, m. The original's terrain is a sculpture of which no
-/// numbers are known but the greatest height.
+/// Length, height and distance to the next bump, m. The original's terrain is a sculpture, of which only the largest
+/// height is known.
 const BUMPS: [[f64; 3]; 6] =
     [[2.0, 0.15, 1.0], [3.0, 0.4, 0.0], [1.5, 0.2, 2.0], [4.0, 0.77, 1.0], [1.0, 0.1, 0.0], [1.0, 0.15, 1.5]];
-/// The same of blocks.
+/// The same for blocks.
 const BLOCKS: [[f64; 3]; 5] = [[0.6, 0.1, 3.0], [1.2, 0.2, 2.0], [0.4, 0.3, 4.0], [2.0, 0.25, 1.5], [0.8, 0.15, 2.5]];
 
 impl Kind {
@@ -100,8 +104,8 @@ impl Kind {
         course.points
     }
 
-    /// Elevations of a field for a figure in space, m above the start, row by row, the one with the smallest y first. Two rows
-    /// are a course that is the same at every y. More rows of random pieces are oblique, and uneven to all sides.
+    /// Heights of a field for a figure in space, m above the start, in rows of increasing y. A field of two rows is a
+    /// course, constant along y. With more rows, random pieces are oblique and have bumps that differ along y.
     pub fn field(self, difficulty: f64, rows: usize, random: &mut EpisodeRng) -> Vec<f32> {
         let course = self.elevations(difficulty, random);
         if rows == 2 || !(MIX.contains(&self) || self == Kind::Mixed) {
@@ -117,7 +121,7 @@ impl Kind {
             let aside = oblique * ROW * (row as f64 - 0.5 * (rows - 1) as f64) / CELL;
             for point in 0..POINTS {
                 let from_start = point as f64 - first;
-                // none at the start, all of it a few meters on
+                // the obliqueness grows from 0 at the start
                 let share = (from_start * CELL / BECOMES).clamp(0.0, 1.0);
                 let (knot, part) = (point / KNOT, (point % KNOT) as f64 / KNOT as f64);
                 let bump = (1.0 - part) * knots[knot] + part * knots[knot + 1];
@@ -129,24 +133,24 @@ impl Kind {
     }
 }
 
-/// Elevation between the points of a course; beyond its ends, that of the end.
+/// Height between two points of a course. Outside, the height of the nearest end.
 fn between(course: &[f64], at: f64) -> f64 {
     let at = at.clamp(0.0, (course.len() - 1) as f64);
     let (i, part) = ((at as usize).min(course.len() - 2), at - libm::floor(at));
     if at as usize > i { course[i + 1] } else { (1.0 - part) * course[i] + part * course[i + 1] }
 }
 
-/// A course in the making.
+/// A course under construction.
 struct Course<'a> {
     points: Vec<f64>,
-    /// Height where it ends as yet.
+    /// Height at the present end.
     height: f64,
     difficulty: f64,
     random: &'a mut EpisodeRng,
 }
 
 impl Course<'_> {
-    /// Adds a piece, the first of which has number 0.
+    /// Adds a piece. `piece` counts from 0.
     fn add(&mut self, kind: Kind, piece: usize) {
         let hard = self.difficulty;
         match kind {
@@ -216,13 +220,13 @@ impl Course<'_> {
         self.slope(length, 0.0);
     }
 
-    /// Level ground of any length in a range.
+    /// Level ground of a random length in a range.
     fn pause(&mut self, least: f64, most: f64) {
         let length = self.random.uniform(least, most);
         self.level(length);
     }
 
-    /// A slope, at least a point long.
+    /// A slope at least one point long.
     fn slope(&mut self, length: f64, rise: f64) {
         let points = (length / CELL).round();
         for i in 1..=points as usize {
@@ -231,14 +235,14 @@ impl Course<'_> {
         self.height += if points > 0.0 { rise } else { 0.0 };
     }
 
-    /// Ground that is higher or lower than what comes before and after it.
+    /// Ground that is higher or lower than its surroundings.
     fn beside(&mut self, length: f64, height: f64) {
         self.height += height;
         self.level(length);
         self.height -= height;
     }
 
-    /// A smooth bump: u^2 (1 - u)^2, whose slope is 0 where it begins and ends.
+    /// A smooth bump, u^2 (1 - u)^2. Its slope is 0 at both ends.
     fn bump(&mut self, length: f64, height: f64) {
         let points = (length / CELL).round();
         for i in 1..=points as usize {
@@ -248,7 +252,8 @@ impl Course<'_> {
         }
     }
 
-    /// A number whose absolute value is in a range, with either sign; far from the start's height, with the one that leads back.
+    /// A random number with an absolute value in a range. The sign is random, or leads back if the height is near its
+    /// limit.
     fn signed(&mut self, least: f64, most: f64) -> f64 {
         let size = self.random.uniform(least, most);
         let up = match self.height {
@@ -265,7 +270,7 @@ mod tests {
     use super::*;
     use crate::episode_rng::EpisodeId;
 
-    /// Kinds that begin as level ground, whatever becomes of it.
+    /// Kinds whose courses are level at first.
     const LEVEL: [Kind; 2] = [Kind::Flat, Kind::Adversary];
 
     fn elevations(kind: Kind, difficulty: f64, episode: u64) -> Vec<f64> {
@@ -287,7 +292,7 @@ mod tests {
         }
     }
 
-    /// A field is level at the start, differs to the sides where its pieces are random, and is a course where they are not.
+    /// A field is level at the start. It varies along y if its pieces are random, otherwise not.
     #[test]
     fn fields_are_uneven_to_all_sides() {
         const ROWS: usize = 17;
@@ -324,7 +329,7 @@ mod tests {
         for (kind, name) in Kind::NAMED.iter().filter(|(kind, _)| !LEVEL.contains(kind)) {
             let [none, some, all] = [0.0, 0.5, 1.0].map(|difficulty| roughness(*kind, difficulty));
             assert_eq!(none, 0.0, "{name}");
-            // a gap is as deep at any width
+            // the depth of a gap does not depend on its width
             let least = match kind {
                 Kind::Gaps => 0.9,
                 Kind::Mixed => 1.2,

@@ -1,4 +1,4 @@
-//! What the runners differ in.
+//! Properties in which the runners differ.
 
 use marathon_physics::lanes::Real;
 
@@ -8,61 +8,61 @@ use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
 use crate::agent::{Agent, Obs, Part, ResetNoise, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
-/// Price of the joints driven at their limit: 0.8 for each.
+/// Weight of the motors driven at their joint's limit: 0.8 for each.
 const JOINTS_AT_LIMIT: f64 = -4.0;
 
-/// What all observe of their bodies.
+/// Groups of the observation of the body that all runners share.
 const BODY: [&str; 6] = ["velocity", "forward", "up", "touch", "joint_rotations", "joint_velocities"];
 
-/// A figure that runs over uneven ground.
+/// A figure that runs on uneven ground.
 pub trait Runner: Agent + Clone + Default {
-    /// Registry name of its task on courses.
+    /// Registry name of the task on courses.
     const ID: &'static str;
     /// One line for listings.
     const SUMMARY: &'static str;
     /// The torso.
     const TORSO: Part;
-    /// What the ground ahead is seen from.
+    /// The part from which the ground ahead is observed.
     const EYES: Part;
-    /// Its feet, in the order in which it observes their heights.
+    /// The feet, in the order in which their heights are observed.
     const SOLES: &'static [Part];
-    /// Price of the effort.
+    /// Weight of the effort.
     const EFFORT: f64 = 0.0;
-    /// Worth of a fall that ends the episode.
+    /// Reward of a fall that ends the episode.
     const FALL: f64 = -1.0;
-    /// Terms of its reward `full`.
+    /// Terms of the reward `full`.
     const TERMS: &'static [&'static str] = &["velocity", "uprightness", "effort", "joints_at_limit"];
-    /// Its own variables, the first of its memory.
+    /// Number of the figure's own memory slots, which come first.
     const MEMORY: usize = 0;
-    /// Whether it moves in space: then it sees the ground to its sides, too, which differs there.
+    /// Whether the figure moves in space. It then also observes the ground to its sides.
     const IN_SPACE: bool = false;
-    /// What it observes of its body, by name.
+    /// Groups of the observation of the body.
     const BODY: &'static [&'static str];
-    /// How many motors it has; those of other roles are behind them.
+    /// Number of motors. Those of other roles follow.
     const MOTORS: usize;
-    /// One of its joints: the adversary's motor needs one that it does not move.
+    /// A joint for the adversary's motor, which exerts no force on it.
     const JOINT: &'static str;
-    /// Half the width of its courses, m: tracks of figures in a plane that are beside each other do not overlap in a picture.
+    /// Half the width of the courses, m. Neighboring tracks of figures in a plane must not overlap in a picture.
     const HALF_WIDTH: f64;
-    /// Writes what it observes of its body.
+    /// Writes the observation of the body.
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
 
-    /// Where it starts.
+    /// Sets the start state.
     fn place(&self, start: &mut Start) {
         start.add_noise(ResetNoise::MARATHON);
     }
 
-    /// Points its own variables along the course when an episode begins.
+    /// Points the figure's own variables along the course at the start of an episode.
     #[inline(always)]
     fn aim<T: Real>(_: &mut [T]) {}
 
-    /// What it is told where nobody commands, and for how many decisions.
+    /// Draws a command if no caller sets one. Returns its duration in decisions.
     fn tell(&self, _: &mut EpisodeRng, _: usize, _: &mut [f64]) -> usize {
         usize::MAX
     }
 
-    /// Adds its terms of the reward `full`. `whole`: 1, or 0 after a fall. `hard`: its effort, and its penalty for motors at
-    /// their limits.
+    /// Adds the figure's terms of the reward `full`. `whole` is 1, or 0 after a fall. `hard` holds the effort and the
+    /// penalty for motors at their limits.
     #[inline(always)]
     fn add_terms<T: Real>(s: &Senses<T>, whole: T, hard: [T; 2], terms: &mut Terms<T>) {
         terms.add("velocity", 1.0, s.velocity(Self::TORSO));
@@ -74,7 +74,7 @@ pub trait Runner: Agent + Clone + Default {
 
 impl Runner for HopperV0 {
     const ID: &'static str = "TerrainHopper-v0";
-    const SUMMARY: &'static str = "one leg in a plane: run over slopes, steps, gaps and boxes that it sees coming";
+    const SUMMARY: &'static str = "one leg in a plane: run over slopes, steps, gaps and boxes that it sees ahead";
     const TORSO: Part = hopper::TORSO;
     const EYES: Part = FOOT;
     const SOLES: &'static [Part] = &[FOOT];
@@ -92,7 +92,7 @@ impl Runner for HopperV0 {
 
 impl Runner for Walker2dV0 {
     const ID: &'static str = "TerrainWalker2d-v0";
-    const SUMMARY: &'static str = "two legs in a plane: run over slopes, steps, gaps and boxes that it sees coming";
+    const SUMMARY: &'static str = "two legs in a plane: run over slopes, steps, gaps and boxes that it sees ahead";
     const TORSO: Part = walker2d::TORSO;
     const EYES: Part = walker2d::TORSO;
     const SOLES: &'static [Part] = &[LEFT_FOOT, RIGHT_FOOT];
@@ -110,7 +110,7 @@ impl Runner for Walker2dV0 {
 
 impl Runner for AntV0 {
     const ID: &'static str = "TerrainAnt-v0";
-    const SUMMARY: &'static str = "four legs: run over slopes, steps, gaps and boxes that it sees coming";
+    const SUMMARY: &'static str = "four legs: run over slopes, steps, gaps and boxes that it sees ahead";
     const TORSO: Part = ant::TORSO;
     const EYES: Part = ant::TORSO;
     const SOLES: &'static [Part] = &ant::SOLES;
@@ -118,7 +118,7 @@ impl Runner for AntV0 {
     const BODY: &'static [&'static str] = &BODY;
     const MOTORS: usize = 8;
     const JOINT: &'static str = "hip_1";
-    // it may stray from its line
+    // it may leave its line
     const HALF_WIDTH: f64 = 8.0;
     const IN_SPACE: bool = true;
 
