@@ -1,4 +1,4 @@
-//! An agent's names resolved to indices of its model, once, with errors that name what does not fit.
+//! Resolves an agent's names to indices of its model, once per environment. Errors name what does not match.
 
 use marathon_physics::hint::among;
 use marathon_physics::lanes::Real;
@@ -11,14 +11,14 @@ use crate::error::EnvError;
 /// Name of the keyframe that holds the start pose and velocity.
 const SPAWN: &str = "spawn";
 
-/// What is resolved in double precision, before lanes come in.
+/// The parts of the resolution that do not depend on the lane type.
 pub(crate) struct Blueprint {
     pub model: Model,
     /// Start pose, length `nq`.
     pub spawn: Vec<f64>,
     /// Start velocity, length `nv`.
     pub spawn_velocity: Vec<f64>,
-    /// Actuated joints that the reset makes noise on.
+    /// Actuated joints that the reset adds noise to.
     pub joints: Vec<SpawnJoint>,
     /// Degrees of freedom that carry the root's linear velocity.
     pub root_dofs: Vec<usize>,
@@ -31,7 +31,7 @@ pub(crate) struct SpawnJoint {
     pub range: Option<[f64; 2]>,
 }
 
-/// A body part: its geom, the body it belongs to, and the axes of that body that pointed forward and up at the start.
+/// A body part: its geom, the geom's body, and the axes of that body that point forward and up in the spawn pose.
 pub(crate) struct PartFrame<C> {
     pub geom: usize,
     pub body: usize,
@@ -47,12 +47,12 @@ enum PairJoint<C> {
 
 /// A body with actuated joints, relative to its parent.
 pub(crate) struct Pair<C> {
-    /// Orientation in the parent at rest, unless it is the parent's own.
+    /// Orientation in the parent at rest. `None` if it equals the parent's.
     rest: Option<[C; 4]>,
     joints: Vec<PairJoint<C>>,
 }
 
-/// What a motor drives.
+/// The joint that a motor drives.
 pub(crate) struct Motor<C> {
     pub dof: usize,
     pub velocity_scale: C,
@@ -61,25 +61,25 @@ pub(crate) struct Motor<C> {
 /// Limit on the physics steps per decision.
 const MOST_FRAME_SKIP: usize = 1000;
 
-/// The indices that [`Senses`](crate::Senses) work with.
+/// The indices that [`Senses`](crate::Senses) uses.
 pub(crate) struct Bindings<T: Real> {
     pub parts: Vec<PartFrame<T::Scalar>>,
     pub bodies: Vec<usize>,
     /// Geoms with touch sensors.
     pub touch: Vec<usize>,
-    /// What is measured after every decision: what the facts have the agent see, and the sites with touch sensors.
+    /// Quantities to compute after every decision: those of the agent's view, and the sites with touch sensors.
     pub measure: MeasurePlan,
     /// Geoms that may touch the ground.
     pub feet: Vec<usize>,
     /// Geoms that must not touch the ground.
     pub not_feet: Vec<usize>,
-    /// Planes and level height fields of the world that can be touched, planes first.
+    /// Planes and level height fields of the world that can be touched. Planes come first.
     pub grounds: Vec<usize>,
     pub pairs: Vec<Pair<T::Scalar>>,
     pub motors: Vec<Motor<T::Scalar>>,
-    /// Moving bodies with mass, and their share of the whole.
+    /// Moving bodies with mass, and their fraction of the total mass.
     pub mass_shares: Vec<(usize, T::Scalar)>,
-    /// Coordinates of the root that move the agent along +x, and how much.
+    /// Coordinates of the root that move the agent along +x, and their factors.
     pub along_x: Vec<(usize, T::Scalar)>,
 }
 
@@ -170,7 +170,7 @@ impl<T: Real> Bindings<T> {
         for name in &facts.parts {
             let geom = geom("body part", name)?;
             let body = model.geoms[geom].body;
-            // a world axis in body coordinates: that component of each body axis
+            // a world axis in body coordinates is that component of each body axis
             let local = |world: usize| [0, 1, 2].map(|i| T::scalar(axes[body][i][world]));
             parts.push(PartFrame { geom, body, forward: local(0), up: local(2) });
         }
@@ -223,7 +223,7 @@ impl<T: Real> Bindings<T> {
     }
 }
 
-/// Root body of the first moving tree: the agent itself, if there are props beside it.
+/// Root body of the first moving tree. If the model has props, this is the agent.
 fn first_root(model: &Model) -> usize {
     model.joints.first().map_or(0, |j| model.bodies[j.body].root_id)
 }
@@ -240,7 +240,7 @@ fn spawn_axes(facts: &Facts, blueprint: &Blueprint) -> Result<Vec<[[f64; 3]; 3]>
     Ok((0..blueprint.model.bodies.len()).map(|b| readings.body_axes(b)).collect())
 }
 
-/// How agents are simulated.
+/// Options of all simulations of agents.
 pub(crate) fn sim_options() -> SimOptions {
     SimOptions::default()
 }

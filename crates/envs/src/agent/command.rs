@@ -16,17 +16,17 @@ pub struct CommandRange {
 }
 
 impl CommandRange {
-    /// A number of this name within a range of a unit.
+    /// A number with this name, range and unit.
     pub fn new(name: &str, range: RangeInclusive<f64>, unit: &str) -> Self {
         CommandRange { name: name.into(), low: *range.start(), high: *range.end(), unit: unit.into() }
     }
 
-    /// Whether it is a speed, which a stick pushed ahead commands.
+    /// Whether it is a speed, which a stick controls.
     pub fn is_speed(&self) -> bool {
         self.unit == "m/s"
     }
 
-    /// Whether it is a turn.
+    /// Whether it is a turn rate.
     pub fn is_turn(&self) -> bool {
         self.unit == "rad/s"
     }
@@ -49,7 +49,7 @@ impl CommandRange {
         }
     }
 
-    /// The value nearest to zero: what an agent is told before anybody tells it anything.
+    /// The value nearest to zero. It is the command before any is set.
     pub fn rest(&self) -> f64 {
         0.0_f64.max(self.low).min(self.high)
     }

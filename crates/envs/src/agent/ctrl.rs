@@ -1,23 +1,24 @@
-//! How an agent turns actions into controls.
+//! The conversion of actions into controls.
 
 use marathon_physics::lanes::Real;
 
 use super::reference::{Frame, Reference};
 
-/// Where an agent turns its action into the controls of its actuators, see [`Agent::ctrl`](crate::Agent::ctrl).
+/// Inputs and outputs of [`Agent::ctrl`](crate::Agent::ctrl), which converts an action into the controls of the
+/// actuators.
 pub struct Ctrl<'a, T: Real> {
-    /// The action, as [`Facts::controls`](crate::Facts::controls) says; a number per actuator.
+    /// The action, one number per actuator, see [`Facts::controls`](crate::Facts::controls).
     pub action: &'a [T],
-    /// Control of each actuator until the next decision, to be written: a motor's share of its strength, the target of a
-    /// position servo.
+    /// Output: the control of each actuator until the next decision. For a motor, it is a fraction of the strength; for
+    /// a position servo, the target.
     pub ctrl: &'a mut [T],
-    /// The agent's own variables, see [`Agent::remember`](crate::Agent::remember).
+    /// The agent's memory, see [`Agent::remember`](crate::Agent::remember).
     pub memory: &'a mut [T],
     /// The command that the agent observed.
     pub command: &'a [T],
-    /// Configuration, MuJoCo's layout.
+    /// Configuration in MuJoCo's layout.
     pub qpos: &'a [T],
-    /// Velocity, MuJoCo's layout.
+    /// Velocity in MuJoCo's layout.
     pub qvel: &'a [T],
     /// Seconds between decisions.
     pub dt: f64,
@@ -25,11 +26,11 @@ pub struct Ctrl<'a, T: Real> {
 }
 
 impl<T: Real> Ctrl<'_, T> {
-    /// What the clip that the agent follows shows `ahead` decisions from now, at most
-    /// [`MOST_AHEAD`](super::reference::MOST_AHEAD); the decision to be made leads to the next.
+    /// The frame of the agent's clip `ahead` decisions from now, at most [`MOST_AHEAD`](super::reference::MOST_AHEAD).
+    /// The present decision leads to frame 1.
     ///
     /// # Panics
-    /// If its facts name no clip, or it is asked for more.
+    /// If the facts name no clip, or `ahead` is too large.
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
         self.reference.expect("the facts name clips").frame(self.memory, ahead)

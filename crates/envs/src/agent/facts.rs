@@ -1,4 +1,4 @@
-//! Constant facts of an agent: its model, its names, its pace.
+//! Constant facts of an agent: model, names and timing.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -8,38 +8,38 @@ use marathon_motion::Clip;
 
 use super::{CommandRange, RoleFacts};
 
-/// Name of the metric that is the distance along +x.
+/// Name of the metric for the distance along +x.
 pub(crate) const FORWARD: &str = "forward";
 
-/// Constant facts of an agent. What is left to [`Facts::default`] is as the suite's own agents have it.
+/// Constant facts of an agent. [`Facts::default`] holds the values of most of the suite's agents.
 #[derive(Clone, Debug)]
 pub struct Facts {
     /// Registry name with a version, such as `Hopper-v0`.
     pub id: String,
     /// One line for listings.
     pub summary: String,
-    /// The model. A keyframe named `spawn`, if there is one, is the pose and the velocity with which episodes start.
+    /// The model. If it has a keyframe named `spawn`, episodes start from its pose and velocity.
     pub model: ModelSource,
     /// Physics steps per decision.
     pub frame_skip: usize,
     /// Decisions after which an episode is truncated.
     pub max_episode_steps: usize,
-    /// Length of the observation; `None`: however long it turns out to be.
+    /// Length of the observation. `None` accepts any length.
     pub observation: Option<usize>,
-    /// Names of the model's actuators in their order: the action. Empty: whatever actuators the model has.
+    /// Names of the model's actuators, in order; they are the action. If empty, all actuators of the model are used.
     pub actions: Vec<String>,
-    /// What an action is.
+    /// Meaning and bounds of an action.
     pub controls: Controls,
-    /// Names of the reward's terms in the order in which `step_reward` adds them.
+    /// Names of the reward's terms, in the order in which `step_reward` adds them.
     pub reward_terms: Vec<String>,
-    /// Names of the numbers that [`Agent::info`](crate::Agent::info) reports.
+    /// Names of the numbers of [`Agent::info`](crate::Agent::info).
     pub info: Vec<String>,
-    /// Numbers that tell, decision by decision, how well the task is done: names out of `info`, and `forward`, the distance
-    /// moved along +x in the decision, m. Reports of a training may show their means.
+    /// Numbers per decision that measure success: names of `info`, and `forward`, the distance along +x in the
+    /// decision, m. Training reports may show their means.
     pub metrics: Vec<String>,
-    /// Geoms that the agent speaks of, see [`Part`].
+    /// Geoms that the agent uses, see [`Part`].
     pub parts: Vec<String>,
-    /// Bodies that the agent speaks of, see [`Body`].
+    /// Bodies that the agent uses, see [`Body`].
     pub bodies: Vec<String>,
     /// Geoms that may touch the ground.
     pub feet: Vec<String>,
@@ -47,21 +47,21 @@ pub struct Facts {
     pub touch: Vec<String>,
     /// Sites with a touch sensor, see [`Senses::touch_force`](crate::Senses::touch_force).
     pub touch_sites: Vec<String>,
-    /// What the agent can be told to do: the numbers of its command, see [`Agent::command`](crate::Agent::command).
+    /// The numbers of the command, see [`Agent::command`](crate::Agent::command).
     pub command: Vec<CommandRange>,
-    /// Who decides in the task, if more than one does; empty: one who has it all.
+    /// The roles, if there are several. Empty: one role has all observations, actions and rewards.
     pub roles: Vec<RoleFacts>,
-    /// Motions of the model's joints, one of which an agent follows. If there are any, the first
-    /// [`Following::SLOTS`](crate::Following::SLOTS) of its memory tell where it is in which.
+    /// Motion clips of the model's joints. Each agent follows one of them. With clips, the first
+    /// [`Following::SLOTS`](crate::Following::SLOTS) of the memory hold the clip and the position in it.
     pub clips: Vec<Arc<Clip>>,
-    /// Whether agents go on with their clip ([`Senses::follow`](crate::Senses::follow)). Otherwise clips only tell where
-    /// episodes start and what demonstrations show.
+    /// Whether the clips advance with the episode ([`Senses::follow`](crate::Senses::follow)). If not, they only supply
+    /// start states and demonstrations.
     pub follows_clips: bool,
-    /// Number of lane variables that the agent keeps from decision to decision, see [`Agent::remember`](crate::Agent::remember).
+    /// Size of the agent's memory per lane, see [`Agent::remember`](crate::Agent::remember).
     pub memory: usize,
-    /// What it sees of the physics.
+    /// Quantities of the physics that the agent reads.
     pub view: View,
-    /// Reward of a decision in which the agent failed, in place of all other terms; `None`: the terms count on.
+    /// Reward of a decision that ends in failure. It replaces all terms. With `None`, the terms count.
     pub termination_reward: Option<f64>,
 }
 
@@ -95,12 +95,12 @@ impl Default for Facts {
     }
 }
 
-/// A list of names, for [`Facts`].
+/// A list of names for [`Facts`].
 pub fn names<S: AsRef<str>>(list: impl IntoIterator<Item = S>) -> Vec<String> {
     list.into_iter().map(|name| name.as_ref().to_string()).collect()
 }
 
-/// Where an agent's model comes from.
+/// Source of an agent's model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ModelSource {
     /// MJCF text that refers to no other files.
@@ -110,7 +110,7 @@ pub enum ModelSource {
 }
 
 impl ModelSource {
-    /// The text, unless it is in a file.
+    /// The text, if it is not in a file.
     pub fn text(&self) -> Option<&str> {
         match self {
             ModelSource::Text(text) => Some(text),
@@ -130,35 +130,35 @@ impl From<String> for ModelSource {
     }
 }
 
-/// What an action is, and what its bounds are ([`Spec::action_low`](crate::Spec::action_low)).
+/// Meaning of an action, and its bounds ([`Spec::action_low`](crate::Spec::action_low)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Controls {
-    /// A number in [-1, 1] per actuator, clipped to it before anything else sees it: the suite's own agents.
+    /// A number in [-1, 1] per actuator. It is clipped before anything reads it. The suite's own agents use this.
     #[default]
     Nominal,
-    /// The actuator's control in its own units, within its `ctrlrange`. It is not clipped: the agent sees and pays for
-    /// what was asked for, while the physics clamps what acts. So in Gymnasium and dm_control.
+    /// The actuator's control in its own units, within its `ctrlrange`, as in Gymnasium and dm_control. It is not
+    /// clipped: observation and reward use the given value, while the physics clamps it.
     Raw,
 }
 
-/// What an agent sees of the physics.
+/// Quantities of the physics that an agent reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Frames and velocities of bodies, geoms and sites are those from which the last physics step computed its forces,
-    /// as MuJoCo's `mj_step` leaves them: of the state before it, or of the last stage of RK4. `qpos` and `qvel` are of
-    /// the present state in any case. (At the start of an episode all is of the present state.)
+    /// Whether frames and velocities of bodies, geoms and sites are those from which the last physics step computed its
+    /// forces, as MuJoCo's `mj_step` leaves them. They then belong to the state before that step, or to the last stage
+    /// of RK4. `qpos` and `qvel` always belong to the present state. At the start of an episode, everything does.
     pub of_last_step: bool,
-    /// [`Readings::cinert`](marathon_physics::Readings::cinert), `cvel` and `cfrc_ext` can be read.
+    /// Whether [`Readings::cinert`](marathon_physics::Readings::cinert), `cvel` and `cfrc_ext` are available.
     pub bodies: bool,
-    /// [`Readings::qfrc_actuator`](marathon_physics::Readings::qfrc_actuator) can be read.
+    /// Whether [`Readings::qfrc_actuator`](marathon_physics::Readings::qfrc_actuator) is available.
     pub actuators: bool,
-    /// The same and [`Readings::qfrc_constraint`](marathon_physics::Readings::qfrc_constraint), which at the start of an
-    /// episode takes an evaluation of all forces.
+    /// The same and [`Readings::qfrc_constraint`](marathon_physics::Readings::qfrc_constraint). At the start of an
+    /// episode, it needs an evaluation of all forces.
     pub joints: bool,
 }
 
-/// How far the start of an episode strays from the spawn pose at rest; every number is the half width of a uniform
-/// distribution around zero, drawn independently per degree of freedom.
+/// Noise added to the spawn pose at the start of an episode. Each number is the half width of a uniform distribution
+/// around zero. Each degree of freedom is drawn independently.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResetNoise {
     /// Actuated joints, rad; the result is clamped to the joint's range.
@@ -170,21 +170,21 @@ pub struct ResetNoise {
 }
 
 impl ResetNoise {
-    /// The suite's noise. The original starts from the exact spawn pose with joint spins of up to 25 rad/s that its
-    /// engine cut or cancelled at once, and +-0.025 m/s; these are the sane reading of it (0.1 rad/s and 0.025 m/s), plus
-    /// 0.01 rad in the joints so that no two episodes look alike to a policy that sees positions only.
+    /// The suite's noise. The original starts from the exact spawn pose, with joint velocities up to 25 rad/s that its
+    /// engine limited or canceled at once, and +-0.025 m/s. The values here are a plausible reading of that (0.1 rad/s
+    /// and 0.025 m/s). They add 0.01 rad in the joints, so that episodes also differ for a policy that observes
+    /// positions only.
     pub const MARATHON: ResetNoise = ResetNoise { joint_position: 0.01, joint_velocity: 0.1, root_velocity: 0.025 };
 }
 
-/// A body part, which is a geom by name: the original made every geom a rigid body of its own.
+/// A body part, which is a geom by name. In the original, every geom is a separate rigid body.
 ///
-/// A part has the position and velocity of the geom's center and the axes of the body that the geom belongs to.
+/// A part has the position and velocity of the geom's center and the axes of the geom's body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part(pub(crate) usize);
 
 impl Part {
-    /// The part called `name` among an agent's [`Facts::parts`]. Meant for a `const`, where an unknown name is a compile
-    /// error.
+    /// The part called `name` in an agent's [`Facts::parts`]. In a `const`, an unknown name is a compile error.
     ///
     /// # Panics
     /// If there is no such name.
@@ -198,8 +198,7 @@ impl Part {
 pub struct Body(pub(crate) usize);
 
 impl Body {
-    /// The body called `name` among an agent's [`Facts::bodies`]. Meant for a `const`, where an unknown name is a compile
-    /// error.
+    /// The body called `name` in an agent's [`Facts::bodies`]. In a `const`, an unknown name is a compile error.
     ///
     /// # Panics
     /// If there is no such name.
@@ -208,7 +207,7 @@ impl Body {
     }
 }
 
-/// A set of motors, used to leave some out of the effort.
+/// A set of motors, used to exclude some from the effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motors(u128);
 
@@ -216,8 +215,8 @@ impl Motors {
     /// No motor.
     pub const NONE: Motors = Motors(0);
 
-    /// The motors of these names among an agent's [`Facts::actions`], of which it may have 128. Meant for a `const`,
-    /// where an unknown name is a compile error.
+    /// The motors with these names in an agent's [`Facts::actions`], at most 128. In a `const`, an unknown name is a
+    /// compile error.
     ///
     /// # Panics
     /// If there is no such name.
@@ -231,17 +230,17 @@ impl Motors {
         Motors(set)
     }
 
-    /// The motor of a number, less than 128.
+    /// The motor with an index below 128.
     pub const fn number(motor: usize) -> Motors {
         Motors(1 << motor)
     }
 
-    /// All motors but those from a number on to before another, at most 127.
+    /// All motors except `first..end`. `end` is at most 127.
     pub const fn except(first: usize, end: usize) -> Motors {
         Motors(!(!0 << first & !(!0 << end)))
     }
 
-    /// All motors from a number on, at most 127.
+    /// All motors from an index on, at most 127.
     pub const fn from(first: usize) -> Motors {
         Motors(!0 << first)
     }

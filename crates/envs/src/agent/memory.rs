@@ -1,31 +1,32 @@
-//! Lane variables that an agent keeps from decision to decision, for [`Agent::remember`](crate::Agent::remember).
+//! Helpers for values that an agent keeps between decisions, for [`Agent::remember`](crate::Agent::remember).
 //!
-//! Each helper owns a run of slots in the agent's memory, which starts at zero in every episode.
+//! Each helper owns a range of slots in the agent's memory, which is zero at the start of every episode.
 
 use marathon_physics::lanes::Real;
 
-/// Bonus for the size of a step, paid at footfall and fading after it: the original's phase bonus, which made its
-/// humanoid walk instead of shuffle.
+/// Bonus for the size of a step, paid at footfall and fading afterward. It is the original's phase bonus, which made
+/// its humanoid walk instead of shuffle.
 ///
-/// The hips' flexion is followed from one footfall of a side to the next; when a foot lands (or the other leaves the
-/// ground), the bonus is the range of that side's hip plus 0.1. It is 0 while both feet are down or both are in the air
-/// after a change, and fades by [`PhaseBonus::FADE`] per physics step. Differences from the original: it is
-/// evaluated once per decision, not per physics step, and the range is always `max - min` (the original
-/// subtracted the wrong way when both were negative).
+/// The range of the hips' flexion is tracked from one footfall of a side to the next. When a foot lands, or the other
+/// one leaves the ground, the bonus is the range of that side's hip plus 0.1. It is 0 while both feet are down, or both
+/// are in the air after a change. It fades by [`PhaseBonus::FADE`] per physics step.
+///
+/// There are two differences from the original. The bonus is evaluated once per decision instead of once per physics
+/// step. The range is always `max - min`; the original subtracted in the wrong order when both were negative.
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseBonus {
-    /// What is left of the bonus after one decision.
+    /// Fraction of the bonus that remains after one decision.
     pub fade: f64,
-    /// The same side twice in a row earns nothing (the rule of the `-v1` humanoid).
+    /// Whether stepping twice in a row on the same side earns nothing (the rule of the `-v1` humanoid).
     pub alternate: bool,
 }
 
-/// What the phase bonus looks at.
+/// Inputs of the phase bonus.
 #[derive(Clone, Copy, Debug)]
 pub struct Stride<T: Real> {
-    /// A foot of this side is on the ground.
+    /// Whether a foot of this side is on the ground.
     pub left_down: T::Mask,
-    /// A foot of this side is on the ground.
+    /// Whether a foot of this side is on the ground.
     pub right_down: T::Mask,
     /// Flexion of the hip in quarter turns.
     pub left_flexion: T,
@@ -34,13 +35,13 @@ pub struct Stride<T: Real> {
 }
 
 impl PhaseBonus {
-    /// Slots it needs.
+    /// Number of slots.
     pub const SLOTS: usize = 8;
-    /// Slot of the bonus itself.
+    /// Slot of the bonus.
     pub const BONUS: usize = 0;
-    /// What is left of the bonus after one physics step.
+    /// Fraction of the bonus that remains after one physics step.
     pub const FADE: f64 = 0.9;
-    /// Bonus of a step of no size.
+    /// Bonus of a step of size 0.
     pub const BASE: f64 = 0.1;
 
     /// A bonus for agents that decide every `frame_skip` physics steps.
@@ -95,7 +96,7 @@ impl PhaseBonus {
         memory[Self::BONUS] = T::select(both, zero, T::select(changed, earned, faded));
         memory[LAST_SIDE] = T::select(left_step, one, T::select(right_step, T::lit(2.0), last));
 
-        // a footfall starts the next range from the present flexion
+        // a footfall restarts the range at the present flexion
         let (new_left, new_right) = (T::or(both, left_step), T::or(both, right_step));
         memory[LEFT_MIN] = T::select(new_left, left_flexion, left_min);
         memory[LEFT_MAX] = T::select(new_left, left_flexion, left_max);
@@ -104,20 +105,20 @@ impl PhaseBonus {
     }
 }
 
-/// Mean of the last nine values, fewer at the start of an episode: `GetAverageVelocity`. (The original's buffer survived
-/// the end of an episode.)
+/// Mean of the last nine values, or fewer at the start of an episode: `GetAverageVelocity`. (The original did not clear
+/// its buffer between episodes.)
 #[derive(Clone, Copy, Debug)]
 pub struct Average;
 
 impl Average {
-    /// Values that are averaged over.
+    /// Number of values in the mean.
     pub const WINDOW: usize = 9;
-    /// Slots it needs.
+    /// Number of slots.
     pub const SLOTS: usize = Self::WINDOW + 2;
-    /// Slot of the average.
+    /// Slot of the mean.
     pub const MEAN: usize = 0;
 
-    /// Takes in one value. `memory` is [`Average::SLOTS`] long.
+    /// Adds a value. `memory` is [`Average::SLOTS`] long.
     #[inline(always)]
     pub fn update<T: Real>(memory: &mut [T], value: T) {
         const COUNT: usize = 1;
@@ -151,7 +152,7 @@ mod tests {
         }
     }
 
-    /// One scripted walk, checked by hand.
+    /// A scripted walk with results checked by hand.
     #[test]
     fn the_phase_bonus_pays_for_the_range_of_the_landing_side() {
         let bonus = PhaseBonus { fade: 0.5, alternate: false };
@@ -160,17 +161,17 @@ mod tests {
             bonus.update(&mut m, Stride { left_down, right_down, left_flexion, right_flexion });
             m[PhaseBonus::BONUS]
         };
-        // standing: nothing, ranges restart here
+        // standing: no bonus, and the ranges restart here
         assert_eq!(decide(true, true, 0.0, 0.0), 0.0);
-        // the right foot leaves: the change pays the left side, which moved by 0.1 since standing
+        // the right foot leaves: the change pays the left side, whose hip moved by 0.1 since standing
         assert!((decide(true, false, -0.1, 0.2) - 0.2).abs() < 1e-12);
-        // no change: fades
+        // no change: the bonus fades
         assert!((decide(true, false, -0.2, 0.4) - 0.1).abs() < 1e-12);
-        // the left leaves as the right lands: the right earns its swing, from 0 to 0.4
+        // the left foot leaves as the right lands: the right side earns its swing, from 0 to 0.4
         assert!((decide(false, true, -0.2, 0.3) - 0.5).abs() < 1e-12);
         // flight earns nothing
         assert_eq!(decide(false, false, 0.1, 0.1), 0.0);
-        // the left lands: it swung from -0.2 (its reset was at -0.1) to 0.5
+        // the left foot lands: its hip swung from -0.2 (its reset was at -0.1) to 0.5
         assert!((decide(true, false, 0.5, 0.1) - 0.8).abs() < 1e-12);
     }
 

@@ -1,10 +1,10 @@
-//! Where an agent writes to: its observation and the terms of its reward.
+//! The outputs of an agent: its observation and the terms of its reward.
 
 use marathon_physics::lanes::Real;
 
 use super::{Part, Senses};
 
-/// An observation in the making.
+/// An observation under construction.
 pub struct Obs<'a, T> {
     values: &'a mut [T],
     len: usize,
@@ -12,20 +12,20 @@ pub struct Obs<'a, T> {
 }
 
 impl<'a, T: Real> Obs<'a, T> {
-    /// `groups` also records names and where they begin, at registration.
+    /// `groups` also records names and start indices, at registration.
     #[inline(always)]
     pub(crate) fn new(values: &'a mut [T], groups: Option<&'a mut Vec<(&'static str, usize)>>) -> Self {
         Obs { values, len: 0, groups }
     }
 
-    /// How many numbers have been written, those beyond the end included.
+    /// How many numbers have been written, including those beyond the end.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    /// Names the numbers that follow, up to the next name: [`Spec::observations`](crate::Spec::observations). Observations
-    /// without any names are called `observation`.
+    /// Names the numbers that follow, up to the next name; see [`Spec::observations`](crate::Spec::observations). An
+    /// observation without names is called `observation`.
     #[inline(always)]
     pub fn group(&mut self, name: &'static str) {
         if let Some(groups) = &mut self.groups {
@@ -36,7 +36,7 @@ impl<'a, T: Real> Obs<'a, T> {
     /// Appends one number.
     #[inline(always)]
     pub fn scalar(&mut self, x: T) {
-        // a wrong length is found when the agent is registered, by counting
+        // registration counts the numbers and reports a wrong length
         if self.len < self.values.len() {
             self.values[self.len] = x;
         }
@@ -51,7 +51,7 @@ impl<'a, T: Real> Obs<'a, T> {
         self.scalar(v[2]);
     }
 
-    /// Appends 1 per touch sensor that touches the ground and 0 per one that does not (`SensorIsInTouch`).
+    /// Appends 1 for each touch sensor that touches the ground, otherwise 0 (`SensorIsInTouch`).
     #[inline(always)]
     pub fn touch_sensors(&mut self, s: &Senses<T>) {
         for i in 0..s.touch_count() {
@@ -59,7 +59,8 @@ impl<'a, T: Real> Obs<'a, T> {
         }
     }
 
-    /// Appends a quaternion x, y, z, w per actuated pair of bodies (`JointRotations`), see [`Senses::joint_rotation`].
+    /// Appends a quaternion x, y, z, w for each actuated pair of bodies (`JointRotations`), see
+    /// [`Senses::joint_rotation`].
     #[inline(always)]
     pub fn joint_rotations(&mut self, s: &Senses<T>) {
         for i in 0..s.joint_rotation_count() {
@@ -69,8 +70,8 @@ impl<'a, T: Real> Obs<'a, T> {
         }
     }
 
-    /// Appends how far the ground is above the center of a part, m, mostly negative, at points `[ahead, left]` of it by its
-    /// heading, see [`Senses::ground_near`].
+    /// Appends the height of the ground relative to a part's center, m, mostly negative. The points are `[ahead, left]`
+    /// of the center, relative to its heading, see [`Senses::ground_near`].
     #[inline(always)]
     pub fn height_scan(&mut self, s: &Senses<T>, part: Part, points: &[[f64; 2]]) {
         let height = s.height(part);
@@ -88,7 +89,7 @@ impl<'a, T: Real> Obs<'a, T> {
     }
 }
 
-/// The terms of a reward in the making; the reward is their sum.
+/// The terms of a reward under construction. The reward is their sum.
 pub struct Terms<'a, T> {
     values: &'a mut [T],
     len: usize,
@@ -102,7 +103,7 @@ impl<'a, T: Real> Terms<'a, T> {
         Terms { values, len: 0, names }
     }
 
-    /// Adds `weight * value` to the reward under a name, which must be the next of the agent's
+    /// Adds `weight * value` to the reward under a name. It must be the next name of the agent's
     /// [`Facts::reward_terms`](crate::Facts::reward_terms).
     #[inline(always)]
     pub fn add(&mut self, name: &'static str, weight: f64, value: T) {
@@ -115,8 +116,8 @@ impl<'a, T: Real> Terms<'a, T> {
         }
     }
 
-    /// Keeps what has been added in some lanes only; returns its sum in the others: what is earned in a part of the episode that
-    /// is another role's.
+    /// Sets the terms to zero outside the lanes, and returns their sum there. It separates rewards of episode parts
+    /// that belong to different roles.
     #[inline(always)]
     pub fn keep(&mut self, lanes: T::Mask) -> T {
         let others = T::masked(T::not(lanes), self.sum());
@@ -125,7 +126,7 @@ impl<'a, T: Real> Terms<'a, T> {
         others
     }
 
-    /// Sum of the terms that have been added: what an opponent's reward may be the inverse of.
+    /// Sum of the terms so far. An opponent may earn its negative.
     #[inline(always)]
     pub fn sum(&self) -> T {
         let mut sum = T::zero();

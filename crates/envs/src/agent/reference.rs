@@ -1,8 +1,8 @@
-//! The motions that agents follow: clips as a constant table with a row per decision.
+//! The motion clips that agents follow, as a constant table with one row per decision.
 //!
-//! The table is made once, with the physics' own kinematics. Each agent has its own row in it, which tells its clip, and its
-//! own place in the world where the clip has begun: the first [`Following::SLOTS`] slots of its memory, which zeros make
-//! the first clip's first frame at the world's origin. A looping clip goes on from there for as long as one likes.
+//! The table is computed once, with the physics' own kinematics. Each agent's memory holds its row, and the position
+//! and yaw in the world at which the present lap of the clip began. These are the first [`Following::SLOTS`] slots.
+//! Zeros mean the first frame of the first clip at the world's origin. A looping clip continues for any time.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -17,47 +17,47 @@ use marathon_physics::{Group, Model, Readings, Sim, Work};
 use super::Part;
 use super::bindings::{Bindings, Blueprint};
 
-/// How much of the future a [`Frame`] can show, decisions.
+/// Farthest that a [`Frame`] can look ahead, decisions.
 pub const MOST_AHEAD: usize = 16;
 
 /// Most cycles of a looping clip in a table.
 const MOST_CYCLES: usize = 64;
 
-/// Height above the ground up to which a foot of a clip counts as set down, m. Motion capture is not more precise.
+/// Height above the ground up to which a foot of a clip counts as in contact, m. Motion capture is not more precise.
 const CONTACT_MARGIN: f64 = 0.01;
 
-/// Where an agent is in the clips that it follows: the first slots of its memory.
+/// An agent's state in its clips: the first slots of its memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Following;
 
 impl Following {
-    /// Slots it needs: the row among those of all clips, and where the clip's present lap has begun.
+    /// Number of slots: the row in the table of all clips, and where the present lap began.
     pub const SLOTS: usize = 4;
     /// Slot of the row.
     pub const ROW: usize = 0;
-    /// Slot of the x at which the clip's present lap has begun, m.
+    /// Slot of the x at which the present lap began, m.
     pub const X: usize = 1;
     /// Slot of the y, m.
     pub const Y: usize = 2;
-    /// Slot of the lap's turn about the vertical axis, rad.
+    /// Slot of the present lap's yaw, rad.
     pub const YAW: usize = 3;
 }
 
-/// Clips at the pace of decisions, in double precision: where episodes start.
+/// Clips sampled at every decision, in double precision. Episodes start from it.
 #[derive(Default)]
 pub(crate) struct Timeline {
     pub qpos: Vec<Vec<f64>>,
     pub qvel: Vec<Vec<f64>>,
-    /// Share of the clip, or of its cycle, that is over, by row.
+    /// Completed fraction of the clip, or of its cycle, by row.
     pub phase: Vec<f64>,
     /// The rows of each clip.
     pub clips: Vec<Lap>,
 }
 
-/// A clip's rows, one after another.
+/// The rows of a clip.
 pub(crate) struct Lap {
     pub rows: Range<usize>,
-    /// What all of them together get to, if the clip loops.
+    /// Displacement and yaw over all rows, if the clip loops.
     pub cycle: Option<Cycle>,
 }
 
@@ -70,8 +70,8 @@ impl Timeline {
         out
     }
 
-    /// A looping clip is cut into whole laps of as many cycles as it takes for their length to be a whole number of
-    /// decisions; what remains is less than a hundredth of a decision for clips of 30 or 60 frames a second, and is spread.
+    /// Samples a clip. A looping clip is repeated until its length is close to a whole number of decisions. For clips
+    /// of 30 or 60 frames per second, the rest is less than a hundredth of a decision. It is spread over all rows.
     fn add(&mut self, clip: &Clip, dt: f64) {
         let (rows, cycles) = rows_of(clip, dt);
         let (step, cycle) = match clip.cycle() {
@@ -99,7 +99,7 @@ impl Timeline {
     }
 }
 
-/// The number of rows of a clip, and the number of cycles if it loops.
+/// Number of rows of a clip, and number of cycles if it loops.
 fn rows_of(clip: &Clip, dt: f64) -> (usize, usize) {
     let decisions = clip.duration() / dt;
     match clip.cycle() {
@@ -111,13 +111,14 @@ fn rows_of(clip: &Clip, dt: f64) -> (usize, usize) {
     }
 }
 
-/// Number of cycles that is nearest to a whole number of decisions, no fewer than [`MOST_AHEAD`].
+/// The number of cycles whose length is closest to a whole number of decisions. The length is at least [`MOST_AHEAD`]
+/// decisions.
 fn fitting_cycles(decisions: f64) -> usize {
     let remainder = |cycles: usize| (cycles as f64 * decisions - (cycles as f64 * decisions).round()).abs();
     let least = (MOST_AHEAD as f64 / decisions).ceil().max(1.0) as usize;
     let mut best = least;
     for cycles in least..least + MOST_CYCLES {
-        // a shorter table that is as good is better
+        // prefer the shorter of equally good tables
         if remainder(cycles) < remainder(best) - 1e-6 {
             best = cycles;
         }
@@ -125,7 +126,7 @@ fn fitting_cycles(decisions: f64) -> usize {
     best
 }
 
-/// Several cycles in a row.
+/// Several cycles in sequence.
 fn repeated(cycle: Cycle, times: usize) -> Cycle {
     let (sin, cos) = (libm::sin(cycle.yaw), libm::cos(cycle.yaw));
     let mut sum = Cycle::default();
@@ -137,7 +138,7 @@ fn repeated(cycle: Cycle, times: usize) -> Cycle {
     sum
 }
 
-/// Where the numbers of a row are.
+/// The columns of a row.
 struct Columns {
     qpos: usize,
     qvel: usize,
@@ -153,16 +154,16 @@ struct Columns {
     phase: usize,
     /// Yaw of the direction of travel.
     facing: usize,
-    /// Of the row's clip: the row after its last one, and how many it has if it loops, else 0.
+    /// Row after the clip's last one, and number of the clip's rows if it loops, otherwise 0.
     end: usize,
-    /// Of the row's clip: what a lap gets to, x, y and yaw; zeros without one.
+    /// Displacement x, y and yaw of a lap; zeros if the clip does not loop.
     lap: usize,
-    /// Of the row's clip: lowest place of each part's center, m.
+    /// Lowest height of each part's center in the clip, m.
     lowest: usize,
     width: usize,
 }
 
-/// What agents follow: clips as a table in lane precision.
+/// The clips of an agent as a table in lane precision.
 pub(crate) struct Reference<T: Real> {
     pub timeline: Timeline,
     columns: Columns,
@@ -172,10 +173,10 @@ pub(crate) struct Reference<T: Real> {
 }
 
 impl<T: Real> Reference<T> {
-    /// The table of clips for an agent that decides every `dt` seconds.
+    /// The table of clips for agents that decide every `dt` seconds.
     ///
     /// # Errors
-    /// If a clip is of another model.
+    /// If a clip belongs to another model, or the table exceeds the memory budget.
     pub fn new(clips: &[Arc<Clip>], dt: f64, blueprint: &Blueprint, bindings: &Bindings<T>) -> Result<Self, String> {
         let model = &blueprint.model;
         for clip in clips {
@@ -213,12 +214,12 @@ impl<T: Real> Reference<T> {
         Ok(Reference { timeline, columns, table, layout: Layout::of(model) })
     }
 
-    /// Rows of the table.
+    /// Number of rows.
     fn rows(&self) -> usize {
         self.timeline.qpos.len()
     }
 
-    /// What the clip shows `ahead` decisions from where the agents are.
+    /// The frame `ahead` decisions after the agents' present one.
     #[inline(always)]
     pub fn frame(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
         assert!(ahead <= MOST_AHEAD, "a clip is shown for {MOST_AHEAD} decisions ahead");
@@ -231,7 +232,7 @@ impl<T: Real> Reference<T> {
         Frame { columns: &self.columns, rows, origin: [at[Following::X], at[Following::Y]], turn: [cos, sin] }
     }
 
-    /// Where agents will be after `ahead` decisions.
+    /// The agents' place in their clips after `ahead` decisions.
     #[inline(always)]
     fn place(&self, memory: &[T], ahead: usize) -> [T; Following::SLOTS] {
         let [row, x, y, yaw] = [0, 1, 2, 3].map(|i| memory[i]);
@@ -251,12 +252,12 @@ impl<T: Real> Reference<T> {
         ]
     }
 
-    /// The table's rows of a number for each agent.
+    /// The table's row of each agent.
     #[inline(always)]
     fn rows_of(&self, at: T) -> [&[T::Scalar]; MAX_LANES] {
         let mut rows: [&[T::Scalar]; MAX_LANES] = [&[]; MAX_LANES];
         for (lane, row) in rows[..T::LANES].iter_mut().enumerate() {
-            // whatever a snapshot may have held
+            // a snapshot may hold any number
             let i = (T::widen(at.get(lane)) as usize).min(self.rows() - 1);
             *row = &self.table[i * self.columns.width..][..self.columns.width];
         }
@@ -272,14 +273,14 @@ impl<T: Real> Reference<T> {
         qpos
     }
 
-    /// A decision has been made.
+    /// Advances the agents' clips by one decision.
     #[inline(always)]
     pub fn advance(&self, memory: &mut [T]) {
         let next = self.place(memory, 1);
         memory[..Following::SLOTS].copy_from_slice(&next);
     }
 
-    /// Lanes in which a clip that does not loop has come to its end.
+    /// Lanes in which a clip that does not loop has reached its last row.
     #[inline(always)]
     pub fn over(&self, memory: &[T]) -> T::Mask {
         let rows = self.rows_of(memory[Following::ROW]);
@@ -318,7 +319,7 @@ impl Columns {
     }
 }
 
-/// What the rows of a clip show, as far as each row tells it alone.
+/// Contents of a clip's rows, without the columns that depend on the whole clip.
 fn shown<T: Real>(lap: &Lap, timeline: &Timeline, sim: &Sim<f64>, bindings: &Bindings<T>) -> Vec<Vec<f64>> {
     let model = sim.model();
     let (mut group, mut work) = (Group::new(sim), Work::new(sim));
@@ -349,7 +350,7 @@ fn shown<T: Real>(lap: &Lap, timeline: &Timeline, sim: &Sim<f64>, bindings: &Bin
             row.extend([libm::sin(angle), libm::cos(angle)]);
         }
         row.push(phase);
-        // the turn of a lap is spread evenly
+        // the yaw of a lap is spread evenly over its rows
         let done = (i - lap.rows.start) as f64;
         row.push(lap.cycle.map_or(0.0, |cycle| cycle.yaw * done / lap.rows.len() as f64));
         rows.push(row);
@@ -357,7 +358,7 @@ fn shown<T: Real>(lap: &Lap, timeline: &Timeline, sim: &Sim<f64>, bindings: &Bin
     rows
 }
 
-/// A number of each agent's row.
+/// A column of each agent's row.
 #[inline(always)]
 fn column<T: Real>(rows: &[&[T::Scalar]; MAX_LANES], column: usize) -> T {
     let mut lanes = [T::Scalar::default(); MAX_LANES];
@@ -372,7 +373,7 @@ fn set_down(model: &Model, readings: &Readings<f64>, site: usize) -> bool {
     readings.site_pos(site)[2] < model.sites[site].size[0] + CONTACT_MARGIN
 }
 
-/// Center of mass and its velocity, from each moving body's share of the mass.
+/// Center of mass and its velocity, from the mass fractions of the moving bodies.
 #[inline(always)]
 pub(crate) fn center_of_mass<T: Real>(r: &Readings<T>, shares: &[(usize, T::Scalar)]) -> [[T; 3]; 2] {
     let mut sums = [[T::zero(); 3]; 2];
@@ -387,13 +388,13 @@ pub(crate) fn center_of_mass<T: Real>(r: &Readings<T>, shares: &[(usize, T::Scal
     sums
 }
 
-/// What a clip shows at a moment of each agent's own: what [`Senses`](crate::Senses) tells of the agent, in the same axes.
+/// A frame of each agent's clip. It has the quantities of [`Senses`](crate::Senses) in the same axes.
 pub struct Frame<'a, T: Real> {
     columns: &'a Columns,
     rows: [&'a [T::Scalar]; MAX_LANES],
-    /// Where the clip's own origin is in the world.
+    /// The clip's origin in the world.
     origin: [T; 2],
-    /// Cosine and sine of the clip's turn about the vertical axis.
+    /// Cosine and sine of the clip's yaw.
     turn: [T; 2],
 }
 
@@ -403,7 +404,7 @@ impl<T: Real> Frame<'_, T> {
         column::<T>(&self.rows, i)
     }
 
-    /// A vector of the row, in world axes.
+    /// A vector of the row in world axes.
     #[inline(always)]
     fn vector(&self, column: usize) -> [T; 3] {
         let ([cos, sin], [x, y]) = (self.turn, [self.column(column), self.column(column + 1)]);
@@ -416,13 +417,13 @@ impl<T: Real> Frame<'_, T> {
         [x + self.origin[0], y + self.origin[1], z]
     }
 
-    /// Coordinate `i` of a joint other than a free one, which would be that of the clip's own frame.
+    /// Coordinate `i` of a hinge, slide or ball joint. For a free joint, the value would be in the clip's own frame.
     #[inline(always)]
     pub fn qpos(&self, i: usize) -> T {
         self.column(self.columns.qpos + i)
     }
 
-    /// Velocity `i` of a joint other than a free one.
+    /// Velocity `i` of a hinge, slide or ball joint.
     #[inline(always)]
     pub fn qvel(&self, i: usize) -> T {
         self.column(self.columns.qvel + i)
@@ -471,26 +472,26 @@ impl<T: Real> Frame<'_, T> {
         T::lit(0.5).lt(self.column(self.columns.touch + i))
     }
 
-    /// Lowest place that the clip has anywhere for a part's center, m.
+    /// Lowest height of a part's center in the whole clip, m.
     #[inline(always)]
     pub fn lowest(&self, part: Part) -> T {
         self.column(self.columns.lowest + part.0)
     }
 
-    /// Share of the clip, or of its cycle, that is over: 0 to 1.
+    /// Completed fraction of the clip, or of its cycle, 0 to 1.
     #[inline(always)]
     pub fn phase(&self) -> T {
         self.column(self.columns.phase + 4)
     }
 
-    /// The phase as an angle, without a jump: its sine and cosine, and those of twice the angle.
+    /// The phase as a continuous encoding: sine and cosine of its angle, and of twice the angle.
     #[inline(always)]
     pub fn phase_angles(&self) -> [T; 4] {
         [0, 1, 2, 3].map(|i| self.column(self.columns.phase + i))
     }
 
-    /// The direction of travel, cosine and sine of its angle from +x: where the clip begins it faces +x, and the turn of a
-    /// lap is spread evenly. (That of the body is not defined in the middle of a flip.)
+    /// The direction of travel: cosine and sine of its angle from +x. A clip starts facing +x, and the yaw of a lap is
+    /// spread evenly. (The body's own heading is undefined in the middle of a flip.)
     #[inline(always)]
     pub fn facing(&self) -> [T; 2] {
         let (sin, cos) = self.column(self.columns.facing).sin_cos();

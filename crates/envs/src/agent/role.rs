@@ -1,19 +1,21 @@
-//! Roles: several deciders of one task, each with a learner of its own.
+//! Roles: several policies that act in one task, each with its own learner.
 
-/// One who decides in a task: a runner, or the opponent that pushes it. Each role sees some parts of the observation, moves
-/// some of the actuators, and earns some terms of the reward; a trainer gives it a policy of its own.
+/// One of the roles of a task, for example a runner, or the opponent that pushes it. Each role observes some groups of
+/// the observation, controls some actuators and earns some terms of the reward. A trainer learns a policy for each
+/// role.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RoleFacts {
     /// Name, such as `runner`.
     pub name: String,
-    /// Parts of the observation that it sees, by the names that [`Obs::group`](crate::Obs::group) gives them: neighbors, in
-    /// their order. Roles may see the same parts.
+    /// Groups of the observation that it observes, by the names that [`Obs::group`](crate::Obs::group) sets. They are
+    /// adjacent and in order. Roles may share groups.
     pub observations: Vec<String>,
-    /// Actuators that it moves: neighbors, in their order. Each actuator has one role.
+    /// Actuators that it controls, adjacent and in order. Each actuator belongs to one role.
     pub actions: Vec<String>,
-    /// Terms of the reward that it earns. [`Facts::reward_terms`](crate::Facts::reward_terms) has those of the first role, then
-    /// those of the second, and so on; failures are priced by terms alone.
+    /// Terms of the reward that it earns. [`Facts::reward_terms`](crate::Facts::reward_terms) lists those of the first
+    /// role, then those of the second, and so on. A failure needs a term of its own:
+    /// [`Facts::termination_reward`](crate::Facts::termination_reward) does not apply.
     pub reward_terms: Vec<String>,
-    /// Whether it does not decide every time, see [`Agent::decides`](crate::Agent::decides).
+    /// Whether it acts in some decisions only, see [`Agent::decides`](crate::Agent::decides).
     pub intermittent: bool,
 }

@@ -1,8 +1,8 @@
-//! What an agent can perceive, and the paper's helper library of bonuses and penalties.
+//! An agent's perception, and the paper's library of bonuses and penalties.
 //!
-//! The names are those of the original's `MarathonAgent` (`GetForwardBonus`, `GetEffort`, ...) in Rust's casing. Angles
-//! are compared as in the original, by the angle itself and not its cosine: a bonus falls linearly from full at 0 to
-//! its negative at 180 degrees. World axes: +x forward, +y left, +z up.
+//! The names are those of the original's `MarathonAgent` (`GetForwardBonus`, `GetEffort`, ...) in Rust's casing. As in
+//! the original, orientations are compared by angle, not by cosine. A bonus falls linearly from its maximum at 0 to its
+//! negative at 180 degrees. World axes: +x forward, +y left, +z up.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 use std::ops::Range;
@@ -14,27 +14,27 @@ use super::bindings::Bindings;
 use super::reference::{Frame, Reference, center_of_mass};
 use super::{Body, Motors, Part};
 
-/// Speed in m/s that [`Senses::velocity`] calls 1.
+/// Speed at which [`Senses::velocity`] is 1, m/s.
 pub const MAX_SPEED: f64 = 4.0;
 /// Penalty per joint driven at its limit.
 pub const AT_LIMIT_PENALTY: f64 = 0.2;
 /// Largest forward and upright bonus.
 pub const MAX_BONUS: f64 = 0.5;
 
-/// An agent's view of itself after a decision: one value per lane.
+/// An agent's state after a decision, with one value per lane.
 pub struct Senses<'a, T: Real> {
     pub(crate) readings: Readings<'a, T>,
     pub(crate) bindings: &'a Bindings<T>,
-    /// What the agent follows.
+    /// The clips that the agent follows.
     pub(crate) reference: Option<&'a Reference<T>>,
-    /// As [`Facts::controls`](crate::Facts::controls) says.
+    /// The action, see [`Facts::controls`](crate::Facts::controls).
     pub(crate) action: &'a [T],
-    /// The command that the present question is about.
+    /// The command that applies to the present call.
     pub(crate) command: &'a [T],
     pub(crate) memory: &'a [T],
-    /// An episode has just begun: there has been no physics step whose contacts could be felt.
+    /// Whether an episode has just begun. There has been no physics step with contacts yet.
     pub(crate) fresh: bool,
-    /// Lanes whose episode's time is over.
+    /// Lanes whose episode has reached its time limit.
     pub(crate) last: T::Mask,
     /// Seconds between decisions.
     pub(crate) dt: f64,
@@ -81,7 +81,7 @@ impl<T: Real> Senses<'_, T> {
         self.readings.body_angular_velocity(self.bindings.parts[part.0].body)
     }
 
-    /// Center of mass of everything that moves, m, by the model's own masses.
+    /// Center of mass of all moving bodies, m, with the model's masses.
     #[inline(always)]
     pub fn center_of_mass(&self) -> [T; 3] {
         center_of_mass(&self.readings, &self.bindings.mass_shares)[0]
@@ -93,8 +93,8 @@ impl<T: Real> Senses<'_, T> {
         center_of_mass(&self.readings, &self.bindings.mass_shares)[1]
     }
 
-    /// Whether this decision is the last that the time of the episode allows; for rewards that are paid at its end. An episode
-    /// that ends otherwise has no such decision.
+    /// Lanes in which this decision is the last one of the time limit, for rewards at the end of an episode. An episode
+    /// that ends earlier has no such decision.
     #[inline(always)]
     pub fn time_is_up(&self) -> T::Mask {
         self.last
@@ -118,8 +118,8 @@ impl<T: Real> Senses<'_, T> {
         if self.fresh { T::none() } else { self.readings.touched(self.bindings.parts[part.0].geom) }
     }
 
-    /// What touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites) feels, N: the value of MuJoCo's touch sensor
-    /// at the last physics step. At the start of an episode, what it feels there without controls.
+    /// Force on touch site `i` of [`Facts::touch_sites`](crate::Facts::touch_sites), N: the value of MuJoCo's touch
+    /// sensor at the last physics step. At the start of an episode, it is the value without controls.
     #[inline(always)]
     pub fn touch_force(&self, i: usize) -> T {
         self.readings.touch_forces()[i]
@@ -131,8 +131,9 @@ impl<T: Real> Senses<'_, T> {
         self.bindings.pairs.len()
     }
 
-    /// Orientation of the parent as seen from the child, `inverse(R_child) R_parent`, for the `i`-th actuated pair of
-    /// bodies in the order of the actuators: `[x, y, z, w]` with `w >= 0`. A joint with several axes is one pair.
+    /// Orientation of the parent relative to the child, `inverse(R_child) R_parent`, for the `i`-th actuated pair of
+    /// bodies in the order of the actuators. The quaternion is `[x, y, z, w]` with `w >= 0`. A joint with several axes
+    /// is one pair.
     #[inline(always)]
     pub fn joint_rotation(&self, i: usize) -> [T; 4] {
         let [w, x, y, z] = self.bindings.pairs[i].rotation(&self.readings);
@@ -147,8 +148,8 @@ impl<T: Real> Senses<'_, T> {
         self.bindings.motors.len()
     }
 
-    /// Velocity of the joint that motor `i` of these drives: rad/s divided by pi (half turns per second) for a hinge, m/s for a
-    /// slide. (The original differentiated an Euler angle that wrapped; this is what it meant.)
+    /// Velocity of the joint that motor `i` drives: rad/s divided by pi (half turns per second) for a hinge, m/s for a
+    /// slide. (The original differentiated an Euler angle that wrapped; this is the intended value.)
     #[inline(always)]
     pub fn joint_velocity(&self, i: usize) -> T {
         let motor = &self.bindings.motors[i];
@@ -167,14 +168,15 @@ impl<T: Real> Senses<'_, T> {
         self.action[i]
     }
 
-    /// Height of the ground at a place in the world, m: of planes and of height fields that lie level, with ground of the
-    /// agent's own. Beyond all of it, that of the nearest place; 0 if the model has none.
+    /// Height of the ground at a point in the world, m. The ground consists of planes and level height fields, with the
+    /// agent's own heights. Outside of it, the nearest point counts. It is 0 if the model has no ground.
     #[inline(always)]
     pub fn ground_height(&self, x: T, y: T) -> T {
         self.readings.ground_height(&self.bindings.grounds, x, y)
     }
 
-    /// Height of the ground `ahead` of a part's center and to its `left`, m, by its [heading](Senses::heading).
+    /// Height of the ground `ahead` of a part's center and to its `left`, m, relative to its
+    /// [heading](Senses::heading).
     #[inline(always)]
     pub fn ground_near(&self, part: Part, [ahead, left]: [f64; 2]) -> T {
         let ([x, y, _], [c, s]) = (self.position(part), self.heading(part));
@@ -182,8 +184,8 @@ impl<T: Real> Senses<'_, T> {
         self.ground_height(s.neg_mul_add(left, c.mul_add(ahead, x)), c.mul_add(left, s.mul_add(ahead, y)))
     }
 
-    /// Which way a part's forward axis points along the ground: cosine and sine of the angle from +x. Of an axis that points
-    /// straight up or down, that of +x.
+    /// Heading of a part: cosine and sine of the angle from +x to its forward axis along the ground. If the axis is
+    /// vertical, the heading is +x.
     #[inline(always)]
     pub fn heading(&self, part: Part) -> [T; 2] {
         let [x, y, _] = self.forward(part);
@@ -193,48 +195,48 @@ impl<T: Real> Senses<'_, T> {
         [T::select(level, x * scale, T::lit(1.0)), T::masked(level, y * scale)]
     }
 
-    /// Number `i` of the command, see [`Facts::command`](crate::Facts::command): to an observation, the one to follow from now
-    /// on; to everything else, the one that the decision was made under.
+    /// Number `i` of the command, see [`Facts::command`](crate::Facts::command). For an observation, it is the command
+    /// that applies from now on. For everything else, it is the one under which the last decision was made.
     #[inline(always)]
     pub fn command(&self, i: usize) -> T {
         self.command[i]
     }
 
-    /// Variable `i` of the agent's own memory, see [`Agent::remember`](crate::Agent::remember).
+    /// Number `i` of the agent's memory, see [`Agent::remember`](crate::Agent::remember).
     #[inline(always)]
     pub fn memory(&self, i: usize) -> T {
         self.memory[i]
     }
 
-    /// What the clip that the agent follows shows `ahead` decisions from where it is, at most
-    /// [`MOST_AHEAD`](super::reference::MOST_AHEAD); 0 is where the agent should be now.
+    /// The frame of the agent's clip `ahead` decisions from now, at most [`MOST_AHEAD`](super::reference::MOST_AHEAD).
+    /// 0 is the present frame.
     ///
     /// # Panics
-    /// If its facts name no clips, or it is asked for more.
+    /// If the facts name no clips, or `ahead` is too large.
     #[inline(always)]
     pub fn reference(&self, ahead: usize) -> Frame<'_, T> {
         self.followed().frame(self.memory, ahead)
     }
 
-    /// The same for an agent with these variables, in [`Agent::remember`](crate::Agent::remember), where they change.
+    /// The same for a memory that [`Agent::remember`](crate::Agent::remember) is changing.
     #[inline(always)]
     pub fn reference_of(&self, memory: &[T], ahead: usize) -> Frame<'_, T> {
         self.followed().frame(memory, ahead)
     }
 
-    /// The rows of clip number `i` among those of all, see [`Start::clips`](crate::Start::clips).
+    /// The row range of clip `i` in the table of all clips, see [`Start::clips`](crate::Start::clips).
     #[inline(always)]
     pub fn clip_rows(&self, i: usize) -> Range<usize> {
         self.followed().timeline.clips[i].rows.clone()
     }
 
-    /// Moves on in the clip by a decision: to be called once by [`Agent::remember`](crate::Agent::remember).
+    /// Advances the clip by one decision. Call it once in [`Agent::remember`](crate::Agent::remember).
     #[inline(always)]
     pub fn follow(&self, memory: &mut [T]) {
         self.followed().advance(memory);
     }
 
-    /// Lanes in which the clip is over; never if it loops.
+    /// Lanes in which the clip has ended. A looping clip never ends.
     #[inline(always)]
     pub fn clip_over(&self) -> T::Mask {
         self.followed().over(self.memory)
@@ -251,14 +253,14 @@ impl<T: Real> Senses<'_, T> {
         self.bindings.bodies[body.0]
     }
 
-    /// What contacts do to the body of an index, see [`Readings::cfrc_ext`]: torque, N m, and force, N. Zero at the start
-    /// of an episode.
+    /// Contact wrench on a body, see [`Readings::cfrc_ext`]: torque, N m, and force, N. Zero at the start of an
+    /// episode.
     #[inline(always)]
     pub fn contact_wrench(&self, body: usize) -> [T; 6] {
         if self.fresh { [T::zero(); 6] } else { self.readings.cfrc_ext(body) }
     }
 
-    /// Whether an episode has just begun: no physics step has been made yet.
+    /// Whether an episode has just begun, with no physics step so far.
     #[inline(always)]
     pub fn fresh(&self) -> bool {
         self.fresh
@@ -290,41 +292,41 @@ impl<T: Real> Senses<'_, T> {
         unit(self.linear_velocity(part)[0] * T::lit(1.0 / fastest))
     }
 
-    /// `GetDirectionBonus`: `max` if the unit vectors coincide, falling linearly with the angle to `-max` at 180 degrees.
-    /// (At exactly 180 degrees the original jumps back to `max`.)
+    /// `GetDirectionBonus`: `max` if the unit vectors coincide, falling linearly with the angle to `-max` at 180
+    /// degrees. (At exactly 180 degrees, the original jumps back to `max`.)
     #[inline(always)]
     pub fn direction_bonus(&self, axis: [T; 3], direction: [T; 3], max: f64) -> T {
         angle(axis, direction).neg_mul_add(T::lit(2.0 * max * FRAC_1_PI), T::lit(max))
     }
 
-    /// `GetForwardBonus`: 0.5 - angle / 180 degrees, the angle between a part's forward axis and +x. Sees pitch and yaw,
-    /// not roll.
+    /// `GetForwardBonus`: 0.5 - angle / 180 degrees, with the angle between a part's forward axis and +x. It detects
+    /// pitch and yaw, not roll.
     #[inline(always)]
     pub fn forward_bonus(&self, part: Part) -> T {
         self.forward_bonus_of(part, MAX_BONUS)
     }
 
-    /// The forward bonus with another maximum than 0.5.
+    /// The forward bonus with a maximum other than 0.5.
     #[inline(always)]
     pub fn forward_bonus_of(&self, part: Part, max: f64) -> T {
         self.direction_bonus(self.forward(part), world::<T>(0), max)
     }
 
-    /// `GetUprightBonus`: 0.5 - angle / 180 degrees, the angle between a part's up axis and +z. Sees pitch and roll, not
-    /// yaw.
+    /// `GetUprightBonus`: 0.5 - angle / 180 degrees, with the angle between a part's up axis and +z. It detects pitch
+    /// and roll, not yaw.
     #[inline(always)]
     pub fn upright_bonus(&self, part: Part) -> T {
         self.upright_bonus_of(part, MAX_BONUS)
     }
 
-    /// The upright bonus with another maximum than 0.5.
+    /// The upright bonus with a maximum other than 0.5.
     #[inline(always)]
     pub fn upright_bonus_of(&self, part: Part, max: f64) -> T {
         self.direction_bonus(self.up(part), world::<T>(2), max)
     }
 
-    /// `GetLeftBonus`: angle by which a part's forward axis points out of the sagittal plane to the left, over 180
-    /// degrees; 0 when straight, at most 0.5, negative to the right.
+    /// `GetLeftBonus`: angle of a part's forward axis out of the sagittal plane to the left, divided by 180 degrees. It
+    /// is 0 when straight, at most 0.5, and negative to the right.
     #[inline(always)]
     pub fn left_bonus(&self, part: Part) -> T {
         let [x, y, z] = self.forward(part);
@@ -337,21 +339,22 @@ impl<T: Real> Senses<'_, T> {
         -self.left_bonus(part)
     }
 
-    /// How far a part's forward axis points above the horizon, in quarter turns: for a thigh, the flexion of the hip.
+    /// Elevation of a part's forward axis above the horizon, in quarter turns. For a thigh, this is the flexion of the
+    /// hip.
     #[inline(always)]
     pub fn flexion(&self, part: Part) -> T {
         let [x, y, z] = self.forward(part);
         z.atan2(hypot(x, y)) * T::lit(FRAC_2_PI)
     }
 
-    /// `GetHeight`: height of a part's center above the ground, m. (The original's search for the lowest foot finds none,
+    /// `GetHeight`: height of a part's center above 0, m. (The original searches for the lowest foot and finds none,
     /// which leaves the height above 0.)
     #[inline(always)]
     pub fn height(&self, part: Part) -> T {
         self.position(part)[2]
     }
 
-    /// `GetHeightPenality`: how far a part is below `height`, clamped to [0, height].
+    /// `GetHeightPenality`: distance of a part below `height`, clamped to [0, height].
     #[inline(always)]
     pub fn height_penalty(&self, part: Part, height: f64) -> T {
         clamp(T::lit(height) - self.height(part), 0.0, height)
@@ -387,8 +390,8 @@ impl<T: Real> Senses<'_, T> {
         sum
     }
 
-    /// `GetJointsAtLimitPenality`: 0.2 per motor driven with full action, |a| >= 1, except those in `ignore`. As in the
-    /// original it is the action that is tested, not the joint's angle.
+    /// `GetJointsAtLimitPenality`: 0.2 for each motor at full action, |a| >= 1, except those in `ignore`. As in the
+    /// original, the test uses the action, not the joint's angle.
     #[inline(always)]
     pub fn joints_at_limit_penalty(&self, ignore: Motors) -> T {
         let mut sum = T::zero();
@@ -406,7 +409,7 @@ impl<T: Real> Senses<'_, T> {
         T::none()
     }
 
-    /// `TerminateOnNonFootHitTerrain`: a geom that is not among the agent's [`Facts::feet`](crate::Facts::feet) touched
+    /// `TerminateOnNonFootHitTerrain`: lanes in which a geom that is not in [`Facts::feet`](crate::Facts::feet) touched
     /// the ground in any physics step of the decision.
     #[inline(always)]
     pub fn terminate_on_non_foot_contact(&self) -> T::Mask {
@@ -441,8 +444,8 @@ pub fn unit<T: Real>(x: T) -> T {
     clamp(x, 0.0, 1.0)
 }
 
-/// Angle between two vectors in radians, from the lengths of their cross and dot products: exact where an arc cosine
-/// loses half of its digits.
+/// Angle between two vectors, rad, from the length of their cross product and their dot product. An arc cosine would
+/// lose half of the digits near 0.
 #[inline(always)]
 pub fn angle<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     let dot = a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
@@ -460,7 +463,7 @@ fn world<T: Real>(i: usize) -> [T; 3] {
     v
 }
 
-/// Length of a vector in a plane.
+/// Length of a two-dimensional vector.
 #[inline(always)]
 pub(crate) fn hypot<T: Real>(x: T, y: T) -> T {
     x.mul_add(x, y * y).sqrt()

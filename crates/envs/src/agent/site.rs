@@ -1,14 +1,14 @@
-//! Ground that changes in mid-episode: what [`Agent::build`](crate::Agent::build) works on.
+//! Ground that changes during an episode, the argument of [`Agent::build`](crate::Agent::build).
 
-/// An agent's ground, and what decides how it goes on.
+/// An agent's ground, and the data for its next change.
 pub struct Site<'a> {
-    /// The action of the decision that is to be carried out on the changed ground, all roles' numbers.
+    /// The action to be executed on the changed ground, with the numbers of all roles.
     pub action: &'a [f64],
-    /// The agent's own variables, see [`Agent::remember`](crate::Agent::remember).
+    /// The agent's memory, see [`Agent::remember`](crate::Agent::remember).
     pub memory: &'a mut [f64],
-    /// Elevations by height field, as [`Start::set_ground`](crate::Start::set_ground) takes them. What is not a finite number is
-    /// not carried out.
+    /// Heights by height field, as in [`Start::set_ground`](crate::Start::set_ground). Numbers that are not finite are
+    /// ignored.
     pub grounds: &'a mut [Vec<f32>],
-    /// Whether the agent's body is to go back to where it spawns before the decision is carried out.
+    /// Whether to move the agent's body back to its spawn state before the decision is executed.
     pub restart: bool,
 }

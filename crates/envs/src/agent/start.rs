@@ -1,4 +1,4 @@
-//! Where an episode starts: what [`Agent::reset`](crate::Agent::reset) writes to.
+//! The start state of an episode, which [`Agent::reset`](crate::Agent::reset) writes.
 
 use std::ops::Range;
 
@@ -9,29 +9,28 @@ use super::bindings::Blueprint;
 use super::reference::{Following, Timeline};
 use crate::episode_rng::EpisodeRng;
 
-/// The state in which an episode starts, in the making.
+/// The start state of an episode under construction.
 pub struct Start<'a> {
-    /// Configuration, MuJoCo's layout; the spawn pose to begin with.
+    /// Configuration in MuJoCo's layout, initially the spawn pose.
     pub qpos: &'a mut [f64],
-    /// Velocity, MuJoCo's layout; the spawn velocity to begin with.
+    /// Velocity in MuJoCo's layout, initially the spawn velocity.
     pub qvel: &'a mut [f64],
-    /// The episode's own random numbers.
+    /// Random numbers of this episode.
     pub random: &'a mut EpisodeRng,
-    /// Whether quaternions are normalized before anybody observes them; they are unless told otherwise.
+    /// Whether to normalize quaternions before the first observation (default: true).
     pub normalize: bool,
-    /// Whether the start counts only if nothing touches anything; no unless told otherwise. One that does not count is drawn
-    /// again, from the spawn pose and with the random numbers that follow.
+    /// Whether to reject a start with contacts (default: false). A rejected start is drawn again, from the spawn pose
+    /// and with the next random numbers.
     pub free_of_contacts: bool,
-    /// Physics steps without controls that lead from here to where the episode begins; none unless told otherwise.
+    /// Physics steps without controls between this state and the start of the episode (default: 0).
     pub settle: usize,
-    /// The agent's own variables, [`Facts::memory`](crate::Facts::memory) of them, zero to begin with: what they are when
-    /// [`Agent::begin`](crate::Agent::begin) is called. For what is drawn here and has to be known later, such as the phase of
-    /// a motion.
+    /// The agent's memory, [`Facts::memory`](crate::Facts::memory) numbers, initially zero.
+    /// [`Agent::begin`](crate::Agent::begin) receives it. Store random draws here that are needed later, such as the
+    /// phase of a motion.
     pub memory: &'a mut [f64],
-    /// The agent's own variables at the end of its last episode, zeros if there has been none since it was given its seed.
+    /// The agent's memory at the end of its last episode. It is zero if there has been none since the seed was set.
     pub previous: &'a [f64],
-    /// What the agent's own schedule tells it at the start, [`Facts::command`](crate::Facts::command); a caller may tell it
-    /// something else.
+    /// The first command of the agent's schedule, [`Facts::command`](crate::Facts::command). A caller may override it.
     pub scheduled: &'a [f64],
     pub(crate) grounds: &'a mut Vec<(usize, Vec<f32>)>,
     pub(crate) timeline: Option<&'a Timeline>,
@@ -44,13 +43,14 @@ impl Start<'_> {
         &self.blueprint.model
     }
 
-    /// The rows of each clip among those of all: decisions, several cycles of a clip that loops. None without clips.
+    /// The row range of each clip in the table of all clips. A row is one decision; a looping clip may cover several
+    /// cycles. Empty without clips.
     pub fn clips(&self) -> impl ExactSizeIterator<Item = Range<usize>> {
         self.timeline.map_or(&[][..], |timeline| &timeline.clips).iter().map(|lap| lap.rows.clone())
     }
 
-    /// The row that is some decisions before another one: in the same clip, and no earlier than its beginning, unless it
-    /// loops.
+    /// The row a number of decisions before another one, in the same clip. A looping clip wraps around; otherwise the
+    /// first row is the limit.
     ///
     /// # Panics
     /// If the facts name no clips.
@@ -64,7 +64,7 @@ impl Start<'_> {
         lap.rows.start + earlier
     }
 
-    /// Share of the clip, or of its cycle, that is over in a row: 0 to 1.
+    /// Phase of a row: the completed fraction of the clip, or of its cycle, 0 to 1.
     ///
     /// # Panics
     /// If there is no such row.
@@ -72,7 +72,7 @@ impl Start<'_> {
         self.timeline.expect("the facts name clips").phase[row]
     }
 
-    /// Puts the agent into a row of the clips, with its velocities.
+    /// Sets the pose and the velocities of a row of the clips.
     ///
     /// # Panics
     /// If there is no such row.
@@ -84,11 +84,11 @@ impl Start<'_> {
         self.memory[Following::ROW] = row as f64;
     }
 
-    /// Gives the agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
-    /// first of which has the smallest y. It lasts until changed, by another start or by a caller.
+    /// Sets the agent's ground: heights above the zero of the model's height field `field`, m, in rows of increasing y.
+    /// It lasts until another start or a caller changes it.
     ///
     /// # Panics
-    /// If there is no such field, or the elevations are not finite numbers for each point of its grid.
+    /// If there is no such field, or the heights are not finite numbers for each point of its grid.
     pub fn set_ground(&mut self, field: usize, elevations: Vec<f32>) {
         let grid = &self.blueprint.model.hfields[field];
         assert_eq!(elevations.len(), grid.nrow * grid.ncol, "one elevation per point of the grid");

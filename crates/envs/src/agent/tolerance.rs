@@ -1,9 +1,9 @@
-//! Rewards between 0 and 1: full within bounds, falling off outside of them (dm_control's `tolerance`).
+//! Rewards between 0 and 1: 1 within bounds, decreasing outside of them (dm_control's `tolerance`).
 //!
 //! ```
 //! use marathon_envs::{Sigmoid, Tolerance};
 //!
-//! // 1 from 2 m/s on, 0.5 at 1 m/s, falling on to 0 at 0 m/s
+//! // 1 at 2 m/s and above, 0.5 at 1 m/s, 0 at 0 m/s
 //! let speed = Tolerance { value_at_margin: 0.5, sigmoid: Sigmoid::Linear, ..Tolerance::at_least(2.0, 1.0) };
 //! assert_eq!([3.0, 1.0, -1.0].map(|x: f64| speed.of(x)), [1.0, 0.5, 0.0]);
 //! ```
@@ -12,8 +12,8 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use marathon_physics::lanes::Real;
 
-/// How a [`Tolerance`] falls off with the distance `d` from the bounds in units of the margin. The scale `s` is such that the
-/// value at `d = 1` is [`Tolerance::value_at_margin`].
+/// Shape of a [`Tolerance`] outside its bounds, as a function of the distance `d` from the bounds in units of the
+/// margin. The scale `s` is such that the value at `d = 1` is [`Tolerance::value_at_margin`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sigmoid {
     /// `exp(-(s d)^2 / 2)`.
@@ -34,39 +34,39 @@ pub enum Sigmoid {
     TanhSquared,
 }
 
-/// Full within `bounds`, falling off outside of them.
+/// A reward that is 1 within `bounds` and decreases outside of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Lowest and highest number that is worth 1; they may be infinite.
+    /// Lowest and highest number with reward 1. They may be infinite.
     pub bounds: [f64; 2],
-    /// Distance from the bounds at which the value has fallen to `value_at_margin`. If it is 0, everything outside of the
-    /// bounds is worth 0.
+    /// Distance from the bounds at which the reward has dropped to `value_at_margin`. If it is 0, the reward is 0
+    /// outside of the bounds.
     pub margin: f64,
-    /// How it falls off.
+    /// Shape of the decrease.
     pub sigmoid: Sigmoid,
-    /// Between 0 and 1; not 0 itself, unless the sigmoid is linear, quadratic or a cosine.
+    /// Between 0 and 1. It may be 0 only for the linear, quadratic and cosine shapes.
     pub value_at_margin: f64,
 }
 
 impl Default for Tolerance {
-    /// dm_control's defaults: worth 1 at 0 and nothing elsewhere; with a margin, a Gaussian that falls to 0.1.
+    /// dm_control's defaults: 1 at 0 and nothing elsewhere. With a margin, a Gaussian that drops to 0.1.
     fn default() -> Self {
         Tolerance { bounds: [0.0, 0.0], margin: 0.0, sigmoid: Sigmoid::Gaussian, value_at_margin: 0.1 }
     }
 }
 
 impl Tolerance {
-    /// Worth 1 from `low` on.
+    /// A reward of 1 from `low` upward.
     pub fn at_least(low: f64, margin: f64) -> Self {
         Tolerance { bounds: [low, f64::INFINITY], margin, ..Tolerance::default() }
     }
 
-    /// Worth 1 at 0 alone.
+    /// A reward of 1 at 0 only.
     pub fn around_zero(margin: f64) -> Self {
         Tolerance { margin, ..Tolerance::default() }
     }
 
-    /// Worth of a number, in [0, 1].
+    /// Reward of a number, in [0, 1].
     #[inline(always)]
     pub fn of<T: Real>(&self, x: T) -> T {
         let [low, high] = self.bounds;
