@@ -64,8 +64,8 @@ pub trait Agent: Send + Sync + 'static {
     }
 
     /// Sets the start state of an episode. `start` holds the spawn pose and velocity. Draw random numbers from
-    /// [`Start::random`] only. The result must depend on nothing else, because it may be computed before the episode is
-    /// due.
+    /// [`Start::random`] only. The result must be a function of `start`, because it may be computed before the episode
+    /// is due.
     fn reset(&self, start: &mut Start) {
         start.add_noise(ResetNoise::MARATHON);
     }

@@ -1,5 +1,5 @@
-//! What is an agent's own, behind a call per decision of a group: everything around it is compiled once per instruction set,
-//! not once per agent besides.
+//! An agent's code behind one dynamic call per decision of a group. Everything around it is compiled once per
+//! instruction set instead of once per agent and instruction set.
 
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Model, Readings, Work};
@@ -10,7 +10,7 @@ use super::task::TaskData;
 use crate::agent::{Agent, Ctrl, Obs, Senses, Site, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
-/// An [`Agent`] for lanes of one kind.
+/// An [`Agent`] for one lane type.
 pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     /// See [`Agent::fits`].
     fn fits(&self, model: &Model) -> Result<(), String>;
@@ -18,14 +18,14 @@ pub(crate) trait AgentKernel<T: Real>: Send + Sync {
     fn draw(&self, start: &mut Start);
     /// Draws a command, see [`Agent::command`].
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize;
-    /// Turns the group's actions into controls, see [`Agent::ctrl`].
+    /// Converts the group's actions into controls, see [`Agent::ctrl`].
     fn control(&self, task: &TaskData<T>, group: &mut LaneGroup<T>);
-    /// Lanes whose ground changes now, a bit each, see [`Agent::builds`].
+    /// Lanes whose ground changes now, one bit each, see [`Agent::builds`].
     fn builds(&self, group: &LaneGroup<T>) -> u32;
     /// Changes an agent's ground, see [`Agent::build`].
     fn build(&self, site: &mut Site);
-    /// Begins or remembers, observes, rewards, reports and terminates, all in one kernel: an agent's code is compiled into it
-    /// once per instruction set.
+    /// Runs all other functions of the agent: begin or remember, observe, reward, info and termination. One kernel
+    /// contains them all, so an agent's code is compiled once per instruction set.
     fn perceive(
         &self,
         task: &TaskData<T>,
@@ -71,7 +71,7 @@ impl<T: Real, A: Agent> AgentKernel<T> for A {
     }
 }
 
-/// What [`AgentKernel::builds`] runs.
+/// The kernel of [`AgentKernel::builds`].
 struct Ask<'a, T: Real, A> {
     agent: &'a A,
     memory: &'a [T],
@@ -85,7 +85,7 @@ impl<T: Real, A: Agent> Kernel<T> for Ask<'_, T, A> {
     }
 }
 
-/// What [`AgentKernel::control`] runs.
+/// The kernel of [`AgentKernel::control`].
 struct Drive<'a, T: Real, A> {
     agent: &'a A,
     task: &'a TaskData<T>,
@@ -104,7 +104,7 @@ impl<T: Real, A: Agent> Kernel<T> for Drive<'_, T, A> {
     }
 }
 
-/// What [`AgentKernel::perceive`] runs.
+/// The kernel of [`AgentKernel::perceive`].
 struct Perceive<'a, T: Real, A> {
     agent: &'a A,
     task: &'a TaskData<T>,
@@ -138,7 +138,7 @@ impl<T: Real, A: Agent> Kernel<T> for Perceive<'_, T, A> {
         match fresh {
             None => agent.remember(&s, memory),
             Some(lanes) => {
-                // the others are in the middle of their episodes
+                // other lanes are in the middle of their episodes
                 let on = T::from_bits(lanes & ((1 << T::LANES) - 1));
                 agent.begin(&s, start);
                 for (m, begun) in memory.iter_mut().zip(start) {

@@ -1,4 +1,4 @@
-//! The commands of the agents of a lane group: from their schedules, or from a caller.
+//! The commands of the agents of a lane group, from their schedules or from a caller.
 
 use marathon_physics::lanes::Real;
 
@@ -6,22 +6,22 @@ use crate::agent::CommandRange;
 
 /// The commands of `T::LANES` agents.
 pub(crate) struct Commands<T: Real> {
-    /// What the agents have observed, and are rewarded for.
+    /// Commands that the agents have observed, and that the reward uses.
     pub present: Vec<T>,
-    /// What they observe at the end of the present decision.
+    /// Commands that they observe at the end of the present decision.
     pub next: Vec<T>,
-    /// By lane.
+    /// Sources of the commands, by lane.
     told: Vec<Told>,
 }
 
-/// Who tells an agent what.
+/// Sources of an agent's command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Told {
-    /// What the agent's schedule says.
+    /// The command of the agent's schedule.
     scheduled: Vec<f64>,
-    /// Number of the observation for which the schedule is asked again.
+    /// Number of the observation for which the schedule draws the next command.
     due: u64,
-    /// What a caller says in its place.
+    /// A caller's command. It overrides the schedule.
     given: Option<Vec<f64>>,
 }
 
@@ -33,15 +33,15 @@ pub(crate) struct SavedCommand {
 }
 
 impl<T: Real> Commands<T> {
-    /// At rest, for commands of these ranges.
+    /// Commands at rest in these ranges.
     pub fn new(ranges: &[CommandRange]) -> Self {
         let n = ranges.len();
         let told = Told { scheduled: idle(ranges), due: 0, given: None };
         Commands { present: vec![T::zero(); n], next: vec![T::zero(); n], told: vec![told; T::LANES] }
     }
 
-    /// Finds the command of an agent for its observation number `step` of an episode, 0 at the start. `draw` asks the
-    /// agent's schedule, and returns for how many decisions the command holds.
+    /// Updates an agent's next command for observation `step` of an episode, 0 at the start. `draw` draws from the
+    /// agent's schedule and returns for how many decisions the command holds.
     pub fn tell(&mut self, ranges: &[CommandRange], lane: usize, step: u64, draw: impl FnOnce(&mut [f64]) -> usize) {
         if ranges.is_empty() {
             return;
@@ -60,19 +60,19 @@ impl<T: Real> Commands<T> {
         }
     }
 
-    /// Makes what an agent is told next its present command: an episode begins.
+    /// Makes an agent's next command the present one, at the start of an episode.
     pub fn begin(&mut self, lane: usize) {
         for (present, next) in self.present.iter_mut().zip(&self.next) {
             present.set(lane, next.get(lane));
         }
     }
 
-    /// A decision has been made and its state observed.
+    /// Makes the next commands the present ones, after a decision and its observation.
     pub fn advance(&mut self) {
         self.present.copy_from_slice(&self.next);
     }
 
-    /// Sets the command of an agent in place of its schedule's; `None` returns to the schedule.
+    /// Sets a caller's command for an agent. `None` returns to the schedule.
     pub fn set(&mut self, lane: usize, given: Option<Vec<f64>>) {
         self.told[lane].given = given;
     }
@@ -93,13 +93,13 @@ impl<T: Real> Commands<T> {
     }
 }
 
-/// The command before any schedule.
+/// The command before any is set.
 pub fn idle(ranges: &[CommandRange]) -> Vec<f64> {
     ranges.iter().map(CommandRange::rest).collect()
 }
 
 impl SavedCommand {
-    /// Appends its bytes, none for an agent without commands.
+    /// Appends the command's bytes. There are none for an agent without commands.
     pub fn write_to(&self, bytes: &mut Vec<u8>) {
         if self.present.is_empty() {
             return;
@@ -130,7 +130,7 @@ impl SavedCommand {
     }
 }
 
-/// The next numbers.
+/// Reads `count` numbers.
 pub(crate) fn numbers(bytes: &mut &[u8], count: usize) -> Option<Vec<f64>> {
     let (mine, rest) = bytes.split_at_checked(count * 8)?;
     *bytes = rest;

@@ -1,6 +1,6 @@
-//! What the agents of a lane group are given from outside besides their actions.
+//! Inputs of the agents of a lane group other than actions.
 //!
-//! Commands are kept by the group. Ground, variations and pushes are kept by the physics, whose kernels read them.
+//! The group stores commands. The physics stores ground, variations and pushes, because its kernels read them.
 
 use marathon_physics::Variation;
 use marathon_physics::lanes::Real;
@@ -12,7 +12,7 @@ use crate::agent::CommandRange;
 use crate::error::EnvError;
 use crate::shard::AgentContext;
 
-/// One agent's circumstances.
+/// Access to the inputs of one agent.
 pub(crate) struct LaneContext<'a, T: Real> {
     pub task: &'a TaskData<T>,
     pub group: &'a mut LaneGroup<T>,

@@ -14,21 +14,22 @@ use crate::agent::{Controls, Site, Start};
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::shard::{AgentState, BLOCK};
 
-/// A coordinate or velocity beyond this has left physics for good, though it may still be finite.
+/// Limit on coordinates and velocities. A larger value means that the simulation has diverged, even if it is still
+/// finite.
 pub(crate) const LARGEST: f64 = 1e6;
 /// Limit on observations and rewards: the largest number that the arrays hold. An action far out of range has a large
 /// cost.
 const STORABLE: f64 = f32::MAX as f64;
 
-/// What all shards of an agent share: the agent's code and the constants of its task.
+/// Shared by all shards of an agent: its code and the constants of its task.
 pub(crate) struct Task<T: Real> {
     pub data: TaskData<T>,
     pub agent: Arc<dyn AgentKernel<T>>,
 }
 
 impl<T: Real> Task<T> {
-    /// Draws the command that the agent's own schedule sets for observation number `step` of an episode, in place of the
-    /// scheduled one so far. Returns for how many decisions it holds.
+    /// Draws the command of the agent's schedule for observation `step` of an episode. `out` holds the last scheduled
+    /// command and receives the new one. Returns for how many decisions it holds.
     pub fn draw_command(&self, id: EpisodeId, step: u64, out: &mut [f64]) -> usize {
         let holds = self.agent.command(&mut EpisodeRng::at(id, step), step as usize, out);
         for (x, range) in out.iter_mut().zip(&self.data.spec.command) {
@@ -38,13 +39,13 @@ impl<T: Real> Task<T> {
         holds
     }
 
-    /// Finds the command of an agent for its observation number `step` of an episode, 0 at the start.
+    /// Updates an agent's command for observation `step` of an episode, 0 at the start.
     pub fn tell(&self, commands: &mut Commands<T>, lane: usize, id: EpisodeId, step: u64) {
         commands.tell(&self.data.spec.command, lane, step, |out| self.draw_command(id, step, out));
     }
 
-    /// Lets the agent draw the start of an episode into `out`, with the episode's random numbers from where `random` is.
-    /// The agent's last episode has left `previous` as its memory.
+    /// Draws the start of an episode into `out`, with the episode's random numbers from the present state of `random`
+    /// on. `previous` is the agent's memory at the end of its last episode.
     pub fn draw_start(&self, out: &mut EpisodeStart, id: EpisodeId, random: &mut EpisodeRng, previous: &[f64]) {
         let blueprint = &self.data.blueprint;
         let mut scheduled = idle(&self.data.spec.command);
@@ -76,7 +77,7 @@ impl<T: Real> Task<T> {
         (out.normalize, out.free_of_contacts, out.settle) = (normalize, free_of_contacts, settle);
     }
 
-    /// Begins and observes an episode of `lanes` (a bit each), which have been put where it starts.
+    /// Begins episodes in `lanes` (one bit each), whose start states have been set, and observes them.
     pub fn begin(&self, group: &mut LaneGroup<T>, work: &mut Work<T>, lanes: u32) {
         self.data.sim.measure_start(work, &group.physics, &self.data.bindings.measure);
         self.agent.perceive(&self.data, group, work, Occasion::Start(lanes));
@@ -84,7 +85,8 @@ impl<T: Real> Task<T> {
         T::enter(SumReward { group, termination_reward: None, of_first, ended: Ended::default() });
     }
 
-    /// Makes one decision. `action` is the block's, `[act][16]`. `last`: lanes whose time is over with it, a bit each.
+    /// Executes one decision. `action` is the block's, `[act][16]`. `last` holds the lanes that reach their time limit,
+    /// one bit each.
     pub fn decide(
         &self,
         group: &mut LaneGroup<T>,
@@ -108,7 +110,7 @@ impl<T: Real> Task<T> {
         T::enter(SumReward { group, termination_reward, of_first, ended })
     }
 
-    /// Changes the ground of the agents that ask for it.
+    /// Changes the ground of the agents for which [`Agent::builds`](crate::Agent::builds) is true.
     fn build(&self, group: &mut LaneGroup<T>) {
         let lanes = self.agent.builds(group);
         for lane in (0..T::LANES).filter(|lane| lanes >> lane & 1 == 1) {
@@ -134,7 +136,7 @@ impl<T: Real> Task<T> {
         }
     }
 
-    /// Puts an agent's body where it spawns, in mid-episode.
+    /// Moves an agent's body to its spawn state during an episode.
     fn restart(&self, group: &mut LaneGroup<T>, lane: usize) {
         let blueprint = &self.data.blueprint;
         group.physics.reset_lane(&self.data.sim, lane, &blueprint.spawn, &blueprint.spawn_velocity);
@@ -144,7 +146,7 @@ impl<T: Real> Task<T> {
         group.forward.set(lane, T::scalar(-along_x.iter().map(at).sum::<f64>()));
     }
 
-    /// Lets an agent do everything once, and returns what it named and how many numbers it wrote.
+    /// Calls the agent's code once. Returns the names that it set and how many numbers it wrote.
     pub fn rehearse(&self, group: &mut LaneGroup<T>, work: &mut Work<T>) -> Rehearsal {
         let mut named = Named::default();
         self.data.sim.measure_start(work, &group.physics, &self.data.bindings.measure);
@@ -154,7 +156,7 @@ impl<T: Real> Task<T> {
     }
 }
 
-/// Reads `T::LANES` numbers of single precision.
+/// Reads `T::LANES` numbers in single precision.
 #[inline(always)]
 fn load<T: Real>(from: &[f32]) -> T {
     let mut x = [T::Scalar::default(); BLOCK];
@@ -164,7 +166,7 @@ fn load<T: Real>(from: &[f32]) -> T {
     T::load(&x[..T::LANES])
 }
 
-/// Lanes in which all values are below `limit`, and therefore finite.
+/// Lanes in which all values are finite and below `limit`.
 #[inline(always)]
 fn below<T: Real>(values: &[T], limit: f64) -> T::Mask {
     // a NaN compares false
@@ -176,13 +178,13 @@ fn below<T: Real>(values: &[T], limit: f64) -> T::Mask {
     ok
 }
 
-/// Takes in the actions; remembers where the agents were. Returns the lanes whose action is not finite.
+/// Stores the actions and the agents' positions along x. Returns the lanes whose action is not finite.
 struct TakeActions<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     along_x: &'a [(usize, T::Scalar)],
     action: &'a [f32],
     first: usize,
-    /// To [-1, 1].
+    /// Whether to clip actions to [-1, 1].
     clip: bool,
 }
 
@@ -207,7 +209,7 @@ impl<T: Real> Kernel<T> for TakeActions<'_, T> {
     }
 }
 
-/// Completes the distance that [`TakeActions`] began.
+/// Completes the distance that [`TakeActions`] started.
 struct CompleteForward<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     along_x: &'a [(usize, T::Scalar)],
@@ -224,13 +226,14 @@ impl<T: Real> Kernel<T> for CompleteForward<'_, T> {
     }
 }
 
-/// Quarantine, termination and the sum of the reward. Nothing that is not a sane number leaves its lane.
+/// Quarantines bad lanes, applies the termination reward and sums the reward. After it, all outputs are finite and
+/// storable.
 struct SumReward<'a, T: Real> {
     group: &'a mut LaneGroup<T>,
     termination_reward: Option<f64>,
-    /// Terms of the first role, which add up to the reward.
+    /// Number of terms of the first role, which add up to the reward.
     of_first: usize,
-    /// Failed lanes, and lanes known to be unsound.
+    /// Lanes that failed, and lanes known to be bad.
     ended: Ended,
 }
 
@@ -245,7 +248,7 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
         ok = T::and(ok, T::and(below(&physics.qpos, LARGEST), below(&physics.qvel, LARGEST)));
         ok = T::and(ok, T::and(below(obs, STORABLE), below(terms, STORABLE)));
         if let Some(price) = termination_reward {
-            // a failure costs its own price in place of everything else
+            // the reward of a failure replaces all other terms
             let (termination, own) = terms.split_last_mut().expect("there is a term for it");
             for term in own {
                 *term = T::masked(T::not(failed), *term);

@@ -1,4 +1,4 @@
-//! What agents would observe that moved exactly as their clips do.
+//! Observations of agents that move exactly as their clips.
 
 use marathon_physics::Work;
 use marathon_physics::lanes::Real;
@@ -10,7 +10,8 @@ use crate::agent::Following;
 use crate::episode_rng::EpisodeId;
 use crate::shard::{AgentState, Demonstrations};
 
-/// The rows of all clips, each put where an episode starts. A clip that loops leads back to its beginning.
+/// Observations of the rows of all clips, each as the start of an episode. The last row of a looping clip is followed
+/// by its first.
 pub(super) fn demonstrations<T: Real>(task: &Task<T>) -> Option<Demonstrations> {
     let timeline = &task.data.reference.as_ref()?.timeline;
     let rows = timeline.qpos.len();
@@ -19,7 +20,7 @@ pub(super) fn demonstrations<T: Real>(task: &Task<T>) -> Option<Demonstrations> 
     let mut start = EpisodeStart::new();
     for first in (0..rows).step_by(T::LANES) {
         for lane in 0..T::LANES {
-            // lanes beyond the end do again what the last one does
+            // lanes beyond the end repeat the last row
             let row = (first + lane).min(rows - 1);
             start.state = AgentState { qpos: timeline.qpos[row].clone(), qvel: timeline.qvel[row].clone() };
             start.memory = vec![0.0; task.data.facts.memory];

@@ -1,4 +1,4 @@
-//! Makes shards of an agent, and checks the agent against its facts and its model first.
+//! Creates the shards of an agent, after checking the agent against its facts and its model.
 
 use std::sync::Arc;
 
@@ -22,16 +22,16 @@ use crate::shard::{Metric, MetricSource, ObsGroup, Spec};
 /// Name of the reward term that replaces all others when an agent fails.
 pub const TERMINATION_TERM: &str = "termination";
 
-/// Name of the numbers of an observation that have none.
+/// Name of an observation without names.
 const UNNAMED: &str = "observation";
 
-/// Makes shards of an agent for one lane width.
+/// Creates shards of an agent for one lane type.
 pub(crate) struct AgentFactory<T: Real> {
     pub(super) task: Arc<Task<T>>,
 }
 
 impl<T: Real> AgentFactory<T> {
-    /// With facts that are the agent's but for its pace or its model.
+    /// Checks an agent. `facts` may differ from the agent's own in timing and model.
     pub fn new(facts: Facts, options: Options, agent: Arc<dyn AgentKernel<T>>) -> Result<Self, EnvError> {
         let blueprint = Blueprint::new(&facts)?;
         let bindings = Bindings::new(&facts, &blueprint)?;
@@ -80,8 +80,7 @@ impl<T: Real> AgentFactory<T> {
     }
 }
 
-/// Lets the agent begin an episode, observe and reward once, to find out whether it keeps to its facts. Returns the parts
-/// of its observation.
+/// Calls the agent's code once to check that it matches its facts. Returns the groups of its observation.
 fn rehearse<T: Real>(task: &Task<T>) -> Result<Vec<ObsGroup>, EnvError> {
     let facts = &task.data.facts;
     let wrong = |problem: String| Err(EnvError::Agent { id: facts.id.clone(), problem });
@@ -112,7 +111,7 @@ fn rehearse<T: Real>(task: &Task<T>) -> Result<Vec<ObsGroup>, EnvError> {
     parts(&named.groups, observed).or_else(wrong)
 }
 
-/// Names of the actuators; of one without a name, its number.
+/// Names of the actuators. An actuator without a name is called by its number.
 fn action_names(model: &Model) -> Vec<String> {
     let name = |(i, a): (usize, &Actuator)| if a.name.is_empty() { i.to_string() } else { a.name.clone() };
     model.actuators.iter().enumerate().map(name).collect()
@@ -131,13 +130,13 @@ fn action_bounds(facts: &Facts, model: &Model) -> [Vec<f32>; 2] {
     [bound(0), bound(1)]
 }
 
-/// Where the numbers are that tell how well the task is done.
+/// Sources of the metrics.
 fn metrics(facts: &Facts, moves_along_x: bool) -> Result<Vec<Metric>, String> {
     let mut out = Vec::new();
     for name in &facts.metrics {
         let source = match facts.info.iter().position(|info| info == name) {
             Some(i) => MetricSource::Info(i),
-            // what cannot move along x has no such number
+            // agents that cannot move along x have no such metric
             None if name == FORWARD && !moves_along_x => continue,
             None if name == FORWARD => MetricSource::Forward,
             None => {
@@ -152,14 +151,14 @@ fn metrics(facts: &Facts, moves_along_x: bool) -> Result<Vec<Metric>, String> {
     Ok(out)
 }
 
-/// The parts of an observation of so many numbers, from their names and where they begin.
+/// Groups of an observation, from their names and start indices and the observation's size.
 fn parts(begun: &[(&'static str, usize)], observed: usize) -> Result<Vec<ObsGroup>, String> {
     let mut out: Vec<ObsGroup> = Vec::new();
     let unnamed = [(UNNAMED, 0)];
     let ends = begun.iter().map(|(_, at)| *at).chain([observed]);
     for ((name, start), end) in unnamed.iter().chain(begun).zip(ends) {
         if out.iter().any(|group| group.name == *name) {
-            return Err(format!("two parts of its observation are called '{name}', expected names of their own"));
+            return Err(format!("two parts of its observation are called '{name}', expected unique names"));
         }
         if *start < end {
             out.push(ObsGroup { name: (*name).into(), range: *start..end });
@@ -168,11 +167,11 @@ fn parts(begun: &[(&'static str, usize)], observed: usize) -> Result<Vec<ObsGrou
     Ok(out)
 }
 
-/// Whether a command has names of its own and ranges that are ranges.
+/// Checks that the numbers of a command have unique names and valid ranges.
 fn check_command(ranges: &[CommandRange]) -> Result<(), String> {
     for (i, CommandRange { name, low, high, .. }) in ranges.iter().enumerate() {
         if name.is_empty() || ranges[..i].iter().any(|other| other.name == *name) {
-            return Err(format!("number {i} of its command is called '{name}', expected a name of its own"));
+            return Err(format!("number {i} of its command is called '{name}', expected a unique name"));
         }
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return Err(format!("its command '{name}' is from {low} to {high}, expected a range of finite numbers"));

@@ -1,4 +1,4 @@
-//! `L` agents side by side: their state, and the results of their last decision.
+//! `L` agents in parallel: their state, and the results of their last decision.
 
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Sim};
@@ -12,20 +12,21 @@ use crate::shard::{BLOCK, BlockStep};
 pub(crate) struct LaneGroup<T: Real> {
     pub physics: Group<T>,
     pub memory: Vec<T>,
-    /// What starts have drawn of the memory, until the episodes begin; otherwise zero.
+    /// Values that [`Agent::reset`](crate::Agent::reset) has set in the memory, until the episode begins. Otherwise
+    /// zero.
     pub start: Vec<T>,
     /// Actions of the last decision.
     pub action: Vec<T>,
     pub commands: Commands<T>,
     pub obs: Vec<T>,
-    /// Terms of the reward; the termination last, if it has a reward of its own.
+    /// Terms of the reward. If the termination has a reward, it is the last one.
     pub terms: Vec<T>,
     pub info: Vec<T>,
-    /// Per foot, the lanes in which it touched the ground during the last decision.
+    /// For each foot, the lanes in which it touched the ground during the last decision.
     pub feet: Vec<u32>,
-    /// Per role, the lanes in which it decides next.
+    /// For each role, the lanes in which it acts next.
     pub decides: Vec<u32>,
-    /// Per role, the lanes in which its part has just ended: where it has failed, and where not.
+    /// For each role, the lanes in which its part has just ended: with failure and without.
     pub leaves: Vec<[u32; 2]>,
     pub(super) reward: T,
     pub(super) forward: T,
@@ -55,7 +56,7 @@ impl<T: Real> LaneGroup<T> {
         group
     }
 
-    /// Puts an agent into a state and empties its memory.
+    /// Sets an agent's state and clears its memory.
     pub fn put(&mut self, sim: &Sim<T>, lane: usize, qpos: &[f64], qvel: &[f64]) {
         self.physics.reset_lane(sim, lane, qpos, qvel);
         for x in self.memory.iter_mut().chain(&mut self.start).chain(&mut self.action) {
@@ -63,12 +64,12 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
-    /// Puts an agent where an episode starts.
+    /// Sets the start state of an agent's episode.
     pub fn put_at_start(&mut self, sim: &Sim<T>, lane: usize, start: &EpisodeStart) {
         let EpisodeStart { state, normalize, memory, grounds, .. } = start;
         self.put(sim, lane, &state.qpos, &state.qvel);
         if !normalize {
-            // these numbers, quaternions included
+            // keep these numbers, including quaternions, as they are
             for (v, x) in self.physics.qpos.iter_mut().zip(&state.qpos) {
                 v.set(lane, T::scalar(*x));
             }
@@ -86,7 +87,7 @@ impl<T: Real> LaneGroup<T> {
         self.memory.iter().map(|x| T::widen(x.get(lane))).collect()
     }
 
-    /// Feet of an agent that touched the ground during its last decision, a bit each.
+    /// Feet of an agent that touched the ground during its last decision, one bit each.
     pub fn feet(&self, lane: usize) -> u32 {
         self.feet.iter().take(32).enumerate().fold(0, |bits, (i, lanes)| bits | (lanes >> lane & 1) << i)
     }
@@ -102,7 +103,7 @@ impl<T: Real> LaneGroup<T> {
         self.physics.ctrl.iter().map(|x| T::widen(x.get(lane))).collect()
     }
 
-    /// Positions of the first agents along the axes that lead to +x.
+    /// Coordinates along x of the first agents.
     pub fn x_positions(&self, along_x: &[(usize, T::Scalar)], out: &mut [f64]) {
         for (lane, out) in out.iter_mut().enumerate() {
             *out = 0.0;
@@ -112,7 +113,7 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
-    /// Copies an agent out of its lane: with its life, everything that its future depends on.
+    /// Copies an agent's state. Together with its life, it determines the agent's future.
     pub fn save(&self, sim: &Sim<T>, lane: usize) -> LaneState {
         let numbers = |v: &[T]| v.iter().map(|x| T::widen(x.get(lane))).collect();
         LaneState {
@@ -123,7 +124,7 @@ impl<T: Real> LaneGroup<T> {
         }
     }
 
-    /// Puts an agent where it was when it was saved.
+    /// Restores an agent's state.
     pub fn load(&mut self, sim: &Sim<T>, lane: usize, saved: &LaneState) {
         let put = |to: &mut [T], from: &[f64]| {
             for (v, x) in to.iter_mut().zip(from) {
@@ -136,12 +137,12 @@ impl<T: Real> LaneGroup<T> {
         self.commands.load(lane, &saved.command);
     }
 
-    /// Writes the observations of `lanes` (a bit each) into a block's `obs`.
+    /// Writes the observations of `lanes` (one bit each) into a block's `obs`.
     pub fn report_start(&self, lanes: u32, first: usize, obs: &mut [f32]) {
         store_lanes(&self.obs, lanes, first, obs);
     }
 
-    /// Writes the infos of `lanes` (a bit each) into a block's `info`.
+    /// Writes the infos of `lanes` (one bit each) into a block's `info`.
     pub fn report_info(&self, lanes: u32, first: usize, info: &mut [f32]) {
         store_lanes(&self.info, lanes, first, info);
     }

@@ -1,4 +1,4 @@
-//! How an agent runs: on the physics kernels, as many agents side by side as a vector has lanes.
+//! Runs agents on the physics kernels, with one agent per lane of a vector.
 
 mod agent_kernel;
 mod commands;

@@ -1,47 +1,47 @@
-//! What an agent's code is run for, and what comes of it.
+//! Inputs and results of an agent's code.
 
-/// What an agent perceives for.
+/// The reason for which an agent perceives its state.
 pub(crate) enum Occasion<'a> {
-    /// A decision that has been carried out; with it the time of the episodes in the lanes `last` is over, a bit each.
+    /// A decision has been executed. `last` holds one bit per lane, set if the episode reaches its time limit.
     Decision { last: u32 },
-    /// The start of episodes in these lanes, a bit each; the reward is then not used.
+    /// The start of episodes in these lanes, one bit each. The reward is not used.
     Start(u32),
-    /// A start in all lanes, to see what the agent names.
+    /// A start in all lanes that records the agent's names.
     Rehearsal(&'a mut Named),
 }
 
-/// What an agent gives names to.
+/// Names that an agent sets.
 #[derive(Default)]
 pub(crate) struct Named {
     /// Terms of the reward.
     pub terms: Vec<&'static str>,
-    /// Parts of the observation, and where they begin.
+    /// Groups of the observation, with their start indices.
     pub groups: Vec<(&'static str, usize)>,
 }
 
-/// What an agent perceived.
+/// Results of an agent's code.
 pub(crate) struct Perceived {
-    /// How many numbers it observed.
+    /// Size of the observation.
     pub observed: usize,
-    /// How many numbers it reported.
+    /// Number of infos.
     pub reported: usize,
-    /// Lanes that failed, a bit each.
+    /// Lanes that failed, one bit each.
     pub failed: u32,
-    /// Lanes whose episode is over all the same.
+    /// Lanes whose episode is truncated by the agent, one bit each.
     pub over: u32,
 }
 
-/// What an agent did when it was let do everything once.
+/// Results of one trial call of an agent's code.
 pub(crate) struct Rehearsal {
-    /// How many numbers it observed.
+    /// Size of the observation.
     pub observed: usize,
-    /// How many numbers it reported.
+    /// Number of infos.
     pub reported: usize,
-    /// What it named.
+    /// Recorded names.
     pub named: Named,
 }
 
-/// Lanes whose episode ended in this decision, a bit each.
+/// Lanes whose episode ended in this decision, one bit each.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Ended {
     pub terminated: u32,

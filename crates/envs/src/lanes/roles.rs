@@ -1,22 +1,20 @@
-//! The roles of a task: from names to places, checked.
+//! Resolves the roles of a task from names to index ranges, and checks them.
 
 use std::ops::Range;
 
 use crate::agent::{Facts, RoleFacts};
 use crate::shard::{Role, Spec};
 
-/// Where the parts of all roles lie in a task.
+/// Index ranges of all roles in a task.
 ///
 /// # Errors
-/// Says what is wrong with the agent's facts.
+/// States what is wrong with the agent's facts.
 pub(super) fn of(facts: &Facts, spec: &Spec) -> Result<Vec<Role>, String> {
     if facts.roles.is_empty() {
         return Ok(Vec::new());
     }
     if facts.termination_reward.is_some() {
-        return Err(
-            "it has roles and a termination_reward, expected None: terms of the roles' own price a failure".into()
-        );
+        return Err("it has roles and a termination_reward, expected None: use a term of each role for failures".into());
     }
     let groups: Vec<&str> = spec.observations.iter().map(|group| group.name.as_str()).collect();
     let actions: Vec<&str> = spec.action_names.iter().map(String::as_str).collect();
@@ -25,13 +23,11 @@ pub(super) fn of(facts: &Facts, spec: &Spec) -> Result<Vec<Role>, String> {
     for RoleFacts { name, observations, actions: moves, reward_terms, intermittent } in &facts.roles {
         let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || !name.chars().all(fits) || out.iter().any(|other| other.name == *name) {
-            return Err(format!(
-                "a role is called '{name}', expected a name of its own of letters, digits, '-' and '_'"
-            ));
+            return Err(format!("a role is called '{name}', expected a unique name of letters, digits, '-' and '_'"));
         }
         let place = |what: &str, all: &[&str], own: &[String]| {
             run(all, own).ok_or_else(|| {
-                format!("the {what} of its role '{name}' are {own:?}, expected neighbors out of {all:?}")
+                format!("the {what} of its role '{name}' are {own:?}, expected adjacent ones of {all:?}")
             })
         };
         let seen = place("observations", &groups, observations)?;
@@ -49,14 +45,14 @@ pub(super) fn of(facts: &Facts, spec: &Spec) -> Result<Vec<Role>, String> {
     }
 }
 
-/// Where names lie in a list in which they are neighbors.
+/// Index range of adjacent names in a list.
 fn run(all: &[&str], own: &[String]) -> Option<Range<usize>> {
     let start = all.iter().position(|name| Some(*name) == own.first().map(String::as_str))?;
     let range = start..start + own.len();
     all.get(range.clone())?.iter().zip(own).all(|(a, b)| a == b).then_some(range)
 }
 
-/// Whether each name of a list has exactly one role.
+/// Checks that each name of a list belongs to exactly one role.
 fn whole(what: &str, all: &[&str], ranges: Vec<Range<usize>>) -> Result<(), String> {
     for (i, name) in all.iter().enumerate() {
         let roles = ranges.iter().filter(|range| range.contains(&i)).count();

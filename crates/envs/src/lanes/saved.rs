@@ -1,8 +1,9 @@
-//! The bytes of a block of agents: what [`Shard::save`](crate::Shard::save) writes.
+//! The bytes of a block of agents, as [`Shard::save`](crate::Shard::save) writes them.
 //!
-//! A block begins with a mark of eight bytes. Each agent follows with the seed, its number, its episode and the decisions
-//! made in it, four 64-bit integers; then its physics ([`PhysicsState::write_to`]), memory, last action, and command if it
-//! takes any. Numbers are little-endian and have 64 bits. They hold single precision exactly, so a block fits every lane width.
+//! A block begins with a mark of eight bytes. For each agent follow four 64-bit integers: seed, number of the agent,
+//! number of the episode, and decisions in it. Then come the physics ([`PhysicsState::write_to`]), the memory, the last
+//! action, and the command if there is one. Numbers are little-endian and have 64 bits. They represent single precision
+//! exactly, so a block fits every lane type.
 
 use marathon_physics::{AgentState as PhysicsState, Model};
 
@@ -10,26 +11,26 @@ use super::commands::{SavedCommand, numbers};
 use crate::error::EnvError;
 use crate::shard::{BLOCK, Spec};
 
-/// The last two digits are the version.
+/// Mark of a block. The last two digits are the version.
 const MARK: &[u8; 8] = b"MRTHNb04";
 
-/// An agent out of a block.
+/// An agent of a block.
 pub(crate) struct Saved {
-    /// Seed, number of the agent, number of the episode, decisions made in it.
+    /// Seed, number of the agent, number of the episode, decisions in it.
     pub life: [u64; 4],
     pub state: LaneState,
 }
 
-/// What an agent's future depends on besides its life.
+/// An agent's state without its life.
 pub(crate) struct LaneState {
     pub physics: PhysicsState,
     pub memory: Vec<f64>,
-    /// Its last action.
+    /// The last action.
     pub action: Vec<f64>,
     pub command: SavedCommand,
 }
 
-/// Begins a block.
+/// Starts a block.
 pub(crate) fn begin(bytes: &mut Vec<u8>) {
     bytes.extend(MARK);
 }
@@ -43,8 +44,8 @@ pub(crate) fn add(bytes: &mut Vec<u8>, agent: &Saved) {
     command.write_to(bytes);
 }
 
-/// Reads a block of agents of a task with this model and so many numbers of memory each. Returns them with the bytes that
-/// follow the block.
+/// Reads a block of agents of a task with this model and `memory` numbers of memory per agent. Returns the agents and
+/// the bytes after the block.
 pub(crate) fn read<'a>(
     model: &Model,
     spec: &Spec,
@@ -55,21 +56,21 @@ pub(crate) fn read<'a>(
     let mut agents = Vec::with_capacity(BLOCK);
     for _ in 0..BLOCK {
         let saved = agent(model, spec, memory, &mut rest);
-        agents.push(saved.ok_or_else(|| EnvError::Snapshot("it ends too early, or is of another model".into()))?);
+        agents.push(saved.ok_or_else(|| EnvError::Snapshot("it ends too early or belongs to another model".into()))?);
     }
     let agents = agents.try_into().unwrap_or_else(|_| unreachable!("a block was read"));
     Ok((agents, rest))
 }
 
-/// Describes a block that does not begin with the mark.
+/// Error message for a block that does not begin with the mark.
 fn wrong_mark(bytes: &[u8]) -> String {
     match bytes.first_chunk::<8>().filter(|mark| mark.starts_with(b"MRTHNb")) {
         Some(mark) => format!(
-            "the format of its agents is '{}', expected '{}': another version of Marathon has saved it",
+            "the format of its agents is '{}', expected '{}': it was saved by another version of Marathon",
             mark.escape_ascii(),
             MARK.escape_ascii()
         ),
-        None => "it does not begin like a block of agents".into(),
+        None => "it does not begin with the mark of a block of agents".into(),
     }
 }
 

@@ -1,7 +1,8 @@
-//! An agent on the physics kernels: the [`Shard`] of every registered agent, for any lane width.
+//! The [`Shard`] of every registered agent, on the physics kernels, for any lane type.
 //!
-//! A block of sixteen agents is `16 / L` lane groups. One decision of a group is: take the actions, step the physics
-//! `frame_skip` times, look at the state reached, reward, terminate. Nothing in it allocates and no lane sees another.
+//! A block of sixteen agents is `16 / L` lane groups. A decision of a group stores the actions, steps the physics
+//! `frame_skip` times, observes the new state, and computes reward and termination. It allocates nothing, and lanes are
+//! independent.
 
 use std::sync::Arc;
 
@@ -35,9 +36,9 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
     fn agent_bytes(&self) -> usize {
         let TaskData { spec, facts, blueprint, .. } = &self.task.data;
         let model = &blueprint.model;
-        // pushes: six numbers per body; a start state that took physics steps is stored with its memory
+        // pushes are six numbers per body; a start that needs physics is stored with its memory
         let own = 2 * model.nu + model.na + 6 * model.bodies.len() + 3 * facts.memory + model.nq + model.nv;
-        // own ground: once in the lanes' precision, and once more if starts draw it
+        // ground is stored once in the lanes' precision, and once more if starts draw it
         let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
         spec.agent_bytes() + NUMBER * own + 2 * size_of::<f32>() * ground
     }
@@ -57,17 +58,17 @@ impl<T: Real> AgentShards for AgentFactory<T> {
     }
 }
 
-/// Whose life it is, and how far it has come: what an agent is besides its physics.
+/// An agent's identity and progress, without its physics.
 #[derive(Clone, Copy, Debug)]
 struct Life {
-    /// The present episode; number 0 before the first.
+    /// The present episode. Its number is 0 before the first one.
     id: EpisodeId,
-    /// Decisions made in it.
+    /// Decisions in it.
     steps: u64,
 }
 
 impl Life {
-    /// Before its first episode.
+    /// The life before the first episode.
     fn new(seed: u64, agent: u64) -> Self {
         Life { id: EpisodeId { seed, agent, episode: 0 }, steps: 0 }
     }
@@ -84,16 +85,16 @@ struct Block<T: Real> {
     lives: [Life; BLOCK],
 }
 
-/// A run of blocks of one agent, owned by one thread.
+/// Consecutive blocks of one agent, owned by one thread.
 struct LaneShard<T: Real> {
     task: Arc<Task<T>>,
     work: Work<T>,
     blocks: Vec<Block<T>>,
     /// Decisions after which an episode is truncated.
     max_episode_steps: u64,
-    /// Starts that took physics.
+    /// Starts that need physics.
     starts: StartCache<T>,
-    /// Scratch of resets.
+    /// Reused by resets.
     start: EpisodeStart,
 }
 
@@ -113,7 +114,7 @@ impl<T: Real> LaneShard<T> {
         LaneShard { task, work, blocks, max_episode_steps, starts, start }
     }
 
-    /// Puts an agent where its next episode starts: the spawn pose with noise of the agent's own.
+    /// Starts an agent's next episode: the spawn pose with random noise.
     fn begin_episode(&mut self, block: usize, agent: usize) {
         let LaneShard { task, work, blocks, starts, start, .. } = self;
         let Block { groups, lives } = &mut blocks[block];
@@ -134,7 +135,7 @@ impl<T: Real> LaneShard<T> {
     }
 }
 
-/// Bits of a block's mask that belong to the group whose first agent is `first`.
+/// Bits of a block's mask for the group whose first agent is `first`.
 fn lanes_of<T: Real>(mask: u16, first: usize) -> u32 {
     (u32::from(mask) >> first) & ((1 << T::LANES) - 1)
 }
@@ -184,7 +185,7 @@ impl<T: Real> Shard for LaneShard<T> {
             for (all, lanes) in out.leaves.iter_mut().flatten().zip(group.leaves.iter().flatten()) {
                 *all |= (lanes << first) as u16;
             }
-            // a broken state is put away at once: it must not slow its group down until the caller resets it
+            // reset a diverged state at once, so that it does not slow its group down until the caller resets it
             for lane in (0..T::LANES).filter(|l| ended.diverged >> l & 1 == 1) {
                 group.put(&task.data.sim, lane, &task.data.blueprint.spawn, &vec![0.0; task.data.blueprint.model.nv]);
             }

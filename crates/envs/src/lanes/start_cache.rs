@@ -1,8 +1,8 @@
-//! Starts of episodes that take physics: free of contacts, or settled for a while.
+//! Starts of episodes that need physics: free of contacts, or settled for some steps.
 //!
-//! All lanes of a group are prepared at once, also those whose next episode is not due yet: a physics step costs the same
-//! for one lane as for all, and episodes that end one by one would each pay for a whole group. A start is a function of
-//! seed, agent and episode alone, so it makes no difference when it is made, and it belongs to no snapshot.
+//! All lanes of a group are prepared at once, including those whose next episode is not due yet. A physics step costs
+//! the same for one lane as for all, so preparing lanes one by one would pay for a whole group each time. A start
+//! depends on seed, agent and episode only. It does not matter when it is computed, and it is not part of a snapshot.
 
 use marathon_physics::lanes::{Kernel, Real};
 use marathon_physics::{Group, Readings, Sim, Work};
@@ -12,33 +12,33 @@ use super::task::EpisodeStart;
 use crate::episode_rng::{EpisodeId, EpisodeRng};
 use crate::shard::AgentState;
 
-/// Most draws of a start that is to be free of contacts; then the last one counts, whatever it touches.
+/// Largest number of draws for a start free of contacts. After that, the last draw is used even with contacts.
 const DRAWS: usize = 1000;
 
 /// Starts of the next episodes of a shard's agents.
 pub(crate) struct StartCache<T: Real> {
-    /// Where they are made.
+    /// Lanes in which starts are prepared.
     scratch: Option<Group<T>>,
     /// By agent.
     starts: Vec<Option<(EpisodeId, EpisodeStart)>>,
 }
 
 impl<T: Real> StartCache<T> {
-    /// No starts, for a number of agents.
+    /// An empty cache for a number of agents.
     pub fn new(agents: usize) -> Self {
         StartCache { scratch: None, starts: vec![None; agents] }
     }
 
-    /// The start of an agent's episode, if it has been made.
+    /// The start of an agent's episode, if it has been prepared.
     pub fn get(&self, agent: usize, id: EpisodeId) -> Option<&EpisodeStart> {
         self.starts[agent].as_ref().filter(|(known, _)| *known == id).map(|(_, start)| start)
     }
 
-    /// Makes the starts of the episodes `ids` of consecutive agents, one per lane, as far as they have not been made.
+    /// Prepares missing starts of the episodes `ids` of consecutive agents, one per lane.
     pub fn make(&mut self, task: &Task<T>, work: &mut Work<T>, first: usize, ids: &[EpisodeId]) {
         let due: Vec<usize> = (0..T::LANES).filter(|lane| self.get(first + lane, ids[*lane]).is_none()).collect();
         let group = self.scratch.get_or_insert_with(|| Group::new(&task.data.sim));
-        // the others must not slow the group down
+        // other lanes rest at the spawn pose, so that they do not slow the group down
         let (spawn, at_rest) = (&task.data.blueprint.spawn, vec![0.0; task.data.blueprint.model.nv]);
         for lane in 0..T::LANES {
             group.reset_lane(&task.data.sim, lane, spawn, &at_rest);
@@ -51,12 +51,12 @@ impl<T: Real> StartCache<T> {
                 if !state.qpos.iter().chain(&state.qvel).all(|x| x.abs() < LARGEST) {
                     state = AgentState { qpos: spawn.clone(), qvel: at_rest.clone() };
                 }
-                // the physics has normalized it
+                // the physics has normalized it already
                 self.starts[first + lane] =
                     Some((ids[lane], EpisodeStart { state, normalize: true, ..drawn[lane].clone() }));
             }
             let Some(next) = due.iter().map(|lane| drawn[*lane].settle).filter(|n| *n > steps).min() else { break };
-            // in calls of single steps: a lane's bits must not depend on when others have settled
+            // single steps, because a lane's bits must not depend on when others have settled
             while steps < next {
                 task.data.sim.advance(work, group, 1);
                 steps += 1;
@@ -69,7 +69,7 @@ impl<T: Real> StartCache<T> {
     }
 }
 
-/// Draws the starts of some lanes until they count. Returns every lane's; how many steps it is to settle is still to be done.
+/// Draws the starts of some lanes until they are accepted. Returns those of all lanes, before settling.
 fn draw<T: Real>(
     task: &Task<T>,
     work: &mut Work<T>,
@@ -80,7 +80,7 @@ fn draw<T: Real>(
     let mut randoms: Vec<EpisodeRng> = ids.iter().map(|id| EpisodeRng::new(*id)).collect();
     let mut drawn = vec![EpisodeStart::new(); T::LANES];
     let mut missing = due.to_vec();
-    // a start that is made in advance cannot know how the episode before it ends
+    // a start prepared in advance cannot depend on how the previous episode ends
     let no_past = vec![0.0; task.data.facts.memory];
     for _ in 0..DRAWS {
         let mut doubtful = Vec::new();
@@ -111,7 +111,7 @@ fn read<T: Real>(group: &Group<T>, lane: usize) -> AgentState {
     AgentState { qpos: numbers(&group.qpos), qvel: numbers(&group.qvel) }
 }
 
-/// Lanes in which something touches something, a bit each, after [`Sim::forward`].
+/// Lanes with any contact, one bit each, after [`Sim::forward`].
 struct Touching<'a, T: Real> {
     sim: &'a Sim<T>,
     group: &'a Group<T>,

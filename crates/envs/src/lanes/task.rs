@@ -1,4 +1,4 @@
-//! The constants of a task in lanes of one kind, and the starts of its episodes.
+//! The constants of a task for one lane type, and the starts of its episodes.
 
 use marathon_physics::Sim;
 use marathon_physics::lanes::Real;
@@ -15,23 +15,23 @@ pub(crate) struct TaskData<T: Real> {
     pub blueprint: Blueprint,
     pub bindings: Bindings<T>,
     pub sim: Sim<T>,
-    /// What the agents follow.
+    /// The clips that the agents follow.
     pub reference: Option<Reference<T>>,
 }
 
 impl<T: Real> TaskData<T> {
-    /// How many terms the first role earns.
+    /// Number of terms that the first role earns.
     pub fn terms_of_first(&self) -> usize {
         self.spec.roles.first().map_or(self.spec.reward_terms.len(), |role| role.terms.end)
     }
 }
 
-/// Where an episode starts, and what is to be done with it first, see [`Start`](crate::agent::Start).
+/// The start of an episode, with the preparation that it needs, see [`Start`](crate::agent::Start).
 #[derive(Clone, Debug)]
 pub(crate) struct EpisodeStart {
     pub state: AgentState,
     pub memory: Vec<f64>,
-    /// Ground of the agent's own, by height field.
+    /// The agent's ground, by height field.
     pub grounds: Vec<(usize, Vec<f32>)>,
     pub normalize: bool,
     pub free_of_contacts: bool,
@@ -39,7 +39,7 @@ pub(crate) struct EpisodeStart {
 }
 
 impl EpisodeStart {
-    /// To be drawn into.
+    /// An empty start to draw into.
     pub fn new() -> Self {
         EpisodeStart {
             state: AgentState { qpos: Vec::new(), qvel: Vec::new() },
@@ -51,7 +51,7 @@ impl EpisodeStart {
         }
     }
 
-    /// Whether it takes physics to find.
+    /// Whether preparing it needs physics steps or contacts.
     pub fn takes_physics(&self) -> bool {
         self.free_of_contacts || self.settle > 0
     }
