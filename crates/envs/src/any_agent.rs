@@ -1,7 +1,7 @@
-//! Agents behind pointers: what the registry holds.
+//! Agents as trait objects, as the registry stores them.
 //!
-//! [`AnyAgent`] is the object-safe face of an agent; every [`Agent`] has it by a blanket implementation, so that the
-//! [`Registry`](crate::Registry) holds agents of any crate.
+//! [`AnyAgent`] is the object-safe interface of an agent. A blanket implementation covers every [`Agent`], so the
+//! [`Registry`](crate::Registry) can hold agents of any crate.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::error::EnvError;
 use crate::lanes::AgentFactory;
 use crate::shard::AgentShards;
 
-/// An [`Agent`] behind a pointer: what the registry holds. Implemented for every agent; not to be implemented by hand.
+/// An [`Agent`] as a trait object. It is implemented for every agent; do not implement it by hand.
 pub trait AnyAgent: Send + Sync {
     /// Constant facts.
     fn facts(&self) -> Facts;
@@ -24,27 +24,27 @@ pub trait AnyAgent: Send + Sync {
     /// # Errors
     /// If the model is not valid MJCF.
     fn model(&self) -> Result<Model, EnvError>;
-    /// The named arguments that it takes, with the values that it has.
+    /// The named arguments with their values.
     fn options(&self) -> Vec<OptionInfo>;
-    /// Whether one of them has this name.
+    /// Whether there is an argument with this name.
     fn has_option(&self, name: &str) -> bool {
         self.options().iter().any(|known| known.name == name)
     }
-    /// The agent with other values for some of its arguments.
+    /// The agent with other values of some arguments.
     ///
     /// # Errors
-    /// If it does not take an argument, or not this value for it.
+    /// If it has no such argument, or the value is invalid.
     fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError>;
     /// Checks the agent against its model and prepares it for stepping with an instruction set.
     ///
     /// # Errors
-    /// If names or lengths of the facts do not fit the model, the model cannot be simulated, or the processor lacks the
-    /// instruction set.
+    /// If names or lengths of the facts do not match the model, the model cannot be simulated, or the processor lacks
+    /// the instruction set.
     fn shards(self: Arc<Self>, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
         let facts = self.facts();
         self.shards_as(facts, isa)
     }
-    /// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
+    /// The same with another number of physics steps per decision. Episodes keep their duration in seconds.
     ///
     /// # Errors
     /// As [`AnyAgent::shards`].
@@ -56,21 +56,21 @@ pub trait AnyAgent: Send + Sync {
         }
         self.shards_as(facts, isa)
     }
-    /// The same with other facts than its own, such as another model; see [`Elsewhere`].
+    /// The same with other facts, such as another model; see [`Elsewhere`].
     ///
     /// # Errors
     /// As [`AnyAgent::shards`].
     fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError>;
 }
 
-/// An agent on another model: its own body and task, on another ground.
+/// An agent with another model: the same body and task on other ground.
 pub struct Elsewhere {
     agent: Arc<dyn AnyAgent>,
     model: ModelSource,
 }
 
 impl Elsewhere {
-    /// Puts an agent on a model.
+    /// Replaces an agent's model.
     pub fn new(agent: Arc<dyn AnyAgent>, model: ModelSource) -> Self {
         Elsewhere { agent, model }
     }

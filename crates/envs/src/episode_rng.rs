@@ -1,15 +1,16 @@
 //! Random numbers of episodes.
 //!
-//! The start of episode `k` of agent `i` under seed `s` is a pure function of (`s`, `i`, `k`): the three are the key of a
-//! stream cipher. No agent's luck can depend on another's, and nothing but two numbers belongs to a snapshot.
+//! The start of episode `k` of agent `i` under seed `s` is a pure function of (`s`, `i`, `k`). The three numbers are
+//! the key of a stream cipher. Agents are therefore independent of each other, and a snapshot stores only numbers that
+//! identify the episode.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Tells these streams from others that might be derived from the same seed.
+/// Separates these streams from others of the same seed.
 const DOMAIN: [u8; 8] = *b"marathon";
 
-/// Which episode of which agent under which seed: what an episode's random numbers are a function of.
+/// An episode of an agent under a seed. It determines the episode's random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct EpisodeId {
     pub seed: u64,
@@ -32,8 +33,8 @@ impl EpisodeRng {
         EpisodeRng(ChaCha8Rng::from_seed(key))
     }
 
-    /// The numbers that belong to observation `step` of an episode: streams apart from each other and from the start's, so
-    /// that what is drawn in mid-episode depends on nothing drawn before.
+    /// The random numbers for observation `step` of an episode. Each step has a separate stream, also from the start's.
+    /// Draws during an episode therefore do not depend on earlier ones.
     pub(crate) fn at(id: EpisodeId, step: u64) -> Self {
         let mut random = EpisodeRng::new(id);
         // the start has stream 0
@@ -51,15 +52,15 @@ impl EpisodeRng {
         (high - low).mul_add(self.unit(), low)
     }
 
-    /// Whole number, each from `low` to `high` as likely as the others.
+    /// Uniform integer in [low, high].
     pub fn whole(&mut self, low: usize, high: usize) -> usize {
-        // of 2^53 values, at most one more falls on one number than on another
+        // of 2^53 values, each integer gets the same number, up to one
         low + (self.unit() * (high - low + 1) as f64) as usize
     }
 
-    /// Normally distributed with mean 0 and standard deviation 1 (Box and Muller's first number of a pair).
+    /// Normally distributed with mean 0 and standard deviation 1 (the first number of a Box-Muller pair).
     pub fn normal(&mut self) -> f64 {
-        // never 0, whose logarithm is not finite
+        // never 0, because its logarithm is not finite
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         radius * libm::cos(std::f64::consts::TAU * self.unit())
     }

@@ -1,4 +1,4 @@
-//! What can go wrong before an environment runs.
+//! Errors of this crate.
 
 use marathon_physics::SimError;
 use marathon_physics::budget::OverBudget;
@@ -12,14 +12,14 @@ pub enum EnvError {
     /// No agent of this name is registered.
     #[error("agent '{name}' does not exist{}", listed(.nearest.as_ref(), known))]
     UnknownAgent {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// The registered name closest to it, if any is close.
+        /// The closest registered name, if any is close.
         nearest: Option<String>,
         /// All registered names, comma separated.
         known: String,
     },
-    /// A name is registered twice.
+    /// The name is registered already.
     #[error("agent '{id}' is registered already; give the new one another id, such as '{suggestion}'")]
     DuplicateAgent {
         /// The name.
@@ -27,38 +27,38 @@ pub enum EnvError {
         /// A free name.
         suggestion: String,
     },
-    /// An agent does not take an argument.
+    /// The agent has no such argument.
     #[error("agent '{id}' takes no option '{name}'{}", listed(.nearest.as_ref(), known))]
     UnknownOption {
         /// Registry name of the agent.
         id: String,
-        /// What was given.
+        /// The given name.
         name: String,
-        /// The argument closest to it, if any is close.
+        /// The closest argument, if any is close.
         nearest: Option<String>,
-        /// All arguments that it takes, comma separated.
+        /// All arguments of the agent, comma separated.
         known: String,
     },
-    /// An argument cannot have this value.
+    /// The value is invalid for the argument.
     #[error("agent '{id}': option {option} is {found}, expected {expected}")]
     OptionValue {
         /// Registry name of the agent.
         id: String,
         /// The argument.
         option: String,
-        /// What was given.
+        /// The given value.
         found: String,
-        /// What is allowed.
+        /// The valid values.
         expected: &'static str,
     },
-    /// An agent cannot be told this.
+    /// A command is out of its range.
     #[error("agent '{id}': command {name} is {found}, expected {low} to {high} {unit}")]
     Command {
         /// Registry name of the agent.
         id: String,
         /// Name of the number.
         name: String,
-        /// What was given.
+        /// The given value.
         found: f64,
         /// Lowest value.
         low: f64,
@@ -67,7 +67,7 @@ pub enum EnvError {
         /// Unit.
         unit: String,
     },
-    /// An agent and its model do not fit together.
+    /// An agent does not match its model.
     #[error("agent '{id}': {problem}")]
     Agent {
         /// Registry name of the agent.
@@ -80,7 +80,7 @@ pub enum EnvError {
     Model {
         /// Registry name of the agent.
         id: String,
-        /// The loader's complaint.
+        /// The loader's error.
         source: Box<MjcfError>,
     },
     /// The agent's model cannot be simulated.
@@ -88,35 +88,35 @@ pub enum EnvError {
     Sim {
         /// Registry name of the agent.
         id: String,
-        /// The simulator's complaint.
+        /// The simulator's error.
         source: SimError,
     },
     /// The processor lacks an instruction set.
     #[error("this processor cannot run '{isa}'; the best it has is '{best}'")]
     Isa {
-        /// What was asked for.
+        /// The requested instruction set.
         isa: &'static str,
-        /// What there is.
+        /// The best available one.
         best: &'static str,
     },
-    /// An array handed over by the caller has the wrong length.
+    /// An array of the caller has the wrong length.
     #[error("{what} has {found} numbers, expected {expected}")]
     Shape {
-        /// Which array, with its shape.
+        /// The array, with its shape.
         what: String,
         /// Its length.
         found: usize,
-        /// The length it should have.
+        /// The required length.
         expected: usize,
     },
-    /// An option has a value that makes no sense.
+    /// An option has an invalid value.
     #[error("{option} is {found}, expected {expected}")]
     Option {
         /// Name of the option.
         option: &'static str,
         /// Its value.
         found: String,
-        /// What is allowed.
+        /// The valid values.
         expected: &'static str,
     },
     /// The memory budget is too small for this number of agents.
@@ -127,7 +127,7 @@ pub enum EnvError {
         /// The limit.
         source: OverBudget,
     },
-    /// A snapshot does not fit the environment it is loaded into.
+    /// A snapshot does not match the environment.
     #[error("snapshot: {0}")]
     Snapshot(String),
 }

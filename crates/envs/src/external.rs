@@ -1,9 +1,9 @@
-//! Tasks whose agents can only be stepped all at once, behind the blocks that a learner works with: environments of
-//! another language, to which one call for all agents costs what a call for one does.
+//! Adapter for external tasks whose agents can only be stepped all at once. An example is an environment in another
+//! language, where a call for all agents costs as much as a call for one.
 //!
-//! A learner's threads own blocks, and go through a rollout without waiting for each other. Here they meet at every
-//! decision: each [announces](Shard::announce) its actions, the last one to do so steps the whole [`Crowd`], and all go
-//! on with their own rows of the result.
+//! A learner's threads own blocks and normally run a rollout without waiting for each other. Here they synchronize at
+//! every decision. Each thread [announces](Shard::announce) its actions, the last one steps the whole [`Crowd`], and
+//! all continue with their own rows of the result.
 
 use crate::error::EnvError;
 use crate::shard::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
@@ -13,30 +13,30 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Why a [`Crowd`] could not go on.
+/// The error of a [`Crowd`].
 pub type CrowdError = Box<dyn std::error::Error + Send + Sync>;
 
-/// All agents of a task, stepped together; an episode that ends is followed by the next within the same step.
+/// All agents of a task, stepped together. When an episode ends, the next one starts within the same step.
 pub trait Crowd: Send {
-    /// Starts the first episodes under a seed and writes the observations, `[agents][obs]`.
+    /// Starts the first episodes with a seed and writes the observations, `[agents][obs]`.
     ///
     /// # Errors
     /// If the task fails.
     fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError>;
-    /// Makes one decision of every agent. `actions` is `[agents][act]`.
+    /// Executes one decision of every agent. `actions` is `[agents][act]`.
     ///
     /// # Errors
     /// If the task fails.
     fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError>;
-    /// Everything that the future depends on.
+    /// The complete state.
     ///
     /// # Errors
     /// If the task fails.
     fn save(&self) -> Result<Vec<u8>, CrowdError>;
-    /// Restores what [`Crowd::save`] returned.
+    /// Restores a state of [`Crowd::save`].
     ///
     /// # Errors
-    /// If it is something else.
+    /// If the bytes are not such a state.
     fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError>;
 }
 
@@ -59,19 +59,19 @@ impl Crowd for VecEnv {
     }
 }
 
-/// What a thread unwinds with, without a message, when the crowd has failed: see [`Lockstep::take_error`].
+/// Panic payload of threads after the crowd has failed, without a message; see [`Lockstep::take_error`].
 #[derive(Debug)]
 pub struct CrowdFailed;
 
-/// Makes shards of one [`Crowd`]. Together they must have all of its blocks, and announce all of their decisions. When all
-/// of them are gone, the next ones start it anew.
+/// Creates shards of one [`Crowd`]. Together they must cover all of its blocks and announce all actions. After all of
+/// them are dropped, the next ones restart the crowd.
 pub struct Lockstep {
     spec: Spec,
     agents: usize,
     meeting: Arc<Meeting>,
 }
 
-/// Where the shards meet.
+/// The barrier of the shards.
 struct Meeting {
     hall: Mutex<Hall>,
     decided: Condvar,
@@ -79,26 +79,26 @@ struct Meeting {
 
 struct Hall {
     crowd: Box<dyn Crowd>,
-    /// The crowd's first episodes have begun, under this seed.
+    /// Seed of the crowd's first episodes, once they have begun.
     begun: Option<u64>,
     /// `[agents][act]`.
     actions: Vec<f32>,
     out: Step,
-    /// Shards in use.
+    /// Number of shards in use.
     shards: usize,
-    /// Agents whose actions are known.
+    /// Number of agents whose actions are announced.
     present: usize,
-    /// Decisions made.
+    /// Number of decisions.
     round: u64,
     error: Option<CrowdError>,
     failed: bool,
 }
 
 impl Lockstep {
-    /// Of a crowd of `agents` agents, a multiple of [`BLOCK`].
+    /// Wraps a crowd of `agents` agents, a multiple of [`BLOCK`].
     ///
     /// # Panics
-    /// If it is not.
+    /// If it is not such a multiple.
     pub fn new(crowd: Box<dyn Crowd>, spec: Spec, agents: usize) -> Self {
         assert!(agents > 0 && agents.is_multiple_of(BLOCK), "{agents} agents are not whole blocks of {BLOCK}");
         let out = Step::new(agents, &spec);
@@ -108,8 +108,8 @@ impl Lockstep {
         Lockstep { spec, agents, meeting: Arc::new(Meeting { hall: Mutex::new(hall), decided: Condvar::new() }) }
     }
 
-    /// Why the crowd failed. When it fails, all threads that use its shards unwind with [`CrowdFailed`]; whoever started
-    /// them catches that.
+    /// The crowd's error. When the crowd fails, all threads that use its shards unwind with [`CrowdFailed`], and their
+    /// starter catches that.
     pub fn take_error(&self) -> Option<CrowdError> {
         self.meeting.enter().error.take()
     }
@@ -141,11 +141,11 @@ impl ShardFactory for Lockstep {
 
 impl Meeting {
     fn enter(&self) -> MutexGuard<'_, Hall> {
-        // a crowd that panicked has left nothing half done that anybody will see
+        // a panic of the crowd leaves no half-finished state that is used later
         self.hall.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lets the crowd do something; if it fails, all who wait and whoever comes unwind.
+    /// Runs an operation of the crowd. If it fails, all waiting and later threads unwind.
     fn attempt<R>(&self, hall: &mut Hall, f: impl FnOnce(&mut Hall) -> Result<R, CrowdError>) -> R {
         let mut reason: Box<dyn Any + Send> = Box::new(CrowdFailed);
         if !hall.failed {
@@ -161,20 +161,20 @@ impl Meeting {
     }
 }
 
-/// A run of blocks of a [`Crowd`].
+/// A range of blocks of a [`Crowd`].
 struct LockstepShard {
     spec: Spec,
     meeting: Arc<Meeting>,
     agents: Range<usize>,
     seed: u64,
-    /// The last decision's results of the shard's own agents.
+    /// Results of the last decision for the shard's agents.
     own: Step,
-    /// Blocks whose step of the announced decision is still to be asked for.
+    /// Number of blocks that have not been stepped since the announcement.
     announced: usize,
 }
 
 impl LockstepShard {
-    /// Copies the agents in `mask` of `[agents][columns]` into a block's `[column][16]`.
+    /// Copies the agents in `mask` from `[agents][columns]` to a block's `[column][16]`.
     fn show(&self, rows: &[f32], block: usize, mask: u16, out: &mut [f32]) {
         let columns = rows.len() / self.agents.len();
         for (i, row) in rows[block * BLOCK * columns..].chunks_exact(columns.max(1)).take(BLOCK).enumerate() {
@@ -206,8 +206,8 @@ impl Shard for LockstepShard {
         self.agents.len() / BLOCK
     }
 
-    /// At the start, begins the episodes of all agents of the crowd at once; later, shows the first observations of the
-    /// episodes that the last decision began by itself.
+    /// At the start, begins the episodes of all agents of the crowd. Later, returns the first observations of the
+    /// episodes that the last decision has begun.
     fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
         let meeting = self.meeting.clone();
         let mut hall = meeting.enter();
@@ -255,9 +255,9 @@ impl Shard for LockstepShard {
     }
 
     /// # Panics
-    /// If the decision was not announced.
+    /// If the actions were not announced.
     fn step(&mut self, block: usize, _: &[f32], obs: &mut [f32], out: &mut BlockStep) {
-        assert!(self.announced > 0, "the actions of all blocks are announced before the step of each");
+        assert!(self.announced > 0, "announce the actions of all blocks before the step of each");
         self.announced -= 1;
         let own = &self.own;
         self.show(&own.final_obs, block, !0, obs);
@@ -274,7 +274,7 @@ impl Shard for LockstepShard {
         out.diverged = bits(&own.diverged);
     }
 
-    /// The whole crowd belongs to its first block.
+    /// The first block holds the state of the whole crowd.
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         if self.agents.start + block == 0 {
             let mut hall = self.meeting.enter();

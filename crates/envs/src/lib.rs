@@ -1,14 +1,14 @@
 //! Marathon's environments: active ragdolls that learn to run.
 //!
-//! * [`factory`] gives a learner the blocks of a task by name: [`ShardFactory`], [`Shard`], [`Spec`].
-//! * [`VecEnv`] is for everybody else: any number of agents, plain row-major arrays, threads, automatic resets.
-//! * [`Agent`] is what one implements to add a creature; [`register`] makes it known by name. [`Options`] are named
-//!   arguments that an agent may take.
-//! * [`Lockstep`] gives a learner the blocks of a [`Crowd`]: a task from elsewhere, whose agents are stepped all at once.
+//! - [`factory`] returns the blocks of a task by name, for learners: [`ShardFactory`], [`Shard`], [`Spec`].
+//! - [`VecEnv`] is the general interface: any number of agents, plain row-major arrays, threads, automatic resets.
+//! - [`Agent`] is the trait to implement for a new creature or task; [`register`] adds it by name. [`Options`] are an
+//!   agent's named arguments.
+//! - [`Lockstep`] returns the blocks of a [`Crowd`]: an external task whose agents are stepped all at once.
 //!
-//! The folders from the bottom to the top, each of which imports from those before it: `error`, `episode_rng`; `agent` (what
-//! one implements); `shard` (what a learner sees); `lanes` (how an agent runs); `any_agent` (an agent behind a pointer);
-//! `agents` (those that come with the crate); `registry`; `vec` (plain arrays); `external` (tasks from elsewhere).
+//! Modules from bottom to top, each importing only from those before it: `error`, `episode_rng`; `agent` (the trait);
+//! `shard` (the learner's interface); `lanes` (runs agents); `any_agent` (agents as trait objects); `agents` (the
+//! agents of this crate); `registry`; `vec` (plain arrays); `external` (external tasks).
 //!
 //! The same seed gives the same bits on every machine, for every number of threads, agents and lanes.
 //!

@@ -1,7 +1,7 @@
 //! Agents by name.
 //!
-//! The global registry starts with the crate's own agents; [`register`] adds others. A [`Registry`] of one's own works
-//! the same way for those who want no global state.
+//! The global registry starts with the crate's own agents, and [`register`] adds others. Create a [`Registry`] to avoid
+//! global state.
 
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
@@ -57,17 +57,17 @@ impl Registry {
             let free = (0..).map(|v| format!("{base}-v{v}")).find(|name| self.find(name).is_none());
             return Err(EnvError::DuplicateAgent { suggestion: free.unwrap_or_default(), id });
         }
-        // an agent that contradicts its model is refused here, not at its first use
+        // reject an agent that contradicts its model now, not at its first use
         agent.clone().shards(Isa::F32)?;
         self.agents.push((id, agent));
         Ok(())
     }
 
-    /// The agent of a name: its id, an alias, or an id without the version (then the lowest version). Case does not
-    /// matter.
+    /// The agent with a name: an id, an alias, or an id without version (which selects the lowest version). Case does
+    /// not matter.
     ///
     /// # Errors
-    /// If there is none; the message names the nearest.
+    /// If there is none. The message contains the closest name.
     pub fn agent(&self, name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
         self.find(name).cloned().ok_or_else(|| {
             let ids: Vec<_> = self.agents.iter().map(|(id, _)| id.as_str()).collect();
@@ -80,10 +80,10 @@ impl Registry {
         })
     }
 
-    /// The agent of a name with other values for some of its arguments.
+    /// The agent with a name, with other values of some arguments.
     ///
     /// # Errors
-    /// If there is no such agent, or it does not take an argument or its value; the message names the nearest.
+    /// If there is no such agent or argument, or a value is invalid. The message contains the closest name.
     pub fn agent_with(&self, name: &str, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
         self.agent(name)?.with_options(options)
     }
@@ -96,7 +96,7 @@ impl Registry {
         self.agent(name)?.shards(isa)
     }
 
-    /// The same with other values for some of the agent's arguments.
+    /// The same with other values of some arguments.
     ///
     /// # Errors
     /// As [`Registry::agent_with`] and [`Registry::shards`].
@@ -142,7 +142,7 @@ pub fn ids() -> Vec<String> {
     global().ids()
 }
 
-/// The agent of a name in the global registry.
+/// The agent with a name in the global registry.
 ///
 /// # Errors
 /// As [`Registry::agent`].
@@ -158,7 +158,7 @@ pub fn factory(name: &str, isa: Isa) -> Result<Arc<dyn ShardFactory>, EnvError> 
     Ok(global().shards(name, isa)?)
 }
 
-/// The same with other values for some of the agent's arguments.
+/// The same with other values of some arguments.
 ///
 /// # Errors
 /// As [`Registry::shards_with`].
@@ -166,7 +166,7 @@ pub fn factory_with(name: &str, options: &Options, isa: Isa) -> Result<Arc<dyn S
     Ok(global().shards_with(name, options, isa)?)
 }
 
-/// The same with `frame_skip` physics steps per decision in place of the agent's own, and episodes of as many seconds.
+/// The same with another number of physics steps per decision. Episodes keep their duration in seconds.
 ///
 /// # Errors
 /// As [`Registry::shards`].

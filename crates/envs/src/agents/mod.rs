@@ -1,4 +1,4 @@
-//! The agents that come with the crate, one file each: Marathon's own, and the tasks of others.
+//! The agents of this crate, one file each: Marathon's own, and the tasks of Gymnasium and dm_control.
 
 pub mod dm_control;
 pub mod gymnasium;
@@ -11,17 +11,17 @@ use marathon_physics::lanes::Real;
 use crate::agent::{Obs, Senses};
 use crate::any_agent::AnyAgent;
 
-/// All of them, in the order of listings.
+/// All agents, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     [marathon::all(), gymnasium::all(), dm_control::all()].concat()
 }
 
-/// Names besides the registered ones, which are the ids without their version. `(alias, id)`.
+/// Extra names of tasks, `(alias, id)`. Each id without its version is a name already.
 pub fn aliases() -> impl Iterator<Item = (&'static str, &'static str)> {
     marathon::ALIASES.into_iter().chain(dm_control::ALIASES)
 }
 
-/// Coordinates from `skip` on.
+/// Writes the coordinates from `skip` on.
 #[inline(always)]
 fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
     for i in skip..s.readings().sim.model().nq {
@@ -29,7 +29,7 @@ fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
     }
 }
 
-/// All velocities.
+/// Writes all velocities.
 #[inline(always)]
 fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     for i in 0..s.readings().sim.model().nv {

@@ -1,44 +1,44 @@
-//! What an agent is given from outside besides its actions.
+//! Inputs of an agent besides its actions.
 
 use marathon_physics::Variation;
 
 use crate::error::EnvError;
 
-/// One agent's circumstances: its command, its ground, its constants, what pushes it. All of it belongs to snapshots.
+/// Inputs of one agent: command, ground, constants and pushes. All of them are part of snapshots.
 ///
-/// [`AgentShard::context`](crate::AgentShard::context) is the way to it; what comes later joins here.
+/// Get it from [`AgentShard::context`](crate::AgentShard::context).
 pub trait AgentContext {
-    /// The command that the agent observed last, in the order of [`Spec::command`](crate::Spec::command).
+    /// The last observed command, in the order of [`Spec::command`](crate::Spec::command).
     fn command(&self) -> Vec<f64>;
-    /// Tells the agent what to do, in place of its own schedule, until changed, over all resets; `None` gives it back to the
-    /// schedule, which has gone on meanwhile. The agent observes the command at the end of its next decision, or at the start
-    /// of its next episode, and is rewarded for it from there on.
+    /// Sets a command that overrides the agent's schedule until changed, also across resets. `None` returns to the
+    /// schedule, which continues in the meantime. The agent observes the command at the end of its next decision, or at
+    /// the start of its next episode. The reward uses it from then on.
     ///
     /// # Errors
-    /// If the number of values is not that of the command, or one is out of its range.
+    /// If the number of values is wrong, or a value is out of its range.
     fn set_command(&mut self, command: Option<&[f64]>) -> Result<(), EnvError>;
-    /// Pushes a body until told otherwise or until the next episode: force, N, and torque, N m, in world axes at the body's
+    /// Pushes a body until changed or until the next episode: force, N, and torque, N m, in world axes at the body's
     /// center of mass.
     ///
     /// # Errors
     /// If there is no such body, or the numbers are not finite.
     fn push(&mut self, body: usize, force: [f64; 3], torque: [f64; 3]) -> Result<(), EnvError>;
-    /// Gives the agent masses, friction, strength and gravity of its own, until changed, over all resets; starts that take
-    /// physics ([`Start::settle`](crate::Start::settle)) are found without them.
+    /// Sets the agent's masses, friction, strength and gravity until changed, also across resets. Starts that need
+    /// physics ([`Start::settle`](crate::Start::settle)) are computed without them.
     ///
     /// # Errors
-    /// If a length is wrong, or a number makes no sense.
+    /// If a length is wrong, or a number is out of its range.
     fn vary(&mut self, variation: &Variation) -> Result<(), EnvError>;
-    /// The agent's ground: elevations of the model's height field `field`, as [`AgentContext::set_ground`] takes them.
+    /// The agent's ground: heights of the model's height field `field`, as in [`AgentContext::set_ground`].
     ///
     /// # Errors
     /// If there is no such field.
     fn ground(&self, field: usize) -> Result<Vec<f32>, EnvError>;
-    /// Gives the agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row, the
-    /// first of which has the smallest y. It lasts until changed, over all resets, unless the agent draws ground of its own
-    /// ([`Start::set_ground`](crate::Start::set_ground)); starts that take physics are found on the model's own.
+    /// Sets the agent's ground: heights above the zero of the model's height field `field`, m, in rows of increasing y.
+    /// It lasts until changed, also across resets, unless the agent draws its own ground
+    /// ([`Start::set_ground`](crate::Start::set_ground)). Starts that need physics are computed on the model's ground.
     ///
     /// # Errors
-    /// If there is no such field, or the elevations are not finite numbers for each point of its grid.
+    /// If there is no such field, or the heights are not finite numbers for each point of its grid.
     fn set_ground(&mut self, field: usize, elevations: &[f32]) -> Result<(), EnvError>;
 }

@@ -1,4 +1,4 @@
-//! Demonstrations: what an expert observed and did, decision by decision.
+//! Demonstrations: observations and actions of an expert, decision by decision.
 
 use std::ops::Range;
 
@@ -9,17 +9,17 @@ use super::{Role, Spec};
 pub struct Demonstrations {
     /// Length of an observation.
     pub obs_len: usize,
-    /// Length of an action; 0 if the actions are not known.
+    /// Length of an action, 0 if actions are unknown.
     pub act_len: usize,
     /// Observations, `[row][obs]`.
     pub obs: Vec<f32>,
-    /// Per decision, the row that was observed and the one that was observed next.
+    /// For each decision, the observed row and the row observed next.
     pub decisions: Vec<[usize; 2]>,
-    /// Runs of decisions, one for each motion, that are as important as each other however long they are.
+    /// Ranges of decisions, one per motion. Motions have equal weight, regardless of their length.
     pub motions: Vec<Range<usize>>,
     /// Actions in [-1, 1], `[decision][act]`.
     pub actions: Vec<f32>,
-    /// File that they come from; none if they are the task's own.
+    /// Source file. `None` for the task's own demonstrations.
     pub source: Option<String>,
 }
 
@@ -28,20 +28,20 @@ impl Demonstrations {
     pub fn len(&self) -> usize {
         self.decisions.len()
     }
-    /// Whether there is none.
+    /// Whether there are no decisions.
     pub fn is_empty(&self) -> bool {
         self.decisions.is_empty()
     }
-    /// A row.
+    /// An observation.
     pub fn row(&self, i: usize) -> &[f32] {
         &self.obs[i * self.obs_len..][..self.obs_len]
     }
-    /// The action of a decision; nothing if it is not known.
+    /// The action of a decision, empty if unknown.
     pub fn action(&self, decision: usize) -> &[f32] {
         &self.actions[decision * self.act_len..][..self.act_len]
     }
 
-    /// As far as a role of the task knows it.
+    /// The part of the demonstrations that a role of the task observes and controls.
     pub fn of_role(self, role: &Role, spec: &Spec) -> Self {
         let cut = |rows: &[f32], len: usize, own: &Range<usize>| -> Vec<f32> {
             rows.chunks_exact(len.max(1)).flat_map(|row| row[own.clone()].iter().copied()).collect()

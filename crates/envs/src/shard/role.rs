@@ -1,36 +1,36 @@
-//! Who decides in a task: which numbers of the whole belong to whom.
+//! Roles of a task: which observations, actions and rewards belong to each.
 
 use std::ops::Range;
 
 use super::{BLOCK, BlockStep};
 
-/// One who decides in a task, and what of the task is its own.
+/// A role of a task.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Role {
-    /// Name, such as `runner`; empty where one has it all.
+    /// Name, such as `runner`. It is empty in a task with a single role.
     pub name: String,
-    /// Numbers of the observation that it sees.
+    /// Range of the observation.
     pub obs: Range<usize>,
-    /// Actions that it chooses.
+    /// Range of the actions.
     pub act: Range<usize>,
-    /// Terms of the reward that it earns.
+    /// Range of the reward's terms.
     pub terms: Range<usize>,
-    /// Whether it does not decide every time.
+    /// Whether it acts in some decisions only.
     pub intermittent: bool,
 }
 
-/// The id of a task as its role of that name knows it.
+/// The id of a task for one of its roles.
 pub fn role_id(task: &str, role: &str) -> String {
     format!("{task}/{role}")
 }
 
-/// The task that an id of [`role_id`] is about, or the id itself.
+/// The task of an id from [`role_id`], or the id itself.
 pub fn task_of_role(id: &str) -> &str {
     id.split_once('/').map_or(id, |(task, _)| task)
 }
 
 impl BlockStep {
-    /// What role number `i` earned.
+    /// Reward of role `i`.
     pub fn reward_of(&self, i: usize, role: &Role) -> [f32; BLOCK] {
         if i == 0 {
             return self.reward;
@@ -42,13 +42,12 @@ impl BlockStep {
         sum
     }
 
-    /// Agents whose role number `i` has come to its end before their episode, a bit each: those where it has failed, and
-    /// those where it has not.
+    /// Agents for which role `i` ended its part before the episode, one bit each: with failure and without.
     pub fn leaving(&self, i: usize) -> [u16; 2] {
         self.leaves.get(i).copied().unwrap_or_default()
     }
 
-    /// Agents whose role number `i` decides next, a bit each: all, where the task has one role.
+    /// Agents for which role `i` acts next, one bit each. In a task with one role, all of them.
     pub fn deciding(&self, i: usize) -> u16 {
         self.decides.get(i).copied().unwrap_or(!0)
     }

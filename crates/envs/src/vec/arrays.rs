@@ -1,28 +1,27 @@
-//! What a step of a [`VecEnv`](crate::VecEnv) tells, as rows of plain arrays.
+//! Results of a step of a [`VecEnv`](crate::VecEnv), as rows of plain arrays.
 
 use std::ops::Range;
 
 use crate::shard::{BLOCK, Spec};
 
-/// Numbers of an observation as a caller wants them: `f32`, in which they are computed, or `f64`, which some interfaces ask
-/// for.
+/// Number type of observations: `f32`, in which they are computed, or `f64`, which some interfaces require.
 pub trait ObsNumber: Copy + Send + Sync + From<f32> {}
 
 impl ObsNumber for f32 {}
 impl ObsNumber for f64 {}
 
-/// Results of a step, in arrays of their own. Made by [`VecEnv::buffers`](crate::VecEnv::buffers).
+/// Results of a step in owned arrays. Create it with [`VecEnv::buffers`](crate::VecEnv::buffers).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
-    /// Observations to act upon next, `[agents][obs]`.
+    /// Observations for the next action, `[agents][obs]`.
     pub obs: Vec<f32>,
-    /// Observations of the states reached, `[agents][obs]`: the same as `obs` except where an episode ended.
+    /// Observations of the new states, `[agents][obs]`. They differ from `obs` only where an episode ended.
     pub final_obs: Vec<f32>,
     /// Rewards, `[agents]`.
     pub reward: Vec<f32>,
     /// Terms that add up to the rewards, `[agents][reward_terms]`.
     pub terms: Vec<f32>,
-    /// Further numbers about the states reached, `[agents][info]`.
+    /// Infos about the new states, `[agents][info]`.
     pub info: Vec<f32>,
     /// Distance moved along +x, m, `[agents]`.
     pub forward: Vec<f32>,
@@ -30,7 +29,7 @@ pub struct Step {
     pub terminated: Vec<bool>,
     /// The episode reached its time limit, `[agents]`.
     pub truncated: Vec<bool>,
-    /// The simulation of the agent broke down; it counts as terminated, with reward 0. `[agents]`.
+    /// The simulation of the agent diverged, `[agents]`. The agent counts as terminated with reward 0.
     pub diverged: Vec<bool>,
 }
 
@@ -50,7 +49,7 @@ impl Step {
         }
     }
 
-    /// Copies consecutive agents' rows out of those of more agents.
+    /// Copies the rows of consecutive agents from those of more agents.
     pub(crate) fn copy_rows(&mut self, from: &Step, spec: &Spec, agents: Range<usize>) {
         let rows = |columns: usize| agents.start * columns..agents.end * columns;
         self.obs.copy_from_slice(&from.obs[rows(spec.obs)]);
@@ -80,7 +79,7 @@ impl Step {
     }
 }
 
-/// Where a step writes to: the caller's arrays, with the shapes of [`Step`].
+/// The caller's arrays for the results of a step, with the shapes of [`Step`].
 #[derive(Debug)]
 pub struct StepMut<'a, O = f32> {
     /// See [`Step::obs`].
@@ -104,7 +103,7 @@ pub struct StepMut<'a, O = f32> {
 }
 
 impl<'a, O> StepMut<'a, O> {
-    /// The same arrays for a shorter time.
+    /// Reborrows the arrays.
     pub(crate) fn borrow(&mut self) -> StepMut<'_, O> {
         StepMut {
             obs: self.obs,
@@ -147,7 +146,7 @@ impl<'a, O> StepMut<'a, O> {
     }
 }
 
-/// Copies the agents in `mask` from a block's `[column][16]` into rows.
+/// Copies the agents in `mask` from a block's `[column][16]` to rows.
 pub(crate) fn to_rows<O: ObsNumber>(block: &[f32], columns: usize, mask: u16, rows: &mut [O]) {
     // there may be no columns
     for (i, row) in rows.chunks_exact_mut(columns.max(1)).enumerate() {

@@ -1,35 +1,35 @@
-//! Who decides next, where a task has several roles.
+//! Tracks which roles act next, in a task with several roles.
 
 use crate::shard::BlockStep;
 
-/// Who decides next in the blocks of a worker, and whose part has just ended.
+/// Turns of the roles in the blocks of a worker.
 pub(super) struct Deciders {
     roles: usize,
     /// `[block][role]`.
     turns: Vec<Turn>,
 }
 
-/// Agents of a block, a bit each, by what they ask of a role.
+/// Turns of a role for the agents of a block, one bit each.
 #[derive(Clone, Copy)]
 pub(super) struct Turn {
-    /// It decides next.
+    /// The role acts next.
     pub decides: u16,
-    /// Its part has just ended before the episode: it has failed, or it has not.
+    /// The role's part has ended before the episode: with failure and without.
     pub leaves: [u16; 2],
 }
 
 impl Turn {
-    /// At the start of episodes, where all roles decide.
+    /// At the start of episodes, all roles act.
     const START: Turn = Turn { decides: !0, leaves: [0; 2] };
 }
 
 impl Deciders {
-    /// Everybody, of so many roles; none where one has it all.
+    /// All roles act. A task with a single role has no entries.
     pub fn new(roles: usize, blocks: usize) -> Self {
         Deciders { roles, turns: vec![Turn::START; roles * blocks] }
     }
 
-    /// Takes note that agents begin an episode, at whose start all roles decide.
+    /// Records that agents begin an episode, at whose start all roles act.
     pub fn begin(&mut self, block: usize, mask: u16) {
         for turn in self.of(block) {
             turn.decides |= mask;
@@ -37,7 +37,7 @@ impl Deciders {
         }
     }
 
-    /// Takes note of a decision, in which episodes of the agents in `begun` have ended or begun.
+    /// Records a decision. `begun` masks the agents whose episode has ended or begun in it.
     pub fn follow(&mut self, block: usize, out: &BlockStep, begun: u16) {
         for (role, turn) in self.of(block).iter_mut().enumerate() {
             turn.decides = out.deciding(role) | begun;
@@ -45,12 +45,12 @@ impl Deciders {
         }
     }
 
-    /// Lets everybody decide, as nobody knows.
+    /// Makes all roles act, because their turns are unknown.
     pub fn forget(&mut self) {
         self.turns.fill(Turn::START);
     }
 
-    /// What the agents of a block ask of a role. A task with a single role keeps no entry: that role acts at every step.
+    /// Turns of a role in a block. A task with a single role keeps no entry: that role acts at every step.
     pub fn turn(&self, block: usize, role: usize) -> &Turn {
         self.turns.get(block * self.roles + role).unwrap_or(&Turn::START)
     }

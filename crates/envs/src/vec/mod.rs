@@ -1,4 +1,4 @@
-//! Any number of agents behind plain arrays.
+//! Any number of agents with plain arrays.
 
 mod arrays;
 mod deciders;

@@ -4,8 +4,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::EnvError;
 
-/// A pool of threads of this process. A process that was forked off has the memory of its parent's pool, but none of its
-/// threads, and would wait for them for ever: it gets threads of its own.
+/// The thread pool of this process. A forked process has the memory of its parent's pool but none of its threads, and
+/// would wait for them forever. It therefore creates its own pool.
 pub(crate) struct Pool {
     threads: usize,
     process: u32,
@@ -31,7 +31,7 @@ impl Pool {
         Ok(self.pool.insert(pool))
     }
 
-    /// Leaves the pool alone that threads of another process belong to.
+    /// Drops the reference to a pool of another process without joining its threads.
     fn forget(&mut self) {
         std::mem::forget(self.pool.take());
     }

@@ -1,4 +1,4 @@
-//! A whole environment as bytes.
+//! Snapshots of a whole environment.
 //!
 //! | bytes | |
 //! |---|---|
@@ -8,13 +8,13 @@
 //! | 8 | length of the task's name |
 //! | as long | the task's name |
 //!
-//! Then, for every sixteen agents, their block (`lanes/saved.rs`) and two bytes: a bit per agent that begins an episode at the
-//! next step. Integers are little-endian.
+//! For every sixteen agents, their block follows (`lanes/saved.rs`), then two bytes with a bit for each agent that
+//! begins an episode at the next step. Integers are little-endian.
 
 use super::vec_env::VecEnv;
 use crate::error::EnvError;
 
-/// The last two digits are the version.
+/// Mark of a snapshot. The last two digits are the version.
 const MARK: &[u8; 8] = b"MRTHNv03";
 
 fn refuse<X>(problem: String) -> Result<X, EnvError> {
@@ -22,9 +22,9 @@ fn refuse<X>(problem: String) -> Result<X, EnvError> {
 }
 
 impl VecEnv {
-    /// Everything that the future depends on, as bytes: restored with [`VecEnv::load`], the environment continues with
-    /// the same bits, whatever the number of threads. What agents have of their own ([`VecEnv::context`])
-    /// is included; the task's arguments and the limit of episodes are not.
+    /// The complete state as bytes. After [`VecEnv::load`], the environment continues with the same bits, regardless of
+    /// the number of threads. It includes the agents' own inputs ([`VecEnv::context`]), but not the task's arguments
+    /// and the episode limit.
     pub fn save(&self) -> Vec<u8> {
         let mut bytes = [&MARK[..], &[0; 4]].concat();
         bytes.extend((self.agents as u64).to_le_bytes());
@@ -41,11 +41,11 @@ impl VecEnv {
         bytes
     }
 
-    /// Restores what [`VecEnv::save`] returned. The roles that [decide](VecEnv::decides) next are not in it.
+    /// Restores a state of [`VecEnv::save`]. It does not include which roles [act](VecEnv::decides) next.
     ///
     /// # Errors
-    /// If the bytes are damaged, or not a snapshot of an environment with the same agent and the same number of them; then
-    /// nothing has changed.
+    /// If the bytes are damaged, or belong to an environment with another agent or number of agents. Then nothing has
+    /// changed.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), EnvError> {
         let blocks = self.blocks_in(bytes)?;
         let before = self.save();
@@ -59,10 +59,10 @@ impl VecEnv {
         result
     }
 
-    /// The blocks of a snapshot of this kind of environment.
+    /// The blocks of a snapshot, after checking that it belongs to this kind of environment.
     fn blocks_in<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
         let Some((mark, rest)) = bytes.split_first_chunk::<8>() else {
-            return refuse(format!("it has {} bytes, expected one of an environment", bytes.len()));
+            return refuse(format!("it has {} bytes, expected a snapshot of an environment", bytes.len()));
         };
         let body = match rest.split_first_chunk() {
             Some((sum, body)) if mark == MARK => {
@@ -76,18 +76,18 @@ impl VecEnv {
             }
             _ if mark.starts_with(b"MRTHNv") => {
                 return refuse(format!(
-                    "its format is '{}', expected '{}': another version of Marathon has saved it",
+                    "its format is '{}', expected '{}': it was saved by another version of Marathon",
                     mark.escape_ascii(),
                     MARK.escape_ascii()
                 ));
             }
-            _ => return refuse("it does not begin like one of an environment".into()),
+            _ => return refuse("it does not begin with the mark of an environment".into()),
         };
         let expected = (self.agents, self.spec.id.as_str());
         match head(body) {
             Some((agents, id, blocks)) if (agents, id) == expected => Ok(blocks),
             Some((agents, id, _)) => {
-                refuse(format!("it is of {agents} agents of '{id}', expected {} of '{}'", expected.0, expected.1))
+                refuse(format!("it has {agents} agents of '{id}', expected {} of '{}'", expected.0, expected.1))
             }
             None => refuse("it ends too early".into()),
         }
@@ -102,11 +102,11 @@ impl VecEnv {
                 bytes = rest;
             }
         }
-        if bytes.is_empty() { Ok(()) } else { refuse(format!("it goes on for {} bytes after its end", bytes.len())) }
+        if bytes.is_empty() { Ok(()) } else { refuse(format!("it has {} bytes after its end", bytes.len())) }
     }
 }
 
-/// Number of agents and name of the task at the head of a snapshot's body, and its blocks.
+/// Number of agents and name of the task at the start of a snapshot's body, and the blocks after them.
 fn head(body: &[u8]) -> Option<(usize, &str, &[u8])> {
     let (agents, rest) = body.split_first_chunk()?;
     let (length, rest) = rest.split_first_chunk()?;

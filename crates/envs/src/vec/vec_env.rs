@@ -1,7 +1,8 @@
-//! Any number of agents behind plain arrays, for everyone who is not the embedded learner.
+//! Any number of agents with plain arrays, for all callers except the embedded learner.
 //!
-//! Arrays are row-major, one row per agent, and belong to the caller. Agents live in blocks of sixteen spread over the
-//! threads of a pool; results do not depend on the number of threads, the number of agents or the instruction set.
+//! Arrays are row-major with one row per agent, and belong to the caller. Agents are stored in blocks of sixteen,
+//! distributed over the threads of a pool. Results do not depend on the number of threads, the number of agents or the
+//! instruction set.
 
 use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
@@ -16,26 +17,26 @@ use crate::error::EnvError;
 use crate::registry::{self, Registry};
 use crate::shard::{AgentContext, AgentState, BLOCK, Spec, check_memory};
 
-/// Limit on the number of threads. Each has its own working memory.
+/// Limit on the number of threads, because each has its own working memory.
 const MOST_THREADS: usize = 1024;
 
 /// Agents of one kind that are stepped together.
 pub struct VecEnv {
     pub(super) spec: Spec,
-    /// No deviation from the model.
+    /// The model's own constants.
     unvaried: Variation,
     pub(super) agents: usize,
     autoreset: Autoreset,
     pub(super) workers: Vec<Worker>,
-    /// Agents per worker, a multiple of the block; the last worker may have fewer.
+    /// Agents per worker, a multiple of the block size. The last worker may have fewer.
     pub(super) stride: usize,
-    /// None for a single worker.
+    /// `None` for a single worker.
     pool: Option<Pool>,
 }
 
 impl VecEnv {
-    /// Makes an environment of an agent of the global registry. Agents must be [reset](VecEnv::reset) before their
-    /// first step.
+    /// Creates an environment of an agent of the global registry. [Reset](VecEnv::reset) the agents before their first
+    /// step.
     ///
     /// # Errors
     /// If there is no such agent, an option is invalid, the agents exceed the memory budget, or the thread pool cannot
@@ -103,8 +104,8 @@ impl VecEnv {
         Step::new(self.agents, &self.spec)
     }
 
-    /// Starts a new episode for every agent and writes the first observations, `[agents][obs]`. A seed starts all random
-    /// streams anew.
+    /// Starts a new episode for every agent and writes the first observations, `[agents][obs]`. A seed restarts all
+    /// random streams.
     ///
     /// # Errors
     /// If the array's length is wrong.
@@ -118,7 +119,7 @@ impl VecEnv {
         self.each_block(&|_| true, obs, Worker::reset)
     }
 
-    /// Starts a new episode for the agents in `mask` and writes their first observations; other rows are left alone.
+    /// Starts a new episode for the agents in `mask` and writes their first observations. Other rows are unchanged.
     ///
     /// # Errors
     /// If an array's length is wrong.
@@ -128,8 +129,8 @@ impl VecEnv {
         self.each_block(&|i| mask[i], obs, Worker::reset)
     }
 
-    /// Starts the random streams of one agent anew, as those of agent `number` of an environment with this seed; its next
-    /// reset begins the first episode under it.
+    /// Restarts the random streams of one agent as those of agent `number` in an environment with this seed. The next
+    /// reset begins the first episode with them.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -139,12 +140,12 @@ impl VecEnv {
         Ok(())
     }
 
-    /// The model's own constants: what [`VecEnv::vary`] may deviate from.
+    /// The model's own constants, which [`VecEnv::vary`] can change.
     pub fn unvaried(&self) -> &Variation {
         &self.unvaried
     }
 
-    /// What an agent is given from outside: its command, and pushes, constants and ground of its own.
+    /// Inputs of an agent besides actions: command, pushes, constants and ground.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -153,19 +154,18 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.context(agent % self.stride))
     }
 
-    /// Tells an agent what to do, or gives it back to its own schedule, see [`AgentContext::set_command`].
+    /// Sets an agent's command, or returns it to its schedule, see [`AgentContext::set_command`].
     ///
     /// # Errors
-    /// If there is no such agent, or it cannot be told this.
+    /// If there is no such agent, or the command is invalid.
     pub fn set_command(&mut self, agent: usize, command: Option<&[f64]>) -> Result<(), EnvError> {
         self.context(agent)?.set_command(command)
     }
 
-    /// Gives an agent masses, friction, strength and gravity of its own, for domain randomization, see
-    /// [`AgentContext::vary`].
+    /// Sets an agent's masses, friction, strength and gravity, for domain randomization, see [`AgentContext::vary`].
     ///
     /// # Errors
-    /// If there is no such agent, a length is wrong, or a number makes no sense.
+    /// If there is no such agent, a length is wrong, or a number is out of its range.
     pub fn vary(&mut self, agent: usize, variation: &Variation) -> Result<(), EnvError> {
         self.context(agent)?.vary(variation)
     }
@@ -178,16 +178,16 @@ impl VecEnv {
         self.context(agent)?.ground(field)
     }
 
-    /// Gives an agent ground of its own, see [`AgentContext::set_ground`].
+    /// Sets an agent's ground, see [`AgentContext::set_ground`].
     ///
     /// # Errors
-    /// If there is no such agent or field, or the elevations are not finite numbers for each point of the field's grid.
+    /// If there is no such agent or field, or the heights are not finite numbers for each point of the field's grid.
     pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
         self.context(agent)?.set_ground(field, elevations)
     }
 
-    /// Writes the observations of the agents in `mask` at their present states, which begin an episode there; for use
-    /// after [`VecEnv::set_state`]. Other rows are left alone.
+    /// Writes the observations of the agents in `mask` at their present states, as at the start of an episode. Use it
+    /// after [`VecEnv::set_state`]. Other rows are unchanged.
     ///
     /// # Errors
     /// If an array's length is wrong.
@@ -197,8 +197,8 @@ impl VecEnv {
         self.each_block(&|i| mask[i], obs, Worker::observe)
     }
 
-    /// Writes what the agents report about their present states, `[agents][info]`: after a reset, or of the episodes that
-    /// have begun within a step. [`Step::info`] is about the states that a step reached.
+    /// Writes the agents' infos at their present states, `[agents][info]`. Use it after a reset, or for episodes that
+    /// began within a step. [`Step::info`] belongs to the states at the end of a decision.
     ///
     /// # Errors
     /// If the array's length is wrong.
@@ -214,11 +214,10 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Advances every agent by one decision. `actions` is `[agents][act]` in the units of
-    /// [`Spec::action_low`].
+    /// Advances every agent by one decision. `actions` is `[agents][act]` in the units of [`Spec::action_low`].
     ///
     /// # Errors
-    /// If an array's length is wrong; then nothing has been done.
+    /// If an array's length is wrong. Then nothing has changed.
     pub fn step<O: ObsNumber>(&mut self, actions: &[f32], out: &mut StepMut<'_, O>) -> Result<(), EnvError> {
         let (obs, act) = (self.spec.obs, self.spec.act);
         let (terms, infos) = (self.spec.reward_terms.len(), self.spec.info.len());
@@ -239,7 +238,7 @@ impl VecEnv {
             return Ok(());
         };
         let pool = pool.get()?;
-        // every worker gets the rows of its own agents
+        // each worker gets the rows of its own agents
         let (spec, n) = (&self.spec, self.stride);
         let mut rest = out.borrow();
         let mut parts = Vec::with_capacity(self.workers.len());
@@ -266,8 +265,8 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.state(agent % self.stride))
     }
 
-    /// Configuration of the clip that an agent follows: `qpos` where the clip is now, in the world, moved by all laps and turns
-    /// since the episode began. Rewards compare the agent with it. `None` for tasks that follow no clips.
+    /// Configuration of the agent's clip at the present frame: `qpos` in the world, including all laps since the
+    /// episode began. Rewards compare the agent with it. `None` for tasks that follow no clips.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -276,8 +275,8 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.reference(agent % self.stride))
     }
 
-    /// Position of every agent's root along x, m, as the distances `forward` of [`Step`] add up to. `None` if the root
-    /// cannot move along x.
+    /// Position of every agent's root along x, m. [`Step::forward`] is its difference between decisions. `None` if the
+    /// root cannot move along x.
     pub fn x_positions(&self) -> Option<Vec<f64>> {
         let mut x = vec![0.0; self.agents];
         let mut there = true;
@@ -287,7 +286,7 @@ impl VecEnv {
         there.then_some(x)
     }
 
-    /// Controls of an agent during its last decision, `[nu]`, in the actuators' units: what its action has become.
+    /// Controls of an agent during its last decision, `[nu]`, in the actuators' units.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -296,10 +295,10 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.ctrl(agent % self.stride))
     }
 
-    /// Puts an agent into a state, as if an episode had begun there.
+    /// Sets an agent's state, as if an episode began there.
     ///
     /// # Errors
-    /// If there is no such agent, or the state does not fit it.
+    /// If there is no such agent, or the state does not match its model.
     pub fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError> {
         self.check_agent(agent)?;
         let (worker, local) = (&mut self.workers[agent / self.stride], agent % self.stride);
@@ -308,7 +307,7 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Pushes a body of an agent until told otherwise or until its next episode, see [`AgentContext::push`].
+    /// Pushes a body of an agent until changed or until its next episode, see [`AgentContext::push`].
     ///
     /// # Errors
     /// If there is no such agent or body, or the numbers are not finite.
@@ -316,8 +315,8 @@ impl VecEnv {
         self.context(agent)?.push(body, force, torque)
     }
 
-    /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision: a bit each,
-    /// of the first 32.
+    /// Feet ([`Facts::feet`](crate::Facts::feet)) of an agent that touched the ground during its last decision, one bit
+    /// each. Only the first 32 are included.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -326,9 +325,9 @@ impl VecEnv {
         Ok(self.workers[agent / self.stride].shard.feet(agent % self.stride))
     }
 
-    /// Writes for which agents a role decides next, `[agents]`. Roles are numbered as in
-    /// [`Spec::deciders`](crate::Spec::deciders). Where an intermittent role does not decide, its last action is to be repeated.
-    /// All roles decide at the start of an episode, and after [`VecEnv::load`] until the next step.
+    /// Writes for which agents a role acts next, `[agents]`. Roles are numbered as in
+    /// [`Spec::deciders`](crate::Spec::deciders). When an intermittent role does not act, repeat its last action. All
+    /// roles act at the start of an episode, and after [`VecEnv::load`] until the next step.
     ///
     /// # Errors
     /// If there is no such role, or the array's length is wrong.
@@ -337,11 +336,11 @@ impl VecEnv {
         self.ask(role, |turn| turn.decides, out)
     }
 
-    /// Writes for which agents a role's part of the episode has ended with the last decision while others go on, `[agents]`: those in
-    /// which it has failed, and those in which it has not, see [`Agent::leaves`](crate::Agent::leaves).
+    /// Writes for which agents the last decision ended a role's part of the episode while others continue, `[agents]`:
+    /// with failure and without, see [`Agent::leaves`](crate::Agent::leaves).
     ///
     /// # Errors
-    /// The same.
+    /// As [`VecEnv::decides`].
     pub fn leaves(&self, role: usize, [failed, finished]: [&mut [bool]; 2]) -> Result<(), EnvError> {
         for (which, out) in [failed, finished].into_iter().enumerate() {
             self.check("leaves [agents]", out.len(), 1)?;
@@ -350,7 +349,7 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Writes a mask of a role for all agents.
+    /// Writes a role's mask for all agents.
     fn ask(&self, role: usize, mask: impl Fn(&Turn) -> u16, out: &mut [bool]) -> Result<(), EnvError> {
         let roles = self.spec.roles.len();
         if role >= roles.max(1) {
@@ -378,7 +377,7 @@ impl VecEnv {
         Err(EnvError::Option { option: "agent", found: agent.to_string(), expected: "less than the number of agents" })
     }
 
-    /// Hands the blocks with chosen agents, and the rows of each, to a function.
+    /// Calls a function for each block with chosen agents, and writes its observations to their rows.
     fn each_block<O: ObsNumber>(
         &mut self,
         chosen: Chosen,
@@ -406,5 +405,5 @@ impl VecEnv {
     }
 }
 
-/// Which agents of an environment are meant.
+/// Chooses agents of an environment.
 type Chosen<'a> = &'a (dyn Fn(usize) -> bool + Sync);

@@ -5,19 +5,19 @@ use super::deciders::Deciders;
 use super::options::Autoreset;
 use crate::shard::{AgentShard, BLOCK, BlockStep};
 
-/// A shard and the block-shaped arrays that it reads and writes.
+/// A shard with the block-shaped arrays that it reads and writes.
 pub(super) struct Worker {
     pub(super) shard: Box<dyn AgentShard>,
     action: Vec<f32>,
     pub(super) obs: Vec<f32>,
     out: BlockStep,
-    /// A mask per block: agents that start a new episode at the next step instead of acting.
+    /// Mask per block: agents that start a new episode at the next step instead of acting.
     pub(super) pending: Vec<u16>,
     pub(super) deciders: Deciders,
 }
 
 impl Worker {
-    /// Before the first reset of the shard, which has so many blocks.
+    /// A worker before the first reset of its shard, which has `blocks` blocks.
     pub fn new(shard: Box<dyn AgentShard>, blocks: usize) -> Self {
         let spec = shard.spec();
         Worker {
@@ -30,19 +30,19 @@ impl Worker {
         }
     }
 
-    /// Takes note that agents of a block are where an episode begins.
+    /// Records that agents of a block are at the start of an episode.
     pub fn begin(&mut self, block: usize, mask: u16) {
         self.pending[block] &= !mask;
         self.deciders.begin(block, mask);
     }
 
-    /// Starts new episodes in a block; their observations are left in `self.obs`.
+    /// Starts new episodes in a block and writes their observations to `self.obs`.
     pub fn reset(&mut self, block: usize, mask: u16) {
         self.shard.reset(block, mask, &mut self.obs);
         self.begin(block, mask);
     }
 
-    /// Leaves the observations of a block in `self.obs`, as if episodes began.
+    /// Writes the observations of a block to `self.obs`, as at the start of episodes.
     pub fn observe(&mut self, block: usize, mask: u16) {
         self.shard.observe(block, mask, &mut self.obs);
         self.deciders.begin(block, mask);
@@ -60,7 +60,7 @@ impl Worker {
             let real = ((1_u32 << count) - 1) as u16;
             let agents = first..first + count;
 
-            // lanes without an agent get no action
+            // lanes without an agent need no action
             for (i, row) in actions[first * n_act..(first + count) * n_act].chunks_exact(n_act).enumerate() {
                 for (a, x) in row.iter().enumerate() {
                     action[a * BLOCK + i] = *x;
@@ -85,7 +85,7 @@ impl Worker {
             }
             let rows = first * n_obs..(first + count) * n_obs;
             to_rows(obs, n_obs, real, &mut out.final_obs[rows.clone()]);
-            // lanes without an agent live on unseen
+            // lanes without an agent continue unseen
             let ended = o.terminated | o.truncated;
             deciders.follow(block, o, ended | due);
             let begun = match autoreset {
@@ -104,7 +104,7 @@ impl Worker {
     }
 }
 
-/// Takes back what a step said of the agents in `mask`.
+/// Clears the results of a step for the agents in `mask`.
 fn clear(out: &mut BlockStep, mask: u16) {
     let terms = out.terms.chunks_exact_mut(BLOCK);
     for row in terms.chain([&mut out.reward[..], &mut out.forward[..]]) {

@@ -18,9 +18,9 @@ const DOMAIN: Domain = Domain {
 const BODIES: [&str; 1] = ["torso"];
 const TORSO: Body = Body::named(&BODIES, "torso");
 
-/// Speed from which the reward is 1, m/s.
+/// Speed at which the reward is 1, m/s.
 const RUN_SPEED: f64 = 10.0;
-/// Physics steps that every start settles for.
+/// Physics steps for which every start settles.
 const SETTLE: usize = 200;
 /// The root's slide along z: coordinate and velocity.
 const Z: usize = 1;
@@ -40,7 +40,7 @@ pub struct Cheetah {
 }
 
 impl Cheetah {
-    /// To run.
+    /// The running task.
     pub fn run() -> Self {
         Cheetah { arguments: Arguments::default() }
     }
@@ -72,8 +72,8 @@ impl Agent for Cheetah {
         super::fits(model, 3)
     }
 
-    /// Limited joints anywhere in their ranges, then 200 physics steps. The first of them takes its forces from the
-    /// reference configuration, as dm_control's does, which has not seen the new one yet: a free fall.
+    /// Limited joints at random angles within their ranges, then 200 physics steps. As in dm_control, the first of them
+    /// computes its forces from the reference configuration: a free fall.
     fn reset(&self, start: &mut Start) {
         let limited: Vec<_> =
             start.model().joints.iter().filter(|j| j.limited).map(|j| (j.qpos_adr, j.range)).collect();

@@ -1,8 +1,9 @@
 //! `hopper-stand-v0`, `hopper-hop-v0`: one leg, a pelvis and a nose in a plane, four motors.
 //!
-//! Observation: qpos without x (6), qvel (7), `ln(1 + force)` of the touch sensors at toe and heel (2). Reward: 1 while the
-//! torso is between 0.6 and 2 m above the foot, times, to stand, 0.8 to 1 for small actions; to hop, up to 1 for the forward
-//! velocity of the center of mass, 2 m/s.
+//! Observation: qpos without x (6), qvel (7), `ln(1 + force)` of the touch sensors at toe and heel (2).
+//!
+//! Reward: 1 while the torso is between 0.6 and 2 m above the foot, times a second factor. To stand, the factor is 0.8
+//! to 1 for small actions. To hop, it is up to 1 for a forward velocity of the center of mass of 2 m/s.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -24,7 +25,7 @@ const TOUCH: [&str; 2] = ["touch_toe", "touch_heel"];
 
 /// Heights of the torso above the foot that count as standing, m.
 const STAND_HEIGHT: [f64; 2] = [0.6, 2.0];
-/// Speed from which hopping is worth 1, m/s.
+/// Speed at which the hopping factor is 1, m/s.
 const HOP_SPEED: f64 = 2.0;
 
 crate::options! {
@@ -32,7 +33,7 @@ crate::options! {
     pub struct Arguments {
         /// Model: `hopper.xml`, or the path of an MJCF file.
         xml_file: String = "hopper.xml".into(),
-        /// Whether it is to hop forward, or to stand.
+        /// Whether the task is to hop forward instead of standing.
         hopping: bool = false,
     }
 }
@@ -46,12 +47,12 @@ pub struct Hopper {
 }
 
 impl Hopper {
-    /// To stand.
+    /// The standing task.
     pub fn stand() -> Self {
         Self::new("hopper-stand-v0", "dm_control's hopper, to stand", false)
     }
 
-    /// To hop at 2 m/s.
+    /// The hopping task, at 2 m/s.
     pub fn hop() -> Self {
         Self::new("hopper-hop-v0", "dm_control's hopper, to hop", true)
     }

@@ -1,9 +1,11 @@
 //! `humanoid-stand-v0`, `humanoid-walk-v0`, `humanoid-run-v0`: two legs, a waist and two arms in space, 21 motors.
 //!
-//! Observation: joint angles (21), height of the head (1), left hand, left foot, right hand and right foot as seen from the
-//! torso (12), z of the torso's axes (3), velocity of the center of mass (3), qvel (27); or qpos (28) and qvel. Reward: 1 for a
-//! head above 1.4 m and an upright torso, times 0.8 to 1 for small actions, times, to stand, 1 for a center of mass at rest;
-//! to walk or run, up to 1 for its horizontal speed in any direction, of which a sixth is left at rest.
+//! Observation: joint angles (21), height of the head (1), left hand, left foot, right hand and right foot relative to
+//! the torso (12), z of the torso's axes (3), velocity of the center of mass (3), qvel (27); or qpos (28) and qvel.
+//!
+//! Reward: 1 for a head above 1.4 m and an upright torso, times 0.8 to 1 for small actions, times a third factor. To
+//! stand, the factor is 1 for a center of mass at rest. To walk or run, it is up to 1 for the horizontal speed in any
+//! direction, and a sixth at rest.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -30,7 +32,7 @@ const EXTREMITIES: [Body; 4] = [
     Body::named(&BODIES, "right_foot"),
 ];
 
-/// Height of the head from which it counts as standing, m.
+/// Height of the head that counts as standing, m.
 const STAND_HEIGHT: f64 = 1.4;
 /// Coordinates of the root.
 const ROOT: usize = 7;
@@ -40,9 +42,9 @@ crate::options! {
     pub struct Arguments {
         /// Model: `humanoid.xml`, or the path of an MJCF file.
         xml_file: String = "humanoid.xml".into(),
-        /// Speed from which the reward is full, m/s; 0: it is for standing still.
+        /// Speed at which the reward is full, m/s. 0 rewards standing still.
         move_speed: f64 = 0.0,
-        /// Whether qpos and qvel are all that is observed.
+        /// Whether the observation is qpos and qvel only.
         pure_state: bool = false,
     }
 }
@@ -56,17 +58,17 @@ pub struct Humanoid {
 }
 
 impl Humanoid {
-    /// To stand still.
+    /// The standing task.
     pub fn stand() -> Self {
         Self::new("humanoid-stand-v0", "dm_control's humanoid, to stand", 0.0)
     }
 
-    /// To walk at 1 m/s.
+    /// The walking task, at 1 m/s.
     pub fn walk() -> Self {
         Self::new("humanoid-walk-v0", "dm_control's humanoid, to walk", 1.0)
     }
 
-    /// To run at 10 m/s.
+    /// The running task, at 10 m/s.
     pub fn run() -> Self {
         Self::new("humanoid-run-v0", "dm_control's humanoid, to run", 10.0)
     }
@@ -94,7 +96,7 @@ impl Humanoid {
         s.readings().subtree_velocity(s.body(TORSO))
     }
 
-    /// A body's place along the torso's axes, m.
+    /// A body's position in the torso's frame, m.
     #[inline(always)]
     fn seen_from_torso<T: Real>(&self, s: &Senses<T>, body: Body) -> [T; 3] {
         let (r, torso) = (s.readings(), s.body(TORSO));

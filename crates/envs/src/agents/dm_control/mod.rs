@@ -1,10 +1,11 @@
-//! dm_control's suite for the bodies that run: the same models, observations, rewards in [0, 1] and starts.
+//! dm_control's suite for bodies that run: the same models, observations, rewards in [0, 1] and starts.
 //!
-//! Everything is dm_control's (1.0), with observations flattened in the order of its dictionaries. Nothing fails: an episode
-//! is truncated after 1000 decisions. `tests/a_dm_control_return_agrees_with_dm_control.rs` holds them to it.
+//! Everything is dm_control's (1.0), with observations flattened in the order of its dictionaries. No episode is
+//! terminated; each is truncated after 1000 decisions. `tests/a_dm_control_return_agrees_with_dm_control.rs` checks all
+//! of it.
 //!
-//! What an observation sees after a decision is of the present state, except what touch sensors feel, which is of the last
-//! physics step. (dm_control's `legacy_step`, its default.)
+//! Observations after a decision belong to the present state, except those of touch sensors, which belong to the last
+//! physics step (dm_control's default, `legacy_step`).
 
 pub mod cheetah;
 pub mod hopper;
@@ -21,7 +22,7 @@ use marathon_physics::model::JointType;
 use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Sigmoid, Start, Terms, Tolerance, names};
 use crate::any_agent::AnyAgent;
 
-/// All of them, in the order of listings.
+/// All tasks, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     vec![
         Arc::new(hopper::Hopper::stand()),
@@ -36,7 +37,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     ]
 }
 
-/// The names that Shimmy gives the tasks in Gymnasium, `(name, id)`.
+/// Shimmy's names of the tasks in Gymnasium, `(name, id)`.
 pub const ALIASES: [(&str, &str); 9] = [
     ("dm_control/hopper-stand-v0", "hopper-stand-v0"),
     ("dm_control/hopper-hop-v0", "hopper-hop-v0"),
@@ -49,23 +50,23 @@ pub const ALIASES: [(&str, &str); 9] = [
     ("dm_control/cheetah-run-v0", "cheetah-run-v0"),
 ];
 
-/// Name of the one term that a reward has: its factors cannot be added.
+/// Name of the reward's only term. Its factors cannot be added.
 const REWARD: &str = "reward";
 
-/// A body, of which there are several tasks.
+/// A body with several tasks.
 struct Domain {
-    /// The model's name among the arguments.
+    /// Name of the model among the arguments.
     file: &'static str,
     /// The model.
     text: &'static str,
     /// Physics steps per decision.
     frame_skip: usize,
-    /// What [`info`](crate::Agent::info) reports.
+    /// Names of [`info`](crate::Agent::info).
     info: &'static [&'static str],
 }
 
 impl Domain {
-    /// What the tasks have in common.
+    /// Facts that the tasks share.
     fn facts(&self, id: &str, summary: &str, xml_file: &str) -> Facts {
         let own = xml_file == self.file;
         Facts {
@@ -84,7 +85,7 @@ impl Domain {
     }
 }
 
-/// Refuses a model with fewer coordinates than the task speaks of, or with joints that are not drawn.
+/// Rejects a model with fewer coordinates than the task uses, or with joints that starts do not randomize.
 fn fits(model: &Model, nq: usize) -> Result<(), String> {
     if model.nq < nq {
         return Err(format!("its model has {} coordinates, expected at least {nq}", model.nq));
@@ -97,7 +98,7 @@ fn fits(model: &Model, nq: usize) -> Result<(), String> {
     }
 }
 
-/// Refuses a speed that is no goal.
+/// Rejects an invalid target speed.
 fn goal(move_speed: f64) -> Result<(), String> {
     if (0.0..=1e3).contains(&move_speed) {
         return Ok(());
@@ -105,8 +106,8 @@ fn goal(move_speed: f64) -> Result<(), String> {
     Err(format!("option move_speed is {move_speed}, expected a speed from 0 to 1000 m/s"))
 }
 
-/// Draws every joint evenly from its range, one without a range from the circle, and the direction of a free root as four
-/// even numbers from 0 to 1 (not every direction is as likely). Slides without a range stay.
+/// Draws every joint uniformly from its range, and a joint without a range from the full circle. The quaternion of a
+/// free root is four uniform numbers from 0 to 1, so directions are not equally likely. Slides without a range stay.
 fn randomize_joints(start: &mut Start) {
     let joints: Vec<_> =
         start.model().joints.iter().map(|j| (j.kind, j.qpos_adr, j.limited.then_some(j.range))).collect();
@@ -126,28 +127,28 @@ fn randomize_joints(start: &mut Start) {
     }
 }
 
-/// Coordinates from `skip` on, by dm_control's name.
+/// Writes the coordinates from `skip` on, under dm_control's name.
 #[inline(always)]
 fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
     out.group("position");
     super::observe_positions(s, out, skip);
 }
 
-/// All velocities.
+/// Writes all velocities.
 #[inline(always)]
 fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.group("velocity");
     super::observe_velocities(s, out);
 }
 
-/// Worth of a speed: 1 from `goal` on, `value` at `goal - margin`, falling in a line.
+/// Reward of a speed: 1 from `goal` upward, `value` at `goal - margin`, linear in between.
 #[inline(always)]
 fn fast<T: Real>(speed: T, goal: f64, margin: f64, value: f64) -> T {
     let tolerance = Tolerance { sigmoid: Sigmoid::Linear, value_at_margin: value, ..Tolerance::at_least(goal, margin) };
     tolerance.of(speed)
 }
 
-/// Mean over the motors of 1 less the squared action, which is worth nothing from 1 on.
+/// Mean over the motors of 1 minus the squared action, at least 0.
 #[inline(always)]
 fn small_control<T: Real>(s: &Senses<T>) -> T {
     let one = Tolerance { sigmoid: Sigmoid::Quadratic, value_at_margin: 0.0, ..Tolerance::around_zero(1.0) };
@@ -158,7 +159,7 @@ fn small_control<T: Real>(s: &Senses<T>) -> T {
     sum * T::lit(1.0 / s.action_count() as f64)
 }
 
-/// `(a x + b) / (a + b)`: a factor that leaves `b / (a + b)` of the reward where `x` is 0.
+/// `(a x + b) / (a + b)`: a factor that is `b / (a + b)` where `x` is 0.
 #[inline(always)]
 fn weighted<T: Real>(a: f64, x: T, b: f64) -> T {
     x.mul_add(T::lit(a / (a + b)), T::lit(b / (a + b)))

@@ -1,8 +1,9 @@
 //! `walker-stand-v0`, `walker-walk-v0`, `walker-run-v0`: two legs in a plane, six motors.
 //!
-//! Observation: of the seven bodies, x of the axes x and z (14), height of the torso (1), qvel (9; z before x). Reward: up to 1
-//! for standing: three quarters for the torso's height, one for its uprightness; that times up to 1 for the forward velocity
-//! of the center of mass, of which a sixth is left at rest.
+//! Observation: for the seven bodies, x of the axes x and z (14); height of the torso (1); qvel (9; z before x).
+//!
+//! Reward: up to 1 for standing, three quarters of it for the torso's height and one for its uprightness. It is
+//! multiplied by up to 1 for the forward velocity of the center of mass, and by a sixth at rest.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -20,7 +21,7 @@ const DOMAIN: Domain = Domain {
 const BODIES: [&str; 1] = ["torso"];
 const TORSO: Body = Body::named(&BODIES, "torso");
 
-/// Height of the torso from which it counts as standing, m.
+/// Height of the torso that counts as standing, m.
 const STAND_HEIGHT: f64 = 1.2;
 
 crate::options! {
@@ -28,7 +29,7 @@ crate::options! {
     pub struct Arguments {
         /// Model: `walker.xml`, or the path of an MJCF file.
         xml_file: String = "walker.xml".into(),
-        /// Speed from which the reward is full, m/s; 0: it is for standing alone.
+        /// Speed at which the reward is full, m/s. 0 rewards standing only.
         move_speed: f64 = 0.0,
     }
 }
@@ -42,17 +43,17 @@ pub struct Walker {
 }
 
 impl Walker {
-    /// To stand.
+    /// The standing task.
     pub fn stand() -> Self {
         Self::new("walker-stand-v0", "dm_control's walker, to stand", 0.0)
     }
 
-    /// To walk at 1 m/s.
+    /// The walking task, at 1 m/s.
     pub fn walk() -> Self {
         Self::new("walker-walk-v0", "dm_control's walker, to walk", 1.0)
     }
 
-    /// To run at 8 m/s.
+    /// The running task, at 8 m/s.
     pub fn run() -> Self {
         Self::new("walker-run-v0", "dm_control's walker, to run", 8.0)
     }

@@ -1,8 +1,10 @@
 //! `Ant-v5`: four legs, eight motors.
 //!
-//! Observation: qpos without x and y (13), qvel (14), torque and force of the contacts on each of the 13 bodies, clipped
-//! to 1 (78). Reward: velocity of the torso + 1 while healthy - 0.5 sum of squared actions - 0.0005 sum of squared clipped
-//! contact forces. Healthy: height between 0.2 and 1 m.
+//! Observation: qpos without x and y (13), qvel (14), torque and force of the contacts on each of the 13 bodies,
+//! clipped to 1 (78).
+//!
+//! Reward: velocity of the torso + 1 while healthy - 0.5 sum of squared actions - 0.0005 sum of squared clipped contact
+//! forces. Healthy: height between 0.2 and 1 m.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -14,7 +16,7 @@ use crate::agent::{
     View, names,
 };
 
-/// A body by number, as MuJoCo counts, or by name.
+/// A body by number, as in MuJoCo, or by name.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MainBody {
     /// Number; 0 is the world.
@@ -37,7 +39,7 @@ impl OptionValue for MainBody {
 }
 
 crate::options! {
-    /// Gymnasium's ant with its keyword arguments.
+    /// Gymnasium's keyword arguments of the ant.
     pub struct Ant {
         /// Model: `ant.xml`, or the path of an MJCF file.
         xml_file: String = "ant.xml".into(),
@@ -55,16 +57,15 @@ crate::options! {
         main_body: MainBody = MainBody::Number(1),
         /// Whether the episode ends when it is no longer healthy.
         terminate_when_unhealthy: bool = true,
-        /// Range of the torso's height, m, ends included.
+        /// Range of the healthy torso height, m, inclusive.
         healthy_z_range: [f64; 2] = [0.2, 1.0],
-        /// Range that contact forces are clipped to, N and N m.
+        /// Range to which contact forces are clipped, N and N m.
         contact_force_range: [f64; 2] = [-1.0, 1.0],
-        /// Half width of the uniform noise of the start's coordinates, and standard deviation of the normal noise of its
-        /// velocities.
+        /// Noise of the start: half width (uniform) for coordinates, standard deviation (normal) for velocities.
         reset_noise_scale: Scale = Scale(0.1),
-        /// Whether x and y are left out of the observation.
+        /// Whether the observation excludes x and y.
         exclude_current_positions_from_observation: bool = true,
-        /// Whether contact forces are observed.
+        /// Whether the observation includes contact forces.
         include_cfrc_ext_in_observation: bool = true,
     }
 }
@@ -76,7 +77,7 @@ impl Ant {
         T::not(T::or(z.lt(T::lit(low)), T::lit(high).lt(z)))
     }
 
-    /// Where the main body is.
+    /// Position of the main body.
     #[inline(always)]
     fn place<T: Real>(&self, s: &Senses<T>) -> [T; 2] {
         let body = match &self.main_body {

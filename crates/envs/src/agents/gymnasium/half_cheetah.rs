@@ -1,6 +1,7 @@
 //! `HalfCheetah-v5`: a spine with two legs in a plane, six motors.
 //!
-//! Observation: qpos without x (8), qvel (9). Reward: velocity of the root - 0.1 sum of squared actions. It never fails.
+//! Observation: qpos without x (8), qvel (9). Reward: velocity of the root - 0.1 sum of squared actions. It never
+//! terminates.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -9,7 +10,7 @@ use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
-    /// Gymnasium's cheetah with its keyword arguments.
+    /// Gymnasium's keyword arguments of the cheetah.
     pub struct HalfCheetah {
         /// Model: `half_cheetah.xml`, or the path of an MJCF file.
         xml_file: String = "half_cheetah.xml".into(),
@@ -19,10 +20,9 @@ crate::options! {
         forward_reward_weight: f64 = 1.0,
         /// Weight of the squared actions.
         ctrl_cost_weight: f64 = 0.1,
-        /// Half width of the uniform noise of the start's coordinates, and standard deviation of the normal noise of its
-        /// velocities.
+        /// Noise of the start: half width (uniform) for coordinates, standard deviation (normal) for velocities.
         reset_noise_scale: Scale = Scale(0.1),
-        /// Whether x is left out of the observation.
+        /// Whether the observation excludes x.
         exclude_current_positions_from_observation: bool = true,
     }
 }

@@ -10,7 +10,7 @@ use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
-    /// Gymnasium's hopper with its keyword arguments.
+    /// Gymnasium's keyword arguments of the hopper.
     pub struct Hopper {
         /// Model: `hopper.xml`, or the path of an MJCF file.
         xml_file: String = "hopper.xml".into(),
@@ -24,15 +24,15 @@ crate::options! {
         healthy_reward: f64 = 1.0,
         /// Whether the episode ends when it is no longer healthy.
         terminate_when_unhealthy: bool = true,
-        /// Range of all coordinates but x and z, and of all velocities.
+        /// Healthy range of all coordinates but x and z, and of all velocities.
         healthy_state_range: [f64; 2] = [-100.0, 100.0],
-        /// Range of the torso's height, m.
+        /// Healthy range of the torso's height, m.
         healthy_z_range: [f64; 2] = [0.7, f64::INFINITY],
-        /// Range of the torso's angle, rad.
+        /// Healthy range of the torso's angle, rad.
         healthy_angle_range: [f64; 2] = [-0.2, 0.2],
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(5e-3),
-        /// Whether x is left out of the observation.
+        /// Whether the observation excludes x.
         exclude_current_positions_from_observation: bool = true,
     }
 }

@@ -1,9 +1,10 @@
 //! `Humanoid-v5`: two legs, a waist and two arms in space, 17 motors.
 //!
-//! Observation: qpos without x and y (22), qvel (23), and of the 13 bodies `cinert` (130) and `cvel` (78), torques of the
-//! motors on the joints (17), contact forces on the bodies (78). Reward: 1.25 velocity of the center of mass + 5 while
-//! healthy - 0.1 sum of squared actions - 5e-7 sum of squared contact forces, at most 10. Healthy: height between 1 and
-//! 2 m.
+//! Observation: qpos without x and y (22), qvel (23); for the 13 bodies `cinert` (130) and `cvel` (78); motor torques
+//! on the joints (17); contact forces on the bodies (78).
+//!
+//! Reward: 1.25 velocity of the center of mass + 5 while healthy - 0.1 sum of squared actions - 5e-7 sum of squared
+//! contact forces (at most 10). Healthy: height between 1 and 2 m.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -18,7 +19,7 @@ use crate::agent::{
 const ROOT: usize = 6;
 
 crate::options! {
-    /// Gymnasium's humanoid with its keyword arguments.
+    /// Gymnasium's keyword arguments of the humanoid.
     pub struct Humanoid {
         /// Model: `humanoid.xml`, or the path of an MJCF file.
         xml_file: String = "humanoid.xml".into(),
@@ -30,30 +31,30 @@ crate::options! {
         ctrl_cost_weight: f64 = 0.1,
         /// Weight of the squared contact forces.
         contact_cost_weight: f64 = 5e-7,
-        /// Range that the cost of the contact forces is clipped to.
+        /// Range to which the cost of contact forces is clipped.
         contact_cost_range: [f64; 2] = [f64::NEG_INFINITY, 10.0],
         /// Reward per decision while healthy.
         healthy_reward: f64 = 5.0,
         /// Whether the episode ends when it is no longer healthy.
         terminate_when_unhealthy: bool = true,
-        /// Range of the torso's height, m.
+        /// Healthy range of the torso's height, m.
         healthy_z_range: [f64; 2] = [1.0, 2.0],
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(1e-2),
-        /// Whether x and y are left out of the observation.
+        /// Whether the observation excludes x and y.
         exclude_current_positions_from_observation: bool = true,
-        /// Whether inertias of the bodies are observed.
+        /// Whether the observation includes inertias of the bodies.
         include_cinert_in_observation: bool = true,
-        /// Whether velocities of the bodies are observed.
+        /// Whether the observation includes velocities of the bodies.
         include_cvel_in_observation: bool = true,
-        /// Whether torques of the motors are observed.
+        /// Whether the observation includes motor torques.
         include_qfrc_actuator_in_observation: bool = true,
-        /// Whether contact forces are observed.
+        /// Whether the observation includes contact forces.
         include_cfrc_ext_in_observation: bool = true,
     }
 }
 
-/// What a humanoid is told to observe beside its joints.
+/// Optional parts of a humanoid's observation.
 pub(super) struct HumanoidObs {
     pub position: bool,
     pub cinert: bool,
@@ -63,7 +64,7 @@ pub(super) struct HumanoidObs {
 }
 
 impl HumanoidObs {
-    /// What the physics has to prepare.
+    /// Quantities that the physics has to compute.
     pub fn view() -> View {
         View { of_last_step: true, bodies: true, actuators: true, ..View::default() }
     }
@@ -138,7 +139,7 @@ impl Humanoid {
     }
 }
 
-/// Center of mass of everything.
+/// Center of mass of the model.
 #[inline(always)]
 fn center<T: Real>(s: &Senses<T>) -> [T; 2] {
     let [x, y, _] = s.readings().center_of_mass();

@@ -1,7 +1,7 @@
 //! `HumanoidStandup-v5`: the humanoid on its back, 17 motors.
 //!
 //! Observation: that of `Humanoid-v5`. Reward: height of the torso over the physics' timestep + 1 - 0.1 sum of squared
-//! actions - 5e-7 sum of squared contact forces, at most 10. It never fails.
+//! actions - 5e-7 sum of squared contact forces (at most 10). It never terminates.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -12,31 +12,31 @@ use crate::agent::senses::clamp;
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
-    /// Gymnasium's humanoid that is to stand up, with its keyword arguments.
+    /// Gymnasium's keyword arguments of the humanoid that stands up.
     pub struct HumanoidStandup {
         /// Model: `humanoidstandup.xml`, or the path of an MJCF file.
         xml_file: String = "humanoidstandup.xml".into(),
         /// Physics steps per decision.
         frame_skip: usize = 5,
-        /// Accepted and, as in Gymnasium 1.4, not used: the weight of the height is 1.
+        /// Accepted but unused, as in Gymnasium 1.4: the weight of the height is 1.
         uph_cost_weight: f64 = 1.0,
         /// Weight of the squared actions.
         ctrl_cost_weight: f64 = 0.1,
         /// Weight of the squared contact forces.
         impact_cost_weight: f64 = 0.5e-6,
-        /// Range that the cost of the contact forces is clipped to.
+        /// Range to which the cost of contact forces is clipped.
         impact_cost_range: [f64; 2] = [f64::NEG_INFINITY, 10.0],
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(1e-2),
-        /// Whether x and y are left out of the observation.
+        /// Whether the observation excludes x and y.
         exclude_current_positions_from_observation: bool = true,
-        /// Whether inertias of the bodies are observed.
+        /// Whether the observation includes inertias of the bodies.
         include_cinert_in_observation: bool = true,
-        /// Whether velocities of the bodies are observed.
+        /// Whether the observation includes velocities of the bodies.
         include_cvel_in_observation: bool = true,
-        /// Whether torques of the motors are observed.
+        /// Whether the observation includes motor torques.
         include_qfrc_actuator_in_observation: bool = true,
-        /// Whether contact forces are observed.
+        /// Whether the observation includes contact forces.
         include_cfrc_ext_in_observation: bool = true,
     }
 }
@@ -45,7 +45,7 @@ impl Agent for HumanoidStandup {
     fn facts(&self) -> Facts {
         let id = "HumanoidStandup-v5";
         Facts {
-            // the last is not in Gymnasium's info, but it is in its reward
+            // the last term is part of Gymnasium's reward but not of its info
             reward_terms: names(["reward_linup", "reward_quadctrl", "reward_impact", "reward_alive"]),
             info: names(["x_position", "y_position", "z_distance_from_origin"]),
             metrics: names(["z_distance_from_origin"]),

@@ -1,8 +1,10 @@
-//! `InvertedDoublePendulum-v5`: two poles on each other on a cart on a rail, one motor.
+//! `InvertedDoublePendulum-v5`: two stacked poles on a cart on a rail, one motor.
 //!
-//! Observation: position of the cart, sines and cosines of the two angles, three velocities clipped to 10, force of the
-//! rail's end on the cart clipped to 10 (9). Reward: 10 while the tip is above 1 m, which else ends the episode,
-//! - 0.01 x^2 - (z - 2 m)^2 of the tip - 0.001 w1^2 - 0.005 w2^2.
+//! Observation: position of the cart, sines and cosines of the two angles, three velocities clipped to 10, and the
+//! force of the rail's end on the cart, clipped to 10 (9).
+//!
+//! Reward: 10 while the tip is above 1 m - 0.01 x^2 - (z - 2 m)^2 of the tip - 0.001 w1^2 - 0.005 w2^2. The episode is
+//! terminated when the tip is lower.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -11,24 +13,23 @@ use super::Noise;
 use crate::agent::senses::clamp;
 use crate::agent::{Agent, Facts, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, View, names};
 
-/// Site at the end of the second pole: the model's first.
+/// Site at the end of the second pole, the model's first site.
 const TIP: usize = 0;
-/// Height of the tip at which the poles have fallen, m.
+/// Height of the tip at which the poles count as fallen, m.
 const FALLEN: f64 = 1.0;
-/// Height of the tip that costs nothing, m.
+/// Height of the tip without a penalty, m.
 const UPRIGHT: f64 = 2.0;
 
 crate::options! {
-    /// Gymnasium's cart and two poles with its keyword arguments.
+    /// Gymnasium's keyword arguments of the cart with two poles.
     pub struct InvertedDoublePendulum {
         /// Model: `inverted_double_pendulum.xml`, or the path of an MJCF file.
         xml_file: String = "inverted_double_pendulum.xml".into(),
         /// Physics steps per decision.
         frame_skip: usize = 5,
-        /// Reward per decision until it falls.
+        /// Reward per decision until the poles fall.
         healthy_reward: f64 = 10.0,
-        /// Half width of the uniform noise of the start's coordinates, and standard deviation of the normal noise of its
-        /// velocities.
+        /// Noise of the start: half width (uniform) for coordinates, standard deviation (normal) for velocities.
         reset_noise_scale: Scale = Scale(0.1),
     }
 }

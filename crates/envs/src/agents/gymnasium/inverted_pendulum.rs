@@ -1,6 +1,7 @@
 //! `InvertedPendulum-v5`: a pole on a cart on a rail, one motor.
 //!
-//! Observation: qpos (2), qvel (2). Reward: 1 until the pole leans by more than 0.2 rad, which ends the episode.
+//! Observation: qpos (2), qvel (2). Reward: 1 per decision. The episode is terminated when the pole leans by more than
+//! 0.2 rad.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -8,17 +9,17 @@ use marathon_physics::lanes::Real;
 use super::Noise;
 use crate::agent::{Agent, Facts, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
-/// Lean at which the pole has fallen, rad.
+/// Lean at which the pole counts as fallen, rad.
 const FALLEN: f64 = 0.2;
 
 crate::options! {
-    /// Gymnasium's cart and pole with its keyword arguments.
+    /// Gymnasium's keyword arguments of the cart and pole.
     pub struct InvertedPendulum {
         /// Model: `inverted_pendulum.xml`, or the path of an MJCF file.
         xml_file: String = "inverted_pendulum.xml".into(),
         /// Physics steps per decision.
         frame_skip: usize = 2,
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(0.01),
     }
 }

@@ -1,11 +1,11 @@
-//! Gymnasium's own MuJoCo tasks, version 5: a policy, a return and a distribution of starts carry over in both directions.
+//! Gymnasium's MuJoCo tasks, version 5. Policies, returns and start distributions carry over in both directions.
 //!
 //! Everything is Gymnasium's (1.4): models, physics steps per decision, integrator, observations, keyword arguments,
-//! reward terms under the keys of its `info`, terminations, starts (drawn from the same distributions by another
-//! generator). `tests/a_gymnasium_return_agrees_with_gymnasium.rs` holds them to it.
+//! reward terms under the keys of its `info`, and terminations. Starts have the same distributions but come from
+//! another generator. `tests/a_gymnasium_return_agrees_with_gymnasium.rs` checks all of it.
 //!
-//! What an observation sees after a step is as in Gymnasium: `qpos` and `qvel` of the present state, but what MuJoCo derives
-//! from them (positions and velocities of bodies, inertias, contact forces) of the state from which the last physics step
+//! Observations after a step are as in Gymnasium. `qpos` and `qvel` belong to the present state. Derived quantities
+//! (positions and velocities of bodies, inertias, contact forces) belong to the state from which the last physics step
 //! computed its forces.
 
 pub mod ant;
@@ -27,7 +27,7 @@ use crate::agent::senses::clamp;
 use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Start, View};
 use crate::any_agent::AnyAgent;
 
-/// All of them, in the order of listings.
+/// All tasks, in the order of listings.
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     vec![
         Arc::new(hopper::Hopper::default()),
@@ -42,7 +42,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     ]
 }
 
-/// The models that come with Gymnasium, by the names that `xml_file` has for them.
+/// The models that ship with Gymnasium, by their names in `xml_file`.
 const MODELS: [(&str, &str); 9] = [
     ("hopper.xml", include_str!("../../../../../assets/gymnasium/hopper.xml")),
     ("walker2d_v5.xml", include_str!("../../../../../assets/gymnasium/walker2d.xml")),
@@ -55,7 +55,7 @@ const MODELS: [(&str, &str); 9] = [
     ("inverted_double_pendulum.xml", include_str!("../../../../../assets/gymnasium/inverted_double_pendulum.xml")),
 ];
 
-/// What the tasks have in common.
+/// Facts that the tasks share.
 fn facts(id: &str, summary: &str, xml_file: &str, frame_skip: usize) -> Facts {
     let built_in = MODELS.iter().find(|(name, _)| *name == xml_file);
     Facts {
@@ -71,7 +71,7 @@ fn facts(id: &str, summary: &str, xml_file: &str, frame_skip: usize) -> Facts {
     }
 }
 
-/// Refuses a model with fewer coordinates, velocities or actuators than the task speaks of.
+/// Rejects a model with fewer coordinates or velocities than the task uses.
 fn has(model: &Model, nq: usize, nv: usize) -> Result<(), String> {
     for (what, found, least) in [("coordinates", model.nq, nq), ("velocities", model.nv, nv)] {
         if found < least {
@@ -81,8 +81,8 @@ fn has(model: &Model, nq: usize, nv: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// The start: the reference configuration at rest, with uniform noise of `scale` on every coordinate, quaternions included
-/// (which are not normalized before they are first observed), and noise on every velocity.
+/// Sets the start: the reference configuration at rest, with uniform noise of `scale` on every coordinate and noise on
+/// every velocity. Quaternions get noise too, and are not normalized before the first observation.
 fn start(start: &mut Start, scale: f64, velocities: Noise) {
     let (qpos0, nv) = (start.model().qpos0.clone(), start.model().nv);
     for (q, q0) in start.qpos.iter_mut().zip(&qpos0) {
@@ -106,21 +106,21 @@ enum Noise {
     Normal,
 }
 
-/// Coordinates from `skip` on, by Gymnasium's name.
+/// Writes the coordinates from `skip` on, under Gymnasium's name.
 #[inline(always)]
 fn observe_positions<T: Real>(s: &Senses<T>, out: &mut Obs<T>, skip: usize) {
     out.group("qpos");
     super::observe_positions(s, out, skip);
 }
 
-/// All velocities.
+/// Writes all velocities.
 #[inline(always)]
 fn observe_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.group("qvel");
     super::observe_velocities(s, out);
 }
 
-/// All velocities, clipped to [-10, 10].
+/// Writes all velocities, clipped to [-10, 10].
 #[inline(always)]
 fn observe_clipped_velocities<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
     out.group("qvel");
@@ -135,7 +135,7 @@ fn within<T: Real>(x: T, [low, high]: [f64; 2]) -> T::Mask {
     T::and(T::lit(low).lt(x), x.lt(T::lit(high)))
 }
 
-/// How far coordinate `i` is from its reference.
+/// Difference of coordinate `i` from its reference.
 #[inline(always)]
 fn from_origin<T: Real>(s: &Senses<T>, i: usize) -> T {
     s.readings().qpos(i) - T::lit(s.readings().sim.model().qpos0[i])
@@ -147,24 +147,24 @@ fn distance<T: Real>([x, y]: [T; 2]) -> T {
     x.mul_add(x, y * y).sqrt()
 }
 
-/// The mean velocity of a point between two decisions, kept in an agent's memory.
+/// Mean velocity of a point between two decisions, stored in an agent's memory.
 struct Travel;
 
 impl Travel {
-    /// Slots it needs: where the point was, and its velocity.
+    /// Number of slots: the last position, and the velocity.
     const SLOTS: usize = 4;
     /// Slot of the velocity along x.
     const X_VELOCITY: usize = 2;
     /// Slot of the velocity along y.
     const Y_VELOCITY: usize = 3;
 
-    /// An episode begins at a point.
+    /// Starts an episode at a point.
     #[inline(always)]
     fn begin<T: Real>(memory: &mut [T], at: [T; 2]) {
         memory[..2].copy_from_slice(&at);
     }
 
-    /// A decision led to a point.
+    /// Updates the velocity after a decision that led to a point.
     #[inline(always)]
     fn update<T: Real>(memory: &mut [T], at: [T; 2], dt: f64) {
         for i in 0..2 {

@@ -1,7 +1,7 @@
-//! `Swimmer-v5`: three links in a horizontal plane of thick liquid, two motors.
+//! `Swimmer-v5`: three links in a horizontal plane of viscous liquid, two motors.
 //!
 //! Observation: qpos without x and y (3), qvel (5). Reward: velocity of the front link along x - 0.0001 sum of squared
-//! actions. It never fails.
+//! actions. It never terminates.
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -10,7 +10,7 @@ use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
-    /// Gymnasium's swimmer with its keyword arguments.
+    /// Gymnasium's keyword arguments of the swimmer.
     pub struct Swimmer {
         /// Model: `swimmer.xml`, or the path of an MJCF file.
         xml_file: String = "swimmer.xml".into(),
@@ -20,9 +20,9 @@ crate::options! {
         forward_reward_weight: f64 = 1.0,
         /// Weight of the squared actions.
         ctrl_cost_weight: f64 = 1e-4,
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(0.1),
-        /// Whether x and y are left out of the observation.
+        /// Whether the observation excludes x and y.
         exclude_current_positions_from_observation: bool = true,
     }
 }

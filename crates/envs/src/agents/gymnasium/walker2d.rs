@@ -10,7 +10,7 @@ use super::{Noise, Travel};
 use crate::agent::{Agent, Facts, Motors, Obs, OptionInfo, OptionSet, Options, Scale, Senses, Start, Terms, names};
 
 crate::options! {
-    /// Gymnasium's walker with its keyword arguments.
+    /// Gymnasium's keyword arguments of the walker.
     pub struct Walker2d {
         /// Model: `walker2d_v5.xml`, or the path of an MJCF file.
         xml_file: String = "walker2d_v5.xml".into(),
@@ -24,13 +24,13 @@ crate::options! {
         healthy_reward: f64 = 1.0,
         /// Whether the episode ends when it is no longer healthy.
         terminate_when_unhealthy: bool = true,
-        /// Range of the torso's height, m.
+        /// Healthy range of the torso's height, m.
         healthy_z_range: [f64; 2] = [0.8, 2.0],
-        /// Range of the torso's angle, rad.
+        /// Healthy range of the torso's angle, rad.
         healthy_angle_range: [f64; 2] = [-1.0, 1.0],
-        /// Half width of the uniform noise of the start.
+        /// Half width of the uniform noise at the start.
         reset_noise_scale: Scale = Scale(5e-3),
-        /// Whether x is left out of the observation.
+        /// Whether the observation excludes x.
         exclude_current_positions_from_observation: bool = true,
     }
 }
