@@ -1,4 +1,4 @@
-//! A state or action that stops being finite ends its own agent's episode, is reported, and reaches nobody else.
+//! A state or action that is not finite ends its own agent's episode, is reported, and does not affect other agents.
 
 mod common;
 
@@ -16,7 +16,7 @@ fn a_broken_agent_is_quarantined_and_made_whole() {
         env.reset(Some(1), &mut out.obs).unwrap();
         healthy.reset(Some(1), &mut reference.obs).unwrap();
 
-        // one agent is thrown out of the world, another gets an action that is not a number
+        // one agent gets an extreme velocity, another an action that is not a number
         let AgentState { mut qvel, qpos } = env.state(3).unwrap();
         qvel[1] = 1e9;
         env.set_state(3, &AgentState { qpos, qvel }).unwrap();
@@ -47,7 +47,7 @@ fn a_broken_agent_is_quarantined_and_made_whole() {
     }
 }
 
-/// Without automatic resets a broken agent is harmless until its caller resets it.
+/// Without automatic resets, a diverged agent is harmless until its caller resets it.
 #[test]
 fn a_broken_agent_may_wait_for_its_reset() {
     let mut env = make("humanoid", 4, 1, None, Autoreset::Disabled);

@@ -1,10 +1,16 @@
-//! A policy, a return and a distribution of starts carry over between dm_control's tasks here and in dm_control.
+//! Policies, returns and start distributions carry over between dm_control's tasks here and in dm_control.
 //!
-//! For every task of [`dm_control`](marathon_envs::agents::dm_control), as it is and with other arguments: from the same
-//! state and with the same actions, the observation and the reward agree for 100 decisions in double precision, and
-//! decision by decision in single precision; rewards are between 0 and 1; starts have the same distribution; episodes
-//! have the same length, and nothing else ends them; returns of random play are the same within their confidence
-//! interval. The other side is the installed `dm_control`, `tests/oracle/dm_control_tasks.py`.
+//! The test covers every task of [`dm_control`](marathon_envs::agents::dm_control), with default and with other
+//! arguments:
+//!
+//! - From the same state and with the same actions, observation and reward agree: for 100 decisions in double
+//!   precision, and for every single decision in single precision.
+//! - Rewards are between 0 and 1.
+//! - Starts have the same distribution.
+//! - Episodes have the same length, and only the time limit ends them.
+//! - Returns of random actions are equal within their confidence interval.
+//!
+//! The other side is the installed `dm_control`, run by `tests/oracle/dm_control_tasks.py`.
 
 mod common;
 
@@ -16,9 +22,9 @@ use serde_json::{Value as Json, json};
 
 /// Decisions per episode.
 const DECISIONS: usize = 100;
-/// Episodes per task, with actions of each of these sizes, relative to their bounds.
+/// Sizes of the actions of a task's episodes, relative to their bounds.
 const SCALES: [f32; 4] = [0.1, 0.4, 1.0, 1.5];
-/// Distance of a twin that began 1e-10 away at which an episode says nothing more about who computes it.
+/// Distance from a twin that began 1e-10 away above which an episode is too chaotic for a comparison.
 const CHAOS: f64 = 1e-4;
 
 /// A task with arguments.
@@ -47,7 +53,7 @@ impl Case {
         format!("{}({})", self.id(), arguments.join(", "))
     }
 
-    /// The environment; its solver runs to the end if `converge`, as only a model can ask it to.
+    /// The environment. With `converge`, its solver runs until it converges, which only a model can set.
     fn make(&self, agents: usize, isa: Option<Isa>, converge: bool) -> VecEnv {
         let mut options: Options = self.arguments.iter().map(|(n, v)| ((*n).to_string(), v.clone())).collect();
         if converge && options.get("xml_file").is_none() {
@@ -63,7 +69,7 @@ impl Case {
         VecEnv::new(&self.id(), &options).unwrap_or_else(|e| panic!("{}: {e}", self.name()))
     }
 
-    /// What the oracle is asked, with some things more.
+    /// A request to the oracle, with additional entries.
     fn job(&self, more: Json) -> Json {
         let of_task = self.arguments.iter().filter(|(name, _)| *name != "xml_file");
         let kwargs = of_task.map(|(name, value)| {
@@ -118,7 +124,7 @@ fn ask(jobs: Vec<Json>) -> Vec<Json> {
     oracle("dm_control_tasks.py", &json!({ "jobs": jobs }))["jobs"].as_array().expect("one answer per job").clone()
 }
 
-/// Where the episodes of a case start, and what is done in them.
+/// Start states and actions of a case's episodes.
 struct Plan {
     states: Vec<AgentState>,
     /// `[episode][decision][act]`.
@@ -144,12 +150,12 @@ impl Plan {
     }
 }
 
-/// How far two sides are apart.
+/// Differences between the two sides.
 #[derive(Default)]
 struct Differences {
-    /// Per decision: the largest of an observation's numbers.
+    /// For each decision, the largest difference in the observation.
     obs: Vec<f64>,
-    /// Per decision.
+    /// For each decision, the difference in reward.
     reward: Vec<f64>,
     state: f64,
 }
@@ -159,7 +165,7 @@ fn apart(ours: f64, theirs: f64) -> f64 {
 }
 
 impl Differences {
-    /// Compares the decision of an agent with what dm_control says of it.
+    /// Compares an agent's decision with dm_control's.
     fn compare(&mut self, step: &Step, columns: usize, agent: usize, theirs: &Json) {
         let numbers = numbers(&theirs["obs"]);
         assert_eq!(columns, numbers.len());
@@ -170,7 +176,7 @@ impl Differences {
     }
 }
 
-/// Plays all episodes side by side, from their starts to their ends.
+/// Executes all episodes in parallel, from start to end.
 fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let n = plan.states.len();
     let mut env = case.make(n, Some(Isa::F64), true);
@@ -207,7 +213,7 @@ fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     found
 }
 
-/// Every decision from the state that dm_control had before it: nothing adds up.
+/// Executes every decision from dm_control's state before it, so that errors do not accumulate.
 fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let n = plan.states.len() * DECISIONS;
     let mut env = case.make(n, None, true);
@@ -233,20 +239,21 @@ fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     found
 }
 
-/// Largest differences.
+/// Largest allowed differences.
 struct Bars {
-    /// Of all numbers of a decision.
+    /// All numbers of a decision.
     decision: f64,
-    /// Share of the decisions that may differ by more: those in which rounding decides whether a contact or a limit is on.
+    /// Fraction of the decisions that may differ by more, because rounding decides whether a contact or a limit is
+    /// active.
     exempt: f64,
-    /// Of coordinates and velocities.
+    /// Coordinates and velocities.
     state: f64,
-    /// Share of the decisions that are compared.
+    /// Least fraction of the decisions that are compared.
     least: f64,
 }
 
-/// Plays all cases in dm_control, compares, and fails where more differs than may. Both sides solve their constraints to
-/// the end, as far as their arithmetic goes.
+/// Runs all cases in dm_control, compares, and fails if differences exceed the bars. Both sides solve their constraints
+/// until convergence, within their arithmetic.
 fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Bars) {
     let cases = cases();
     let plans: Vec<Plan> = cases.iter().enumerate().map(|(i, case)| Plan::new(case, 3 + i as u64)).collect();
@@ -259,7 +266,7 @@ fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Ba
     for ((case, plan), theirs) in cases.iter().zip(&plans).zip(&answers) {
         let found = compare(case, plan, theirs);
         let n = found.obs.len();
-        // the share that may differ by more is at the end
+        // the exempt fraction is at the end
         let sorted = |list: &[f64]| -> [f64; 2] {
             let mut list = list.to_vec();
             list.sort_by(f64::total_cmp);
@@ -282,7 +289,7 @@ fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Ba
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    // the comparison means something only if these happened
+    // the comparison is meaningful only if these cases occurred
     let all = cases.len() * SCALES.len() * DECISIONS;
     assert!(count as f64 >= bars.least * all as f64, "{count} decisions of {all} were not chaotic");
     assert!(paid > 500, "{paid} decisions had a reward");
@@ -315,8 +322,8 @@ fn spaces_and_time_limits_are_dm_controls() {
     }
 }
 
-/// Largest distance of two distributions of numbers (Kolmogorov and Smirnov), in units of its standard deviation if they
-/// are the same.
+/// Largest distance of two empirical distributions (Kolmogorov-Smirnov), in units of its standard deviation under equal
+/// distributions.
 fn distance(a: &mut [f64], b: &mut [f64]) -> f64 {
     a.sort_by(f64::total_cmp);
     b.sort_by(f64::total_cmp);
@@ -354,10 +361,10 @@ fn starts_have_the_same_distribution() {
         assert_eq!(ours[0].len(), theirs[0].len(), "{}", case.name());
         let mut farthest = 0.0_f64;
         for k in 0..ours[0].len() {
-            // observations are single precision, and so are those numbers that are the same in all starts
+            // observations are in single precision, so numbers that are equal in all starts are rounded too
             let column = |rows: &[Vec<f64>]| rows.iter().map(|row| f64::from(row[k] as f32)).collect::<Vec<f64>>();
             let far = distance(&mut column(&ours), &mut column(&theirs));
-            // one of 1e5 numbers from the same distribution is farther than 2.5
+            // with equal distributions, one in 1e5 numbers exceeds 2.5
             assert!(far < 2.5, "{}, number {k}: {far}", case.name());
             farthest = farthest.max(far);
         }
@@ -365,7 +372,7 @@ fn starts_have_the_same_distribution() {
     }
 }
 
-/// The first of the cheetah's 200 steps is a free fall, as in dm_control, where it takes its forces from the pose before.
+/// The first of the cheetah's 200 steps is a free fall. As in dm_control, it computes its forces from the pose before.
 #[test]
 fn a_cheetah_settles_as_in_dm_control() {
     const STARTS: usize = 8;
@@ -417,7 +424,7 @@ fn mean(values: &[f64]) -> (f64, f64) {
     (mean, values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n * (n - 1.0)))
 }
 
-/// Random play earns the same on average, in episodes that end by time alone and with a discount of 1.
+/// Random actions earn the same on average. Episodes end at the time limit only, with a discount of 1.
 #[test]
 fn returns_of_random_play_agree() {
     const OURS: usize = 256;
@@ -442,7 +449,7 @@ fn returns_of_random_play_agree() {
         assert!(theirs.iter().all(|e| e["length"] == 1000 && e["discount"] == 1.0), "{}", case.name());
         let theirs: Vec<f64> = theirs.iter().map(|e| e["return"].as_f64().unwrap()).collect();
         let ((ours, own), (theirs, other)) = (mean(&totals), mean(&theirs));
-        // of the few episodes on their side, the spread is known from the many on ours
+        // the variance of their few episodes is at least that of our many
         let error = (own + other.max(own * OURS as f64 / THEIRS as f64)).sqrt();
         println!("{}: {ours:.2} and {theirs:.2}, standard error {error:.2}", case.name());
         assert!((ours - theirs).abs() < 4.0 * error, "{}: {ours} and {theirs}, error {error}", case.name());
@@ -483,7 +490,7 @@ fn a_tolerance_is_dm_controls() {
         for (x, expected) in x.iter().zip(numbers(theirs)) {
             let (double, single): (f64, f32) = (t.of(*x), t.of(*x as f32));
             assert!((double - expected).abs() < 1e-6, "{t:?} of {x} is {double}, expected {expected}");
-            // a bound that single precision moves is another bound
+            // single precision may move the value across a bound
             let at_a_bound = t.margin == 0.0 && t.bounds.iter().any(|bound| (x - bound).abs() < 1e-6);
             assert!(at_a_bound || (f64::from(single) - expected).abs() < 2e-6, "{t:?} of {x} is {single}");
         }

@@ -1,6 +1,10 @@
-//! Marathon Man in a player's hands: he observes all that the steered figure does, and more; a button begins a skill where he is
-//! and as he faces, whose clip then leads him and pays him; the skill ends by itself; and who falls gets up, unless the clips of
-//! that are left out, or the episode is one that a fall ends.
+//! Marathon Man under a player's control.
+//!
+//! - It observes everything that the steered task does, and more.
+//! - A button starts a skill at the character's position and heading. The skill's clip guides and rewards the
+//!   character, and the skill ends by itself.
+//! - After a fall, the character gets up. The episode ends instead if the getting-up clips are excluded or the episode
+//!   is mortal.
 
 mod common;
 
@@ -11,11 +15,13 @@ use std::f64::consts::FRAC_PI_2;
 
 const ID: &str = "MarathonManController-v0";
 const AGENTS: usize = 16;
-/// Most decisions of the jump, and of the backflip, which waits for up to 80 until he stands as the clip does.
+/// Most decisions of the jump.
 const JUMP: usize = 39;
+/// Most decisions of the backflip, which waits up to 80 of them for the clip's first pose.
 const BACKFLIP: usize = 80 + 66;
-/// Numbers of the command, and of what is told: which skill is on, and whether it is one of getting up.
+/// Size of the command.
 const COMMAND: usize = 5;
+/// Size of `info`, and its slots of the active skill and of getting up.
 const INFO: usize = 4;
 const SKILL: usize = 2;
 const RISING: usize = 3;
@@ -24,7 +30,7 @@ fn made(list: &[(&str, &str)]) -> (VecEnv, Step) {
     begun(ID, AGENTS, 11, list)
 }
 
-/// Lets the servos follow what leads him.
+/// Steps without offsets, so that the servos follow the reference pose.
 fn go(env: &mut VecEnv, step: &mut Step) {
     let actions = vec![0.0; AGENTS * env.spec().act];
     env.step(&actions, &mut step.as_mut()).unwrap();
@@ -38,18 +44,18 @@ fn tell(env: &mut VecEnv, command: [f64; COMMAND]) {
     (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
 }
 
-/// Where a part of the observation is.
+/// Range of a group of the observation.
 fn part(env: &VecEnv, name: &str) -> std::ops::Range<usize> {
     env.spec().observations.iter().find(|group| group.name == name).expect("it observes that").range.clone()
 }
 
-/// Where the velocity is that he is to have by now: behind the command, and the sine and cosine of its direction.
+/// Start of the target velocity in the observation: after the command, and the sine and cosine of its direction.
 fn target_of(env: &VecEnv) -> usize {
     part(env, "command").start + 4
 }
 
 #[test]
-fn he_observes_what_the_steered_figure_does_first() {
+fn the_steered_observation_comes_first() {
     let [own, steered] = [ID, "MarathonManSteer-v0"].map(|id| factory(id, Isa::best()).unwrap().spec().clone());
     assert!(own.obs > steered.obs && own.observations.starts_with(&steered.observations));
     let names: Vec<&str> = own.command.iter().map(|range| range.name.as_str()).collect();
@@ -57,9 +63,9 @@ fn he_observes_what_the_steered_figure_does_first() {
     assert_eq!(own.command.iter().filter(|range| range.is_button()).count(), 2);
 }
 
-/// However slowly he is told to go, his gait is one that lifts the feet; at rest it is none.
+/// Every command to move, however slow, has a gait that lifts the feet. A stop command has none.
 #[test]
-fn who_creeps_lifts_his_feet() {
+fn slow_commands_still_lift_the_feet() {
     let cases = [([0.3, 0.0, 0.0], 0.8), ([0.0, -0.5, 0.0], 0.8), ([0.1, 0.0, 0.0], 0.4), ([0.0; 3], 0.0)];
     for ([speed, left, turn], expected) in cases.into_iter().chain([([0.0, 0.0, FRAC_PI_2], 0.6 * FRAC_PI_2)]) {
         let (mut env, mut step) = made(&[("start", "first")]);
@@ -70,7 +76,7 @@ fn who_creeps_lifts_his_feet() {
         assert!(up.len() > AGENTS / 2, "{up:?}");
         for agent in up {
             let [pace, x, y] = [pace, target, target + 1].map(|i| f64::from(step.obs[agent * obs + i]));
-            // whoever lags behind is to go faster than he is told
+            // a character that lags behind is sped up beyond the command
             let expected = expected.max(x.hypot(y));
             assert!((pace - expected).abs() < 1e-3, "told {speed} {left} {turn}: {pace}, expected {expected}");
         }
@@ -79,7 +85,7 @@ fn who_creeps_lifts_his_feet() {
 
 /// The policy was trained on backflip commands without speed or turn, so a backflip hides all other commands.
 #[test]
-fn a_backflip_goes_before_all_other_commands() {
+fn a_backflip_overrides_all_other_commands() {
     let story = |command: [f64; COMMAND]| {
         let (mut env, mut step) = made(&[("start", "first")]);
         let mut seen = Vec::new();
@@ -110,10 +116,10 @@ fn a_backflip_goes_before_all_other_commands() {
     }
 }
 
-/// Where he is told to go, the velocity that he is to have by now aims beyond the command by half of what he lacks, and by 0.5 m/s at
-/// most, but never beyond 3 m/s. At rest it is none.
+/// Under a command to move, the target velocity overshoots the command by half of the velocity error. The overshoot is
+/// at most 0.5 m/s, and the target never exceeds 3 m/s. A stop command has no target velocity.
 #[test]
-fn who_lags_behind_is_urged() {
+fn the_target_velocity_overshoots_the_command() {
     for (speed, expected) in
         [(2.0, 2.2..2.501), (2.8, 2.5..3.001), (3.0, 2.5..3.001), (0.2, 0.0..0.701), (0.0, 0.0..0.001)]
     {
@@ -130,13 +136,13 @@ fn who_lags_behind_is_urged() {
     }
 }
 
-/// What a button begins has the length of its piece of the clip, and he is paid for being like it.
+/// A skill started by a button has the length of its clip section, and its reward is similarity to the clip.
 #[test]
 fn a_button_begins_a_skill_that_ends_by_itself() {
     for (button, number, length) in [(3, 1.0, JUMP), (4, 2.0, BACKFLIP)] {
         let (mut env, mut step) = made(&[("start", "first")]);
         tell(&mut env, [0.0; COMMAND]);
-        // the first decisions do not count: somebody may just have landed
+        // skip the first decisions, because some characters are still landing
         for _ in 0..12 {
             go(&mut env, &mut step);
         }
@@ -157,7 +163,7 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
                 toppled[agent] |= !begun[agent] && told(&step, agent, RISING) > 0.5;
                 if skill == number {
                     on[agent] += 1;
-                    // from a stand into the midst of a clip
+                    // the skill starts in the middle of a clip, from standing
                     let gap = &step.obs[agent * env.spec().obs..][next.clone()];
                     assert!(on[agent] > 1 || gap.iter().any(|x| x.abs() > 0.2), "{gap:?}");
                 } else if on[agent] > 0 {
@@ -167,8 +173,8 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
             }
         }
         let whole = lengths.iter().filter(|(n, skill)| *n == length && *skill == 0.0).count();
-        // servos alone do not always land, but nobody is in the skill any longer than it is
-        // who topples before he is slow enough to turn over has begun nothing
+        // without a policy, some characters do not land, but no skill takes longer than its clip a character that
+        // topples before it is slow enough for a backflip starts none
         let toppled = toppled.iter().filter(|toppled| **toppled).count();
         assert!(lengths.iter().all(|(n, _)| *n <= length) && lengths.len() + toppled == AGENTS, "{lengths:?}");
         assert!(toppled <= usize::from(button == 4), "{toppled}");
@@ -176,11 +182,11 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
     }
 }
 
-/// In the midst of a skill, with the clip's own velocities, he is like the clip.
+/// Starting within a skill, with the clip's velocities, the character is similar to the clip.
 #[test]
-fn who_is_like_the_clip_is_paid() {
+fn similarity_to_the_clip_is_rewarded() {
     let model = marathon_envs::agent("MarathonManController-v0").unwrap().model().unwrap();
-    // a jump for its pose alone, and for the velocity that he is to have
+    // a jump is rewarded for its pose and for the target velocity only
     for (clip, worth) in [("jump", 0.65), ("backflip", 1.0), ("getup_facedown", 0.5), ("getup_faceup", 0.5)] {
         let (mut env, mut step) = made(&[("clip", clip)]);
         go(&mut env, &mut step);
@@ -190,10 +196,11 @@ fn who_is_like_the_clip_is_paid() {
         let mut likeness: Vec<f64> = (0..AGENTS).map(|agent| of(agent, skill) / worth).collect();
         likeness.sort_by(f64::total_cmp);
         assert!(likeness[AGENTS / 2] > 0.8 && likeness[AGENTS - 1] <= 1.0, "{clip}: {likeness:?}");
-        // whoever stands at the end of getting up has got up
+        // a character that stands at the end of getting up is up
         let paid = |i: &usize| (0..AGENTS).any(|agent| told(&step, agent, SKILL) > 0.5 && of(agent, *i) != 0.0);
         let paid: Vec<&str> = (0..names.len()).filter(paid).map(|i| names[i].as_str()).collect();
-        // a jump is paid for its height, 5 for each meter of the lower foot, up to 1.5; who gets up for that of his butt, up to 0.3
+        // a jump earns 5 per meter of the lower foot's height, up to 1.5; getting up earns up to 0.3 for the height of
+        // the butt
         let expected = match clip {
             "jump" => vec!["velocity", "pace", "drift", "skill", "leap"],
             "backflip" => vec!["skill"],
@@ -217,16 +224,17 @@ fn who_is_like_the_clip_is_paid() {
     }
 }
 
-/// Whoever is told to jump on the run leaps: his gait goes on leading him, and pays him, for half a second.
+/// While running, the jump button starts a leap. The gait continues to guide and reward the character for half a
+/// second.
 #[test]
-fn a_jump_on_the_run_goes_on_running() {
+fn a_jump_while_running_keeps_the_gait() {
     let (mut env, mut step) = made(&[]);
     tell(&mut env, [3.0, 0.0, 0.0, 1.0, 0.0]);
     let names = &env.spec().reward_terms.clone();
     let term = |name: &str| names.iter().position(|known| known == name).unwrap();
     let [gait, skill] = ["gait", "skill"].map(term);
     let later = part(&env, "later_pose");
-    // how long each has been on the ground and on the run, and all leaps
+    // for each agent, the last skill and the duration of the present leap; then the durations of all leaps
     let (mut before, mut lasts, mut lengths, mut jumps) = ([0.0; AGENTS], [0; AGENTS], Vec::new(), 0);
     for decision in 0..60 {
         go(&mut env, &mut step);
@@ -240,7 +248,7 @@ fn a_jump_on_the_run_goes_on_running() {
                 assert_eq!(seen.iter().all(|x| *x == 0.0), leaps, "{agent}, decision {decision}");
                 jumps += usize::from(!leaps);
             }
-            // a leap comes after going
+            // a leap follows locomotion, not another skill
             assert!(!leaps || lasts[agent] > 0 || before[agent] == 0.0, "{agent}, decision {decision}");
             if lasts[agent] > 0 && !leaps {
                 lengths.push(lasts[agent]);
@@ -252,9 +260,9 @@ fn a_jump_on_the_run_goes_on_running() {
     assert!(jumps > 0 && lengths.iter().all(|n| *n <= 20) && lengths.contains(&20), "{jumps} {lengths:?}");
 }
 
-/// The clips of getting up lead him half as fast again as they were: three of their decisions in two of his.
+/// Getting-up clips play 1.5 times as fast: three of their decisions in two of the character's.
 #[test]
-fn getting_up_makes_haste() {
+fn getting_up_plays_its_clip_faster() {
     let (mut env, mut step) = made(&[("clip", "getup_faceup"), ("start", "first")]);
     let phase = part(&env, "phase").start;
     let mut before: Option<Vec<f64>> = None;
@@ -273,7 +281,7 @@ fn getting_up_makes_haste() {
         }
         before = Some(now);
     }
-    // whoever still lies as the clip does waits
+    // a character that still lies in the clip's first pose waits
     let mut led = 0;
     for ways in ways {
         let moving: Vec<f64> = ways.into_iter().skip_while(|way| way.abs() < 1e-6).take(8).collect();
@@ -288,9 +296,9 @@ fn getting_up_makes_haste() {
     assert!(led > AGENTS / 2, "{led}");
 }
 
-/// Who stands before the clip does has got up, however far from the clip he is; who lies has not.
+/// A character that stands before the clip does is up, however far it is from the clip. A lying one is not.
 #[test]
-fn who_stands_has_got_up() {
+fn a_standing_character_is_up() {
     let (standing, _) = made(&[("start", "first")]);
     for clip in ["getup_facedown", "getup_faceup"] {
         let (mut env, mut step) = made(&[("clip", clip), ("start", "first")]);
@@ -307,7 +315,7 @@ fn who_stands_has_got_up() {
     }
 }
 
-/// Pushes everybody over, and tells who was still at play before and what became of him.
+/// Pushes all characters over. Returns whether the episode ended or getting up began, whichever came first.
 fn felled(list: &[(&str, &str)]) -> Vec<(bool, bool)> {
     let (mut env, mut step) = made(list);
     tell(&mut env, [0.0; COMMAND]);
@@ -325,11 +333,11 @@ fn felled(list: &[(&str, &str)]) -> Vec<(bool, bool)> {
             }
         }
     }
-    fate.into_iter().map(|fate| fate.expect("everybody falls")).collect()
+    fate.into_iter().map(|fate| fate.expect("all characters fall")).collect()
 }
 
 #[test]
-fn who_falls_gets_up_or_has_failed() {
+fn a_fall_leads_to_getting_up_or_ends_the_episode() {
     let all = felled(&[("start", "first")]);
     assert!(all.iter().all(|(ended, rises)| !ended && *rises), "{all:?}");
     for list in [[("start", "first"), ("clip", "walk,stand,jump")], [("start", "first"), ("mortal", "1")]] {
@@ -338,7 +346,7 @@ fn who_falls_gets_up_or_has_failed() {
     }
 }
 
-/// Skills alone end their episodes; who cannot get up has failed at last.
+/// Without locomotion clips, the end of a skill ends the episode. A character that cannot get up fails in the end.
 #[test]
 fn a_skill_alone_is_an_episode() {
     let (mut env, mut step) = made(&[("clip", "jump"), ("start", "first")]);
@@ -354,7 +362,7 @@ fn a_skill_alone_is_an_episode() {
 }
 
 #[test]
-fn a_clip_that_he_has_no_skill_of_is_refused() {
+fn a_clip_without_a_skill_is_refused() {
     let error = registry::factory_with(ID, &options(&[("clip", "walk,backflap")]), Isa::best()).err().unwrap();
     let text = error.to_string();
     assert!(text.contains("'backflap'") && text.contains("did you mean 'backflip'?"), "{text}");

@@ -1,7 +1,7 @@
-//! Marathon Man told where to go: the direction that he is to keep turns as commanded, the velocity that he is to have changes
-//! no faster than a person can, his gait goes round as fast as its pace asks for and its pace follows that velocity, his reward
-//! is its formula, his starts fit the command where they should, and the demonstrations of his style are what he would observe
-//! in his clips.
+//! The steered Marathon Man. The commanded direction turns as commanded. The target velocity changes with a limited
+//! acceleration. The gait's phase advances with the pace, which follows the target velocity. The reward is the
+//! documented formula, and adaptive starts fit the command. Style demonstrations are the observations that the clips
+//! produce.
 
 mod common;
 
@@ -18,7 +18,7 @@ use marathon_physics::lanes::Isa;
 
 const ID: &str = "MarathonManSteer-v0";
 const AGENTS: usize = 16;
-/// Where the observation has the target velocity, his own, the joints' angles and velocities, the gait and its next pose.
+/// Indices in the observation: target velocity, own velocity, joint angles and velocities, gait, and next pose.
 const TARGET: usize = 4;
 const VELOCITY: usize = 13;
 const ANGLES: usize = 19;
@@ -30,7 +30,7 @@ fn demonstrations(id: &str, isa: Isa) -> Demonstrations {
 }
 
 #[test]
-fn demonstrations_are_what_he_observes_in_a_clip() {
+fn demonstrations_are_the_observations_of_a_clip() {
     let (id, all) = ("MarathonManSpinKick-v0", demonstrations("MarathonManSpinKick-v0", Isa::F64));
     let clip = clips::find("spinkick").unwrap();
     let mut env = make(id, 1, 1, Some(Isa::F64), Autoreset::Disabled);
@@ -39,7 +39,7 @@ fn demonstrations_are_what_he_observes_in_a_clip() {
     assert_eq!((all.obs_len, all.act_len, all.obs.len()), (obs_len, 0, rows * obs_len));
     let pairs: Vec<[usize; 2]> = (1..rows).map(|row| [row - 1, row]).collect();
     assert_eq!((&all.decisions, all.motions.len(), &all.motions[0]), (&pairs, 1, &(0..rows - 1)));
-    // all but the phase and what compares him with the clip, whose row only the start of an episode sets
+    // without the phase and the comparison with the clip, whose row only the start of an episode sets
     let own = 4..65;
     let mut obs = vec![0.0f32; obs_len];
     env.reset(Some(1), &mut obs).unwrap();
@@ -57,7 +57,7 @@ fn demonstrations_are_what_he_observes_in_a_clip() {
 fn demonstrations_of_loops_are_closed_and_as_fast_as_the_clips() {
     let all = demonstrations(ID, Isa::best());
     assert_eq!(all.motions.len(), 5);
-    // the component of the velocity along the heading; walks in circles are slower than their paths
+    // velocity along the heading; walking in circles is slower by this measure than along the path
     for (motion, speed) in all.motions.iter().zip([0.88, 0.84, 0.78, 3.2, 0.0]) {
         let first = all.decisions[motion.start][0];
         assert_eq!(all.decisions[motion.end - 1], [first + motion.len() - 1, first]);
@@ -76,15 +76,15 @@ fn demonstrations_do_not_depend_on_the_vector_width() {
 }
 
 #[test]
-fn his_style_has_names() {
+fn style_groups_have_names() {
     let spec = factory(ID, Isa::best()).unwrap().spec().clone();
     let named: Vec<&str> = spec.observations.iter().map(|group| group.name.as_str()).collect();
     assert!(STYLE.iter().all(|name| named.contains(name)), "{named:?}");
     assert!(["command", "touch", "gait", "next_pose"].iter().all(|name| named.contains(name) && !STYLE.contains(name)));
 }
 
-/// Angle of the butt's forward axis along the ground: the torso's rotation, then the waist's about z and y. That about x,
-/// which follows, leaves the axis where it is.
+/// Heading of the butt's forward axis: the torso's rotation, then the waist's about z and y. The waist's rotation about
+/// x follows and does not change the axis.
 fn heading(state: &AgentState) -> f64 {
     let [w, x, y, z, yaw, pitch] = state.qpos[3..9] else { panic!("a free joint and a waist") };
     let axis = [yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), -pitch.sin()];
@@ -103,25 +103,25 @@ fn center_velocity(model: &Model, state: &AgentState) -> [f64; 2] {
     [velocity.x, velocity.y]
 }
 
-/// What an agent observes.
+/// Observation of an agent.
 fn row(obs: &[f32], agent: usize, n: usize) -> Vec<f64> {
     obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect()
 }
 
-/// DeepMimic's weights of the joints in the order of `qpos`: abdomen, then a right and a left leg (hip of three axes, knee,
-/// ankle of two), then a right and a left arm (shoulder of two axes, elbow).
+/// DeepMimic's weights of the joints in the order of `qpos`. They are the abdomen, the right and the left leg (three
+/// hip axes, knee, two ankle axes), and the right and the left arm (two shoulder axes, elbow).
 fn weights() -> Vec<f64> {
     let (leg, arm) = ([0.5, 0.5, 0.5, 0.3, 0.2, 0.2], [0.3, 0.3, 0.2]);
     [0.5; 3].into_iter().chain(leg).chain(leg).chain(arm).chain(arm).collect()
 }
 
 #[test]
-fn his_gait_follows_the_command_and_leads_him_by_little() {
+fn the_gait_follows_the_command_and_stays_near_the_body_speed() {
     let mut env = make(ID, AGENTS, 1, Some(Isa::F64), Autoreset::Disabled);
     let (n, dt) = (env.spec().obs, env.spec().dt);
     let mut out = env.buffers();
     for agent in 0..AGENTS {
-        // a turn on the spot takes the pace of a walk on a circle of 0.4 m
+        // a turn on the spot uses the pace of walking on a circle of 0.4 m
         let command = if agent % 4 == 0 { [0.0, FRAC_PI_2] } else { [3.0 * agent as f64 / (AGENTS - 1) as f64, 0.0] };
         env.set_command(agent, Some(&command)).unwrap();
     }
@@ -143,11 +143,11 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
             let turned = next_sin.atan2(next_cos) - sin.atan2(cos);
             let expected = TAU * gaits().frequency(pace) * dt;
             assert!((turned.rem_euclid(TAU) - expected).abs() < 1e-5, "agent {agent}: {turned}, expected {expected}");
-            // to the target by 4 m/s^2, but no farther from his own speed than 0.8 m/s: it may come nearer, never leave
+            // toward the target at 4 m/s^2, within 0.8 m/s of the body's speed; the gap may only shrink
             let asked = is[TARGET].hypot(is[TARGET + 1]).max(0.4 * was[1].abs());
             let change = next_pace - pace;
             assert!(change.abs() < 4.0 * dt + 1e-5);
-            // told to go nowhere, the error of his velocity is his speed
+            // under a command of 0, the velocity error is the speed
             if was[0] == 0.0 {
                 let speed = f64::from(info[2 * agent]);
                 let led = speed + (asked - speed).clamp(-0.8, 0.8);
@@ -155,10 +155,10 @@ fn his_gait_follows_the_command_and_leads_him_by_little() {
                 assert!((change - expected).abs() < 1e-5, "agent {agent}: {change}, expected {expected}");
             }
             if change > 1e-5 && pace > asked + 1e-5 {
-                // he is faster than the pace by more than it may be behind
+                // the body is faster than the pace by more than the allowed lead
                 faster += 1;
             }
-            // the next pose, less his own
+            // the next pose minus the present one
             let next =
                 gaits().moment(next_sin.atan2(next_cos) / TAU + gaits().frequency(next_pace) * dt, next_pace, 0.0);
             for joint in 0..21 {
@@ -188,7 +188,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
     let mut directions: Vec<f64> = (0..AGENTS).map(|agent| heading(&env.state(agent).unwrap())).collect();
     let mut info = vec![0.0f32; AGENTS * 2];
     let (mut checked, mut behind, mut reached, mut limited) = (0, 0.0f64, 0, 0);
-    // what the agents are to have, in the world
+    // target velocities in the world
     let mut targets: Vec<[f64; 2]> = (0..AGENTS)
         .map(|agent| {
             let (sin, cos) = directions[agent].sin_cos();
@@ -208,10 +208,10 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             let angle = is[2].atan2(is[3]);
             assert!((is[2].hypot(is[3]) - 1.0).abs() < 1e-5 && angle.abs() < MOST_BEHIND + 1e-5);
             behind = behind.max(angle.abs());
-            // an angle is as good as another one a whole turn away
+            // angles are compared modulo a full turn
             let (own, off) = (heading(&env.state(agent).unwrap()), |a: f64| a.sin().atan2(a.cos()));
             let velocity = center_velocity(&model, &env.state(agent).unwrap());
-            // by no more than 3 m/s^2 to the side allow at his speed
+            // the turn rate is limited to a lateral acceleration of 3 m/s^2 at the body's speed
             let most = 3.0 / velocity[0].hypot(velocity[1]);
             let expected =
                 (off(directions[agent] - own) + was[1].clamp(-most, most) * dt).clamp(-MOST_BEHIND, MOST_BEHIND);
@@ -220,7 +220,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             assert!((angle - expected).abs() < 1e-5, "agent {agent}: {angle}, expected {expected}");
             let [off_command, a] = [0, 1].map(|i| f64::from(info[2 * agent + i]));
             assert!((a - angle.abs()).abs() < 1e-5);
-            // the target follows the commanded velocity by 4 m/s^2, but no sharper turn than one of 2.5 m/s^2
+            // the target follows the commanded velocity at 4 m/s^2, and turns are limited to 2.5 m/s^2
             let (direction, target) = (own + expected, &mut targets[agent]);
             let at = |speed: f64| [speed * direction.cos(), speed * direction.sin()];
             let (told, able) = (at(was[0]), at(was[0].min(2.5 / was[1].abs())));
@@ -258,7 +258,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
     assert!(limited > 0 && limited < checked / 2, "{limited} of {checked}");
 }
 
-/// Agents that have just begun, and speeds of theirs: forward, and as commanded.
+/// Agents at their start, their forward speeds and the commanded ones.
 fn starts(start: &str, seed: u64) -> (VecEnv, Vec<[f64; 2]>) {
     const MANY: usize = 512;
     let options = [("start".to_string(), start.into())].into_iter().collect();
@@ -278,12 +278,12 @@ fn adaptive_starts_fit_the_command_and_try_again() {
     };
     let (_, random) = starts("random", 3);
     assert!((run(&random, true) - 0.2).abs() < 0.1 && (run(&random, false) - 0.2).abs() < 0.1);
-    // half of them fit, one of five of the others runs
+    // half of them fit, and one in five of the others runs
     let (mut env, adaptive) = starts("adaptive", 3);
     assert!((run(&adaptive, true) - 0.6).abs() < 0.12, "{}", run(&adaptive, true));
     assert!((run(&adaptive, false) - 0.1).abs() < 0.06, "{}", run(&adaptive, false));
 
-    // the gait alone does not keep him on his feet; half of the episodes after begin in the same pose but for the noise
+    // the gait alone does not prevent falls; half of the next episodes begin in the same pose, up to noise
     let (agents, act) = (env.agents(), env.spec().act);
     let first: Vec<AgentState> = (0..agents).map(|agent| env.state(agent).unwrap()).collect();
     let mut out = env.buffers();
@@ -303,7 +303,7 @@ fn adaptive_starts_fit_the_command_and_try_again() {
     assert!(ended > 100 && (share - 0.5).abs() < 0.12, "{again} of {ended}");
 }
 
-/// Sixty-four of them with some arguments, and what they observe at first.
+/// 64 agents with some arguments, and their first observations.
 fn begun(options: &[(&str, &str)]) -> (VecEnv, Vec<f32>) {
     let options = common::options(options);
     let options = VecEnvOptions { agents: 64, options, autoreset: Autoreset::Disabled, ..Default::default() };
@@ -329,11 +329,11 @@ fn sharp_commands_are_extremes_half_of_the_time() {
 }
 
 #[test]
-fn he_may_begin_standing_and_a_fall_may_have_a_price() {
+fn episodes_may_start_standing_and_falls_may_have_a_penalty() {
     let (mut env, obs) = begun(&[("start", "first"), ("price", "20")]);
     let n = env.spec().obs;
     for row in obs.chunks_exact(n) {
-        // at rest but for the noise and the sway of who stands, upright
+        // upright and at rest, up to noise and the sway of standing
         assert!(
             row[VELOCITY..VELOCITY + 3].iter().all(|v| v.abs() < 0.2) && row[6] > 0.8,
             "{:?}",

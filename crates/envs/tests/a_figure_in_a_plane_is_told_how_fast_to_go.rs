@@ -1,5 +1,5 @@
-//! The paper's controllers: figures in a plane observe what they are told, the mean velocity is that of three decisions, and
-//! the reward is the original's formula with terms for standing still and for a jump that is late.
+//! The paper's controllers. Figures in a plane observe their command. The mean velocity is that of three decisions. The
+//! reward is the original's formula, with additional terms for standing still and for a late jump.
 
 mod common;
 
@@ -32,7 +32,8 @@ fn height(model: &Model, env: &VecEnv, agent: usize) -> f64 {
 
 #[test]
 fn observations_are_the_originals_and_the_command() {
-    // the original has 34 and 46 numbers with buttons, of which one is the jump, no target velocity, and nothing about a jump that is awaited
+    // with buttons, the original has 34 and 46 numbers, one of them the jump; it has no target velocity and no awaited
+    // jump
     for (id, own, buttons) in [("HopperController-v0", 31, 36), ("WalkerController-v0", 43, 48)] {
         for (input, numbers) in [("discrete", buttons), ("continuous", buttons - 2)] {
             let mut env = env(id, input);
@@ -79,7 +80,7 @@ fn the_reward_is_its_formula() {
         let masses: Vec<f64> = model.bodies[1..].iter().map(|body| body.mass).collect();
         for decision in 0..60 {
             for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
-                // four of them do nothing
+                // four of them have zero actions
                 action(agent, decision, if agent < 4 { 0.0 } else { 1.0 }, row);
             }
             env.step(&actions, &mut out.as_mut()).unwrap();
@@ -109,7 +110,7 @@ fn the_reward_is_its_formula() {
                 let still =
                     if rests { 1.5 * [0.4, 0.04].map(|most| (-speed2 / most).exp()).iter().sum::<f64>() } else { 0.0 };
                 let effort: f64 = actions[agent * act..(agent + 1) * act].iter().map(|a| f64::from(a * a)).sum();
-                // a tenth of a second off the ground makes a jump, from a moment on at which the center of mass rises by 0.7 m/s
+                // a jump is 0.1 s off the ground, after the center of mass has risen at 0.7 m/s
                 let up: f64 = masses.iter().zip(&moving).map(|(mass, v)| mass * v[2]).sum();
                 let rises = up / masses.iter().sum::<f64>();
                 aloft[agent] = if leap > 0.0 && (aloft[agent] > 0 || rises > 0.7) { aloft[agent] + 1 } else { 0 };
@@ -133,9 +134,10 @@ fn the_reward_is_its_formula() {
     }
 }
 
-/// A figure that stands pays for each decision until it has been off the ground for a tenth of a second after it rose, less the faster it
-/// has risen, and again when it is told anew. Whoever falls meanwhile, as a figure does that draws up its legs, has not jumped; the
-/// Hopper, which would draw up its leg, is not paid for that either.
+/// Under a jump command, a standing figure pays for each decision until it has been off the ground for 0.1 s after
+/// rising. It pays less the faster it has risen, and again after a new command. A figure that falls meanwhile, as it
+/// does when it pulls up its legs, has not jumped. The Hopper, for which pulling up the leg is easier, does not earn
+/// the `jump` term for that either.
 #[test]
 fn a_jump_that_is_late_costs() {
     for (id, jumped, dt, drawn) in [("WalkerController-v0", 10, 0.01, 1.0), ("HopperController-v0", 5, 0.02, 0.0)] {
@@ -144,7 +146,7 @@ fn a_jump_that_is_late_costs() {
         let (act, k) = (env.spec().act, env.spec().reward_terms.len());
         let mut out: Step = env.buffers();
         env.reset(Some(2), &mut out.obs).unwrap();
-        // so high that a fall takes 0.17 s; who is put somewhere is told anew
+        // high enough that a fall takes 0.17 s; setting a state restarts the command
         let lift = |env: &mut VecEnv, command: [f64; 2], upward: f64| {
             for agent in 0..AGENTS {
                 env.set_command(agent, Some(&command)).unwrap();
@@ -155,7 +157,7 @@ fn a_jump_that_is_late_costs() {
                 env.set_state(agent, &state).unwrap();
             }
         };
-        // what a jump and its delay are worth
+        // the `jump` and `late` terms
         let mut paid = |env: &mut VecEnv, command: [f64; 2]| {
             (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
             env.step(&vec![0.0; AGENTS * act], &mut out.as_mut()).unwrap();
@@ -179,18 +181,18 @@ fn a_jump_that_is_late_costs() {
             let [jumps, late] = paid(&mut env, jump);
             assert!(jumps[0] > 1.0, "{id}, decision {decision}: {jumps:?}");
             if decision < jumped {
-                // spared 0.6 of it by 1 m/s, of which gravity has taken a tenth or two
+                // 0.6 of it is waived at 1 m/s, of which gravity has taken a tenth or two
                 assert!(late[0] > -3.2 && late[1] < -2.4, "{id}, decision {decision}: {late:?}");
             } else {
                 assert_eq!(late, [0.0; 2], "{id}, decision {decision}");
             }
         }
         (0..jumped).for_each(|_| _ = paid(&mut env, jump));
-        // on the ground again, and told anew: a command is obeyed from the decision after the one in which it is given
+        // on the ground again, with a new command: it applies from the decision after the one in which it is set
         let told = [stand, stand, jump, jump].map(|command| paid(&mut env, command)[1]);
         assert_eq!(told[..3], [[0.0; 2]; 3], "{id}");
         assert!(told[3][0] >= -6.0 && told[3][1] < -4.0, "{id}: {told:?}");
-        // who is to run need not hurry
+        // a figure that is to run does not have to hurry
         lift(&mut env, [4.0, 1.0], 0.0);
         for _ in 1..jumped {
             assert_eq!(paid(&mut env, [4.0, 1.0])[1], [0.0; 2], "{id}");
@@ -198,24 +200,24 @@ fn a_jump_that_is_late_costs() {
     }
 }
 
-/// Price of the effort.
+/// Weight of the effort.
 const EFFORT: f64 = 0.05;
 /// Terms of the reward.
 const TERMS: [&str; 8] = ["velocity", "pace", "uprightness", "jump", "late", "still", "height", "effort"];
 
-/// The target velocity after a decision of `dt` seconds: it follows the command by 5 m/s^2.
+/// The target velocity after a decision of `dt` seconds. It follows the command at 5 m/s^2.
 fn follow(target: f64, told: f64, dt: f64) -> f64 {
     target + (told - target).clamp(-5.0 * dt, 5.0 * dt)
 }
 
-/// What a velocity earns.
+/// Values of the velocity terms.
 fn paid(target: f64, velocity: f64) -> [f64; 2] {
     let off = (target - velocity).abs();
     [(-4.0 * off * off).exp(), 4.0 - off]
 }
 
-/// With an adversary, its action is what the figure is told from the next decision on, the figure observes and earns what it does
-/// without one, and the adversary earns what is not obeyed.
+/// With an adversary, its action is the command from the next decision on. The figure observes and earns the same as
+/// without one, and the adversary earns the velocity error.
 #[test]
 fn an_adversary_commands() {
     for id in ["HopperController-v0", "WalkerController-v0"] {
@@ -231,7 +233,7 @@ fn an_adversary_commands() {
             assert_eq!((runner.obs.clone(), runner.act.clone()), (0..plain.obs, 0..plain.act), "{id} {input}");
             assert_eq!(commander.act, plain.act..plain.act + 1 + buttons);
             assert!(commander.intermittent && spec.command.is_empty());
-            // who plays sees what the adversary says
+            // `info` shows the adversary's command
             let infos = 2 + buttons;
             assert_eq!(spec.info, ["velocity_error", "told_velocity", "told_jump"][..infos]);
             assert_eq!(spec.reward_terms[runner.terms.clone()], [&plain.reward_terms[..8], &["fall".into()]].concat());
@@ -241,7 +243,7 @@ fn an_adversary_commands() {
             let mut out = env.buffers();
             env.reset(Some(1), &mut out.obs).unwrap();
             let (mut told, mut fallen) = ([[0.0; 2]; AGENTS], [false; AGENTS]);
-            // where the figure observes the command, its velocity and its target
+            // indices of command, velocity and target in the figure's observation
             let own = plain.obs - 3 - 2 * buttons;
             let (at, target) = (own + 1 + buttons, own + 2 + buttons);
             let mut targets: Vec<f64> = out.obs.chunks_exact(n).map(|obs| f64::from(obs[target])).collect();
@@ -285,7 +287,7 @@ fn an_adversary_commands() {
                     fallen[i] |= out.terminated[i];
                 }
             }
-            assert!(fallen.iter().any(|f| *f), "{id}: nobody has fallen");
+            assert!(fallen.iter().any(|f| *f), "{id}: no agent has fallen");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The assault courses: each agent has ground of its own in each episode, it sees that ground and stands on it, a curriculum
-//! rises with the way that it comes, and the reward is the formula on the page.
+//! The assault courses. Each agent has its own ground in each episode, observes it and stands on it. A curriculum rises
+//! with the distance covered. The reward is the documented formula.
 
 mod common;
 
@@ -10,8 +10,9 @@ use marathon_physics::Model;
 use std::f64::consts::PI;
 
 const AGENTS: usize = 20;
-/// First and last point of a course, and the distance of its points, m.
+/// First point of a course, m.
 const FROM: f64 = -6.0;
+/// Distance between points, m.
 const CELL: f64 = 0.1;
 /// Slots of `info`.
 const DISTANCE: usize = 0;
@@ -23,16 +24,17 @@ fn env(id: &str, options: &[(&str, &str)], autoreset: Autoreset) -> VecEnv {
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Points along a course, and distance of the rows of one that differs to the sides, m.
+/// Points along a course.
 const POINTS: usize = 1121;
+/// Distance between the rows of a course that varies along y, m.
 const ROW: f64 = 0.5;
-/// All of them.
+/// All figures.
 const FIGURES: [&str; 4] = ["TerrainHopper-v0", "TerrainWalker2d-v0", "TerrainAnt-v0", "TerrainMarathonMan-v0"];
 /// Feet of the Ant and of Marathon Man.
 const ANKLES: [&str; 4] = ["left_ankle_geom", "right_ankle_geom", "third_ankle_geom", "fourth_ankle_geom"];
 const SOLES: [&str; 2] = ["right_right_foot", "left_left_foot"];
 
-/// Whether a figure moves in space: the height is the third of its coordinates, not the second.
+/// Whether a figure moves in space. Its height is then the third of its coordinates instead of the second.
 fn in_space(id: &str) -> bool {
     matches!(id, "TerrainAnt-v0" | "TerrainMarathonMan-v0")
 }
@@ -50,7 +52,7 @@ fn up(id: &str) -> usize {
     if in_space(id) { 2 } else { 1 }
 }
 
-/// The axis of a geom's body that points forward in the spawn pose.
+/// The forward axis of a geom's body, as in the spawn pose.
 fn axis(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
     let body = model.geoms.iter().find(|g| g.name == geom).unwrap().body;
     let (now, spawn) = (Pose::of(model, &state.qpos), Pose::of(model, &model.qpos0));
@@ -59,7 +61,7 @@ fn axis(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
     (now.quat[body] * (spawn.quat[body].inverse() * ahead)).to_array()
 }
 
-/// Height of the ground at a place, m. A cell of its grid is two triangles, whose common side goes to the upper right.
+/// Height of the ground at a point, m. A cell of the grid is two triangles whose common side goes to the upper right.
 fn height(ground: &[f32], x: f64, y: f64) -> f64 {
     let rows = ground.len() / POINTS;
     let row = if rows == 2 { 16.0 } else { ROW };
@@ -78,7 +80,7 @@ fn height(ground: &[f32], x: f64, y: f64) -> f64 {
     }
 }
 
-/// Numbers of the ground that a figure sees besides the heights of its feet.
+/// Size of a figure's observation of the ground, without the heights of its feet.
 fn seen(id: &str) -> usize {
     if in_space(id) { 45 } else { 26 }
 }
@@ -95,7 +97,7 @@ fn a_figure_sees_the_ground_that_it_has() {
         let mut blind = env(id, &[("heights", "false"), ("difficulty", "1")], Autoreset::Disabled);
         assert_eq!(blind.spec().obs, own + feet.len(), "{id}");
         let mut env = env(id, &[("difficulty", "1")], Autoreset::Disabled);
-        // in a plane 57 and 69 numbers, as the original's
+        // in a plane 57 and 69 numbers, as in the original
         let n = env.spec().obs;
         assert_eq!(n, own + feet.len() + seen(id), "{id}");
         let mut out = env.buffers();
@@ -104,14 +106,14 @@ fn a_figure_sees_the_ground_that_it_has() {
         assert!((1..AGENTS).all(|i| grounds[i] != grounds[0] && grounds[i].iter().any(|z| *z != 0.0)), "{id}");
         let differs = |ground: &[f32]| ground[..POINTS] != ground[ground.len() - POINTS..];
         assert!(grounds.iter().all(|ground| differs(ground) == in_space(id)), "{id}");
-        // somewhere on the course, so high that nothing touches it
+        // somewhere on the course, high enough to touch nothing
         for (i, ground) in grounds.iter().enumerate() {
             let mut state = env.state(i).unwrap();
             state.qpos[0] += 5.0 + 4.9 * i as f64;
             let y = if in_space(id) { 0.7 * (i % 5) as f64 - 1.3 } else { 0.0 };
             if in_space(id) {
                 state.qpos[1] = y;
-                // faces to the left, and the hands are off the ground
+                // faces to the left, with the hands off the ground
                 let turn = 0.3 * (i % 3) as f64;
                 let [w, z] = [(0.5 * turn).cos(), (0.5 * turn).sin()];
                 let q: [f64; 4] = std::array::from_fn(|k| state.qpos[3 + k]);
@@ -132,7 +134,7 @@ fn a_figure_sees_the_ground_that_it_has() {
             let [x, y, z] = center(&model, &state, eyes);
             let clipped = |ground: f64| (ground - z).clamp(-3.0, 3.0);
             if in_space(id) {
-                // nine rows ahead, five places from left to right in each
+                // nine rows ahead, with five points from left to right in each
                 let [c, d, _] = axis(&model, &state, eyes);
                 let [c, d] = [c / c.hypot(d), d / c.hypot(d)];
                 for k in 0..45 {
@@ -150,7 +152,7 @@ fn a_figure_sees_the_ground_that_it_has() {
                 assert!(off < 1e-3 || jumps, "{id}, agent {i}, number {k}: {expected} {seen}");
             }
         }
-        // what a figure does not see does not change what it observes of itself
+        // the rest of the observation does not depend on the ground's
         let mut step = blind.buffers();
         blind.reset(Some(1), &mut step.obs).unwrap();
         env.reset(Some(1), &mut out.obs).unwrap();
@@ -160,7 +162,7 @@ fn a_figure_sees_the_ground_that_it_has() {
     }
 }
 
-/// Ground is drawn for each episode: by seed, agent and episode, and as the options say.
+/// Ground is drawn for each episode from seed, agent, episode and options.
 #[test]
 fn each_episode_has_its_course() {
     let id = "TerrainHopper-v0";
@@ -191,20 +193,20 @@ fn each_episode_has_its_course() {
     assert!(least < 0.25 && most > 0.55 && most <= 0.8, "{least} to {most}");
 }
 
-/// Puts agents `x` meters ahead, lying, and lets their episodes end there.
+/// Moves agents `x` meters ahead, lying, and waits until their episodes end.
 fn fall_at(env: &mut VecEnv, out: &mut Step, x: &[f64]) {
     for (i, x) in x.iter().enumerate() {
         let mut state = env.state(i).unwrap();
         let ground = env.ground(i, 0).unwrap();
         state.qpos[0] += x;
-        // on its side: nothing but feet may touch the ground
+        // on its side, because only feet may touch the ground
         state.qpos[1] += height(&ground, state.qpos[0], 0.0) - 0.8;
         state.qpos[2] += 0.5 * PI;
         env.set_state(i, &state).unwrap();
     }
     let actions = vec![0.0; AGENTS * env.spec().act];
     env.step(&actions, &mut out.as_mut()).unwrap();
-    assert!(out.terminated.iter().all(|over| *over), "who lies has fallen");
+    assert!(out.terminated.iter().all(|over| *over), "a lying figure has fallen");
 }
 
 #[test]
@@ -219,7 +221,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
     let weight = agent("TerrainHopper-v0").unwrap().model().unwrap().bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
     for _ in 0..400 {
         for i in 0..AGENTS {
-            // carried as far as its turn says, then down
+            // moved as far as its turn requires, then down
             let far = [20.0, 20.0, 12.0, 4.0][(i + rounds[i]) % 4];
             let x = env.state(i).unwrap().qpos[0];
             let force = if x < far { [20.0 * weight / 9.81, 0.0, weight] } else { [0.0, 0.0, -20.0 * weight] };
@@ -228,7 +230,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
         env.step(&actions, &mut out.as_mut()).unwrap();
         env.info(&mut info).unwrap();
         for i in (0..AGENTS).filter(|i| out.terminated[*i]) {
-            // 5 % of the difficulty more after 16 m, less after less than 8 m, the same between
+            // 5 % harder after 16 m, 5 % easier after less than 8 m, unchanged in between
             let far = f64::from(out.info[n * i + DISTANCE]);
             let change = if far >= 16.0 { 2 } else { usize::from(far >= 8.0) };
             changes[change] += 1;
@@ -241,7 +243,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
     assert!(changes.iter().all(|n| *n >= AGENTS / 2) && levels.iter().any(|level| *level > 0.05), "{changes:?}");
     let rough = (0..AGENTS).filter(|i| env.ground(*i, 0).unwrap().iter().any(|z| *z != 0.0)).count();
     assert_eq!(rough, levels.iter().filter(|level| **level > 0.0).count());
-    // a reset by hand begins again
+    // a manual reset starts at level 0
     env.reset(Some(1), &mut out.obs).unwrap();
     assert!(env.ground(0, 0).unwrap().iter().all(|z| *z == 0.0));
 }
@@ -269,7 +271,7 @@ fn a_figure_stands_on_its_ground() {
             let state = env.state(i).unwrap();
             let [x, y, z] = center(&model, &state, torso(id));
             let above = z - height(&ground, x, y);
-            // it has fallen, and lies on the ground and not in it
+            // it has fallen, and lies on the ground, not inside it
             assert!((0.03..1.4).contains(&above), "{id}, agent {i}: {above} at {x}");
         }
     }
@@ -292,7 +294,7 @@ fn rewards_are_their_formulas() {
                     action(agent, decision, 1.3, row);
                 }
                 if decision == 0 {
-                    // beyond the first meters a fall is no end
+                    // after the first meters, a fall does not end the episode
                     for i in 0..AGENTS {
                         let mut state = env.state(i).unwrap();
                         state.qpos[0] += 4.8;
@@ -314,7 +316,7 @@ fn rewards_are_their_formulas() {
                         "sparse" => vec![0.0],
                         _ => {
                             let hit = terms[4] != 0.0;
-                            // who begins to lie had not lain
+                            // a figure that begins to lie was not lying before
                             assert!(!(hit && lay[i]));
                             hurt[i] |= hit;
                             lay[i] = hit;
@@ -335,7 +337,7 @@ fn rewards_are_their_formulas() {
                     };
                     for (term, expected) in terms.iter().zip(&expected) {
                         let off = (f64::from(*term) - expected).abs();
-                        // the arc cosine of a number in single precision
+                        // error of an arc cosine in single precision
                         let most = if in_space(id) { 5e-4 } else { 1e-4 };
                         assert!(off < most, "{id} {reward}, agent {i}, {decision}: {terms:?} {expected:?}");
                     }
@@ -347,7 +349,7 @@ fn rewards_are_their_formulas() {
     }
 }
 
-/// With the sparse reward, the way is paid when the episode ends, whatever ends it.
+/// The sparse reward pays the distance at the end of the episode, however it ends.
 #[test]
 fn the_way_is_paid_at_the_end() {
     let mut env = env("TerrainHopper-v0", &[("reward", "sparse")], Autoreset::SameStep);
@@ -360,7 +362,7 @@ fn the_way_is_paid_at_the_end() {
     }
 }
 
-/// Who makes no new meter for five seconds, or comes to the end of the course, is out of it without having failed.
+/// A figure without a new meter for five seconds, or at the end of the course, is truncated, not terminated.
 #[test]
 fn an_episode_ends_where_nothing_happens_any_more() {
     let mut env = env("TerrainHopper-v0", &[("falls", "hurt"), ("course", "flat")], Autoreset::Disabled);
@@ -381,11 +383,11 @@ fn an_episode_ends_where_nothing_happens_any_more() {
         }
     }
     assert_eq!(ends[0], Some(1));
-    // it may fall forward by a meter, and lie five seconds there
+    // it may fall forward by a meter and lie there for five seconds
     assert!(ends[1..].iter().all(|end| end.is_some_and(|at| (251..=300).contains(&at))), "{ends:?}");
 }
 
-/// The adversary builds a meter whenever the runner reaches one, and earns what the runner loses.
+/// The adversary builds a meter whenever the runner reaches one, and earns the runner's reward with the opposite sign.
 #[test]
 fn an_adversary_builds_ahead_of_the_runner() {
     for id in FIGURES {
@@ -407,7 +409,7 @@ fn an_adversary_builds_ahead_of_the_runner() {
         let mut actions = vec![0.0; AGENTS * act];
         for i in 0..AGENTS {
             assert!(env.ground(i, 0).unwrap().iter().all(|z| *z == 0.0));
-            // up, or down, by a step of its own
+            // a different step up or down for each agent
             actions[act * i + act - 1] = 0.1 * (i as f32 - 10.0);
         }
         env.step(&actions, &mut out.as_mut()).unwrap();
@@ -423,13 +425,13 @@ fn an_adversary_builds_ahead_of_the_runner() {
             assert_eq!(terms[k - 1], -terms[..k - 1].iter().sum::<f32>());
             assert_eq!(out.reward[i], terms[..k - 1].iter().sum::<f32>());
         }
-        // it does not decide again before the next meter
+        // it does not act again before the next meter
         let before: Vec<_> = (0..AGENTS).map(|i| env.ground(i, 0).unwrap()).collect();
         actions.iter_mut().for_each(|a| *a = 0.0);
         actions.chunks_exact_mut(act).for_each(|row| row[act - 1] = 1.0);
         env.step(&actions, &mut out.as_mut()).unwrap();
         assert!((0..AGENTS).all(|i| env.ground(i, 0).unwrap() == before[i]), "{id}");
-        // carried on by more than a meter
+        // pushed ahead by more than a meter
         let weight = agent(id).unwrap().model().unwrap().bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
         for i in 0..AGENTS {
             env.push(i, 1, [2.0 * weight, 0.0, weight], [0.0; 3]).unwrap();
@@ -452,8 +454,8 @@ fn an_adversary_builds_ahead_of_the_runner() {
     }
 }
 
-/// An adversary that earns regret: when the runner's run is over, a reference runs over the same ground from the start, with the
-/// actions of its own, and the adversary earns what the reference earns more.
+/// With `builder=regret`, a reference runs on the same ground after the runner, from the start and with its own
+/// actions. The adversary earns how much more the reference earns.
 #[test]
 fn a_reference_runs_over_the_same_ground() {
     for id in FIGURES {
@@ -477,7 +479,7 @@ fn a_reference_runs_over_the_same_ground() {
                 decides
             })
         };
-        // per agent: in which decision the reference began, what each has earned, and the runner's way
+        // for each agent: the decision at which the reference began, the sums of rewards, and the runner's distance
         let (mut began, mut earned) = ([None; AGENTS], [[0.0_f32; 3]; AGENTS]);
         let (mut ground, mut way) = (vec![Vec::new(); AGENTS], [0.0; AGENTS]);
         let mut over = [false; AGENTS];
@@ -485,7 +487,7 @@ fn a_reference_runs_over_the_same_ground() {
             let mut actions = vec![0.0; AGENTS * act];
             actions.chunks_exact_mut(act).enumerate().for_each(|(i, row)| action(i, decision, 1.0, row));
             let decides = who(&env);
-            // whoever does not run decides nothing: in the other world that says anything
+            // actions of a role that does not run have no effect; the other environment gets different ones
             let before: Vec<f64> = (0..AGENTS).map(|i| torso_at(&env, i)).collect();
             env.step(&actions, &mut out.as_mut()).unwrap();
             for (i, row) in actions.chunks_exact_mut(act).enumerate() {
@@ -510,7 +512,7 @@ fn a_reference_runs_over_the_same_ground() {
                     *sum += x;
                 }
                 if decision > 0 && !decides[0][i] && began[i].is_none() {
-                    // it is back at the start, on the ground that there is
+                    // it is back at the start, on the same ground
                     began[i] = Some(decision);
                     assert!(
                         before[i] != 0.0 && torso_at(&env, i).abs() < 0.2,
@@ -525,14 +527,14 @@ fn a_reference_runs_over_the_same_ground() {
                 match began[i] {
                     None => assert!(theirs == 0.0 && !now[2] && !over[i], "{id}, agent {i}: {now:?}"),
                     Some(_) => {
-                        // all decide where an episode ends
+                        // all roles act at the end of an episode
                         let reference = (now[0] == over[i]) && now[2];
                         assert!(of_runner == 0.0 && reference, "{id}, agent {i}: {now:?}");
                         assert_eq!(env.ground(i, 0).unwrap(), ground[i], "{id}, agent {i}");
                         assert_eq!(out.info[spec.info.len() * i], way[i]);
                     }
                 }
-                // the runner's part is over before it is the reference's turn
+                // the runner's part ends before the reference begins
                 if !now[0] && began[i].is_none() {
                     assert!(now == [false; 3], "{id}, agent {i}: {now:?}");
                 }
@@ -544,7 +546,7 @@ fn a_reference_runs_over_the_same_ground() {
     }
 }
 
-/// What an adversary has built belongs to snapshots, and depends neither on threads nor on other agents.
+/// Ground built by an adversary is part of snapshots. It does not depend on threads or on other agents.
 #[test]
 fn built_ground_is_saved_and_restored() {
     let id = "TerrainHopper-v0";
@@ -567,7 +569,8 @@ fn built_ground_is_saved_and_restored() {
     assert!((0..AGENTS).all(|i| first.ground(i, 0).unwrap() == other.ground(i, 0).unwrap()));
 }
 
-/// Marathon Man starts as somewhere in his clips, but at the beginning of the course and along it, and is told to run ahead.
+/// Marathon Man starts in the poses of its clips, but at the beginning of the course and facing along it. The command
+/// is to run ahead.
 #[test]
 fn marathon_man_starts_along_his_course() {
     let id = "TerrainMarathonMan-v0";
@@ -579,7 +582,7 @@ fn marathon_man_starts_along_his_course() {
     for i in 0..AGENTS {
         let state = env.state(i).unwrap();
         assert_eq!(state.qpos[..2], [0.0; 2]);
-        // the root faces along the course, the butt not quite; he is told to go along it
+        // the root faces along the course, the butt only roughly; the commanded direction is along it
         let [x, y, _] = axis(&model, &state, "butt");
         let angle = y.atan2(x);
         assert!(angle.abs() < 0.3, "agent {i} faces {x} {y}");
@@ -589,11 +592,11 @@ fn marathon_man_starts_along_his_course() {
             "agent {i}: {off:?} {angle}"
         );
         let [vx, vy] = [state.qvel[0], state.qvel[1]];
-        // from a run or a walk, he goes on forward, and sways
+        // starts from walking or running continue forward, with some sway
         assert!(vx > -0.3 && vy.abs() < 0.6 + 0.1 * vx.abs(), "agent {i}: {vx} {vy}");
         fastest = fastest.max(vx);
         let told = f64::from(out.obs[n * i]);
-        assert!((1.0..=3.0).contains(&told) && out.obs[n * i + 1] == 0.0, "agent {i} is told {told}");
+        assert!((1.0..=3.0).contains(&told) && out.obs[n * i + 1] == 0.0, "agent {i}: commanded {told} m/s");
     }
-    assert!(fastest > 1.5, "somebody runs: {fastest}");
+    assert!(fastest > 1.5, "some agents run: {fastest}");
 }

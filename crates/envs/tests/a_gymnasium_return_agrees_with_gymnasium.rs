@@ -1,10 +1,15 @@
-//! A policy, a return and a distribution of starts carry over between Gymnasium's tasks here and in Gymnasium.
+//! Policies, returns and start distributions carry over between Gymnasium's tasks here and in Gymnasium.
 //!
-//! For every task of [`gymnasium`](marathon_envs::agents::gymnasium), with its default keyword arguments and with others:
-//! from the same state and with the same actions, the observation, the reward and each of its terms, the info, terminated
-//! and truncated agree for 100 decisions in double precision, and decision by decision in single precision; starts
-//! have the same distribution; keyword arguments have the same names and defaults; returns of random play are the
-//! same within their confidence interval. The other side is the installed `gymnasium`, `tests/oracle/gymnasium_tasks.py`.
+//! The test covers every task of [`gymnasium`](marathon_envs::agents::gymnasium), with its default keyword arguments
+//! and with others:
+//!
+//! - From the same state and with the same actions, observation, reward, its terms, info, terminated and truncated
+//!   agree: for 100 decisions in double precision, and for every single decision in single precision.
+//! - Starts have the same distribution.
+//! - Keyword arguments have the same names and defaults.
+//! - Returns of random actions are equal within their confidence interval.
+//!
+//! The other side is the installed `gymnasium`, run by `tests/oracle/gymnasium_tasks.py`.
 
 mod common;
 
@@ -16,10 +21,10 @@ use serde_json::{Value as Json, json};
 
 /// Decisions per episode.
 const DECISIONS: usize = 100;
-/// Episodes per task, with actions of each of these sizes, relative to their bounds.
+/// Sizes of the actions of a task's episodes, relative to their bounds.
 const SCALES: [f32; 4] = [0.1, 0.4, 1.0, 1.5];
 
-/// Distance of a twin that began 1e-10 away at which an episode says nothing more about who computes it.
+/// Distance from a twin that began 1e-10 away above which an episode is too chaotic for a comparison.
 const CHAOS: f64 = 1e-4;
 
 /// A task with keyword arguments.
@@ -44,7 +49,7 @@ impl Case {
         let one = |(name, value): &(&str, Value)| ((*name).to_string(), to_json(value));
         Json::Object(self.arguments.iter().map(one).collect())
     }
-    /// The environment; its solver runs to the end if `converge`, as only a model can ask it to.
+    /// The environment. With `converge`, its solver runs until it converges, which only a model can set.
     fn make(&self, agents: usize, isa: Option<Isa>, autoreset: Autoreset, converge: bool) -> VecEnv {
         let mut options: Options = self.arguments.iter().map(|(n, v)| ((*n).to_string(), v.clone())).collect();
         if converge && options.get("xml_file").is_none() {
@@ -67,7 +72,7 @@ impl Case {
     }
 }
 
-/// As Python's keyword argument: whole numbers as such, because a body's number is one.
+/// A Python keyword argument. Whole numbers become integers, because a body's number is one.
 fn to_json(value: &Value) -> Json {
     match value {
         Value::Bool(x) => json!(x),
@@ -152,7 +157,7 @@ fn cases() -> Vec<Case> {
             .with("frame_skip", 2.0)
             .with("exclude_current_positions_from_observation", false),
         Case::new("InvertedPendulum-v5").with("frame_skip", 3.0).with("reset_noise_scale", 0.15),
-        // fast enough to run into the end of the rail
+        // fast enough to hit the end of the rail
         Case::new("InvertedDoublePendulum-v5").with("healthy_reward", 3.0).with("reset_noise_scale", 0.5),
     ]);
     cases
@@ -162,7 +167,7 @@ fn numbers(v: &Json) -> Vec<f64> {
     v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
 }
 
-/// Where the episodes of a case start, and what is done in them.
+/// Start states and actions of a case's episodes.
 struct Plan {
     states: Vec<AgentState>,
     /// `[episode][decision][act]`.
@@ -177,7 +182,7 @@ fn plan(case: &Case, seed: u64) -> Plan {
     let states = (0..SCALES.len())
         .map(|i| {
             let mut state = env.state(i).unwrap();
-            // quaternions are compared where both sides agree on them; `starts_have_the_same_distribution` has the rest
+            // only normalized quaternions are compared here; `starts_have_the_same_distribution` covers the rest
             if spec.nq > spec.nv {
                 let norm = state.qpos[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
                 state.qpos[3..7].iter_mut().for_each(|x| *x /= norm);
@@ -203,12 +208,12 @@ fn request(case: &Case, plan: &Plan, alone: bool) -> Json {
 /// Moving bodies of the ant and the humanoids.
 const BODIES: usize = 13;
 
-/// How far two sides are apart.
+/// Differences between the two sides.
 #[derive(Default)]
 struct Differences {
-    /// Per decision: the largest of an observation's numbers.
+    /// For each decision, the largest difference in the observation.
     obs: Vec<f64>,
-    /// Per decision: reward, its terms, and the info.
+    /// For each decision, the largest difference in reward, its terms, and the info.
     reward: Vec<f64>,
     state: f64,
     flags: usize,
@@ -219,13 +224,13 @@ fn apart(ours: f64, theirs: f64) -> f64 {
 }
 
 impl Differences {
-    /// Compares the decision of an agent with what Gymnasium says of it.
+    /// Compares an agent's decision with Gymnasium's.
     fn compare(&mut self, env: &VecEnv, step: &Step, agent: usize, theirs: &Json) {
         let spec = env.spec();
         let row = |array: &[f32], n: usize| array[agent * n..][..n].to_vec();
         let (ours, numbers) = (row(&step.obs, spec.obs), numbers(&theirs["obs"]));
         assert_eq!(ours.len(), numbers.len());
-        // forces and torques of contacts come last; a small one is the difference of large ones
+        // contact forces and torques come last; a small one is the difference of large ones
         let forces =
             if spec.options.get("include_cfrc_ext_in_observation") == Some(&true.into()) { BODIES * 6 } else { 0 };
         let force = largest(numbers[spec.obs - forces..].iter().map(|x| x.abs()));
@@ -238,7 +243,7 @@ impl Differences {
         for (name, ours) in named.chain(spec.info.iter().zip(row(&step.info, spec.info.len()))) {
             match info.get(name) {
                 Some(theirs) => worst = largest([worst, apart(f64::from(ours), theirs.as_f64().unwrap())]),
-                // the one term that Gymnasium does not report
+                // the only term that Gymnasium does not report
                 None => assert_eq!((spec.id.as_str(), name.as_str()), ("HumanoidStandup-v5", "reward_alive")),
             }
         }
@@ -251,7 +256,7 @@ impl Differences {
     }
 }
 
-/// Plays all episodes side by side, from their starts to their ends.
+/// Executes all episodes in parallel, from start to end.
 fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let n = plan.states.len();
     let mut env = case.make(n, Some(Isa::F64), Autoreset::Disabled, true);
@@ -289,7 +294,7 @@ fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     found
 }
 
-/// Every decision from the state that Gymnasium had before it: nothing adds up.
+/// Executes every decision from Gymnasium's state before it, so that errors do not accumulate.
 fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let n = plan.states.len() * DECISIONS;
     let mut env = case.make(n, None, Autoreset::Disabled, true);
@@ -315,18 +320,19 @@ fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     found
 }
 
-/// Largest differences.
+/// Largest allowed differences.
 struct Bars {
-    /// Of all numbers of a decision.
+    /// All numbers of a decision.
     decision: f64,
-    /// Share of the decisions that may differ by more: those in which rounding decides whether a contact or a limit is on.
+    /// Fraction of the decisions that may differ by more, because rounding decides whether a contact or a limit is
+    /// active.
     exempt: f64,
-    /// Of coordinates and velocities.
+    /// Coordinates and velocities.
     state: f64,
 }
 
-/// Plays all cases in Gymnasium, compares, and fails where more differs than may. Both sides solve their constraints to
-/// the end, as far as their arithmetic goes.
+/// Runs all cases in Gymnasium, compares, and fails if differences exceed the bars. Both sides solve their constraints
+/// until convergence, within their arithmetic.
 fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Bars) {
     let cases = cases();
     let plans: Vec<Plan> = cases.iter().enumerate().map(|(i, case)| plan(case, 3 + i as u64)).collect();
@@ -337,7 +343,7 @@ fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Ba
     for ((case, plan), theirs) in cases.iter().zip(&plans).zip(answers.as_array().unwrap()) {
         let found = compare(case, plan, theirs);
         let n = found.obs.len();
-        // the share that may differ by more is at the end
+        // the exempt fraction is at the end
         let sorted = |list: &[f64]| -> [f64; 2] {
             let mut list = list.to_vec();
             list.sort_by(f64::total_cmp);
@@ -363,7 +369,7 @@ fn agree(alone: bool, compare: fn(&Case, &Plan, &Json) -> Differences, bars: &Ba
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    // the comparison means something only if these happened
+    // the comparison is meaningful only if these cases occurred
     let all = cases.len() * SCALES.len() * DECISIONS;
     assert!(100 * count >= 95 * all, "{count} decisions of {all} were not chaotic");
     assert!(ended > 500 && contacts > 500, "{ended} decisions in terminal states, {contacts} with contacts");
@@ -380,7 +386,7 @@ fn every_decision_agrees_in_single_precision() {
     agree(true, play_single, &Bars { decision: 1e-4, exempt: 0.02, state: 0.0 });
 }
 
-/// An action far out of range is clipped by the actuators and paid for in full; the episode goes on.
+/// The actuators clip an action far out of range, its full size has a cost, and the episode continues.
 #[test]
 fn actions_far_out_of_range_cost_what_they_cost_in_gymnasium() {
     const DECISIONS: usize = 5;
@@ -420,7 +426,7 @@ fn actions_far_out_of_range_cost_what_they_cost_in_gymnasium() {
     }
 }
 
-/// A default value of Python's as one of ours.
+/// A default value of Python as one of ours.
 fn from_json(value: &Json) -> Value {
     let number = |x: &Json| x.as_f64().or_else(|| x.as_str()?.parse().ok());
     match value {
@@ -493,7 +499,7 @@ fn starts_have_the_same_distribution() {
             // the standard error of a variance is at most sqrt(2 / n) of it for these distributions: 4.9% together
             assert!((var_a - var_b).abs() < 0.25 * var_b + 1e-10, "{place}");
             if k < env.spec().nq + env.spec().nv {
-                // uniform draws have an end, normal ones have not
+                // uniform draws are bounded, normal ones are not
                 let reach_a = largest(a.map(|x| (x - mean_b).abs())) / var_b.sqrt();
                 let reach_b = largest(b.map(|x| (x - mean_b).abs())) / var_b.sqrt();
                 let uniform = [reach_a < 1.9, reach_b < 1.9];
@@ -503,7 +509,7 @@ fn starts_have_the_same_distribution() {
     }
 }
 
-/// Random play earns the same on average.
+/// Random actions earn the same on average.
 #[test]
 fn returns_of_random_play_agree() {
     const OURS: usize = 512;

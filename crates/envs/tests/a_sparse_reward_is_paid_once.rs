@@ -1,6 +1,6 @@
-//! `MarathonManSparse-v0` earns nothing until its episode ends, by a fall, by the time limit (the caller's, if there is one) or
-//! by the clip's end. The last decision then pays the way from where the episode began to the last place where a foot has
-//! touched the ground, 1 for 20 m. The way is computed here from the states and the observed touches.
+//! `MarathonManSparse-v0` earns nothing until its episode ends by a fall, by the time limit (also a caller's) or by the
+//! clip's end. The last decision pays the distance from the start to the last foot contact, 1 for 20 m. The test
+//! computes the distance from the states and the observed contacts.
 
 mod common;
 
@@ -9,10 +9,10 @@ use marathon_envs::{Autoreset, Options, VecEnv, VecEnvOptions};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::lanes::Isa;
 
-/// Where the touches of the right foot and of the left are observed.
+/// Indices of the contacts of the right and of the left foot in the observation.
 const TOUCHES: [std::ops::Range<usize>; 2] = [59..62, 62..65];
 
-/// Ends of episodes: by falls, and by time.
+/// Number of episodes ended by falls, and by time.
 fn ends(scale: f32, limit: Option<usize>, clip: Option<&str>, isa: Isa) -> [usize; 2] {
     const AGENTS: usize = 20;
     let (id, given) = match clip {

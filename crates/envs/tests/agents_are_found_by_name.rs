@@ -1,4 +1,4 @@
-//! Agents are found by id, alias and base name; a wrong name is answered with the nearest right one.
+//! Agents are found by id, alias and base name. The error for a wrong name contains the closest right one.
 
 use std::sync::Arc;
 
@@ -67,13 +67,13 @@ mod with_arguments {
     use marathon_physics::lanes::{Isa, Real};
 
     marathon_envs::options! {
-        /// A cart that is told what to do.
+        /// A cart with commands.
         struct Cart {
             /// Price of the effort.
             effort_weight: f64 = 0.5,
-            /// Whether it sees its position.
+            /// Whether the observation includes its position.
             see_position: bool = true,
-            /// Where it may be.
+            /// Allowed positions.
             range: [f64; 2] = [-1.0, f64::INFINITY],
             /// Physics steps per decision.
             frame_skip: usize = 2,
@@ -167,7 +167,7 @@ mod with_arguments {
             options.set(name, value);
             assert_eq!(refusal("cart", &options), format!("agent 'Cart-v3': {complaint}"));
         }
-        // right in itself, wrong for the agent
+        // valid by itself, invalid for the agent
         let error = registry().shards_with("cart", &Options::new().with("frame_skip", 0.0), Isa::F32).map(|_| ());
         assert!(matches!(error, Err(EnvError::Agent { .. })));
     }

@@ -1,5 +1,5 @@
-//! Too many agents for the memory budget are refused before any is created. The estimated memory per agent is an upper
-//! bound on the memory that it takes.
+//! A number of agents that exceeds the memory budget is rejected before any agent is created. The estimated memory per
+//! agent is an upper bound.
 
 use marathon_envs::{EnvError, VecEnv, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
@@ -43,7 +43,7 @@ fn an_agent_takes_no_more_than_it_is_said_to() {
         ("Swimmer-v5", 16_000),
     ] {
         let said = registry::factory(id, Isa::best()).unwrap().agent_bytes();
-        // shared data is already allocated
+        // shared data is allocated before the measurement
         let play = |agents: usize| {
             let mut env = VecEnv::new(id, &VecEnvOptions { agents, threads: 1, ..Default::default() }).unwrap();
             let mut step = env.buffers();
@@ -55,9 +55,9 @@ fn an_agent_takes_no_more_than_it_is_said_to() {
         let kept = play(agents);
         let each = memory().saturating_sub(before) / agents;
         println!("{id}: {each} bytes, {said} said");
-        assert!(each <= said, "{id}: an agent takes {each} bytes, {said} were said");
+        assert!(each <= said, "{id}: an agent takes {each} bytes, the estimate is {said}");
         // the estimate is not so high that it refuses agents that fit
-        assert!(said < 12 * each.max(500), "{id}: an agent takes {each} bytes, {said} were said");
+        assert!(said < 12 * each.max(500), "{id}: an agent takes {each} bytes, the estimate is {said}");
         // reused memory would hide an allocation
         std::mem::forget(kept);
     }

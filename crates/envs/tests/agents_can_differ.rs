@@ -1,5 +1,5 @@
-//! Each agent can have masses, friction, strength and gravity of its own: they act on that agent alone, last over resets until
-//! changed, and what makes no sense is refused.
+//! Each agent can have its own masses, friction, strength and gravity. They apply to that agent only and last across
+//! resets until changed. Invalid values are rejected.
 
 use marathon_envs::{VecEnv, VecEnvOptions};
 
@@ -41,7 +41,7 @@ fn a_variation_is_one_agents_own() {
         assert_eq!(varied[agent] == plain[agent], ![2, 17, 19].contains(&agent), "agent {agent}");
     }
 
-    // over a reset, until taken back
+    // across a reset, until withdrawn
     let mut obs = env.buffers().obs;
     env.reset(Some(3), &mut obs).unwrap();
     assert_eq!(live(&mut env), varied);

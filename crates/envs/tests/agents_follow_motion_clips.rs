@@ -1,8 +1,10 @@
-//! An agent that follows a clip sees, earns and fails by what the clip shows where the agent is in it.
+//! Observation, reward and termination of an agent that follows a clip agree with the clip at the agent's present
+//! frame.
 //!
-//! Marathon Man, and the paper's Humanoid and Walker, play the same actions in this engine (double precision) and in MuJoCo,
-//! where `tests/oracle/imitation.py` computes everything in plain Python. The clip's poses that it is told are those of [`Clip::qpos`] at times that never
-//! wrap around, so that the table of the environment, which does, has to agree with them; one clip walks in circles.
+//! Marathon Man, and the paper's Humanoid and Walker, execute the same actions in this engine (double precision) and in
+//! MuJoCo. For MuJoCo, `tests/oracle/imitation.py` computes everything in plain Python. Its clip poses are those of
+//! [`Clip::qpos`] at times that never wrap around. The table of the environment wraps around and has to agree with
+//! them. One of the clips walks in circles.
 
 mod common;
 
@@ -21,23 +23,23 @@ use serde_json::{Value, json};
 
 /// Starts per case.
 const EPISODES: usize = 4;
-/// Decisions per start: short enough that chaos has not grown beyond the tolerance.
+/// Decisions per start: short enough that chaos stays below the tolerance.
 const DECISIONS: usize = 25;
 /// Observations are stored in single precision.
 const TOLERANCE: f64 = 5e-5;
 /// Seconds between Marathon Man's decisions.
 const DT: f64 = 0.025;
-/// Decisions that observations look ahead.
+/// Farthest frame that observations look ahead, decisions.
 const AHEAD: usize = 16;
-/// Size of the actions: none, gentle, middling and wild, which is clipped.
+/// Sizes of the actions: none, small, medium, and large enough to be clipped.
 const SCALES: [f32; EPISODES] = [0.0, 0.1, 0.5, 1.3];
 
-/// A clip that comes with the crate.
+/// A clip that ships with the crate.
 fn shipped(name: &str) -> Arc<Clip> {
     clips::find(name).unwrap_or_else(|| panic!("there is a clip '{name}'"))
 }
 
-/// The walk on a circle: each cycle turns to the left.
+/// The walking clip on a circle: each cycle turns to the left.
 fn circling() -> Clip {
     let walk = shipped("walk");
     let frames: Vec<Vec<f64>> = (0..walk.frames()).map(|i| walk.frame(i).to_vec()).collect();
@@ -46,7 +48,7 @@ fn circling() -> Clip {
     Clip::new(Path::new("circling"), about, walk.layout().clone(), walk.dt(), cycle, &frames).expect("a clip")
 }
 
-/// A figure that stands still for a second, once.
+/// A clip of standing still for a second, without a loop.
 fn standing() -> Clip {
     let model = marathon_envs::agent("MarathonMan-v0").unwrap().model().unwrap();
     let about = About { name: "standing".into(), model: model.name.clone(), ..About::default() };
@@ -71,7 +73,7 @@ fn follow_as(id: &str, options: &Options, agents: usize, isa: Option<Isa>) -> Ve
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A clip cut into decisions.
+/// A clip sampled at every decision.
 struct Cut<'a> {
     clip: &'a Clip,
     rows: usize,
@@ -81,7 +83,7 @@ struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    /// As the environment, with laps of a whole number of decisions.
+    /// Sampled as in the environment, with laps of a whole number of decisions.
     fn new(clip: &Clip, dt: f64) -> Cut<'_> {
         let decisions = clip.duration() / dt;
         if clip.cycle().is_none() {
@@ -107,8 +109,8 @@ impl Cut<'_> {
         json!({ "qpos": qpos, "qvel": qvel, "phase": clip.phase(time), "facing": facing })
     }
 
-    /// The row that is nearest to a state, and how far away it is: the noise of a start is smaller than the distance of two
-    /// decisions, at any but a standstill.
+    /// The row closest to a state, and its distance. The noise of a start is smaller than the distance between two
+    /// decisions, except at a standstill.
     fn nearest(&self, state: &AgentState) -> (usize, f64) {
         let away = |row: usize| {
             let moment = self.at(row);
@@ -120,12 +122,12 @@ impl Cut<'_> {
     }
 }
 
-/// How far a state is from a clip.
+/// Distance of a state from a clip.
 fn gap(clip: &Clip, dt: f64, state: &AgentState) -> f64 {
     Cut::new(clip, dt).nearest(state).1
 }
 
-/// What the clip shows in the decisions from a state on, which is that of a start; and how many decisions into it that is.
+/// The clip's frames from a start state on, and the row of that state.
 fn moments(clip: &Clip, dt: f64, state: &AgentState) -> (usize, Vec<Value>) {
     let cut = Cut::new(clip, dt);
     let (start, away) = cut.nearest(state);
@@ -228,13 +230,13 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             }
         }
     }
-    // the comparison means something only if these happened
+    // the comparison is meaningful only if these cases occurred
     assert!(played.len() > 1, "one clip only: {played:?}");
     assert!(touches > 100 && far > 3 && decisions > 300, "{touches} touches, {far} too far, {decisions} decisions");
 }
 
-/// [`VecEnv::reference`] is what rewards compare with: its distance from the agent is what the agent reports and observes, over
-/// laps that turn, for agents at different places, on any vector width.
+/// [`VecEnv::reference`] is the pose that rewards use. Its distance from the agent equals the reported and observed
+/// one, over laps that turn, for agents at different positions, with any vector width.
 #[test]
 fn the_clip_in_the_world_is_the_one_that_rewards_see() {
     clips::add("circling", circling());
@@ -276,7 +278,7 @@ fn the_clip_in_the_world_is_the_one_that_rewards_see() {
     }
 }
 
-/// Centers of the parts, the butt's first.
+/// Centers of the parts. The butt's is first.
 fn centers(model: &Model, qpos: &[f64]) -> Vec<[f64; 3]> {
     let pose = Pose::of(model, qpos);
     let parts = marathon_envs::agent("MarathonMan-v0").unwrap().facts().parts;
@@ -304,8 +306,9 @@ fn episodes_start_all_over_the_clip() {
     assert!((0..20).all(|agent| moments(&clip, DT, &env.state(agent).unwrap()).0 == 0));
 }
 
-/// Half of the adaptive starts after a failure are where that episode has started if it was short, and in the second before the
-/// failure if it was not. Of the others, a quarter are at the beginning. The same seed starts alike, whatever has been.
+/// Half of the adaptive starts after a failure are where the failed episode started if it was short, otherwise in the
+/// second before the failure. Of the others, a quarter are at the beginning. The same seed starts alike, regardless of
+/// earlier episodes.
 #[test]
 fn adaptive_starts_are_where_the_agent_has_failed() {
     let still = standing();
@@ -336,10 +339,7 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
             env.reset_agents(&ended, &mut out.obs).unwrap();
             let places = places(&env);
             for agent in (0..agents).filter(|agent| ended[*agent]) {
-                assert!(
-                    out.terminated[agent] && (t - begun[agent].0 < 80) == (stands == 0),
-                    "falls when it is told to"
-                );
+                assert!(out.terminated[agent] && (t - begun[agent].0 < 80) == (stands == 0), "fails when its actions are large");
                 failures += 1;
                 let is_near = match stands {
                     0 => places[agent] == begun[agent].1,
@@ -350,7 +350,8 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
                 begun[agent] = (t, places[agent]);
             }
         }
-        // of the others, some are there by chance: from the beginning to the beginning again, and within a second of many
+        // some of the others are there by chance: from the beginning to the beginning again, and within a second of
+        // many
         let share = |count: usize| count as f64 / failures as f64;
         let chance = if stands == 0 { 0.06 } else { 0.04 };
         assert!(failures > 400 && (share(near) - 0.5 - chance).abs() < 0.09, "{near} of {failures}");
@@ -370,11 +371,11 @@ fn standing_beside_a_standing_clip_earns_everything_until_it_is_over() {
         env.step(&[0.0; 3 * 21], &mut out.as_mut()).unwrap();
         assert!(out.reward.iter().all(|r| (0.97..=1.0).contains(r)), "decision {t}: {:?}", out.reward);
         assert!(out.truncated.iter().all(|over| *over == (t == 40)), "a clip of one second has 40 decisions");
-        assert!(!out.terminated.contains(&true), "nobody has failed");
+        assert!(!out.terminated.contains(&true), "no agent has failed");
     }
 }
 
-/// Nobody shares a place in the clip; lanes begin and end alone.
+/// Each agent has its own place in the clip, and lanes begin and end independently.
 #[test]
 fn agents_are_where_they_are_in_the_clip_whoever_runs_beside_them() {
     let phases = |agents: usize| {

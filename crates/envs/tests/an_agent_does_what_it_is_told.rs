@@ -1,6 +1,6 @@
-//! Commands: an agent is told something by its own schedule or by a caller, observes it, and is rewarded for what it has
-//! observed. No lane, thread, slot or width shows in what it is told, and a snapshot continues it exactly. What an agent
-//! draws at its start, memory and ground, reaches it.
+//! Commands come from the agent's schedule or from a caller. The agent observes its command, and the reward uses the
+//! observed command. Commands do not depend on lanes, threads, slots or widths, and a snapshot continues them exactly.
+//! Memory and ground that a start draws reach the agent.
 
 mod common;
 
@@ -33,7 +33,7 @@ const MODEL: &str = r#"
   </actuator>
 </mujoco>"#;
 
-/// What it observes: place, velocity, the two numbers of its command, its memory.
+/// Its observation: position, velocity, the two numbers of its command, its memory.
 const OBS: usize = 7;
 const VELOCITY: usize = 2;
 const BRAKE: usize = 3;
@@ -43,7 +43,7 @@ const FORETOLD: usize = 6;
 
 #[derive(Clone, Copy, Default)]
 struct Cart {
-    /// Starts take physics, on hills that the start draws.
+    /// Whether starts need physics, on hills that they draw.
     hilly: bool,
 }
 
@@ -82,7 +82,7 @@ impl Agent for Cart {
 
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
-        // half at once, half with the next decision
+        // half acts at once, half with the next decision
         c.ctrl[0] = (c.action[0] + c.memory[0]) * T::lit(0.5);
         c.memory[0] = c.action[0];
     }
@@ -128,7 +128,7 @@ fn carts(id: &str, agents: usize, threads: usize, isa: Option<Isa>) -> VecEnv {
     VecEnv::from_registry(&registry(), id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Makes decisions `from .. to`, with `before` called before each.
+/// Executes decisions `from .. to`, and calls `before` before each.
 fn go_on(
     env: &mut VecEnv,
     out: &mut Step,
@@ -149,7 +149,7 @@ fn go_on(
         .collect()
 }
 
-/// Begins, and makes decisions; what the first observations are comes first.
+/// Resets and executes decisions. The first entry holds the first observations.
 fn play(env: &mut VecEnv, decisions: usize, before: impl FnMut(usize, &mut VecEnv)) -> Vec<Step> {
     let mut out = env.buffers();
     env.reset(Some(5), &mut out.obs).expect("the array fits");
@@ -159,7 +159,7 @@ fn play(env: &mut VecEnv, decisions: usize, before: impl FnMut(usize, &mut VecEn
     seen
 }
 
-/// A caller who tells some agents something for a while.
+/// A caller that sets commands of some agents for a while.
 fn meddle(decision: usize, env: &mut VecEnv) {
     let n = env.agents();
     for agent in [0, 5, 17, 38].into_iter().filter(|agent| *agent < n) {
@@ -187,7 +187,7 @@ fn the_schedule_draws_a_command_and_holds_it() {
             story.iter().take(39).map(|s| [seen(s, agent, VELOCITY), seen(s, agent, BRAKE)]).collect();
         assert!(commands.iter().all(|[v, b]| v.abs() <= 2.0 && (*b == 0.0 || *b == 1.0)), "{commands:?}");
         let runs: Vec<usize> = commands.chunk_by(|a, b| a[0] == b[0]).map(<[_]>::len).collect();
-        // the last one goes on
+        // the last command continues
         assert!(runs.len() > 3 && runs[..runs.len() - 1].iter().all(|n| (3..=9).contains(n)), "{runs:?}");
         firsts.push(commands[0][0]);
     }
@@ -207,7 +207,7 @@ fn a_start_knows_what_the_schedule_begins_with() {
             assert_eq!(seen(&story[40], agent, FORETOLD), seen(&story[40], agent, VELOCITY), "{id}, agent {agent}");
             assert_ne!(seen(&story[0], agent, FORETOLD), seen(&story[40], agent, FORETOLD));
         }
-        // a start is a function of seed, agent and episode, whatever a caller says
+        // a start depends on seed, agent and episode, not on a caller's commands
         let alone = play(&mut carts(id, N, 1, None), 1, |_, _| {});
         assert_eq!(seen(&story[0], 3, FORETOLD), seen(&alone[0], 3, FORETOLD));
         assert_eq!(seen(&story[0], 3, VELOCITY), -0.5);
@@ -221,7 +221,7 @@ fn the_reward_is_for_the_command_that_was_observed() {
     let story = play(&mut env, 90, meddle);
     for pair in story.windows(2) {
         for agent in 0..N {
-            // the decision was made under the command of the observation before it
+            // the decision used the command of the observation before it
             let told = seen(&pair[0], agent, VELOCITY);
             assert_eq!(pair[1].info[agent * 2], told, "agent {agent}");
             let velocity = pair[1].final_obs[agent * OBS + 1];
@@ -244,7 +244,7 @@ fn a_caller_goes_before_the_schedule_until_it_gives_the_command_back() {
     for (k, (a, b)) in alone.iter().zip(&told).enumerate() {
         for agent in 0..N {
             let [a, b] = [a, b].map(|s| [seen(s, agent, VELOCITY), seen(s, agent, BRAKE)]);
-            // set before decision 10, so in the observation that it leads to; the schedule goes on underneath
+            // set before decision 10, so observed after it; the schedule continues in the background
             if agent == 7 && (11..=20).contains(&k) {
                 assert_eq!(b, [1.25, 0.5], "observation {k}");
             } else {
@@ -253,7 +253,7 @@ fn a_caller_goes_before_the_schedule_until_it_gives_the_command_back() {
         }
     }
 
-    // over the end of an episode, and from the start of one
+    // across the end of an episode, and from the start of one
     let mut env = carts("Cart-v0", 3, 1, None);
     env.set_command(1, Some(&[-1.0, 0.0])).expect("within the range");
     let story = play(&mut env, 60, |_, _| {});
@@ -303,11 +303,11 @@ fn no_lane_thread_slot_or_width_shows() {
 #[test]
 fn a_snapshot_continues_what_agents_are_told() {
     const N: usize = 40;
-    // in the midst of an episode and of what a caller says, and after it has given the commands back
+    // during an episode with a caller's commands, and after the caller has returned them to the schedule
     for at in [13, 19, 61] {
         let mut env = carts("Cart-v0", N, 1, None);
         let mut out = play(&mut env, at, meddle).pop().expect("decisions");
-        // told, but not observed yet
+        // set, but not observed yet
         env.set_command(9, Some(&[0.125, 0.0])).expect("within the range");
         let snapshot = env.save();
         let uninterrupted = go_on(&mut env, &mut out, at, at + 60, meddle);
@@ -329,7 +329,7 @@ fn a_snapshot_continues_what_agents_are_told() {
     }
 }
 
-/// Sixteen agents in another slot of another shard.
+/// Sixteen agents move to another slot of another shard.
 #[test]
 fn a_block_moves_with_its_commands() {
     let shards = registry().shards("Cart-v0", Isa::best()).unwrap_or_else(|e| panic!("{e}"));
@@ -355,7 +355,7 @@ fn a_block_moves_with_its_commands() {
     }
 }
 
-/// Actions become controls by the agent's own function: half of each acts a decision later.
+/// Actions become controls by the agent's own function. Here half of each acts one decision later.
 #[test]
 fn an_action_becomes_controls_by_the_agents_own_rule() {
     let mut env = carts("Cart-v0", 2, 1, Some(Isa::F64));
@@ -367,7 +367,7 @@ fn an_action_becomes_controls_by_the_agents_own_rule() {
     for (action, ctrl) in [(1.0, 0.5), (0.0, 0.5), (-1.0, -0.5), (-1.0, -1.0)] {
         env.step(&[action, 0.0], &mut out.as_mut()).expect("the arrays fit");
         for _ in 0..2 {
-            // the damping is taken at the end of the step
+            // the damping is implicit: it acts on the velocity at the end of the step
             velocity = (mass * velocity + 0.01 * 20.0 * ctrl) / (mass + 0.01);
         }
         assert!((f64::from(seen(&out, 0, 1)) - velocity).abs() < 1e-6, "{} {velocity}", seen(&out, 0, 1));
@@ -384,14 +384,14 @@ fn what_a_start_draws_reaches_the_agent() {
         assert!(drawn.iter().all(|x| (1.0..2.0).contains(x)), "{drawn:?}");
         assert!((1..20).all(|i| !drawn[..i].contains(&drawn[i])), "{drawn:?}");
         for agent in 0..20 {
-            // kept to the end of the episode, and drawn again for the next
+            // kept until the end of the episode, and drawn again for the next one
             assert!(story[1..40].iter().all(|s| seen(s, agent, DRAWN) == drawn[agent]));
             assert!(story[40..].iter().all(|s| seen(s, agent, DRAWN) == seen(&story[40], agent, DRAWN)));
             assert_ne!(seen(&story[40], agent, DRAWN), drawn[agent]);
         }
     }
 
-    // carts that have settled lie on the hills that they drew, 10 to 20 cm high, and stay there
+    // settled carts lie on the hills that they drew, 10 to 20 cm high, and stay there
     let mut env = carts("HillyCart-v0", 20, 1, None);
     let story = play(&mut env, 39, |_, _| {});
     let height = |step: &Step, agent: usize| 0.3 + step.info[agent * 2 + 1] - 0.1;

@@ -1,7 +1,8 @@
-//! A crate that depends on this one adds an agent, and it is as good as the built-in ones.
+//! A crate that depends on this one can add an agent, with the same features as the built-in ones.
 //!
-//! The agent here is a probe: it observes what every helper of the library says, and the test computes the same in plain
-//! double precision from the state. A wrong description of an agent is refused with a message that helps.
+//! The agent here is a probe. It observes the result of every helper of the library, and the test computes the same
+//! numbers from the state in plain double precision. An agent with a wrong description is rejected with a helpful
+//! message.
 
 mod common;
 
@@ -135,7 +136,7 @@ fn make(agents: usize) -> VecEnv {
     VecEnv::from_registry(&registry(), "probe", &VecEnvOptions { agents, seed: 2, ..Default::default() }).unwrap()
 }
 
-/// `v` turned by a unit quaternion w x y z.
+/// `v` rotated by a unit quaternion w x y z.
 fn turn(q: &[f64], v: [f64; 3]) -> [f64; 3] {
     let [w, x, y, z] = [q[0], q[1], q[2], q[3]];
     let r = [
@@ -150,13 +151,13 @@ fn degrees(u: [f64; 3], v: [f64; 3]) -> f64 {
     (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-/// The probe's observation in the way of a textbook.
+/// The probe's observation by textbook formulas.
 fn expected(state: &AgentState, action: &[f32]) -> Vec<f64> {
     let (q, v) = (&state.qpos, &state.qvel);
     let (root, shoulder) = (&q[3..7], q[7]);
     let ball = [q[0], q[1], q[2]];
     let (forward, up) = (turn(root, [1.0, 0.0, 0.0]), turn(root, [0.0, 0.0, 1.0]));
-    // the arm turns about the ball's y axis; its capsule's center is 0.2 along its x axis
+    // the arm rotates about the ball's y axis; its capsule's center is 0.2 along its x axis
     let (s, c) = shoulder.sin_cos();
     let (arm_forward, arm_up) = (turn(root, [c, 0.0, -s]), turn(root, [s, 0.0, c]));
     let arm = turn(root, [0.3 + 0.2 * c, 0.0, -0.2 * s]);
@@ -185,7 +186,7 @@ fn expected(state: &AgentState, action: &[f32]) -> Vec<f64> {
     out.extend([e0 + e1, e1, (e0 + e1) / 2.0, a[0].abs() + a[1].abs(), at_limit(0) + at_limit(1), at_limit(1)]);
     out.push(0.0);
     out.push(v[7]);
-    // the parent as seen from the child: minus the angle
+    // the parent relative to the child: minus the angle
     let (half_s, half_c) = (-shoulder / 2.0).sin_cos();
     let sign = if half_c < 0.0 { -1.0 } else { 1.0 };
     out.extend([0.0, sign * half_s, 0.0, sign * half_c]);
@@ -200,7 +201,7 @@ fn every_helper_is_its_formula() {
         let mut env = VecEnv::from_registry(&registry(), "Probe-v0", &options).unwrap();
         let mut out = env.buffers();
         env.reset(Some(4), &mut out.obs).unwrap();
-        // all attitudes, spins and arm angles
+        // all orientations, angular velocities and arm angles
         let mut noise = common::Noise::new(8);
         for agent in 0..40 {
             let mut state = env.state(agent).unwrap();
@@ -256,7 +257,7 @@ fn failure_and_time_limit_are_the_agents_own() {
     let mut env = make(3);
     let mut out = env.buffers();
     env.reset(None, &mut out.obs).unwrap();
-    // the arm hits the floor in one agent; the ball is a foot and may
+    // the arm hits the floor in one agent; the ball is a foot and may touch it
     for (agent, height, pitch) in [(0, 0.1, PI), (1, 0.1, 0.0)] {
         let mut state = env.state(agent).unwrap();
         state.qpos[2] = height + 0.1;

@@ -1,5 +1,5 @@
-//! The height of the ground under any place is that of the surface which the physics collides with, down to its
-//! triangles. Each agent sees its own ground, and what lies ahead of it by its own heading.
+//! The height of the ground at any point is that of the surface that the physics collides with, including its
+//! triangles. Each agent observes its own ground, at points relative to its heading.
 
 mod common;
 
@@ -29,7 +29,7 @@ const MODEL: &str = r#"
 const EYE: Part = Part::named(&["eye"], "eye");
 const POINTS: [[f64; 2]; 3] = [[0.0, 0.0], [0.5, 0.0], [0.25, -0.75]];
 
-/// It observes its place, the ground under it, and the scan of some points.
+/// It observes its position, the ground height below it, and a height scan.
 struct Eye {
     floor: bool,
 }
@@ -75,13 +75,13 @@ fn eyes(floor: bool, agents: usize, isa: Isa) -> VecEnv {
     VecEnv::from_registry(&registry, &id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Hills of an agent's own.
+/// Hills of one agent.
 fn hills(agent: usize) -> Vec<f32> {
     let mut noise = Noise::new(agent as u64);
     (0..35).map(|_| 0.5 + 0.5 * noise.next()).collect()
 }
 
-/// Puts an agent over a place, turned by an angle.
+/// Moves an agent to a point, with a yaw.
 fn put(env: &mut VecEnv, agent: usize, [x, y]: [f64; 2], yaw: f64) {
     let (s, c) = (0.5 * yaw).sin_cos();
     let state = AgentState { qpos: vec![x, y, 6.0, c, 0.0, 0.0, s, 0.0], qvel: vec![0.0; 7] };
@@ -94,7 +94,7 @@ fn look(env: &mut VecEnv) -> Vec<f32> {
     obs
 }
 
-/// Height of hills over a place in the field's frame, from the triangles' corners in double precision.
+/// Height of hills at a point of the field's frame, from the triangles' corners in double precision.
 fn surface(heights: &[f32], [x, y]: [f64; 2]) -> f64 {
     let (column, row) = ((x + 3.0).clamp(0.0, 6.0), (y + 2.0).clamp(0.0, 4.0));
     let (c, r) = ((column as usize).min(5), (row as usize).min(3));
@@ -104,7 +104,7 @@ fn surface(heights: &[f32], [x, y]: [f64; 2]) -> f64 {
     if u > v { (1.0 - u) * a + (u - v) * at(c + 1, r) + v * b } else { (1.0 - v) * a + (v - u) * at(c, r + 1) + u * b }
 }
 
-/// A place of the world in the field's frame.
+/// A point of the world in the field's frame.
 fn in_field([x, y]: [f64; 2]) -> [f64; 2] {
     let (s, c) = 30.0_f64.to_radians().sin_cos();
     let (dx, dy) = (x - 0.5, y + 0.25);
@@ -146,7 +146,7 @@ fn the_ground_is_as_high_as_its_triangles() {
                         let [x, y] = places[agent];
                         let near = [x + c * ahead - s * left, y + s * ahead + c * left];
                         let [u, v] = in_field(near);
-                        // single precision may put a place on the other side of the border
+                        // in single precision, a point may be on the other side of the border
                         if (u.abs() - 3.0).abs() > 1e-4 && (v.abs() - 2.0).abs() > 1e-4 {
                             let expected = ground(near) - 6.0;
                             let found = f64::from(seen[4 + k]);
@@ -160,11 +160,11 @@ fn the_ground_is_as_high_as_its_triangles() {
     }
 }
 
-/// What is seen is what carries: a ball that falls on the hills comes to rest on them.
+/// The observed ground supports the agent: a ball that falls on the hills comes to rest on them.
 #[test]
-fn what_is_seen_is_what_carries() {
+fn the_observed_ground_supports_the_agent() {
     let mut env = eyes(true, 1, Isa::best());
-    // a valley along y, so that the ball rolls nowhere
+    // a valley along y, so that the ball does not roll away
     let valley: Vec<f32> = (0..35).map(|k| 0.5 + 0.25 * ((k % 7) as f32 - 3.0).abs()).collect();
     env.set_ground(0, 0, &valley).expect("the field's grid");
     let state = AgentState { qpos: vec![0.5, -0.25, 1.2, 1.0, 0.0, 0.0, 0.0, 0.0], qvel: vec![0.0; 7] };
@@ -174,7 +174,7 @@ fn what_is_seen_is_what_carries() {
         env.step(&[0.0], &mut out.as_mut()).expect("the arrays fit");
     }
     let [z, ground] = [out.final_obs[2], out.final_obs[3]];
-    // it lies on both slopes, a fourteenth above its radius
+    // it rests on both slopes, its center higher than its radius by the factor below
     let rest = 0.1 * (1.0_f32 + 0.0625).sqrt();
     assert!((z - ground - rest).abs() < 0.02 && (ground - 0.625).abs() < 0.02, "{z} above {ground}");
 }

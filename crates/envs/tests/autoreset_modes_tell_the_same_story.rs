@@ -1,5 +1,5 @@
-//! How episodes begin anew is a matter of bookkeeping: an agent lives the same life, bit for bit, whether it is reset
-//! within the step that ended its episode, at the next one, or by the caller.
+//! An agent has the same trajectory, bit for bit, in all autoreset modes: reset within the step that ended its episode,
+//! at the next step, or by the caller.
 
 mod common;
 
@@ -10,7 +10,7 @@ const AGENTS: usize = 21;
 const STEPS: usize = 160;
 const LIMIT: usize = 40;
 
-/// What happened to an agent, in order.
+/// Events of an agent, in order.
 #[derive(Clone, Debug, PartialEq)]
 enum Event {
     Begin(Vec<f32>),
@@ -19,7 +19,7 @@ enum Event {
 
 struct Diary {
     events: Vec<Vec<Event>>,
-    /// Decisions that each agent has made: its next action depends on this number.
+    /// Number of decisions of each agent. Its next action depends on it.
     decisions: Vec<usize>,
 }
 
@@ -65,7 +65,7 @@ fn ended(out: &Step, agent: usize) -> bool {
     out.terminated[agent] || out.truncated[agent]
 }
 
-/// Plays in a mode and writes down every agent's life. A snapshot halfway goes through another environment.
+/// Runs a mode and records every agent's events. Halfway, a snapshot passes through another environment.
 fn diary(id: &str, mode: Autoreset, threads: usize) -> Vec<Vec<Event>> {
     let options = VecEnvOptions {
         agents: AGENTS,
@@ -118,7 +118,7 @@ fn every_mode_gives_the_same_lives() {
         assert!(begins > 2 * AGENTS && truncated > 0, "{id}: {begins} episodes, {truncated} truncated");
         for (mode, threads) in [(Autoreset::SameStep, 1), (Autoreset::NextStep, 1), (Autoreset::NextStep, 2)] {
             for (agent, (a, b)) in diary(id, mode, threads).iter().zip(&reference).enumerate() {
-                // a mode that spends steps on resets comes less far
+                // a mode that spends steps on resets covers fewer events
                 let n = a.len().min(b.len());
                 assert!(n > STEPS / 2 && a[..n] == b[..n], "{id}, {mode:?}: agent {agent} lived another life");
             }
@@ -126,7 +126,7 @@ fn every_mode_gives_the_same_lives() {
     }
 }
 
-/// A seed of its own makes an agent the only one of an environment with that seed.
+/// With its own seed, an agent equals the only agent of an environment with that seed.
 #[test]
 fn an_agent_can_have_a_seed_of_its_own() {
     let mut many = make("walker", 19, 2, None, Autoreset::SameStep);
@@ -147,7 +147,7 @@ fn an_agent_can_have_a_seed_of_its_own() {
     assert!(many.reseed_agent(19, 0, 0).is_err());
 }
 
-/// After a state was set, its observation is that of an episode which begins there.
+/// After a state is set, its observation is that of an episode that begins there.
 #[test]
 fn a_state_that_was_set_can_be_observed() {
     let mut env = make("humanoid", 18, 1, None, Autoreset::SameStep);

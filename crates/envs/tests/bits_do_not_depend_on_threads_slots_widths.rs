@@ -1,7 +1,8 @@
-//! An agent's life depends on its number and the seed, not on who else is simulated, where, or with what instructions.
+//! An agent's trajectory depends on its number and the seed, not on other agents, its slot, or the instruction set.
 //!
-//! The same agents play the same actions among 1, 7, 16 and 100 agents, on 1, 2 and 3 threads, with every instruction set
-//! of single precision that this processor has. All observations, rewards and endings are equal to the bit.
+//! The same agents execute the same actions among 1, 7, 16 and 100 agents, on 1, 2 and 3 threads, with every
+//! instruction set of single precision that this processor has. All observations, rewards and endings are equal to the
+//! bit.
 
 mod common;
 
@@ -11,7 +12,7 @@ use marathon_physics::lanes::Isa;
 
 const DECISIONS: usize = 60;
 
-/// Everything the first `agents` agents saw and earned, by decision.
+/// All observations and rewards of the first `agents` agents, by decision.
 fn lives(id: &str, agents: usize, n: usize, threads: usize, isa: Isa) -> Vec<Vec<u32>> {
     let mut env = make(id, n, threads, Some(isa), Autoreset::SameStep);
     let (obs, terms, infos) = (env.spec().obs, env.spec().reward_terms.len(), env.spec().info.len());
@@ -71,37 +72,37 @@ fn marathon_man() {
     check("MarathonManWalkLeft-v0");
 }
 
-/// His commands and the direction that he remembers are his own.
+/// Every agent has its own commands and commanded direction.
 #[test]
 fn marathon_man_steered() {
     check("MarathonManSteer-v0");
 }
 
-/// What he does when is his own, and where his clip is.
+/// Every agent has its own skill and clip.
 #[test]
 fn marathon_man_in_a_players_hands() {
     check("MarathonManController-v0");
 }
 
-/// Its commands and the velocities that it remembers are its own.
+/// Every agent has its own commands and velocities in its memory.
 #[test]
 fn walker_controller() {
     check("WalkerController-v0");
 }
 
-/// The direction that it remembers is its own.
+/// Every agent has its own commanded direction.
 #[test]
 fn ant_controller() {
     check("AntController-v0");
 }
 
-/// Each has a course of its own.
+/// Every agent has its own course.
 #[test]
 fn ant_on_courses() {
     check("TerrainAnt-v0");
 }
 
-/// His gait and the course have variables in one memory.
+/// The gait and the course share a memory.
 #[test]
 fn marathon_man_on_courses() {
     check("TerrainMarathonMan-v0");
@@ -113,7 +114,7 @@ fn hopper_on_courses() {
     check("TerrainHopper-v0");
 }
 
-/// Gymnasium's tasks see forces and inertias, and some look at the physics as its last step left it.
+/// Gymnasium's tasks observe forces and inertias, and some read the physics as of its last step.
 #[test]
 fn gymnasiums_ant() {
     check("Ant-v5");
@@ -129,7 +130,7 @@ fn gymnasiums_double_pendulum() {
     check("InvertedDoublePendulum-v5");
 }
 
-/// dm_control's tasks: touch sensors; starts that are drawn again and again; starts that settle.
+/// dm_control's tasks: touch sensors, starts that are drawn repeatedly, and starts that settle.
 #[test]
 fn dm_controls_hopper() {
     check("hopper-stand-v0");
@@ -145,7 +146,8 @@ fn dm_controls_cheetah() {
     check("cheetah-run-v0");
 }
 
-/// Where the agents' episodes begin, `[episode][agent]`, if the agents begin theirs one by one in an order of `turns`.
+/// Start states of the agents' episodes, `[episode][agent]`. The agents begin them one by one, in an order given by
+/// `turns`.
 fn starts(env: &mut VecEnv, episodes: usize, turns: impl Fn(usize, usize) -> usize) -> Vec<Vec<AgentState>> {
     let n = env.agents();
     let mut obs = vec![0.0; n * env.spec().obs];
@@ -163,7 +165,7 @@ fn starts(env: &mut VecEnv, episodes: usize, turns: impl Fn(usize, usize) -> usi
     starts
 }
 
-/// A start that takes physics is made beside those of other agents, which must not show.
+/// A start that needs physics is prepared beside those of other agents. This must not affect it.
 #[test]
 fn starts_do_not_depend_on_when_they_are_made() {
     for id in ["humanoid-stand-v0", "cheetah-run-v0"] {
@@ -177,7 +179,7 @@ fn starts_do_not_depend_on_when_they_are_made() {
     }
 }
 
-/// Agents differ from each other: otherwise the tests above would pass for the wrong reason.
+/// Agents differ from each other. Otherwise the tests above would pass for the wrong reason.
 #[test]
 fn no_two_agents_live_the_same_life() {
     let lives = lives("Hopper-v0", 40, 40, 1, Isa::best());

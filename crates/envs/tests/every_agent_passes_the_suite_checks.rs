@@ -1,4 +1,4 @@
-//! What every registered agent must do, whoever wrote it: dm_control's suite checks and Marathon's own.
+//! Requirements for every registered agent: dm_control's suite checks and Marathon's own.
 
 mod common;
 
@@ -37,7 +37,7 @@ fn touch_sensors_are_those_of_the_model() {
     }
 }
 
-/// Wild actions end episodes of these agents hardly ever, or never; one has eight seconds to get up after a fall.
+/// Agents whose episodes random actions rarely or never end. One of them has eight seconds to get up after a fall.
 const STEADY: [&str; 8] = [
     "Ant-v0",
     "Ant-v1",
@@ -49,7 +49,7 @@ const STEADY: [&str; 8] = [
     "Swimmer-v5",
 ];
 
-/// One of dm_control's tasks, in which nothing fails.
+/// Whether it is a task of dm_control, in which episodes are never terminated.
 fn is_dm_controls(id: &str) -> bool {
     id.starts_with(char::is_lowercase)
 }
@@ -84,7 +84,7 @@ fn every_step_is_sound() {
     }
 }
 
-/// The `-v1` rewards lie between 0 and 1 while the agent is on its feet.
+/// The `-v1` rewards are between 0 and 1 while the agent is on its feet.
 #[test]
 fn rewards_of_v1_are_between_0_and_1() {
     for id in marathon_envs::ids().iter().filter(|id| id.ends_with("-v1")) {
@@ -97,8 +97,8 @@ fn rewards_of_v1_are_between_0_and_1() {
     }
 }
 
-/// Every number of the observation moves, except those that a planar agent cannot move: the sideways components of
-/// velocity and axes, and two of the four components of every quaternion; masses; forces that nothing exerts.
+/// Every number of the observation varies, except those that cannot: the sideways components of velocity and axes of a
+/// planar agent, two of the four components of its quaternions, masses, and forces without a cause.
 #[test]
 fn no_observation_is_constant() {
     for id in marathon_envs::ids() {
@@ -114,7 +114,7 @@ fn no_observation_is_constant() {
                 }
             }
         });
-        // a body that nothing touched feels no force
+        // bodies without contacts have no contact force
         let forces = env.spec().options.get("include_cfrc_ext_in_observation").map_or(obs, |_| obs - 13 * 6);
         let constant: Vec<usize> = (0..obs).filter(|i| least[*i] == most[*i]).collect();
         assert!(constant.iter().filter(|i| **i >= forces).all(|i| least[*i] == 0.0), "{id}: constant forces");
@@ -128,22 +128,22 @@ fn no_observation_is_constant() {
             "Walker2d-v0" | "Walker2d-v1" | "WalkerController-v0" | "TerrainWalker2d-v0" => {
                 [1, 4, 7].into_iter().chain(quaternions(11, 6)).collect()
             }
-            // hips turn about z; ankles about an axis in the horizontal plane
+            // hips rotate about z, ankles about a horizontal axis
             "Ant-v0" | "Ant-v1" | "TerrainAnt-v0" => {
                 (0..4).flat_map(|leg| [13 + 8 * leg, 14 + 8 * leg, 19 + 8 * leg]).collect()
             }
             "AntController-v0" => vec![],
-            // nobody tells him to turn
+            // no turn is commanded
             "TerrainMarathonMan-v0" => vec![1],
-            // the masses of 13 bodies, the last of ten numbers of each
+            // the masses of 13 bodies, the last of ten numbers each
             "Humanoid-v5" | "HumanoidStandup-v5" => (0..13).map(|body| 22 + 23 + 10 * body + 9).collect(),
-            // the poles fall before the cart comes to the rail's end
+            // the poles fall before the cart reaches the end of the rail
             "InvertedDoublePendulum-v5" => vec![8],
-            // sideways: axes, velocity; all of the angular velocity but pitch; the place in the clip
+            // sideways: axes, velocity; all of the angular velocity but pitch; the position in the clip
             id if id.starts_with("Walker2dStyle") => vec![6, 9, 12, 14, 16, 32],
             id if id.contains("MarathonMan") || id.starts_with("HumanoidStyle") => vec![],
             id if id.ends_with("-v5") || is_dm_controls(id) => vec![],
-            // knees, pairs 3 and 6, turn about y; elbows, pairs 9 and 11, about an axis without x
+            // knees, pairs 3 and 6, rotate about y; elbows, pairs 9 and 11, about an axis without x
             _ => vec![31, 33, 43, 45, 55, 63],
         };
         assert_eq!(constant, planar, "{id}: constant observations");
@@ -152,7 +152,8 @@ fn no_observation_is_constant() {
     }
 }
 
-/// The same seed gives the same episode, another seed another; episodes of one agent differ, as do agents.
+/// The same seed gives the same episode and another seed a different one. Episodes of one agent differ, and so do
+/// agents.
 #[test]
 fn resets_are_random_and_reproducible() {
     for id in marathon_envs::ids() {
@@ -206,7 +207,7 @@ fn resets_stay_near_the_spawn_pose() {
             let velocities = state.qvel.iter().zip(&spawn.qvel);
             assert!(velocities.into_iter().all(|(v, at_spawn)| (v - at_spawn).abs() <= most + 1e-6), "{id}");
         }
-        // nothing touches the ground before the first step, and no touch is felt
+        // before the first step there are no contacts
         let feet = agent.facts().touch.len();
         let first = if id.starts_with("Humanoid") || id == "AntController-v0" { 15 } else { 9 };
         let obs = env.spec().obs;
@@ -214,7 +215,7 @@ fn resets_stay_near_the_spawn_pose() {
     }
 }
 
-/// An episode that nothing ends lasts exactly 1000 decisions and is truncated, not terminated.
+/// An episode without termination lasts exactly 1000 decisions and is truncated.
 #[test]
 fn the_time_limit_truncates() {
     // an idle ant stands

@@ -1,6 +1,6 @@
-//! With `relive`, a share of the episodes of figures that obey starts in a state from 0.75 to 1.5 s before the figure's last fall:
-//! pose, velocities and gait. A figure that falls at once keeps the state of the fall before. Without it, or before any fall,
-//! an episode starts as ever.
+//! With `relive`, a fraction of the episodes of commanded figures starts 0.75 to 1.5 s before the figure's last fall,
+//! with its pose, velocities and gait. A figure that falls right after its start keeps the state from before the
+//! earlier fall. Without `relive`, or before any fall, episodes start as usual.
 
 mod common;
 
@@ -9,37 +9,37 @@ use marathon_envs::{AgentState, Step, VecEnv};
 use std::ops::RangeInclusive;
 
 const AGENTS: usize = 16;
-/// How far noise takes an angle, rad.
+/// Largest noise of an angle at the start, rad.
 const NOISE: f64 = 0.0101;
 
 /// A figure that falls.
 #[derive(Clone, Copy)]
 struct Figure {
     id: &'static str,
-    /// A force that carries it, and pushes those ahead who only stand, N.
+    /// Force that supports its weight, and pushes figures forward that would only stand, N.
     carried: [f64; 3],
-    /// Decisions from one state that is kept to the next.
+    /// Decisions between two stored states.
     apart: usize,
-    /// How many numbers of the configuration are places along the ground.
+    /// How many numbers of `qpos` are positions along the ground.
     places: usize,
-    /// How many of the configuration, noiseless, and of the velocity are the root's.
+    /// How many numbers of `qpos` (without noise) and of `qvel` are the root's.
     root: [usize; 2],
-    /// Decisions after which it is no longer where any episode starts: those in a plane all start alike.
+    /// Decisions after which its state differs from any episode's start. Figures in a plane all start alike.
     alike: usize,
 }
 
 impl Figure {
-    /// Decisions from a state that is kept to a fall.
+    /// Decisions from the stored state to a fall.
     fn before(self) -> RangeInclusive<usize> {
         self.apart..=2 * self.apart
     }
 
-    /// For how long it is carried to fall after two states have been kept.
+    /// Decisions of support, long enough to store two states before the fall.
     fn long(self) -> usize {
         2 * self.apart + 10
     }
 
-    /// Whether an episode that starts in a state may have been meant to start in another one.
+    /// Whether `start` matches `state` up to the noise of a start.
     fn is_from(self, start: &AgentState, state: &AgentState) -> bool {
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() < by);
         let Figure { places, root: [qpos, qvel], .. } = self;
@@ -70,8 +70,8 @@ const WALKER: Figure = Figure {
 };
 const HOPPER: Figure = Figure { id: "HopperController-v0", carried: [10.0, 0.0, 12.4 * 9.81], apart: 38, ..WALKER };
 
-/// An episode of each: a force carries his weight, and lets him go after some decisions. Returns where each of those was that fell,
-/// decision by decision, and starts their next episodes.
+/// Runs an episode of each figure. A force supports its weight and stops after some decisions. Returns the states of
+/// those that fell, decision by decision, and starts their next episodes.
 fn fall(figure: Figure, env: &mut VecEnv, step: &mut Step, after: usize) -> Vec<Option<Vec<AgentState>>> {
     let (stand, actions) = (vec![0.0; env.spec().command.len()], vec![0.0; AGENTS * env.spec().act]);
     if !stand.is_empty() {
@@ -110,7 +110,7 @@ fn starts_before_the_fall(figure: Figure, list: &[(&str, &str)]) {
         }
     }
     assert!(relived.len() > AGENTS / 2, "{id}: {} fell", relived.len());
-    // a fall at once has no state of its own before it
+    // after a fall right at the start, the earlier state stays
     let ways = fall(figure, &mut env, &mut step, 5);
     for (agent, before) in relived {
         let Some(way) = &ways[agent] else { continue };
@@ -124,17 +124,17 @@ fn starts_before_the_fall(figure: Figure, list: &[(&str, &str)]) {
 }
 
 #[test]
-fn the_steered_figure_starts_before_his_fall() {
+fn the_steered_figure_starts_before_its_fall() {
     starts_before_the_fall(MARATHON_MAN, &[("relive", "1")]);
 }
 
 #[test]
-fn so_does_the_figure_in_a_players_hands() {
+fn a_figure_under_player_control_starts_before_its_fall() {
     starts_before_the_fall(PLAYED, &[("relive", "1"), ("mortal", "1"), ("clip", "walk,stand")]);
 }
 
 #[test]
-fn so_do_the_figures_in_a_plane() {
+fn figures_in_a_plane_start_before_their_fall() {
     for figure in [WALKER, HOPPER] {
         starts_before_the_fall(figure, &[("relive", "1")]);
         starts_before_the_fall(figure, &[("relive", "1"), ("commander", "adversary")]);
@@ -142,7 +142,7 @@ fn so_do_the_figures_in_a_plane() {
 }
 
 #[test]
-fn without_it_nobody_does() {
+fn without_the_option_no_figure_does() {
     for figure in [MARATHON_MAN, WALKER] {
         let (mut env, mut step) = begun(figure.id, AGENTS, 5, &[]);
         let ways = fall(figure, &mut env, &mut step, figure.long());

@@ -1,9 +1,9 @@
-//! What an agent observes, earns and fails by is what the environment's page says, computed by other people's software.
+//! Observations, rewards and terminations agree with the documented formulas, computed by independent software.
 //!
-//! Every agent of the suite's own plays the same actions from the same starts in this engine (double precision) and in
-//! MuJoCo, where `tests/oracle/agents.py` computes observations, reward terms and terminations in plain Python. Agents that take
-//! commands, and those on courses, have tests of their own: `a_figure_in_a_plane_is_told_how_fast_to_go` and
-//! `a_figure_runs_over_ground_of_its_own`.
+//! Each of the suite's own agents executes the same actions from the same starts in this engine (double precision) and
+//! in MuJoCo. For MuJoCo, `tests/oracle/agents.py` computes observations, reward terms and terminations in plain
+//! Python. Agents with commands, and agents on courses, have their own tests:
+//! `a_figure_in_a_plane_is_told_how_fast_to_go` and `a_figure_runs_over_ground_of_its_own`.
 
 mod common;
 
@@ -14,11 +14,11 @@ use serde_json::json;
 
 /// Starts per agent.
 const EPISODES: usize = 6;
-/// Decisions per start: long enough to fall or step, short enough that chaos has not grown beyond the tolerance.
+/// Decisions per start: long enough to fall or step, short enough that chaos stays below the tolerance.
 const DECISIONS: usize = 25;
 /// Observations are stored in single precision.
 const TOLERANCE: f64 = 2e-5;
-/// Gentle, middling and wild action; the last is clipped and pays for joints at their limit.
+/// Small, medium and large actions. The last one is clipped and has joints at their limit.
 const SCALES: [f32; 3] = [0.1, 0.6, 1.3];
 
 #[test]
@@ -89,7 +89,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             }
         }
     }
-    // the comparison means something only if these happened
+    // the comparison is meaningful only if these cases occurred
     assert!(
         touches > 100 && failures > 5 && at_limit > 20,
         "{touches} touches, {failures} failures, {at_limit} at limit"

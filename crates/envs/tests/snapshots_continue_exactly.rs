@@ -1,4 +1,5 @@
-//! Saved, restored and continued equals never having stopped, for any number of threads and any width.
+//! An environment that is saved, restored and continued equals one that never stopped, for any number of threads and
+//! any width.
 
 mod common;
 
@@ -24,7 +25,7 @@ fn a_restored_environment_continues_with_the_same_bits() {
         let mut uninterrupted = Vec::new();
         go_on(&mut env, &mut out, BEFORE, AFTER, 0.8, |_, step| uninterrupted.push(step.clone()));
 
-        // in the same environment, and in new ones that have other seeds, threads and widths
+        // in the same environment, and in new ones with other seeds, threads and widths
         let mut others = vec![env, make(&id, 20, 2, None, Autoreset::SameStep)];
         if id.ends_with("-v0") || id == "Humanoid-v5" {
             others.extend(
@@ -42,7 +43,7 @@ fn a_restored_environment_continues_with_the_same_bits() {
     }
 }
 
-/// A block's bytes hold the agents themselves, so they may be loaded into another block of another shard.
+/// A block's bytes hold the complete agents, so another block of another shard can load them.
 #[test]
 fn a_block_can_move() {
     let factory = factory("ant", Isa::best()).unwrap();
@@ -83,10 +84,10 @@ fn a_wrong_snapshot_is_refused_and_changes_nothing() {
     for (bytes, complaint) in [
         (&good[..good.len() - 1], "it is damaged or cut short: its checksum is"),
         (&longer, "it is damaged or cut short: its checksum is"),
-        (&[], "it has 0 bytes, expected one of an environment"),
-        (b"something else altogether", "it does not begin like one of an environment"),
-        (&older, "its format is 'MRTHNv02', expected 'MRTHNv03': another version of Marathon has saved it"),
-        (&newer, "its format is 'MRTHNv99', expected 'MRTHNv03': another version of Marathon has saved it"),
+        (&[], "it has 0 bytes, expected a snapshot of an environment"),
+        (b"something else altogether", "it does not begin with the mark of an environment"),
+        (&older, "its format is 'MRTHNv02', expected 'MRTHNv03': it was saved by another version of Marathon"),
+        (&newer, "its format is 'MRTHNv99', expected 'MRTHNv03': it was saved by another version of Marathon"),
         (&other_agent, "it is of 3 agents of 'Walker2d-v0', expected 3 of 'Hopper-v0'"),
         (&other_number, "it is of 4 agents of 'Hopper-v0', expected 3 of 'Hopper-v0'"),
     ] {
@@ -110,7 +111,7 @@ fn a_damaged_byte_is_found_wherever_it_is() {
     assert!(env.save() == good, "nothing has changed");
 }
 
-/// A snapshot whose checksum fits but whose blocks do not is refused, and the environment stays as it is.
+/// A snapshot with a valid checksum but invalid blocks is rejected, and the environment does not change.
 #[test]
 fn blocks_that_do_not_fit_are_refused_and_change_nothing() {
     let mut env = make("hopper", 20, 1, None, Autoreset::SameStep);
@@ -127,14 +128,14 @@ fn blocks_that_do_not_fit_are_refused_and_change_nothing() {
     unmarked.drain(marks[1]..marks[1] + 8);
     for (body, complaint) in [
         (&body[..body.len() - 1], "it ends too early"),
-        (&[body, &[0]].concat(), "it goes on for 1 bytes after its end"),
+        (&[body, &[0]].concat(), "it has 1 bytes after its end"),
         (
             &older,
-            "the format of its agents is 'MRTHNb03', expected 'MRTHNb04': another version of Marathon has saved it",
+            "the format of its agents is 'MRTHNb03', expected 'MRTHNb04': it was saved by another version of Marathon",
         ),
-        (&unmarked, "it does not begin like a block of agents"),
+        (&unmarked, "it does not begin with the mark of a block of agents"),
     ] {
-        // another state than the saved one
+        // a state other than the saved one
         play(&mut env, 3, 0.5, |_, _| {});
         let before = env.save();
         let error = env.load(&sealed(body)).unwrap_err().to_string();
@@ -143,8 +144,8 @@ fn blocks_that_do_not_fit_are_refused_and_change_nothing() {
     }
 }
 
-/// A creature whose future hangs on everything that an agent can have: muscles that react late, ground of its own, and
-/// starts that take physics.
+/// A creature that uses everything a snapshot must include: muscles with a delay, its own ground, and starts that need
+/// physics.
 const MODEL: &str = r#"
 <mujoco model="beetle">
   <option timestep="0.005"/>
@@ -231,7 +232,7 @@ fn beetle(agents: usize, seed: u64, threads: usize, isa: Option<Isa>) -> VecEnv 
     VecEnv::from_registry(&beetles(), "Beetle-v0", &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Gives some agents things of their own.
+/// Sets commands, pushes, variations and ground of some agents.
 fn make_different(env: &mut VecEnv) {
     let mut own = env.unvaried().clone();
     own.mass.fill(1.7);
@@ -250,7 +251,7 @@ fn make_different(env: &mut VecEnv) {
     }
 }
 
-/// Plays on from a decision and returns everything that was seen.
+/// Executes more decisions and returns all results.
 fn story(env: &mut VecEnv, from: usize) -> Vec<Step> {
     let mut out = env.buffers();
     let mut seen = Vec::new();
@@ -270,7 +271,7 @@ fn what_an_agent_has_of_its_own_is_in_the_snapshot() {
     let snapshot = env.save();
     let uninterrupted = story(&mut env, BEFORE);
 
-    // the things matter: without any of them the agent goes another way
+    // each of these inputs matters: without any one of them the agent moves differently
     let mut plain = beetle(N, 11, 1, None);
     plain.reset(Some(5), &mut out.obs).expect("the array fits");
     go_on(&mut plain, &mut out, 0, BEFORE, 1.0, |_, _| {});
@@ -281,7 +282,7 @@ fn what_an_agent_has_of_its_own_is_in_the_snapshot() {
         assert_eq!(last(&plain, agent) == last(&uninterrupted, agent), !own, "agent {agent}");
     }
 
-    // into environments in other states, with other things of their own, of other seeds, threads and widths
+    // into environments with other states, inputs, seeds, threads and widths
     let mut others = vec![env, beetle(N, 2, 3, None)];
     others.extend(isas().filter(|isa| *isa != Isa::F64).map(|isa| beetle(N, 1, 2, Some(isa))));
     for mut other in others {
@@ -299,7 +300,7 @@ fn what_an_agent_has_of_its_own_is_in_the_snapshot() {
     }
 }
 
-/// Sixteen agents with things of their own, in another slot of another shard.
+/// Sixteen agents with their own inputs move to another slot of another shard.
 #[test]
 fn a_block_moves_with_what_its_agents_have_of_their_own() {
     let shards = beetles().shards("Beetle-v0", Isa::best()).unwrap_or_else(|e| panic!("{e}"));

@@ -1,5 +1,5 @@
-//! The Ant told where to go: it observes its command and itself from its heading, the commanded direction turns as told and waits,
-//! its reward is the formula on the page, and it fails on its back.
+//! The commanded Ant. It observes its command and its body relative to its heading. The commanded direction turns as
+//! commanded and waits. The reward is the documented formula, and lying on its back is a failure.
 
 mod common;
 
@@ -14,7 +14,7 @@ use marathon_physics::model::Geom;
 const ID: &str = "AntController-v0";
 const AGENTS: usize = 24;
 
-/// Rows of the torso's rotation: its forward axis is the first column.
+/// Rows of the torso's rotation matrix. Its forward axis is the first column.
 fn rotation(state: &AgentState) -> [[f64; 3]; 3] {
     let [w, x, y, z] = state.qpos[3..7] else { panic!("a free joint") };
     [
@@ -33,7 +33,7 @@ fn wrapped(angle: f64) -> f64 {
     angle.sin().atan2(angle.cos())
 }
 
-/// Along the ground, in axes that are turned by an angle.
+/// A ground vector in axes rotated by an angle.
 fn seen_from(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let (sin, cos) = angle.sin_cos();
     [cos * x + sin * y, cos * y - sin * x]
@@ -52,7 +52,7 @@ fn observation_reward_and_direction_are_those_of_the_page() {
     assert_eq!((n, act), (35, 8));
     let told = |agent: usize| {
         let x = agent as f64 / AGENTS as f64;
-        // a third stands, a third goes and does not turn, a third turns as sharply as it may
+        // a third stands, a third moves without turning, a third turns at the highest rate
         [[0.0; 3], [3.0 * x, -2.0 * x, 0.0], [-3.0 * x, 2.0 * x, std::f64::consts::FRAC_PI_2]][agent % 3]
     };
     for agent in 0..AGENTS {

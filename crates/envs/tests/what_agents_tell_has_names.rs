@@ -1,4 +1,4 @@
-//! Every number of an observation belongs to a part with a name, and the metrics of a task are found by theirs.
+//! Every number of an observation belongs to a named group, and the metrics of a task are found by name.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use marathon_envs::{
 };
 use marathon_physics::lanes::{Isa, Real};
 
-/// Names and lengths of the parts.
+/// Names and lengths of the groups.
 fn parts(spec: &Spec) -> Vec<(&str, usize)> {
     spec.observations.iter().map(|group| (group.name.as_str(), group.range.len())).collect()
 }
@@ -58,7 +58,7 @@ fn parts_are_called_as_everybody_calls_them() {
     assert_eq!(parts(&spec("humanoid-run-v0")), humanoid);
 }
 
-/// A ball with a motor that says what it is told to.
+/// A ball with a motor that reports the groups and metrics of its fields.
 #[derive(Clone)]
 struct Talker {
     groups: [Option<&'static str>; 3],
@@ -171,7 +171,7 @@ fn a_metric_is_found_by_its_name() {
         }
         before.copy_from_slice(place);
     }
-    // what cannot move along x does not tell how far it did
+    // a task that cannot move along x has no distance metric
     assert!(spec_metrics("InvertedPendulum-v5").is_empty());
     assert_eq!(spec_metrics("Hopper-v0"), ["forward"]);
     assert_eq!(spec_metrics("cheetah-run-v0"), ["forward", "speed"]);

@@ -1,6 +1,6 @@
-//! Who decides next is told: in a task with several roles, `VecEnv::decides` says for each agent which of them has to act. The
-//! builder of an assault course decides at the start of an episode and whenever the runner has made a new meter, which the test
-//! computes from the distances, whatever the number of threads and however episodes begin anew.
+//! In a task with several roles, `VecEnv::decides` returns for each agent which roles act next. The builder of an
+//! assault course acts at the start of an episode and whenever the runner has made a new meter. The test computes this
+//! from the distances, for different numbers of threads and autoreset modes.
 
 use marathon_envs::{Autoreset, EnvError, Options, VecEnv, VecEnvOptions};
 
@@ -8,7 +8,7 @@ const AGENTS: usize = 21;
 const STEPS: usize = 260;
 const RUNNER: usize = 0;
 const BUILDER: usize = 1;
-/// Body of the torso, and a push that carries walkers along.
+/// Body of the torso.
 const TORSO: usize = 1;
 const PUSH: [f64; 3] = [350.0, 0.0, 100.0];
 
@@ -32,12 +32,13 @@ fn decides(env: &VecEnv, role: usize) -> Vec<bool> {
     out
 }
 
-/// The farthest x of each runner, m: the first number that it reports.
+/// The farthest x of each runner, m: the first number of `info`.
 fn farthest(info: &[f32]) -> Vec<f32> {
     info.chunks_exact(2).map(|row| row[0]).collect()
 }
 
-/// Where runners are now: after a step, `info` is about the states reached, not about the episodes that have begun since.
+/// Present positions of the runners. After a step, `info` belongs to the states at its end, not to episodes that have
+/// begun since.
 fn at_start(env: &VecEnv) -> Vec<f32> {
     let mut info = vec![0.0; 2 * AGENTS];
     env.info(&mut info).unwrap();
@@ -54,7 +55,7 @@ fn the_builder_decides_at_starts_and_new_meters() {
         let (mut from, mut meters, mut over) = (at_start(&env), [0.0; AGENTS], vec![false; AGENTS]);
         let (mut at_meters, mut nothing, mut starts) = (0, 0, 0);
         for step in 0..STEPS {
-            // some stand still
+            // some agents stand still
             for agent in (0..AGENTS).filter(|agent| agent % 3 != 0) {
                 env.push(agent, TORSO, PUSH, [0.0; 3]).unwrap();
             }
@@ -67,7 +68,7 @@ fn the_builder_decides_at_starts_and_new_meters() {
             assert_eq!(decides(&env, RUNNER), [true; AGENTS]);
             for agent in 0..AGENTS {
                 let begun = match autoreset {
-                    // the step in which it begins has no action
+                    // the step in which it begins ignores its action
                     Autoreset::NextStep => over[agent],
                     _ => ended[agent],
                 };
@@ -91,7 +92,7 @@ fn the_builder_decides_at_starts_and_new_meters() {
 }
 
 #[test]
-fn everybody_decides_where_an_episode_begins_or_nobody_knows() {
+fn all_roles_act_at_starts_and_after_a_load() {
     let mut env = walkers(Autoreset::SameStep);
     let mut out = env.buffers();
     env.reset(Some(3), &mut out.obs).unwrap();
@@ -112,7 +113,7 @@ fn everybody_decides_where_an_episode_begins_or_nobody_knows() {
     step(&mut env, &mut out);
     env.reset_agents(&only, &mut out.obs).unwrap();
     assert_eq!(decides(&env, BUILDER), only);
-    // what is refused changes nothing
+    // a rejected snapshot changes nothing
     env.load(&saved[..saved.len() - 1]).unwrap_err();
     assert_eq!(decides(&env, BUILDER), only);
     env.load(&saved).unwrap();
@@ -121,7 +122,7 @@ fn everybody_decides_where_an_episode_begins_or_nobody_knows() {
 }
 
 #[test]
-fn where_one_has_it_all_it_decides_always_and_what_is_not_there_is_refused() {
+fn a_single_role_always_acts_and_unknown_roles_are_refused() {
     let mut env = VecEnv::new("Hopper-v0", &VecEnvOptions { agents: 3, ..Default::default() }).unwrap();
     let mut out = env.buffers();
     env.reset(Some(1), &mut out.obs).unwrap();

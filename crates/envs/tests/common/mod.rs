@@ -1,4 +1,4 @@
-//! Shared by the contract tests.
+//! Shared by the tests of this crate.
 #![allow(dead_code)]
 
 #[path = "../../../physics/tests/common/numbers.rs"]
@@ -19,12 +19,12 @@ fn workspace() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The Python that has the oracles.
+/// The Python that has the packages of the oracles.
 fn python() -> PathBuf {
     std::env::var_os("MARATHON_PYTHON").map_or_else(|| workspace().join(".venv/bin/python"), PathBuf::from)
 }
 
-/// Asks a Python script in `tests/oracle`: JSON in, JSON out.
+/// Runs a Python script of `tests/oracle`: JSON in, JSON out.
 pub fn oracle(script: &str, request: &Value) -> Value {
     let (root, python) = (workspace(), python());
     let spawned = Command::new(&python)
@@ -52,7 +52,7 @@ pub fn package(name: &str) -> PathBuf {
     PathBuf::from(String::from_utf8(output.stdout).expect("a path").trim())
 }
 
-/// The suite's own agents, whose rewards end with a price of failure.
+/// The suite's own agents, whose rewards end with a termination term.
 pub fn own_agents() -> Vec<String> {
     let own = |id: &String| marathon_envs::agent(id).is_ok_and(|agent| agent.facts().termination_reward.is_some());
     marathon_envs::ids().into_iter().filter(own).collect()
@@ -78,13 +78,13 @@ impl Noise {
     }
 
     pub fn next(&mut self) -> f32 {
-        // the generator of Knuth's MMIX; its upper bits are good enough for test inputs
+        // the generator of Knuth's MMIX; its upper bits suffice for test inputs
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 }
 
-/// Action of one agent at one decision: a function of these numbers alone, the same in any batch.
+/// Action of an agent at a decision. It depends on these numbers only, so it is the same in any batch.
 pub fn action(agent: usize, decision: usize, scale: f32, row: &mut [f32]) {
     let mut noise = Noise::new((agent as u64) << 32 | decision as u64);
     noise.next();
@@ -93,13 +93,14 @@ pub fn action(agent: usize, decision: usize, scale: f32, row: &mut [f32]) {
     }
 }
 
-/// An environment of its own options.
+/// An environment with default arguments.
 pub fn make(id: &str, agents: usize, threads: usize, isa: Option<Isa>, autoreset: Autoreset) -> VecEnv {
     let options = VecEnvOptions { agents, seed: 11, threads, isa, autoreset, ..Default::default() };
     VecEnv::new(id, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// An environment of so many agents at the start, in double precision and with these arguments, whose episodes begin when told to.
+/// An environment of `agents` agents at the start, in double precision and with these arguments. The caller resets
+/// ended episodes.
 pub fn begun(id: &str, agents: usize, seed: u64, list: &[(&str, &str)]) -> (VecEnv, Step) {
     let options = VecEnvOptions {
         agents,
@@ -114,7 +115,7 @@ pub fn begun(id: &str, agents: usize, seed: u64, list: &[(&str, &str)]) -> (VecE
     (env, step)
 }
 
-/// Resets and plays `decisions` decisions with [`action`]; calls `each` after every one.
+/// Resets and executes `decisions` decisions with [`action`]. Calls `each` after every one.
 pub fn play(env: &mut VecEnv, decisions: usize, scale: f32, mut each: impl FnMut(usize, &Step)) -> Step {
     let mut out = env.buffers();
     env.reset(Some(5), &mut out.obs).expect("the arrays fit");
@@ -122,7 +123,7 @@ pub fn play(env: &mut VecEnv, decisions: usize, scale: f32, mut each: impl FnMut
     out
 }
 
-/// Plays decisions `from .. to`.
+/// Executes decisions `from .. to`.
 pub fn go_on(env: &mut VecEnv, out: &mut Step, from: usize, to: usize, scale: f32, mut each: impl FnMut(usize, &Step)) {
     let act = env.spec().act;
     let mut actions = vec![0.0; env.agents() * act];
@@ -135,7 +136,7 @@ pub fn go_on(env: &mut VecEnv, out: &mut Step, from: usize, to: usize, scale: f3
     }
 }
 
-/// Where the center of a geom is, m.
+/// Center of a geom, m.
 pub fn center(model: &Model, state: &AgentState, geom: &str) -> [f64; 3] {
     let pose = Pose::of(model, &state.qpos);
     let geom = model.geoms.iter().find(|g| g.name == geom).unwrap();
