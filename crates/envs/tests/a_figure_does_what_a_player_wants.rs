@@ -173,8 +173,8 @@ fn a_button_begins_a_skill_that_ends_by_itself() {
             }
         }
         let whole = lengths.iter().filter(|(n, skill)| *n == length && *skill == 0.0).count();
-        // without a policy, some characters do not land, but no skill takes longer than its clip a character that
-        // topples before it is slow enough for a backflip starts none
+        // without a policy, some characters do not land, but no skill takes longer than its clip;
+        // a character that topples before it is slow enough for a backflip starts none
         let toppled = toppled.iter().filter(|toppled| **toppled).count();
         assert!(lengths.iter().all(|(n, _)| *n <= length) && lengths.len() + toppled == AGENTS, "{lengths:?}");
         assert!(toppled <= usize::from(button == 4), "{toppled}");

@@ -191,7 +191,7 @@ fn the_schedule_draws_a_command_and_holds_it() {
         assert!(runs.len() > 3 && runs[..runs.len() - 1].iter().all(|n| (3..=9).contains(n)), "{runs:?}");
         firsts.push(commands[0][0]);
     }
-    assert!((1..N).all(|i| !firsts[..i].contains(&firsts[i])), "each agent has chances of its own: {firsts:?}");
+    assert!((1..N).all(|i| !firsts[..i].contains(&firsts[i])), "each agent draws its own commands: {firsts:?}");
 }
 
 #[test]

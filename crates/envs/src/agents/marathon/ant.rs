@@ -11,8 +11,8 @@
 //!
 //! `Ant-v0`: r = v/4 - 0.5 effort - 4 (joints at limit).
 //! `Ant-v1`: r = V + (1 - mean effort) min(V, 0.3), V = 0.7 v / 8 m/s.
-//! An episode is terminated when the Ant faces more than 54 degrees away from +x or lies on its back. Any part may touch
-//! the ground.
+//! An episode is terminated when the Ant faces more than 54 degrees away from +x or lies on its back. Any part may
+//! touch the ground.
 
 use marathon_physics::lanes::Real;
 
@@ -58,7 +58,7 @@ impl Agent for AntV0 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Ant-v0".into(),
-            summary: "four legs: run forward, cheaply".into(),
+            summary: "four legs: run forward, with little effort".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
@@ -112,7 +112,7 @@ impl Agent for AntV1 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Ant-v1".into(),
-            summary: "four legs, sees its height, reward between 0 and 1".into(),
+            summary: "four legs, observes its height, reward between 0 and 1".into(),
             observation: Some(54),
             reward_terms: names(["velocity", "effort"]),
             ..AntV0.facts()

@@ -54,7 +54,7 @@ impl Agent for HopperV0 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Hopper-v0".into(),
-            summary: "one leg in a plane: run forward upright, cheaply".into(),
+            summary: "one leg in a plane: run forward upright, with little effort".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,

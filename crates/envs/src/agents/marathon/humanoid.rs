@@ -111,7 +111,7 @@ impl Agent for HumanoidV0 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Humanoid-v0".into(),
-            summary: "a figure of 21 motors: walk forward upright, in long steps, cheaply".into(),
+            summary: "a figure of 21 motors: walk forward upright, in long steps, with little effort".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
@@ -190,7 +190,7 @@ impl Agent for HumanoidV1 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Humanoid-v1".into(),
-            summary: "a figure of 21 motors, sees its feet, reward between 0 and 1".into(),
+            summary: "a figure of 21 motors, observes its feet, reward between 0 and 1".into(),
             observation: Some(92),
             reward_terms: names(["velocity", "uprightness", "facing", "phase", "height", "limbs", "effort"]),
             ..HumanoidV0.facts()

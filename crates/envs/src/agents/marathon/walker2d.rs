@@ -56,7 +56,7 @@ impl Agent for Walker2dV0 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Walker2d-v0".into(),
-            summary: "two legs in a plane: run forward upright and tall, cheaply".into(),
+            summary: "two legs in a plane: run forward upright and tall, with little effort".into(),
             model: MODEL.into(),
             frame_skip: FRAME_SKIP,
             max_episode_steps: MAX_EPISODE_STEPS,
@@ -108,7 +108,7 @@ impl Agent for Walker2dV1 {
     fn facts(&self) -> Facts {
         Facts {
             id: "Walker2d-v1".into(),
-            summary: "two legs in a plane, sees its feet, reward between 0 and 1".into(),
+            summary: "two legs in a plane, observes its feet, reward between 0 and 1".into(),
             observation: Some(43),
             ..Walker2dV0.facts()
         }

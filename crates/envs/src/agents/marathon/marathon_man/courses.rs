@@ -19,7 +19,7 @@ pub type TerrainMarathonMan = Terrain<Steer>;
 impl Runner for Steer {
     const ID: &'static str = "TerrainMarathonMan-v0";
     const SUMMARY: &'static str =
-        "a figure of 21 motors: run as commanded over slopes, steps, gaps and boxes that it sees ahead";
+        "a figure of 21 motors: run as commanded over slopes, steps, gaps and boxes that it observes ahead";
     const TORSO: Part = BUTT;
     const EYES: Part = BUTT;
     const SOLES: &'static [Part] = &FEET;

@@ -14,8 +14,8 @@
 //! - *Getting up* begins when the trunk touches the ground in a skill, or any part but the feet outside one. The
 //!   direction in which the butt faces selects the clip.
 //!
-//! A backflip and getting up first wait at the start of their clip until the body is close to the clip's pose, up to
-//! [`SETTLING`].
+//! A backflip and getting up first wait at the start of their clip until the body is close to the clip's pose. The wait
+//! is at most 2 s for a backflip ([`SETTLING`]) and 0.5 s for getting up ([`LYING`]).
 
 use marathon_physics::lanes::Real;
 

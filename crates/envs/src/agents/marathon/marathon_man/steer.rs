@@ -22,10 +22,10 @@
 //! A command passes through three reference signals, updated once per decision by `Steer::lead`:
 //!
 //! 1. The *commanded direction* turns at the commanded rate. It stays within [`MOST_BEHIND`] of the heading, so it
-//!   waits for a character that cannot follow.
+//!    waits for a character that cannot follow.
 //! 2. The *target velocity* moves toward the commanded velocity with a limited acceleration.
 //! 3. The *pace* is the speed for which the [gait](super::gait) is generated. It follows the target speed and stays
-//!   near the body's own speed. The pace sets how fast the gait's phase advances.
+//!    near the body's own speed. The pace sets how fast the gait's phase advances.
 //!
 //! The gait is a periodic reference pose. No clip prescribes where the character is. An action of `pd` is a deviation
 //! from the gait's next pose.

@@ -74,7 +74,7 @@ pub trait Runner: Agent + Clone + Default {
 
 impl Runner for HopperV0 {
     const ID: &'static str = "TerrainHopper-v0";
-    const SUMMARY: &'static str = "one leg in a plane: run over slopes, steps, gaps and boxes that it sees ahead";
+    const SUMMARY: &'static str = "one leg in a plane: run over slopes, steps, gaps and boxes that it observes ahead";
     const TORSO: Part = hopper::TORSO;
     const EYES: Part = FOOT;
     const SOLES: &'static [Part] = &[FOOT];
@@ -92,7 +92,7 @@ impl Runner for HopperV0 {
 
 impl Runner for Walker2dV0 {
     const ID: &'static str = "TerrainWalker2d-v0";
-    const SUMMARY: &'static str = "two legs in a plane: run over slopes, steps, gaps and boxes that it sees ahead";
+    const SUMMARY: &'static str = "two legs in a plane: run over slopes, steps, gaps and boxes that it observes ahead";
     const TORSO: Part = walker2d::TORSO;
     const EYES: Part = walker2d::TORSO;
     const SOLES: &'static [Part] = &[LEFT_FOOT, RIGHT_FOOT];
@@ -110,7 +110,7 @@ impl Runner for Walker2dV0 {
 
 impl Runner for AntV0 {
     const ID: &'static str = "TerrainAnt-v0";
-    const SUMMARY: &'static str = "four legs: run over slopes, steps, gaps and boxes that it sees ahead";
+    const SUMMARY: &'static str = "four legs: run over slopes, steps, gaps and boxes that it observes ahead";
     const TORSO: Part = ant::TORSO;
     const EYES: Part = ant::TORSO;
     const SOLES: &'static [Part] = &ant::SOLES;
