@@ -339,7 +339,10 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
             env.reset_agents(&ended, &mut out.obs).unwrap();
             let places = places(&env);
             for agent in (0..agents).filter(|agent| ended[*agent]) {
-                assert!(out.terminated[agent] && (t - begun[agent].0 < 80) == (stands == 0), "fails when its actions are large");
+                assert!(
+                    out.terminated[agent] && (t - begun[agent].0 < 80) == (stands == 0),
+                    "fails when its actions are large"
+                );
                 failures += 1;
                 let is_near = match stands {
                     0 => places[agent] == begun[agent].1,
