@@ -72,7 +72,7 @@ pub enum EnvError {
     Agent {
         /// Registry name of the agent.
         id: String,
-        /// What was found and what was expected.
+        /// The problem: found and expected values.
         problem: String,
     },
     /// The agent's model file cannot be read.

@@ -88,8 +88,8 @@ fn a_wrong_snapshot_is_refused_and_changes_nothing() {
         (b"something else altogether", "it does not begin with the mark of an environment"),
         (&older, "its format is 'MRTHNv02', expected 'MRTHNv03': it was saved by another version of Marathon"),
         (&newer, "its format is 'MRTHNv99', expected 'MRTHNv03': it was saved by another version of Marathon"),
-        (&other_agent, "it is of 3 agents of 'Walker2d-v0', expected 3 of 'Hopper-v0'"),
-        (&other_number, "it is of 4 agents of 'Hopper-v0', expected 3 of 'Hopper-v0'"),
+        (&other_agent, "it has 3 agents of 'Walker2d-v0', expected 3 of 'Hopper-v0'"),
+        (&other_number, "it has 4 agents of 'Hopper-v0', expected 3 of 'Hopper-v0'"),
     ] {
         let error = env.load(bytes).unwrap_err().to_string();
         assert!(error.contains(complaint), "{error}");
