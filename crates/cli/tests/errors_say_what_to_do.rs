@@ -83,7 +83,7 @@ fn a_changed_description_is_refused() {
             "marathon-policy".into(),
             "a/run.json: format: found \"marathon-policy\", expected \"marathon-run\"",
         ),
-        ("/version", 1.into(), "a/run.json: version: found 1, expected 2, the one that this program knows"),
+        ("/version", 1.into(), "a/run.json: version: found 1, expected 2, which this program supports"),
         ("/config/algorithm/ppo/lr", (-1.0).into(), "config.algorithm.ppo.lr: found -1, expected a positive number"),
         ("/config/run/horizon", 0.into(), "config.run.horizon: found 0, expected at least 1"),
         ("/config/run/horizon", 32.into(), "config.run.horizon: found 32, expected 64, as in checkpoint"),

@@ -129,7 +129,7 @@ behaviors:
         let output = shell.args(["-c", &script, program()]).args(words).current_dir(temp.path()).output().unwrap();
         let text = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{text}");
-        assert!(text.contains("GB of memory, more than can be had") && text.contains(part), "{text}");
+        assert!(text.contains("GB of memory, more than is available") && text.contains(part), "{text}");
         assert!(!temp.path().join("a").exists());
     }
     succeed(temp.path(), &train("a"));

@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! Errors of the trainer.
 
 use marathon_physics::budget::OverBudget;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Limit on the characters of a file's contents in a message.
 const MOST_SHOWN: usize = 300;
 
-/// An error of the trainer; the text says where, what was found and what was expected.
+/// An error of the trainer. The text says where it occurred, what was found and what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A configuration value is out of range.
@@ -16,37 +16,37 @@ pub enum Error {
         field: &'static str,
         /// Its value.
         found: String,
-        /// What would do, with the nearest valid choice where there is one.
+        /// Valid values, with the nearest one if there is one.
         expected: String,
     },
-    /// A setting by its name is none, or of the wrong kind.
+    /// A setting does not exist or has the wrong type.
     #[error("configuration: {place}: {why}")]
     Settings {
-        /// The setting.
+        /// Path of the setting.
         place: String,
-        /// What is wrong with it.
+        /// Reason.
         why: String,
     },
-    /// The instruction set is not one that networks run on, or not there.
+    /// Networks do not run with this instruction set, or this processor lacks it.
     #[error("instruction set {0} cannot train networks on this processor; use {1}")]
     Isa(&'static str, &'static str),
-    /// A run needs more memory than there is.
-    #[error("this run needs about {gigabytes:.1} GB of memory, more than can be had; {less} need less")]
+    /// A run needs more memory than is available.
+    #[error("this run needs about {gigabytes:.1} GB of memory, more than is available; {less} need less")]
     Memory {
-        /// What it needs.
+        /// Memory that the run needs, GB.
         gigabytes: f64,
-        /// What would need less.
+        /// Settings that need less.
         less: String,
     },
-    /// Learning has led to parameters that are not finite.
+    /// Training led to parameters that are not finite.
     #[error(
         "training has diverged: {count} of {parameters} parameters are not finite after {steps} steps; a smaller learning rate \
          ({rates}) keeps them finite"
     )]
     Diverged {
-        /// Parameters that are not finite.
+        /// Number of parameters that are not finite.
         count: usize,
-        /// All parameters.
+        /// Number of all parameters.
         parameters: usize,
         /// Agent-steps done.
         steps: u64,
@@ -58,21 +58,21 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The attempted action.
         action: &'static str,
-        /// Why it failed.
+        /// Its cause.
         source: std::io::Error,
     },
-    /// A file is not what it should be.
+    /// A file has wrong contents.
     #[error("{}: {place}: found {found}, expected {expected}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// Where in the file.
+        /// Place in the file.
         place: String,
-        /// What is there.
+        /// Contents at that place.
         found: String,
-        /// What should be there.
+        /// Valid contents.
         expected: String,
     },
     /// A file's contents exceed a limit.
@@ -85,27 +85,27 @@ pub enum Error {
         /// The amount and the limit.
         error: OverBudget,
     },
-    /// A policy or checkpoint belongs to something else.
+    /// A policy or checkpoint does not belong here.
     #[error("{what} is for {found}, expected {expected}")]
     Mismatch {
-        /// What does not fit.
+        /// Item that does not fit.
         what: String,
-        /// What it is for.
+        /// Its purpose.
         found: String,
-        /// What it is used for.
+        /// Its use here.
         expected: String,
     },
 }
 
 impl Error {
-    /// The same error as one of a file: what is wrong with a configuration is wrong in the file that holds it, under `key`.
+    /// Converts a configuration error into one of the file that holds the configuration under `key`.
     pub fn in_file(self, path: &Path, key: &str) -> Self {
         match self {
             Error::Config { field, found, expected } => Error::file(path, format!("{key}.{field}"), found, expected),
             other => other,
         }
     }
-    /// What does not fit, as an error of the file that holds it.
+    /// Converts a mismatch into an error of the file that holds the item.
     pub fn of_file(self, path: &Path) -> Self {
         match self {
             Error::Mismatch { what, found, expected } => Error::file(path, what, found, expected),

@@ -1,5 +1,5 @@
-//! Files, written whole or not at all: safetensors with one JSON document in the header, and JSON documents that know their
-//! own checksum.
+//! Files that are written completely or not at all: safetensors with one JSON document in the header, and JSON
+//! documents with a checksum of their own.
 
 use crate::error::Error;
 use fnv::FnvHasher;
@@ -95,10 +95,10 @@ impl Drop for AtomicFile {
     }
 }
 
-/// Writes a file under a temporary name and renames it, so that a reader never sees half of it.
+/// Writes a file under a temporary name and renames it, so that readers never see a partial file.
 ///
 /// # Errors
-/// If the file cannot be written; the old one is whole then.
+/// If the file cannot be written. The old file then stays intact.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(Error::io(path, "write"))?;
@@ -133,7 +133,7 @@ number!(u8, U8);
 number!(u32, U32);
 number!(u64, U64);
 
-/// A safetensors file being made.
+/// Builds a safetensors file.
 #[derive(Default)]
 pub struct TensorWriter {
     tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)>,
@@ -150,7 +150,7 @@ impl TensorWriter {
     pub fn list<N: Number>(&mut self, name: &str, data: &[N]) {
         self.add(name, &[data.len()], data.iter().copied());
     }
-    /// The file's bytes, the document in its header.
+    /// The bytes of the file, with the document in its header.
     pub fn bytes<D: Serialize>(&self, document: &D) -> Vec<u8> {
         self.with_document(serde_json::to_string(document).expect("documents are plain data"))
     }
@@ -176,7 +176,7 @@ impl TensorWriter {
     }
 }
 
-/// A safetensors file being read.
+/// Reads a safetensors file.
 pub struct TensorReader<'a> {
     path: &'a Path,
     tensors: SafeTensors<'a>,
@@ -194,7 +194,7 @@ impl<'a> TensorReader<'a> {
         budget::MEMORY.check(JSON_MEMORY * document.len() as f64).map_err(|e| Error::budget(path, "header", e))?;
         Ok(Self { path, tensors: SafeTensors::deserialize(bytes).map_err(bad)?, document })
     }
-    /// The JSON document.
+    /// Returns the JSON document.
     pub fn document<D: DeserializeOwned>(&self, format: &str, version: u32) -> Result<D, Error> {
         let mut value = json(self.path, &self.document, format)?;
         // the checksum covers all bytes: see `seal`
@@ -217,7 +217,7 @@ impl<'a> TensorReader<'a> {
             false => Err(changed(self.path, found, &sum)),
         }
     }
-    /// A tensor of a known shape.
+    /// Returns a tensor of a known shape.
     pub fn get<N: Number>(&self, name: &str, shape: &[usize]) -> Result<Vec<N>, Error> {
         let place = format!("tensor '{name}'");
         let expected = format!("{:?} {shape:?}", N::DTYPE);
@@ -232,7 +232,7 @@ impl<'a> TensorReader<'a> {
         }
         Ok(view.data().chunks_exact(size_of::<N>()).map(N::read).collect())
     }
-    /// A tensor of a known shape without infinities and NaN.
+    /// Returns a tensor of a known shape without infinities and NaN.
     pub fn finite(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>, Error> {
         let data: Vec<f32> = self.get(name, shape)?;
         match data.iter().position(|x| !x.is_finite()) {
@@ -240,18 +240,18 @@ impl<'a> TensorReader<'a> {
             Some(i) => Err(Error::file(self.path, format!("tensor '{name}', number {i}"), data[i], "a finite number")),
         }
     }
-    /// A list of unknown length.
+    /// Returns a list of unknown length.
     pub fn list<N: Number>(&self, name: &str) -> Result<Vec<N>, Error> {
         self.get(name, &[self.list_len(name)])
     }
-    /// The same without infinities and NaN.
+    /// Returns a list of unknown length without infinities and NaN.
     pub fn finite_list(&self, name: &str) -> Result<Vec<f32>, Error> {
         self.finite(name, &[self.list_len(name)])
     }
     fn list_len(&self, name: &str) -> usize {
         self.tensors.tensor(name).map_or(0, |t| t.shape().iter().product())
     }
-    /// Names of all tensors in order, with the kinds of their numbers.
+    /// Names of all tensors in order, with the types of their numbers.
     pub fn names(&self) -> Vec<(&str, Dtype)> {
         let mut names: Vec<_> = self.tensors.iter().map(|(name, tensor)| (name, tensor.dtype())).collect();
         names.sort_by_key(|(name, _)| *name);
@@ -285,7 +285,7 @@ fn known<D: DeserializeOwned>(path: &Path, mut value: Value, format: &str, versi
         return Err(Error::file(path, "format", found, format!("\"{format}\"")));
     }
     if *number != version {
-        return Err(Error::file(path, "version", number, format!("{version}, the one that this program knows")));
+        return Err(Error::file(path, "version", number, format!("{version}, which this program supports")));
     }
     if let Some(found) = value.as_object_mut().and_then(|keys| keys.remove(CHECKSUM)) {
         let sum = checksum_of(&value);
@@ -302,7 +302,7 @@ fn known<D: DeserializeOwned>(path: &Path, mut value: Value, format: &str, versi
 /// Writes a description: a JSON document that names its format and version, with a checksum of its values.
 ///
 /// # Errors
-/// If the file cannot be written; the old one is whole then.
+/// If the file cannot be written. The old file then stays intact.
 pub fn write_description(path: &Path, document: &impl Serialize) -> Result<(), Error> {
     let bad = |e: serde_json::Error| Error::file(path, "JSON", format!("'{e}'"), "plain data");
     let json = serde_json::to_string_pretty(document).map_err(bad)?;
@@ -311,16 +311,16 @@ pub fn write_description(path: &Path, document: &impl Serialize) -> Result<(), E
     write_atomic(path, format!("{open},\n  \"{CHECKSUM}\": \"{sum}\"\n}}\n").as_bytes())
 }
 
-/// Reads a description. A missing checksum is no error, so that a person can edit the file.
+/// Reads a description. A missing checksum is not an error, so that people can edit the file.
 ///
 /// # Errors
-/// If the file cannot be read, has changed since it was written, or is of another format.
+/// If the file cannot be read, has changed since it was written, or has another format.
 pub fn read_description<D: DeserializeOwned>(path: &Path, format: &str, version: u32) -> Result<D, Error> {
     let text = budget::read_to_string(path, &budget::CONFIG_FILE).map_err(Error::io(path, "read"))?;
     known(path, json(path, &text, format)?, format, version)
 }
 
-/// Checksum of a document's values, whatever the order of its keys and the spelling of its numbers.
+/// Checksum of a document's values. It does not depend on the order of keys or the notation of numbers.
 fn checksum_of(document: &Value) -> String {
     fn write(value: &Value, out: &mut Vec<u8>) {
         match value {
@@ -339,7 +339,7 @@ fn checksum_of(document: &Value) -> String {
                 values.iter().for_each(|value| write(value, out));
                 out.push(b']');
             }
-            // a comma ends numbers, of which integers have all their digits
+            // a comma ends numbers; integers keep all their digits
             Value::Number(n) => match n.as_f64().filter(|_| n.is_f64()) {
                 Some(x) => out.extend(format!("{:x},", x.to_bits()).bytes()),
                 None => out.extend(format!("{n},").bytes()),

@@ -1,35 +1,35 @@
-//! Marathon's trainer: PPO, A2C, ACKTR and SAC on the processor, in the lane layout of the physics.
+//! Marathon's trainer: PPO, A2C, ACKTR and SAC on the CPU, in the lane layout of the physics.
 //!
-//! A rollout of thousands of agents and the network updates on it run on the same cores, in the same layout: blocks of
-//! sixteen agents, `[feature][16]`, from the physics through observations, networks and gradients, so nothing is ever
-//! transposed or copied to a device.
+//! Rollouts of thousands of agents and the network updates run on the same cores and in the same layout: blocks of
+//! sixteen agents, `[feature][16]`. This holds from the physics through observations, networks and gradients, so data
+//! is never transposed or copied to a device.
 //!
-//! * [`train`] learns a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory). [`TrainConfig`] says how, its
-//!   [`Algorithm`] by what; an [`Observer`] follows the run and may stop it.
-//! * [`Trainer`] is the same run, made an iteration at a time by its caller.
-//! * [`train_with`] has the rollouts played by others, such as [`Player`]s on other machines.
-//! * [`Policy`] is the result: it acts, and it is a file. [`evaluate`] tells how good it is.
-//! * [`Checkpoint`] is an interrupted run. Resumed, it gives the bits of a run that was never interrupted.
+//! * [`train`] trains a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory). [`TrainConfig`] holds
+//!   the settings, its [`Algorithm`] the method. An [`Observer`] follows the run and may stop it.
+//! * [`Trainer`] is the same run, one iteration per call.
+//! * [`train_with`] lets others play the rollouts, such as [`Player`]s on other machines.
+//! * [`Policy`] is the result. It acts, and you can save it to a file. [`evaluate`] measures it.
+//! * [`Checkpoint`] is an interrupted run. When resumed, it gives the same bits as an uninterrupted run.
 //!
-//! # The same bits
+//! # Reproducibility
 //!
-//! A policy depends on the task, the configuration and its seed alone: not on the number of threads, not on the vector
-//! width, not on interruptions. Four rules make it so:
+//! A policy depends only on the task, the configuration and its seed. The number of threads, the vector width and
+//! interruptions do not change it. Four rules ensure this:
 //!
 //! 1. Elementary operations round alike on every backend of [`marathon_physics::lanes`], and transcendental functions
-//!    are made of them.
+//!    are composed of them.
 //! 2. A sum over samples runs within each of sixteen lanes first and then over the lanes in one fixed tree.
-//! 3. Whatever is summed over blocks or groups of samples is kept per block or group, and added up in their order.
-//! 4. Every agent has its own stream of random numbers, and shuffles come from the seed and the iteration.
+//! 3. Sums over blocks or groups of samples are kept per block or group, and added up in their order.
+//! 4. Every agent has its own stream of random numbers, and shuffles depend on the seed and the iteration.
 //!
 //! # Reading the code
 //!
-//! [`algorithms`] has `ppo`, `a2c`, `acktr` and `sac`: what each does with a rollout, from top to bottom. The folders below
-//! are what they stand on, each on those before it: [`lanes`] (memory and random numbers, sixteen agents side by side),
-//! [`nets`] (networks and distributions), [`optim`] (optimizers), [`policy`] (the result), [`rewards`], and [`rollout`]
-//! (collecting, and what is kept). `trainer` is around the algorithms: threads, iterations, files, reports.
+//! [`algorithms`] has `ppo`, `a2c`, `acktr` and `sac`, each from top to bottom. They build on the folders below, each
+//! of which builds on those before it: [`lanes`] (memory and random numbers, sixteen agents side by side), [`nets`]
+//! (networks and distributions), [`optim`] (optimizers), [`policy`] (the result), [`rewards`], and [`rollout`]
+//! (collecting and storing). `trainer` runs the algorithms: threads, iterations, files, reports.
 //!
-//! To add an algorithm, implement [`Learner`](algorithms::Learner) and give it a place in [`Algorithm`]. To add a reward,
+//! To add an algorithm, implement [`Learner`](algorithms::Learner) and add it to [`Algorithm`]. To add a reward,
 //! implement [`Reward`](rewards::Reward).
 //!
 //! # Example

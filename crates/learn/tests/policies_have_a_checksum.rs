@@ -86,7 +86,7 @@ fn a_policy_of_another_version_is_refused() {
         meta.version = version;
         let stats = (mean.clone(), std.clone());
         let other = Policy::from_parts(meta, policy.params().to_vec(), stats, policy.log_std().to_vec()).unwrap();
-        let expected = "expected 1, the one that this program knows";
+        let expected = "expected 1, which this program supports";
         assert_eq!(refusal(&other.to_bytes()), format!("puck.safetensors: version: found {version}, {expected}"));
     }
 }

@@ -135,12 +135,12 @@ fn damaged_checkpoints_are_refused() {
         (
             "\"version\": 2",
             "\"version\": 1",
-            "checkpoint.json: version: found 1, expected 2, the one that this program knows",
+            "checkpoint.json: version: found 1, expected 2, which this program supports",
         ),
         (
             "\"version\": 2",
             "\"version\": 7",
-            "checkpoint.json: version: found 7, expected 2, the one that this program knows",
+            "checkpoint.json: version: found 7, expected 2, which this program supports",
         ),
         ("\"agents\": 80", "\"agents\": 81", "config.run.agents: found 81, expected a multiple of 16, such as 80"),
         ("\"horizon\": 24", "\"horizon\": -24", "config.run.horizon: found 'invalid value: integer `-24`"),

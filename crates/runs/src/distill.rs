@@ -133,7 +133,7 @@ impl DistillOptions {
                 let (gigabytes, less) = ((student + lessons) / 1e9, "narrower layers or fewer teachers need less");
                 let (n, hidden) = (self.agents, &self.hidden);
                 let what = format!("is {n} and the hidden layers {hidden:?}: that needs about {gigabytes:.1} GB of");
-                refused("agents", format!("{what} memory, more than can be had; fewer agents, {less}"))
+                refused("agents", format!("{what} memory, more than is available; fewer agents, {less}"))
             }
         }
     }

@@ -1,14 +1,14 @@
-//! Advantage actor-critic (Mnih et al., "Asynchronous methods for deep reinforcement learning", 2016), synchronous, as in
-//! the paper's comparison: one step of RMSProp on each short rollout.
+//! Advantage actor-critic (Mnih et al., "Asynchronous methods for deep reinforcement learning", 2016), synchronous, as
+//! in the paper's comparison. Each short rollout gives one step of RMSProp.
 //!
-//! Minimized per sample, with `A` the advantage as it is (not normalized) and `R` the return:
+//! The loss per sample, with `A` the advantage (not normalized) and `R` the return:
 //!
 //! ```text
 //! -A log pi(a|s) - entropy_coef H + value_coef (V - R)^2
 //! ```
 //!
-//! The rollout was drawn from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of
-//! `A log pi`: the gradient comes from the same code as PPO's. The bound of its norm is for both networks together.
+//! The rollout comes from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of `A log
+//! pi`. A2C therefore shares PPO's gradient code. The gradient norm is bounded for both networks together.
 
 use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
 use super::loss::{LossSums, Objective};
@@ -21,19 +21,19 @@ use crate::optim::rmsprop::RmsProp;
 use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 
-/// Far outside of what the ratio of a policy to itself can reach by rounding.
+/// Far beyond the rounding errors of a ratio of a policy to itself.
 const NO_CLIP: f64 = 1e9;
 
-/// Settings of A2C; the defaults are those of the paper's comparison (OpenAI Baselines with the weight of the value loss and
-/// the rate that its authors chose).
+/// Settings of A2C. The defaults are those of the paper's comparison: OpenAI Baselines with the authors' learning rate
+/// and weight of the value loss.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct A2c {
     /// Learning rate of both networks.
     pub lr: f64,
-    /// How it moves.
+    /// Schedule of the learning rate.
     pub schedule: Schedule,
-    /// Bound of the gradient's norm, for both networks together.
+    /// Bound of the gradient norm of both networks together.
     pub max_grad_norm: f64,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
@@ -41,11 +41,11 @@ pub struct A2c {
     pub entropy_coef: Moving,
     /// Standard deviations of the actions.
     pub deviations: Deviations,
-    /// Weight of the value function's squared error.
+    /// Weight of the squared error of the value function.
     pub value_coef: f64,
     /// Decay of RMSProp's mean square.
     pub rms_decay: f64,
-    /// Added to the mean square under the root.
+    /// Constant that RMSProp adds to the mean square under the root.
     pub rms_epsilon: f64,
 }
 
@@ -82,13 +82,13 @@ impl A2c {
         self.deviations.validate()
     }
 
-    /// What a run needs.
+    /// Memory that a run needs.
     pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
         Layout::new(setup, Ratio::Joint).needs(setup.common.items(), 0)
     }
 }
 
-/// The objective of an actor-critic method without a bound of the ratio.
+/// The actor-critic objective without a bound of the ratio.
 pub fn objective(entropy_coef: f64) -> Objective {
     Objective {
         ratio: Ratio::Joint,
@@ -100,7 +100,7 @@ pub fn objective(entropy_coef: f64) -> Objective {
     }
 }
 
-/// A2C at work.
+/// A2C with the state of its optimizer.
 #[derive(Clone)]
 pub struct A2cRule {
     settings: A2c,
@@ -108,7 +108,7 @@ pub struct A2cRule {
 }
 
 impl A2cRule {
-    /// A learner at the start of a run.
+    /// Creates a learner at the start of a run.
     pub fn learner(settings: A2c, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
         let rms = RmsProp::new(nets.params.len(), settings.rms_decay, settings.rms_epsilon);
@@ -117,11 +117,11 @@ impl A2cRule {
 
     fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
         let (Self { settings, rms }, Student { nets, lr, skipped, .. }) = (self, student);
-        // nobody has decided anything
+        // no agent acted in this batch
         if sums.samples == 0.0 {
             return;
         }
-        // the gradient at hand is that of (V - R)^2 / 2
+        // the available gradient is that of (V - R)^2 / 2
         let weight = [1.0, 2.0 * settings.value_coef];
         let squares = workers.squares();
         let norm = (squares[0] + weight[1] * weight[1] * squares[1]).sqrt() / sums.samples;
@@ -130,7 +130,7 @@ impl A2cRule {
             return;
         }
         let bound = (settings.max_grad_norm / norm).min(1.0) / sums.samples;
-        // each reward's networks have a rate of their own, and their gradient is not bounded
+        // the networks of each reward have their own rate, and their gradient is not bounded
         let rates = nets.layout.rates(*lr, *lr);
         workers.pieces(&mut |net, range, gradient| {
             let scale = weight.get(net).map_or(1.0 / sums.samples, |weight| bound * weight);

@@ -1,20 +1,20 @@
 //! Actor-critic with the natural gradient and a trust region (Wu et al., "Scalable trust-region method for deep
 //! reinforcement learning using Kronecker-factored approximation", 2017).
 //!
-//! The objective is A2C's. What differs is the step: the gradient of each layer is multiplied by the inverse of its block
-//! of the Fisher matrix, which [`kfac`](crate::optim::kfac) approximates, and the step is shortened where it would change the
-//! distribution of the actions by more than `kl_clip`:
+//! The objective is A2C's. Only the step differs. The gradient of each layer is multiplied by the inverse of its block
+//! of the Fisher matrix, which [`kfac`](crate::optim::kfac) approximates. A step that would change the action
+//! distribution by more than `kl_clip` is shortened:
 //!
 //! ```text
 //! d = F^-1 g        eta = min(lr, sqrt(2 kl_clip / d'g))        m <- momentum m + (1 - momentum) eta d        p <- p - m
 //! ```
 //!
-//! Policy and value function are separate networks and have a step length each; the value is taken for the mean of a
-//! normal distribution of deviation 1, whose Fisher matrix is that of Gauss and Newton. The deviations of the actions are
-//! parameters of their own: their block of the Fisher matrix is known, 2 for each logarithm.
+//! Policy and value function are separate networks with separate step lengths. The value is treated as the mean of a
+//! normal distribution of deviation 1, whose Fisher matrix is the Gauss-Newton matrix. The deviations of the actions
+//! are parameters of their own. Their block of the Fisher matrix is known: 2 for each logarithm.
 //!
-//! Unlike OpenAI Baselines, no updates with another optimizer come first (the running means of the factors weigh the
-//! first rollouts alike instead), and the damping is split between the factors (Martens and Grosse, 2015, section 6.3).
+//! OpenAI Baselines starts with updates of another optimizer. This version instead weighs the first rollouts equally in
+//! the running means of the factors. The damping is split between the factors (Martens and Grosse, 2015, section 6.3).
 
 use super::a2c;
 use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
@@ -29,13 +29,13 @@ use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Settings of ACKTR; the defaults are those of OpenAI Baselines.
+/// Settings of ACKTR. The defaults are those of OpenAI Baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Acktr {
     /// Largest step length.
     pub lr: f64,
-    /// How it moves.
+    /// Schedule of the step length.
     pub schedule: Schedule,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
@@ -43,17 +43,17 @@ pub struct Acktr {
     pub entropy_coef: Moving,
     /// Standard deviations of the actions.
     pub deviations: Deviations,
-    /// Weight of the value function's squared error.
+    /// Weight of the squared error of the value function.
     pub value_coef: f64,
-    /// Divergence that a step may cause, nats; in the value network half the mean squared change.
+    /// KL divergence that a step may cause, nats. For the value network: half the mean squared change.
     pub kl_clip: f64,
-    /// Decay of the sum of steps.
+    /// Decay of the momentum, a running sum of steps.
     pub momentum: f64,
-    /// Added to the Fisher matrix.
+    /// Damping, added to the Fisher matrix.
     pub damping: f64,
     /// Decay of the running means of the factors.
     pub stats_decay: f64,
-    /// Updates from one inversion of the factors to the next; the first so many updates invert every time.
+    /// Updates between two inversions of the factors. The first `inverse_every` updates invert every time.
     pub inverse_every: u64,
 }
 
@@ -87,7 +87,7 @@ impl Acktr {
         if self.inverse_every == 0 {
             return Err(Error::config("inverse_every", 0, "at least 1"));
         }
-        // the factors are square
+        // the factors are square matrices
         let network = common.network;
         for (field, widths) in [("actor_hidden", &network.actor_hidden), ("critic_hidden", &network.critic_hidden)] {
             if widths.iter().any(|w| *w > 2048) {
@@ -100,24 +100,24 @@ impl Acktr {
         self.deviations.validate()
     }
 
-    /// What a run needs.
+    /// Memory that a run needs.
     pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
         let layout = Layout::new(setup, Ratio::Joint);
         layout.needs(setup.common.items(), Kfac::moments_len(&layout.actor, &layout.critic))
     }
 }
 
-/// ACKTR at work.
+/// ACKTR with the state of its optimizer.
 #[derive(Clone)]
 pub struct AcktrRule {
     settings: Acktr,
-    /// The factors, which all workers share.
+    /// The factors, shared by all workers.
     kfac: Arc<Kfac>,
     momentum: Vec<f32>,
 }
 
 impl AcktrRule {
-    /// A learner at the start of a run.
+    /// Creates a learner at the start of a run.
     pub fn learner(settings: Acktr, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
         let Layout { actor, critic, critic_start, .. } = &nets.layout;
@@ -126,7 +126,7 @@ impl AcktrRule {
         OnPolicy::new(nets, settings.lr, moments, Self { settings, kfac, momentum })
     }
 
-    /// The step on the worker's replica.
+    /// Takes a step on the worker's replica.
     fn step(&mut self, student: &mut Student, progress: &Progress, scale: [f64; 2], sums: &mut LossSums) {
         let Self { settings, kfac, momentum } = self;
         let Student { nets, lr, skipped, space: Some(space), .. } = student else { return };
@@ -140,7 +140,7 @@ impl AcktrRule {
             *skipped += 1;
             return;
         }
-        // a product of zero asks for no step: any length will do
+        // a product of zero means a step of zero: any length works
         let length = products.map(|p| lr.min((2.0 * settings.kl_clip / p.max(1e-300)).sqrt()));
         let mut step = |i: usize, d: f64, length: f64| {
             let m = &mut momentum[i];
@@ -156,7 +156,7 @@ impl AcktrRule {
             }
         }
         nets.bound_std(progress);
-        // the divergence is known without looking at samples
+        // the divergence follows from the step, without samples
         let kl = 0.5 * length[0] * length[0] * products[0];
         sums.kl = kl * sums.samples;
     }
@@ -175,16 +175,16 @@ impl Rule for AcktrRule {
         let objective = a2c::objective(progress.at(settings.entropy_coef));
         let mut sums = student.gradient(workers, experience, &items, objective, Some(kfac));
         let mean = 1.0 / sums.samples;
-        // the gradient at hand is that of (V - R)^2 / 2
+        // the available gradient is that of (V - R)^2 / 2
         let scale = [mean, mean * 2.0 * settings.value_coef];
         let Student { nets, space: Some(space), .. } = &mut *student else { return sums };
         let gradient = &mut space.gradient;
         workers.pieces(&mut |_, range, piece| gradient[range].copy_from_slice(piece));
 
-        // factors, inverses and natural gradients, a layer at a time, shared out among the workers
+        // the workers share the factors, inverses and natural gradients, one layer at a time
         let count = progress.iteration;
         let refresh = count <= settings.inverse_every || count.is_multiple_of(settings.inverse_every);
-        // all rollouts weigh the same at first
+        // the first rollouts weigh the same
         let decay = settings.stats_decay.min(1.0 - 1.0 / count as f64);
         workers.divide(kfac.count(), &mut |l, partials| {
             let mut layer = kfac.layer(l);

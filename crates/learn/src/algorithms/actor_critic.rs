@@ -1,5 +1,5 @@
-//! What the algorithms share that learn from their own rollouts: a policy and a value function as separate networks, the
-//! networks of the rewards, and the gradient of the objective on all of them.
+//! The common part of the on-policy algorithms: a policy and a value function as separate networks, the networks of the
+//! rewards, and the gradient of the objective with respect to all of them.
 
 use super::loss::{Loss, LossSums, Objective};
 use super::parameters::Places;
@@ -31,12 +31,12 @@ use std::ops::Range;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Deviations {
-    /// Bound of the actions drawn, which are then divided by it; standard deviations are those before that. ML-Agents has 3:
-    /// with a larger number the same step of the optimizer moves the actions less.
+    /// Bound of the sampled actions, which are then divided by it. Standard deviations refer to the values before the
+    /// division. ML-Agents uses 3: a larger bound makes the same optimizer step move the actions less.
     pub action_clip: f64,
     /// Logarithm of the standard deviation of the actions at the start.
     pub init_log_std: f64,
-    /// Smallest standard deviation: a floor keeps a policy that has found one safe way from ceasing to look for better ones.
+    /// Smallest standard deviation. It keeps a policy exploring after it has found one safe solution.
     pub min_std: Moving,
     /// Largest standard deviation.
     pub max_std: f64,
@@ -49,7 +49,7 @@ impl Default for Deviations {
 }
 
 impl Deviations {
-    /// Hardly any bounds, from 1 on.
+    /// Practically unbounded deviations that start at 1.
     pub const FREE: Self = Self { action_clip: 1.0, init_log_std: 0.0, min_std: Moving::still(1e-3), max_std: 1e3 };
 
     /// Checks every field.
@@ -68,7 +68,7 @@ impl Deviations {
     }
 }
 
-/// Checks settings that all algorithms with an actor and a critic have.
+/// Checks the settings that all actor-critic algorithms have.
 pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Moving) -> Result<(), Error> {
     check::positive(&[("lr", lr)])?;
     if !(0.0..=1.0).contains(&gae_lambda) {
@@ -83,7 +83,7 @@ pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Moving) -> Result<(), Er
     Ok(())
 }
 
-/// Refuses the schedule that PPO alone has.
+/// Refuses the adaptive schedule, which only PPO supports.
 pub fn refuse_adaptive(schedule: Schedule, name: &str) -> Result<(), Error> {
     match schedule {
         Schedule::Adaptive => Err(Error::config("schedule", "adaptive", format!("constant or linear with {name}"))),
@@ -96,7 +96,7 @@ pub fn refuse_adaptive(schedule: Schedule, name: &str) -> Result<(), Error> {
 pub struct Layout {
     /// Policy network.
     pub actor: Mlp,
-    /// Value network, which has an output for each stream of rewards.
+    /// Value network, with one output per stream of rewards.
     pub critic: Mlp,
     /// Logarithms of the standard deviations, after the policy network's parameters.
     pub log_std: Range<usize>,
@@ -104,14 +104,14 @@ pub struct Layout {
     pub critic_start: usize,
     /// The streams of rewards.
     pub streams: Vec<Stream>,
-    /// All networks: the policy's, the value function's, those of the rewards.
+    /// All networks: policy, value function, rewards.
     pub places: Places,
     ratio: Ratio,
     shape: Shape,
 }
 
 impl Layout {
-    /// For a task.
+    /// Creates the networks for a task.
     pub fn new(setup: &Setup<'_>, ratio: Ratio) -> Self {
         let (obs, act, network) = (setup.spec.obs, setup.spec.act, setup.common.network);
         let net = |hidden: &[usize], out| Mlp::new(&[&[obs], hidden, &[out]].concat(), network.activation);
@@ -132,12 +132,12 @@ impl Layout {
         Self { log_std: actor.len()..of_actor.end, actor, critic, critic_start, streams, places, ratio, shape }
     }
 
-    /// What a run needs, whose longest list of samples has so many items.
+    /// Memory that a run needs. `items` is the length of the longest list of samples.
     pub fn needs(&self, items: usize, moments: usize) -> Needs {
         Needs { parameters: self.places.total(), moments, items, shape: self.shape, replay: 0 }
     }
 
-    /// Rates of all networks: the policy's, the value function's, those of the rewards.
+    /// Learning rates of all networks: policy, value function, rewards.
     pub fn rates(&self, policy: f64, value: f64) -> Vec<f64> {
         let of_rewards = self.streams.iter().filter_map(|stream| stream.networks.as_ref()).map(|nets| nets.lr);
         [policy, value].into_iter().chain(of_rewards).collect()
@@ -147,7 +147,7 @@ impl Layout {
 /// The networks with their parameters.
 #[derive(Clone)]
 pub struct ActorCritic {
-    /// Where they are.
+    /// Shapes and places of the networks.
     pub layout: Layout,
     /// The parameters.
     pub params: Vec<f32>,
@@ -158,7 +158,7 @@ pub struct ActorCritic {
 }
 
 impl ActorCritic {
-    /// At the start of a run.
+    /// Creates the networks at the start of a run.
     pub fn new(setup: &Setup<'_>, ratio: Ratio, deviations: Deviations, lambda: f64) -> Self {
         let layout = Layout::new(setup, ratio);
         let mut params = vec![0.0; layout.places.total()];
@@ -183,16 +183,16 @@ impl ActorCritic {
     pub fn gaussian(&self) -> Gaussian<f32> {
         Gaussian::new(&self.params[self.layout.log_std.clone()])
     }
-    /// Factor of the actions drawn, before they are clipped to [-1, 1].
+    /// Factor of the sampled actions, before they are clipped to [-1, 1].
     fn action_scale(&self) -> f32 {
         1.0 / self.deviations.action_clip as f32
     }
-    /// What is to be kept of a decision.
+    /// Data that is kept per decision.
     pub fn shape(&self) -> Shape {
         self.layout.shape
     }
 
-    /// What a horizon is played with.
+    /// Networks and constants for a rollout.
     pub fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_> {
         RolloutContext {
             acting: Acting {
@@ -211,8 +211,8 @@ impl ActorCritic {
         }
     }
 
-    /// Leaves the gradient of an objective, summed over a list of items of the rollout, with the workers; returns the sums
-    /// of the objective. With `kfac`, each group leaves sums for the factors of the Fisher matrix, too.
+    /// Leaves the gradient of an objective, summed over a list of items of the rollout, with the workers. Returns the
+    /// sums of the objective. With `kfac`, each group also leaves sums for the factors of the Fisher matrix.
     pub fn gradient(
         &self,
         workers: &mut dyn Workers,
@@ -229,7 +229,7 @@ impl ActorCritic {
         })
     }
 
-    /// Gradient of the objective summed over a group of items, a chunk at a time.
+    /// Computes the gradient of the objective summed over a group of items, one chunk at a time.
     fn gradient_of_group(
         &self,
         gaussian: &Gaussian<f32>,
@@ -254,7 +254,7 @@ impl ActorCritic {
                     steps.push(rollout.step(item));
                 }
             }
-            // the first chunk's gradient needs no sum
+            // the first chunk needs no sum
             let gradient = if i == 0 { &mut partial.gradient } else { &mut space.gradient };
             let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
             for (networks, judge) in networks.zip(&mut space.judges) {
@@ -300,14 +300,14 @@ impl ActorCritic {
         bound_std(log_std, progress.at(self.deviations.min_std), self.deviations.max_std);
     }
 
-    /// Lets both networks make of an observation what they did with another map of observations.
+    /// Adapts both networks to another map of observations, so that their outputs for a raw observation stay the same.
     pub fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
         let (of_actor, of_critic) = self.params.split_at_mut(self.layout.critic_start);
         self.layout.actor.follow(of_actor, before, after);
         self.layout.critic.follow(of_critic, before, after);
     }
 
-    /// What reports say of it.
+    /// Numbers for reports.
     pub fn describe(&self, totals: &Totals, lr: f64, skipped: u64) -> Description {
         let gaussian = self.gaussian();
         Description {
@@ -319,14 +319,14 @@ impl ActorCritic {
         }
     }
 
-    /// The policy to act with.
+    /// The current policy.
     pub fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
         let net = self.layout.actor.clone();
         let mut params = self.actor_params().to_vec();
         let mut log_std = self.params[self.layout.log_std.clone()].to_vec();
         let scale = self.action_scale();
         if scale != 1.0 {
-            // the last layer takes in the scale of the actions, so that every policy is bounded by 1
+            // the last layer absorbs the scale of the actions, so that every policy is bounded by 1
             let (weights, biases) = net.layers().last().expect("a network has layers");
             params[weights].iter_mut().for_each(|w| *w *= scale);
             params[biases].iter_mut().for_each(|b| *b *= scale);
@@ -336,20 +336,20 @@ impl ActorCritic {
     }
 }
 
-/// A worker's space for computing gradients.
+/// Work space of a worker for gradients.
 pub struct Space {
     input: Blocks<f32>,
     actor: Tape<f32>,
     critic: Tape<f32>,
     judges: Vec<Box<dyn Judge>>,
-    /// Room for all parameters.
+    /// Gradient of all parameters.
     pub gradient: Vec<f32>,
     moments: Vec<f32>,
     rows: Vec<[f32; BLOCK]>,
 }
 
 impl Space {
-    /// For networks, and for so many moments.
+    /// Creates the work space for networks and a number of moments.
     pub fn new(layout: &Layout, moments: usize) -> Self {
         let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
         Self {

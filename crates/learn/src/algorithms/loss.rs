@@ -1,15 +1,15 @@
 //! The objective of PPO (Schulman et al., "Proximal policy optimization algorithms", 2017) and its derivative with
-//! respect to the outputs of the networks, for a chunk of blocks.
+//! respect to the network outputs, for a chunk of blocks.
 //!
-//! Minimized per sample, with `r` the probability ratio, `A` the normalized advantage and `R` the return:
+//! The loss per sample, with `r` the probability ratio, `A` the normalized advantage and `R` the return:
 //!
 //! ```text
 //! policy:  -min(r A, clip(r, 1 - clip, 1 + clip) A) - entropy_coef H
 //! value:   max((V - R)^2, (clip(V, V_old - value_clip, V_old + value_clip) - R)^2) / 2      (without value_clip: (V - R)^2 / 2)
 //! ```
 //!
-//! With [`Ratio::PerAction`] each of the `n` actions has a ratio of its own, and the policy's part is the mean over the
-//! actions, that of the entropy too (`trust_region_policy_loss` and `entropy` of ML-Agents 1.1.0).
+//! With [`Ratio::PerAction`] each of the `n` actions has its own ratio. The policy term and the entropy are then means
+//! over the actions (`trust_region_policy_loss` and `entropy` of ML-Agents 1.1.0).
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -21,7 +21,7 @@ use std::marker::PhantomData;
 /// Constants of the objective.
 #[derive(Clone, Copy, Debug)]
 pub struct Objective {
-    /// Whose ratio is clipped.
+    /// Whether the ratio is clipped for all actions together or for each one.
     pub ratio: Ratio,
     /// Clip range of the probability ratio.
     pub clip: f64,
@@ -31,7 +31,7 @@ pub struct Objective {
     pub entropy_coef: f64,
     /// Subtracted from the advantages.
     pub advantage_mean: f64,
-    /// Multiplies the advantages after that.
+    /// Factor of the advantages after the subtraction.
     pub advantage_scale: f64,
 }
 
@@ -42,14 +42,14 @@ pub struct LossSums {
     pub policy: f64,
     /// Value objective, over all streams.
     pub value: f64,
-    /// Estimate of the divergence from the policy that acted, `r - 1 - ln r`.
+    /// Estimate of the divergence from the policy that collected the rollout, `r - 1 - ln r`.
     pub kl: f64,
-    /// Samples whose ratio left the clip range in the direction of their advantage; the share of the actions where each has
-    /// its own.
+    /// Samples whose ratio left the clip range in the direction of their advantage. With one ratio per action: the
+    /// fraction of the actions.
     pub clipped: f64,
-    /// Of SAC, whose deviations depend on the state: minus the log-probabilities of the actions drawn.
+    /// SAC only, whose deviations depend on the state: negative log-probabilities of the sampled actions.
     pub entropy: f64,
-    /// Of SAC: mean standard deviations of the actions.
+    /// SAC only: mean standard deviations of the actions.
     pub std: f64,
     /// Number of samples.
     pub samples: f64,
@@ -67,7 +67,7 @@ impl std::ops::AddAssign for LossSums {
     }
 }
 
-/// Evaluates the objective: fills the derivatives with respect to the networks' outputs and the log standard deviations
+/// Evaluates the objective: fills the derivatives with respect to the network outputs and the log standard deviations
 /// (sums over samples, not means).
 pub struct Loss<'a, T: Real> {
     /// Constants.
@@ -76,15 +76,15 @@ pub struct Loss<'a, T: Real> {
     pub gaussian: &'a Gaussian<T::Scalar>,
     /// One entry per block.
     pub samples: &'a [Samples<'a, T::Scalar>],
-    /// Means and the derivative with respect to them.
+    /// Means, and the derivative with respect to them.
     pub mean: (&'a Blocks<T::Scalar>, &'a mut Blocks<T::Scalar>),
-    /// Values and the derivative with respect to them.
+    /// Values, and the derivative with respect to them.
     pub value: (&'a Blocks<T::Scalar>, &'a mut Blocks<T::Scalar>),
     /// Out: derivative with respect to the log standard deviations.
     pub d_log_std: &'a mut [T::Scalar],
     /// Work space: a row per action.
     pub rows: &'a mut [[T::Scalar; BLOCK]],
-    /// The lanes.
+    /// The lane type.
     pub lanes: PhantomData<T>,
 }
 
@@ -99,7 +99,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
         let (zero, one) = (T::zero(), T::lit(1.0));
         let (low, high) = (T::lit(1.0 - objective.clip), T::lit(1.0 + objective.clip));
         let (shift, scale) = (T::lit(objective.advantage_mean), T::lit(objective.advantage_scale));
-        // the mean over the actions, where each has a ratio
+        // with one ratio per action, the mean over the actions
         let weight = match objective.ratio {
             Ratio::Joint => 1.0,
             Ratio::PerAction => 1.0 / gaussian.std.len() as f64,
@@ -153,7 +153,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
                         let held = old + moved.max(-range).min(range);
                         let held_error = held - target;
                         let worse = (error * error).lt(held_error * held_error);
-                        // the held value does not move with the network outside the range
+                        // outside the range the clipped value does not depend on the network
                         d = T::select(worse, T::masked(moved.abs().lt(range), held_error), error);
                         error = T::select(worse, held_error, error);
                     }
@@ -184,7 +184,7 @@ struct Surrogate<T: Real> {
     gain: T,
     /// `r - 1 - ln r`.
     kl: T,
-    /// Where the ratio has left the clip range in the direction of the advantage.
+    /// True where the ratio left the clip range in the direction of the advantage.
     clipped: T::Mask,
     /// Derivative of `-gain` with respect to the log-probability.
     d_log_prob: T,

@@ -1,9 +1,9 @@
-//! The algorithms: what each does with a rollout, from top to bottom.
+//! The algorithms: how each one learns from a rollout, from top to bottom.
 //!
-//! An algorithm is a [`Learner`]: its networks' parameters, its optimizer, and whatever else it alone has. It sees the
-//! rollout as [`Experience`] and the machine as [`Workers`], who share out the work on gradients; threads, files and the
-//! clock are elsewhere. Every worker has a replica and changes it alike, so nothing is shared while gradients are computed;
-//! the replicas stay equal bit for bit.
+//! An algorithm is a [`Learner`]: the parameters of its networks, its optimizer, and its own further state. It reads
+//! the rollout as [`Experience`] and shares the work on gradients through [`Workers`]. Threads, files and the clock are
+//! elsewhere. Every worker has a replica and updates it in the same way, so replicas share nothing during gradients and
+//! stay equal bit for bit.
 
 pub mod a2c;
 pub mod acktr;
@@ -38,7 +38,7 @@ use schedule::Progress;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// What learns from the rollouts, with the settings that are its own.
+/// An algorithm with its settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Algorithm {
@@ -58,7 +58,7 @@ impl Default for Algorithm {
     }
 }
 
-/// What an algorithm is to learn, and with what.
+/// The task and the settings for a new learner.
 #[derive(Clone, Copy)]
 pub struct Setup<'a> {
     /// The task.
@@ -67,63 +67,63 @@ pub struct Setup<'a> {
     pub isa: Isa,
     /// Settings.
     pub common: Common<'a>,
-    /// Bound of the actions drawn, which are then divided by it.
+    /// Bound of the sampled actions, which are then divided by it.
     pub action_clip: f64,
-    /// What is to be imitated, if it is known here.
+    /// Demonstrations to imitate, if this process has them.
     pub demonstrations: Option<&'a Demonstrations>,
 }
 
 impl<'a> Setup<'a> {
-    /// What the rewards are for.
+    /// The context of the rewards.
     pub fn purpose(&self) -> Purpose<'a> {
         let Self { spec, common, action_clip, demonstrations, .. } = *self;
         Purpose { spec, seed: common.seed, action_scale: 1.0 / action_clip as f32, demonstrations }
     }
 }
 
-/// The settings of a run that are not the algorithm's own, but that it sees.
+/// Settings of a run that are not specific to the algorithm but visible to it.
 #[derive(Clone, Copy)]
 pub struct Common<'a> {
     /// Networks.
     pub network: &'a NetworkConfig,
-    /// Rewards.
+    /// Reward signals.
     pub rewards: &'a [RewardConfig],
-    /// How observations and rewards are normalized.
+    /// Normalization of observations and rewards.
     pub statistics: &'a StatisticsConfig,
-    /// Agents that act side by side.
+    /// Number of agents.
     pub agents: usize,
-    /// Decisions of each in a rollout.
+    /// Decisions per agent and rollout.
     pub horizon: usize,
     /// Seed.
     pub seed: u64,
 }
 
 impl Common<'_> {
-    /// Agents of a block.
+    /// Agents per block.
     pub fn lanes(&self) -> usize {
         self.agents.min(BLOCK)
     }
-    /// Blocks of agents.
+    /// Number of blocks of agents.
     pub fn blocks(&self) -> usize {
         self.agents.div_ceil(BLOCK)
     }
-    /// Blocks of samples in a rollout.
+    /// Blocks of samples per rollout.
     pub fn items(&self) -> usize {
         self.blocks() * self.horizon
     }
 }
 
-/// What a run with an algorithm needs of memory.
+/// Memory that a run with an algorithm needs.
 pub struct Needs {
-    /// Parameters.
+    /// Number of parameters.
     pub parameters: usize,
-    /// Numbers beside the gradient that a group of samples contributes.
+    /// Numbers that a group of samples contributes besides the gradient.
     pub moments: usize,
-    /// Items of the longest list that a gradient is computed on.
+    /// Items of the longest list for which a gradient is computed.
     pub items: usize,
-    /// What is kept of a decision.
+    /// Data that is kept per decision.
     pub shape: Shape,
-    /// Numbers of what the algorithm keeps of earlier rollouts.
+    /// Numbers that the algorithm keeps of earlier rollouts.
     pub replay: u64,
 }
 
@@ -131,7 +131,7 @@ impl Algorithm {
     /// Names in configurations and on the command line.
     pub const NAMES: [&str; 4] = ["ppo", "a2c", "acktr", "sac"];
 
-    /// Its name.
+    /// Name of the algorithm.
     pub fn name(&self) -> &'static str {
         match self {
             Algorithm::Ppo(_) => "ppo",
@@ -141,7 +141,7 @@ impl Algorithm {
         }
     }
 
-    /// A learner at the start of a run, for workers that have so many blocks each.
+    /// Creates a learner at the start of a run, for workers with `blocks[i]` blocks each.
     pub fn learner(&self, setup: &Setup<'_>, blocks: &[usize]) -> Box<dyn Learner> {
         match self {
             Algorithm::Ppo(settings) => Box::new(ppo::PpoRule::learner(*settings, setup)),
@@ -151,7 +151,7 @@ impl Algorithm {
         }
     }
 
-    /// Checks every setting, and what the algorithm demands of the others.
+    /// Checks every setting, and what the algorithm requires of the other settings.
     ///
     /// # Errors
     /// Names the setting, its value and the values that are valid.
@@ -164,7 +164,7 @@ impl Algorithm {
         }
     }
 
-    /// What a run needs.
+    /// Memory that a run needs.
     pub fn needs(&self, setup: &Setup<'_>) -> Needs {
         match self {
             Algorithm::Ppo(settings) => settings.needs(setup),
@@ -174,7 +174,7 @@ impl Algorithm {
         }
     }
 
-    /// Its learning rates, for messages.
+    /// Text with the learning rates, for messages.
     pub fn rates(&self) -> String {
         match self {
             Algorithm::Ppo(ppo::Ppo { lr, value_lr, .. }) | Algorithm::Sac(sac::Sac { lr, value_lr, .. }) => {
@@ -184,7 +184,7 @@ impl Algorithm {
         }
     }
 
-    /// How the learning rate moves.
+    /// Schedule of the learning rate.
     pub fn schedule(&self) -> schedule::Schedule {
         match self {
             Algorithm::Ppo(settings) => settings.schedule,
@@ -194,7 +194,7 @@ impl Algorithm {
         }
     }
 
-    /// Standard deviations of the actions, where they do not depend on the state.
+    /// Mutable standard deviations of the actions, if they do not depend on the state.
     pub fn deviations_mut(&mut self) -> Option<&mut Deviations> {
         match self {
             Algorithm::Ppo(settings) => Some(&mut settings.deviations),
@@ -204,63 +204,63 @@ impl Algorithm {
         }
     }
 
-    /// Whether rollouts may be played elsewhere: not if they are kept, with the agents.
+    /// Whether other processes may play rollouts. A replay keeps rollouts with the agents, which rules that out.
     pub fn travels(&self) -> bool {
         !matches!(self, Algorithm::Sac(_))
     }
 }
 
-/// What learns: every worker has a replica, and all change alike.
+/// A learner. Every worker has a replica, and all replicas change in the same way.
 pub trait Learner: Send {
-    /// Another worker's, which shares what all workers share.
+    /// Creates a replica for another worker. It shares the data that all workers share.
     fn replica(&self) -> Box<dyn Learner>;
-    /// Where its parameters lie.
+    /// Places of the networks in the parameters.
     fn places(&self) -> &Places;
-    /// Its parameters.
+    /// The parameters.
     fn params(&self) -> &[f32];
-    /// Its parameters, as many.
+    /// The parameters. Their number must stay the same.
     fn params_mut(&mut self) -> &mut Vec<f32>;
-    /// What is to be kept of a decision.
+    /// Data that is kept per decision.
     fn shape(&self) -> Shape;
-    /// What a horizon is played with.
+    /// Networks and constants for a rollout.
     fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_>;
 
-    /// Learns from a rollout together with all other workers, and adds up what the objective was.
+    /// Learns from a rollout together with all other workers, and adds the objective to `sums`.
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums);
-    /// Lets the networks make of an observation what they did with another map of observations.
+    /// Adapts the networks to another map of observations, so that their outputs for a raw observation stay the same.
     fn follow(&mut self, before: &Normalizer, after: &Normalizer);
 
-    /// What reports say of it, after a rollout with such sums and updates with such sums.
+    /// Numbers for reports, given the sums over the rollout and over its updates.
     fn describe(&self, totals: &Totals, sums: &LossSums) -> Description;
-    /// The policy to act with.
+    /// The current policy.
     fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy;
 
-    /// All that it needs to go on.
+    /// The full state, for resuming.
     fn save(&self) -> Saved;
-    /// Takes that back.
+    /// Restores a saved state.
     ///
     /// # Errors
-    /// Names what is missing or of another length.
+    /// Names the entry that is missing or has the wrong length.
     fn load(&mut self, saved: &Saved) -> Result<(), Error>;
 }
 
-/// The moment of an update.
+/// Context of an update.
 #[derive(Clone, Copy)]
 pub struct Now<'a> {
-    /// How far the run is.
+    /// Progress of the run.
     pub progress: &'a Progress,
     /// Statistics of observations and rewards.
     pub statistics: &'a Statistics,
 }
 
-/// What reports say of a learner.
+/// Numbers of a learner for reports.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// Learning rate of the policy.
     pub lr: f64,
-    /// Minibatches left out because their gradient was not finite.
+    /// Minibatches that were skipped because their gradient was not finite.
     pub skipped: u64,
-    /// Part of the returns' variance that the value function foresaw.
+    /// Fraction of the variance of the returns that the value function explains.
     pub explained_variance: f64,
     /// Entropy of the policy, nats.
     pub entropy: f64,
@@ -268,51 +268,53 @@ pub struct Description {
     pub std_mean: f64,
 }
 
-/// What a group of samples contributes.
+/// Contribution of a group of samples.
 pub struct Partial {
     /// Gradient of all parameters.
     pub gradient: Vec<f32>,
-    /// Whatever else the algorithm sums.
+    /// Further sums of the algorithm.
     pub moments: Vec<f32>,
     /// Sums of the objective.
     pub sums: LossSums,
 }
 
 impl Partial {
-    /// Room for parameters and moments.
+    /// Allocates parameters and moments.
     pub fn new(parameters: usize, moments: usize) -> Self {
         Self { gradient: vec![0.0; parameters], moments: vec![0.0; moments], sums: LossSums::default() }
     }
 }
 
-/// Sees a piece of the gradient: its network, its place among the parameters, and the numbers.
+/// Receives a piece of the gradient: its network, its place among the parameters, and the numbers.
 pub type ShowPiece<'s> = &'s mut dyn FnMut(usize, Range<usize>, &[f32]);
 
-/// All workers of a run, from the view of one of them. What one calls, all call, in the same order.
+/// All workers of a run, as seen by one of them. All workers must make the same calls in the same order.
 pub trait Workers {
-    /// Shares a list of so many items out in groups: `work` fills a group's part, for the items of a range. Then the
-    /// gradients of all groups are summed. Returns the sums of the objective.
+    /// Splits a list of `items` items into groups: `work` fills the contribution of a group for a range of items. Then
+    /// sums the gradients of all groups. Returns the sums of the objective.
     fn share_out(&mut self, items: usize, work: &mut dyn FnMut(Range<usize>, &mut Partial)) -> LossSums;
-    /// Sums of the squares of that gradient, for each network of [`Places`].
+    /// Sums of squares of the summed gradient, for each network of [`Places`].
     fn squares(&self) -> Vec<f64>;
-    /// Shows every piece of that gradient with its network and its place among the parameters; no piece is in two networks.
+    /// Shows every piece of the summed gradient with its network and its place among the parameters. No piece spans two
+    /// networks.
     fn pieces(&self, show: ShowPiece<'_>);
-    /// Shares `parts` parts of another piece of work out, with what the groups of the last gradient contributed, in order;
-    /// returns when all are done.
+    /// Splits other work into `parts` parts. `work` also gets the groups' contributions to the last gradient, in order.
+    /// Returns when all parts are done.
     fn divide(&mut self, parts: usize, work: &mut dyn FnMut(usize, &[&Partial]));
     /// Waits for all workers.
     fn wait(&self);
 }
 
-/// Most groups of a list of samples: bounds the memory for partial gradients and the threads that can share a list.
+/// Maximum number of groups per list of samples. It bounds the memory for partial gradients and the threads that can
+/// share a list.
 pub const MAX_GROUPS: usize = 32;
 
-/// Groups that a list of items is split into.
+/// Number of groups for a list of items.
 pub fn group_count(items: usize) -> usize {
     items.div_ceil(CHUNK).clamp(1, MAX_GROUPS)
 }
 
-/// Part `i` of `0..n` split into `parts` nearly equal runs.
+/// Part `i` of `0..n` when it is split into `parts` nearly equal ranges.
 pub fn share(n: usize, parts: usize, i: usize) -> Range<usize> {
     n * i / parts..n * (i + 1) / parts
 }
@@ -321,22 +323,22 @@ pub fn share(n: usize, parts: usize, i: usize) -> Range<usize> {
 pub(crate) mod check {
     use super::*;
 
-    /// Refuses what is not above zero.
+    /// Refuses values that are not above zero.
     pub fn positive(list: &[(&'static str, f64)]) -> Result<(), Error> {
-        // in single precision, too, in which most of them are used
+        // checked in single precision too, where most of them are used
         match list.iter().find(|(_, x)| !((*x as f32).is_finite() && *x > 0.0)) {
             Some((field, x)) => Err(Error::config(field, x, "a positive number")),
             None => Ok(()),
         }
     }
-    /// Refuses what is not from 0 to below 1.
+    /// Refuses values outside 0 to below 1.
     pub fn fraction(field: &'static str, x: f64) -> Result<(), Error> {
         match (0.0..1.0).contains(&x) {
             true => Ok(()),
             false => Err(Error::config(field, x, "a number from 0 to below 1")),
         }
     }
-    /// Refuses rewards beside the task's.
+    /// Refuses rewards other than the task's.
     pub fn task_alone(common: &Common<'_>, name: &str) -> Result<(), Error> {
         match common.rewards.iter().find(|reward| reward.kind != RewardKind::Task) {
             Some(reward) => {

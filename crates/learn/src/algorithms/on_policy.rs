@@ -1,4 +1,4 @@
-//! What every learner from its own rollouts does alike, whatever moves its networks.
+//! The common part of all on-policy learners.
 
 use super::actor_critic::{ActorCritic, Space};
 use super::loss::{LossSums, Objective};
@@ -15,21 +15,21 @@ use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 
-/// Networks, and how far they have come.
+/// Networks and the progress of their training.
 pub struct Student {
     /// The networks.
     pub nets: ActorCritic,
     /// Learning rate of the policy.
     pub lr: f64,
-    /// Steps left out because their gradient was not finite.
+    /// Steps that were skipped because their gradient was not finite.
     pub skipped: u64,
-    /// Numbers beside the gradient that a group of samples contributes.
+    /// Numbers that a group of samples contributes besides the gradient.
     moments: usize,
-    /// Where gradients are computed, once there are any.
+    /// Work space for gradients, allocated at the first one.
     pub space: Option<Box<Space>>,
-    /// What observations of the present rollout were normalized with.
+    /// Map that normalized the observations of the current rollout.
     normalizer: Normalizer,
-    /// Gradients computed.
+    /// Number of computed gradients.
     batches: u64,
 }
 
@@ -51,9 +51,9 @@ impl Student {
     }
 }
 
-/// What moves the networks: an algorithm with its settings and the memory of its optimizer.
+/// An update rule: an algorithm with its settings and the state of its optimizer.
 pub trait Rule: Clone + Send + 'static {
-    /// Learns from a rollout together with all other workers; returns what the objective was.
+    /// Learns from a rollout together with all other workers. Returns the sums of the objective.
     fn learn(
         &mut self,
         student: &mut Student,
@@ -61,20 +61,21 @@ pub trait Rule: Clone + Send + 'static {
         experience: &Experience<'_>,
         progress: &Progress,
     ) -> LossSums;
-    /// Adds what its optimizer remembers.
+    /// Adds the state of its optimizer.
     fn save(&self, saved: &mut Saved);
-    /// Takes that back.
+    /// Restores that state.
     fn load(&mut self, saved: &Saved) -> Result<(), Error>;
 }
 
-/// A [`Learner`] from its own rollouts.
+/// An on-policy [`Learner`].
 pub struct OnPolicy<R> {
     student: Student,
     rule: R,
 }
 
 impl<R: Rule> OnPolicy<R> {
-    /// At the start of a run; each group of samples contributes so many `moments` beside its gradient.
+    /// Creates a learner at the start of a run. Each group of samples contributes `moments` numbers besides its
+    /// gradient.
     pub fn new(nets: ActorCritic, lr: f64, moments: usize, rule: R) -> Self {
         let normalizer = Normalizer::identity(0, 1.0);
         Self { student: Student { nets, lr, skipped: 0, moments, space: None, normalizer, batches: 0 }, rule }
@@ -85,7 +86,7 @@ impl<R: Rule> Learner for OnPolicy<R> {
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
         // the first rollout only fills the statistics
         if now.progress.iteration > 0 {
-            // counted from the rollout's number, a run that goes on draws as one that never stopped
+            // counting from the rollout's number makes a resumed run draw the same numbers
             self.student.batches = now.progress.iteration << 32;
             self.student.normalizer = now.statistics.normalizer();
             *sums += self.rule.learn(&mut self.student, workers, experience, now.progress);

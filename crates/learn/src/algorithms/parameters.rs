@@ -1,4 +1,4 @@
-//! Where the parameters of several networks lie in one array.
+//! Places of the parameters of several networks in one array.
 
 use crate::lanes::BLOCK;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 /// Gradient elements whose squares are summed together.
 const NORM_BLOCK: usize = 1024;
 
-/// Places of networks in one array, each padded with zeros to rows of sixteen.
+/// Places of networks in one array. Each is padded with zeros to rows of sixteen.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
     starts: Vec<usize>,
@@ -14,7 +14,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// The place of one more network, of so many parameters.
+    /// Adds a network of `count` parameters and returns its place.
     pub fn add(&mut self, count: usize) -> Range<usize> {
         let start = self.len;
         self.starts.push(start);
@@ -29,7 +29,7 @@ impl Places {
     pub fn count(&self) -> usize {
         self.starts.len()
     }
-    /// Pieces of the array whose squares are summed together, with the number of their network.
+    /// Pieces of the array whose squares are summed together, with the index of their network.
     pub fn pieces(&self) -> Vec<(usize, Range<usize>)> {
         let ends = self.starts.iter().skip(1).copied().chain([self.len]);
         let of = |(network, (start, end)): (usize, (&usize, usize))| {

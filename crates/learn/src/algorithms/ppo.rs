@@ -1,7 +1,7 @@
-//! Proximal policy optimization (Schulman et al., 2017): what it does with a rollout, from top to bottom.
+//! Proximal policy optimization (Schulman et al., 2017): how it learns from a rollout, from top to bottom.
 //!
-//! `epochs` times, the rollout of all workers is shuffled and split into minibatches; each gives one step of Adam on the
-//! clipped objective of [`loss`](super::loss).
+//! In each of `epochs` epochs, the rollout of all workers is shuffled and split into minibatches. Each minibatch gives
+//! one step of Adam on the clipped objective of [`loss`](super::loss).
 
 use super::actor_critic::{self, ActorCritic, Deviations, Layout};
 use super::loss::{LossSums, Objective};
@@ -15,39 +15,39 @@ use crate::optim::adam::Adam;
 use crate::rollout::data::Experience;
 use serde::{Deserialize, Serialize};
 
-/// Settings of PPO; the defaults solve the small tasks.
+/// Settings of PPO. The defaults solve the small tasks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Ppo {
-    /// Parts that the rollout is split into in every epoch. A part of fewer than 256 samples per thread leaves threads idle.
+    /// Minibatches per epoch. Minibatches with fewer than 256 samples per thread leave threads idle.
     pub minibatches: usize,
     /// Passes over each rollout.
     pub epochs: usize,
-    /// Learning rate of the policy (where the adaptive schedule starts).
+    /// Learning rate of the policy. The adaptive schedule starts with it.
     pub lr: f64,
     /// Learning rate of the value function.
     pub value_lr: f64,
-    /// Rollouts at the start in which the value function learns alone: a policy that starts from another would forget what it
-    /// knows by the advantages of a value function that knows nothing.
+    /// Number of first rollouts that train only the value function. Without it, the advantages of an untrained value
+    /// function would spoil a policy that starts from another one.
     #[serde(skip_serializing_if = "is_zero")]
     pub value_warmup: u64,
-    /// How the policy's learning rate moves.
+    /// Schedule of the policy's learning rate.
     pub schedule: Schedule,
-    /// Divergence per update that the adaptive schedule aims at, nats. Small steps at the end settle a gait.
+    /// KL divergence per update that the adaptive schedule aims at, nats. Small values at the end refine a gait.
     pub target_kl: Moving,
     /// Bounds of the adaptive schedule.
     pub lr_range: [f64; 2],
-    /// Added to the root of Adam's second moment: how small a gradient may be and still count.
+    /// Constant that Adam adds to the root of the second moment: the smallest gradients that still count.
     pub adam_epsilon: f64,
-    /// Bound of the gradient's norm, for each network by itself.
+    /// Bound of the gradient norm, for each network separately.
     pub max_grad_norm: f64,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
-    /// Whose probability ratio is clipped.
+    /// Whether the probability ratio is clipped for all actions together or for each one.
     pub ratio: Ratio,
     /// Clip range of the probability ratio.
     pub clip: Moving,
-    /// Clip range of the value's change (in units of the scaled return) at the start; it shrinks as that of the ratio does.
+    /// Clip range of the value's change at the start, in units of the scaled return. It shrinks with that of the ratio.
     /// None by default.
     pub value_clip: Option<f64>,
     /// Weight of the entropy bonus.
@@ -116,7 +116,7 @@ impl Ppo {
         Ok(())
     }
 
-    /// What a run needs.
+    /// Memory that a run needs.
     pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
         Layout::new(setup, self.ratio).needs(setup.common.items().div_ceil(self.minibatches), 0)
     }
@@ -127,7 +127,7 @@ fn is_zero(n: &u64) -> bool {
     *n == 0
 }
 
-/// PPO at work.
+/// PPO with the state of its optimizer.
 #[derive(Clone)]
 pub struct PpoRule {
     settings: Ppo,
@@ -136,14 +136,14 @@ pub struct PpoRule {
 }
 
 impl PpoRule {
-    /// A learner at the start of a run.
+    /// Creates a learner at the start of a run.
     pub fn learner(settings: Ppo, setup: &Setup<'_>) -> OnPolicy<Self> {
         let nets = ActorCritic::new(setup, settings.ratio, settings.deviations, settings.gae_lambda);
         let adam = Adam::new(nets.params.len(), settings.adam_epsilon);
         OnPolicy::new(nets, settings.lr, 0, Self { settings, seed: setup.common.seed, adam })
     }
 
-    /// The objective with the settings of this moment; advantages are normalized over the rollout.
+    /// The objective with the current settings. Advantages are normalized over the rollout.
     fn objective(&self, experience: &Experience<'_>, progress: &Progress) -> Objective {
         let settings = &self.settings;
         let (mean, var) = experience.totals.advantage();
@@ -158,10 +158,10 @@ impl PpoRule {
         }
     }
 
-    /// One step of Adam on the worker's replica, each network's gradient bounded by itself.
+    /// Takes one step of Adam on the worker's replica. The gradient of each network is bounded separately.
     fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
         let (Self { settings, adam, .. }, Student { nets, lr, skipped, .. }) = (self, student);
-        // nobody has decided anything
+        // no agent acted in this batch
         if sums.samples == 0.0 {
             return;
         }

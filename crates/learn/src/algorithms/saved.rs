@@ -1,9 +1,9 @@
-//! A learner's state, by names.
+//! The saved state of a learner, by name.
 
 use crate::error::Error;
 use crate::optim::adam::Adam;
 
-/// All that a learner needs to go on.
+/// The state that a learner needs to resume.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Saved {
     /// Single numbers.
@@ -19,9 +19,9 @@ pub enum Numbers {
     F32(Vec<f32>),
     /// Double precision.
     F64(Vec<f64>),
-    /// Words.
+    /// 32-bit words.
     U32(Vec<u32>),
-    /// Double words.
+    /// 64-bit words.
     U64(Vec<u64>),
 }
 
@@ -68,7 +68,7 @@ impl Saved {
     /// Copies a list of known length.
     ///
     /// # Errors
-    /// If it is missing or has another length.
+    /// If the list is missing or has another length.
     pub fn copy<'s, N: Copy + 'static>(&'s self, name: &str, to: &mut [N]) -> Result<(), Error>
     where
         &'s [N]: TryFrom<&'s Numbers>,
@@ -84,10 +84,10 @@ impl Saved {
         to.copy_from_slice(list);
         Ok(())
     }
-    /// A list of any length.
+    /// Returns a list of any length.
     ///
     /// # Errors
-    /// If it is missing.
+    /// If the list is missing.
     pub fn get<'s, N: 'static>(&'s self, name: &str) -> Result<&'s [N], Error>
     where
         &'s [N]: TryFrom<&'s Numbers>,
@@ -99,10 +99,10 @@ impl Saved {
             expected: "those of the algorithm".into(),
         })
     }
-    /// A number.
+    /// Returns a single number.
     ///
     /// # Errors
-    /// If it is missing.
+    /// If the number is missing.
     pub fn number(&self, name: &str) -> Result<f64, Error> {
         self.scalars.iter().find(|(n, _)| n == name).map(|(_, x)| *x).ok_or_else(|| Error::Mismatch {
             what: format!("checkpoint: {name}"),
@@ -112,7 +112,7 @@ impl Saved {
     }
 }
 
-/// Notes the state of Adam.
+/// Saves the state of Adam.
 pub(crate) fn save_adam(adam: &Adam, saved: &mut Saved) {
     saved.list("adam_m", &adam.m);
     saved.list("adam_v", &adam.v);

@@ -1,9 +1,9 @@
-//! Learning to decide as other policies do: supervised, from observations and the actions that a teacher would take there.
+//! Policy distillation: supervised learning from observations and a teacher's actions.
 //!
-//! One network can so do what several have learned by themselves (policy distillation: Rusu et al., 2016), in a small part of
-//! the time that it would take by reinforcement. Whoever calls lets the student play and asks the teachers what they would do
-//! where it gets to (DAgger: Ross, Gordon and Bagnell, 2011): a student that has seen its teachers' states only does not know
-//! what to do in its own.
+//! One network learns what several policies do (policy distillation: Rusu et al., 2016), in a fraction of the time that
+//! reinforcement learning takes. The caller lets the student play and asks the teachers for their actions in the states
+//! that the student reaches (DAgger: Ross, Gordon and Bagnell, 2011). A student that has only seen its teachers' states
+//! cannot act in its own.
 //!
 //! The loss is half the squared distance from the teacher's best action, in the units of the network's output.
 
@@ -23,24 +23,24 @@ use crate::optim::adam::Adam;
 use crate::policy::{Policy, PolicyMeta, check_widths};
 use marathon_physics::lanes::Isa;
 
-/// Added to the root of Adam's second moment.
+/// Constant that Adam adds to the root of the second moment.
 const ADAM_EPSILON: f64 = 1e-5;
 /// Bound of the normalized observations.
 const OBSERVATION_CLIP: f32 = 10.0;
 
-/// Observations with what a teacher does there: the latest ones, up to a number.
+/// A bounded buffer of the latest observations with the teacher's actions.
 pub struct Lessons {
     obs_len: usize,
     act_len: usize,
     room: usize,
     obs: Vec<f32>,
     actions: Vec<f32>,
-    /// Where the next row goes once the room is full.
+    /// Index of the row that is overwritten next, once the buffer is full.
     next: usize,
 }
 
 impl Lessons {
-    /// Room for so many rows of such lengths.
+    /// Creates a buffer of `room` rows.
     pub fn new(room: usize, obs_len: usize, act_len: usize) -> Self {
         Self { obs_len, act_len, room: room.max(1), obs: Vec::new(), actions: Vec::new(), next: 0 }
     }
@@ -52,20 +52,20 @@ impl Lessons {
     pub fn len(&self) -> usize {
         self.actions.len() / self.act_len
     }
-    /// Whether there are none.
+    /// Whether the buffer is empty.
     pub fn is_empty(&self) -> bool {
         self.actions.is_empty()
     }
-    /// Observations of at most so many rows, those that came last, while there is room.
+    /// Observations of at most `rows` rows. Before the buffer is full, these are the latest ones.
     pub fn latest(&self, rows: usize) -> &[f32] {
         &self.obs[(self.len() - rows.min(self.len())) * self.obs_len..]
     }
-    /// Takes rows in, `[n][obs]` and `[n][act]`, in the place of the oldest if there is no more room.
+    /// Adds rows, `[n][obs]` and `[n][act]`. A full buffer overwrites its oldest rows.
     ///
     /// # Panics
     /// If the lengths do not fit.
     pub fn push(&mut self, obs: &[f32], actions: &[f32]) {
-        assert_eq!(obs.len() / self.obs_len, actions.len() / self.act_len, "an action for each observation");
+        assert_eq!(obs.len() / self.obs_len, actions.len() / self.act_len, "one action per observation");
         for (obs, action) in obs.chunks_exact(self.obs_len).zip(actions.chunks_exact(self.act_len)) {
             if self.len() < self.room {
                 self.obs.extend(obs);
@@ -79,17 +79,17 @@ impl Lessons {
     }
 }
 
-/// A policy in the making.
+/// A student policy in training.
 pub struct Distiller {
     meta: PolicyMeta,
     isa: Isa,
     seed: u64,
     net: Mlp,
-    /// Parameters, and zeros up to whole rows of sixteen.
+    /// Parameters, padded with zeros to whole rows of sixteen.
     params: Vec<f32>,
     adam: Adam,
     updates: u64,
-    /// Whether it started from a policy.
+    /// Whether it started from another policy.
     started: bool,
     noise: SplitMix,
     moments: Moments,
@@ -107,7 +107,8 @@ struct Space {
 }
 
 impl Distiller {
-    /// A policy that knows nothing yet. `log_std`: logarithms of the standard deviations of its actions, which it keeps.
+    /// Creates an untrained policy. `log_std` holds the logarithms of the standard deviations of its actions, which
+    /// stay fixed.
     ///
     /// # Errors
     /// If a width is not allowed for a policy.
@@ -142,10 +143,10 @@ impl Distiller {
         })
     }
 
-    /// Starts from a policy, whose number `i` of the observation is number `sees[i]` here.
+    /// Starts from a policy. Number `i` of its observation is number `sees[i]` of the student's.
     ///
     /// # Errors
-    /// If its network is wider, or of another kind.
+    /// If the policy's network is wider or has another form.
     pub fn start_from(&mut self, policy: &Policy, sees: &[usize]) -> Result<(), Error> {
         let params = &mut self.params[..self.net.len()];
         graft(&self.net, params, policy.net(), policy.params(), sees)?;
@@ -155,13 +156,13 @@ impl Distiller {
         Ok(())
     }
 
-    /// Lets observations, `[n][obs]`, count in the statistics that normalize all of them; before the first update only, since
-    /// what the network makes of an observation changes.
+    /// Adds observations, `[n][obs]`, to the normalization statistics. This is allowed before the first update only,
+    /// because it changes the network's output for an observation.
     ///
     /// # Panics
     /// After the first update.
     pub fn see(&mut self, obs: &[f32]) {
-        assert_eq!(self.updates, 0, "statistics are made before the first update");
+        assert_eq!(self.updates, 0, "statistics change before the first update only");
         let n = self.meta.obs;
         let centers: Vec<f32> = self.moments.mean32();
         let mut sums = vec![(0.0, 0.0); n];
@@ -175,19 +176,19 @@ impl Distiller {
         self.moments.merge((obs.len() / n) as f64, &sums, f64::INFINITY);
         let before = self.normalizer.clone();
         self.normalizer = Normalizer::new(self.moments.mean32(), self.moments.std(), OBSERVATION_CLIP);
-        // what the network has learned elsewhere it is to know still
+        // keeps what the network learned before
         if self.started {
             self.net.follow(&mut self.params[..self.net.len()], &before, &self.normalizer);
         }
     }
 
-    /// One step of Adam on rows drawn from the lessons, a multiple of sixteen. Returns the mean squared distance of an action's
-    /// numbers from the teacher's.
+    /// Takes one step of Adam on rows that are drawn from the lessons, a multiple of sixteen. Returns the mean squared
+    /// distance between the numbers of an action and the teacher's.
     ///
     /// # Panics
     /// If there are no lessons.
     pub fn learn(&mut self, lessons: &Lessons, rows: usize, lr: f64) -> f64 {
-        assert!(!lessons.is_empty(), "there is something to learn from");
+        assert!(!lessons.is_empty(), "no lessons to learn from");
         let mut random = SplitMix::new(SplitMix::new(self.seed, self.updates).word(), SAMPLES);
         self.updates += 1;
         let (blocks, act) = (rows.div_ceil(BLOCK), self.meta.act);
@@ -219,7 +220,7 @@ impl Distiller {
         loss * scale / act as f64
     }
 
-    /// Puts a row of the lessons into a lane of the work space.
+    /// Copies a row of the lessons into a lane of the work space.
     fn place(&mut self, lessons: &Lessons, row: usize, block: usize, lane: usize) {
         let (obs, act) = (self.meta.obs, self.meta.act);
         let input = self.space.input.block_mut(block);
@@ -232,12 +233,12 @@ impl Distiller {
         }
     }
 
-    /// Fills a list with standard normal numbers, for actions as in training.
+    /// Fills a list with standard normal numbers, for sampled actions as in training.
     pub fn draw(&mut self, noise: &mut [f32]) {
         noise.iter_mut().for_each(|x| *x = normal(&mut self.noise) as f32);
     }
 
-    /// Number of the network's parameters that are not finite.
+    /// Number of network parameters that are not finite.
     pub fn lost(&self) -> usize {
         self.params.iter().filter(|x| !x.is_finite()).count()
     }
@@ -251,14 +252,14 @@ impl Distiller {
         (6.0 * params + activations) * size_of::<f32>() as f64
     }
 
-    /// The policy as it is now.
+    /// The current policy.
     pub fn policy(&self) -> Policy {
         let params = self.params[..self.net.len()].to_vec();
         Policy::assemble(self.meta.clone(), self.net.clone(), params, self.normalizer.clone(), self.log_std.clone())
     }
 }
 
-/// What the network has to put out for an action of the environment's.
+/// Network output that gives an action of the environment.
 fn nominal(ranges: &[[f32; 2]], i: usize, action: f32) -> f32 {
     match ranges.get(i) {
         Some([low, high]) => (2.0 * action - low - high) / (high - low),

@@ -87,7 +87,8 @@ impl Distiller {
         for name in names {
             let [found, expected] = [&document.about, about].map(|about| about.get(name).unwrap_or(&none));
             if found != expected {
-                let expected = format!("{expected}; it is of another distillation: delete it to begin anew");
+                let expected =
+                    format!("{expected}; the file belongs to another distillation: delete it to start again");
                 return Err(Error::file(path, name, found, expected));
             }
         }

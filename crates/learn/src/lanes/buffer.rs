@@ -14,11 +14,11 @@ impl<S: Copy + Default> Aligned<S> {
     pub fn new(len: usize) -> Self {
         const LINE: usize = 64;
         let data = vec![S::default(); len + LINE / size_of::<S>()];
-        // the heap block does not move with the vector, which is never resized
+        // moving the vector does not move its heap block, which is never resized
         let start = (LINE - data.as_ptr() as usize % LINE) % LINE / size_of::<S>();
         Self { data, start, len }
     }
-    /// `blocks * features` rows of sixteen zeros.
+    /// `rows` rows of sixteen zeros.
     pub fn rows(rows: usize) -> Self {
         Self::new(rows * BLOCK)
     }
@@ -51,7 +51,7 @@ impl<S> std::ops::DerefMut for Aligned<S> {
 
 /// A chunk of blocks in the layout `[block][feature][16]`, the work space of a network.
 ///
-/// Consecutive blocks are an odd number of rows apart: with a power of two, the same feature of every block would
+/// The stride between blocks is an odd number of rows. With a power of two, the same feature of every block would
 /// compete for one set of the first-level cache.
 pub struct Blocks<S> {
     data: Aligned<S>,
@@ -60,7 +60,7 @@ pub struct Blocks<S> {
 }
 
 impl<S: Copy + Default> Blocks<S> {
-    /// Zeros for `blocks` blocks of `features` features.
+    /// Creates `blocks` blocks of `features` features, filled with zeros.
     pub fn new(blocks: usize, features: usize) -> Self {
         let stride = features | 1;
         Self { data: Aligned::rows(blocks * stride), features, stride }

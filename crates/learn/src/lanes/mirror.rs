@@ -1,13 +1,13 @@
-//! Fewer agents than a block has lanes: 1, 2, 4 or 8.
+//! Blocks with fewer agents than lanes: 1, 2, 4 or 8.
 //!
-//! The lanes that are left over show what those of the agents show: lane `i` has the experience of agent `i % agents`, to the
-//! bit. Every agent then counts as often as any other, so means over samples, and with them gradients and statistics, are
-//! those of the agents alone; sums are [scaled](crate::rollout::sums::BlockSums::scale) down to them. It costs as much as sixteen agents.
+//! The unused lanes mirror the agents: lane `i` has the experience of agent `i % agents`, to the bit. Every agent then
+//! has the same weight, so means over samples, gradients and statistics are those of the agents alone. Sums are
+//! [scaled](crate::rollout::sums::BlockSums::scale) down to them. The cost is that of sixteen agents.
 
 use crate::lanes::BLOCK;
 use marathon_envs::BlockStep;
 
-/// The mask of the agents alone, repeated.
+/// Repeats the mask of the agents.
 fn repeat(mask: u16, agents: usize) -> u16 {
     let own = mask & ((1 << agents) - 1);
     (0..BLOCK).step_by(agents).fold(0, |all, at| all | own << at)
@@ -22,7 +22,7 @@ pub fn rows<S: Copy>(rows: &mut [S], agents: usize) {
     }
 }
 
-/// Repeats what a decision led to.
+/// Repeats the results of a decision.
 pub fn step(out: &mut BlockStep, obs: &mut [f32], agents: usize) {
     for row in [obs, &mut out.reward, &mut out.forward, &mut out.terms, &mut out.info] {
         rows(row, agents);

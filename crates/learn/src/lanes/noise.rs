@@ -1,14 +1,14 @@
 //! Random streams: one per agent, sixteen side by side.
 //!
 //! Every agent has its own xoshiro128++ generator (Blackman and Vigna, "Scrambled linear pseudorandom number
-//! generators", 2021), seeded from the run's seed and the agent's number, so its noise depends on the seed, the agent
-//! and the step alone. The loops over `[u32; 16]` become vector instructions inside [`Real::enter`].
+//! generators", 2021), seeded from the run's seed and the agent's number. Its noise therefore depends only on the seed,
+//! the agent and the step. The loops over `[u32; 16]` become vector instructions inside [`Real::enter`].
 
 use crate::lanes::BLOCK;
 use crate::lanes::mirror;
 use marathon_physics::lanes::Real;
 
-/// Marks of the streams for different purposes.
+/// Stream numbers for different purposes.
 const ACTIONS: u64 = 1 << 62;
 /// Shuffles of rollouts.
 pub const SHUFFLES: u64 = 1 << 63;
@@ -16,22 +16,22 @@ pub const SHUFFLES: u64 = 1 << 63;
 pub const PARAMETERS: u64 = 3 << 61;
 /// Batches from a replay.
 pub const SAMPLES: u64 = 1 << 61;
-/// Actions of a student that learns from others.
+/// Actions of a distilled student.
 pub const EXPLORATION: u64 = 3 << 60;
-/// Initial parameters of reward signals; two streams for each.
+/// Initial parameters of reward signals, two streams for each.
 pub const SIGNALS: u64 = PARAMETERS + 1;
-/// Demonstrations beside an update's samples.
+/// Demonstrations that go with an update's samples.
 const DEMONSTRATIONS: u64 = 7 << 60;
 
-/// Seeds of roles but the first.
+/// Seeds of all roles but the first.
 const ROLES: u64 = 5 << 60;
 
-/// Seed of everything random about role number `i` of a run: that of the run for the first.
+/// Seed for all random numbers of role `i` of a run. The first role uses the run's seed.
 pub fn seed_of_role(seed: u64, i: usize) -> u64 {
     if i == 0 { seed } else { SplitMix::new(seed, ROLES | i as u64).word() }
 }
 
-/// Seed of the draws of demonstrations for minibatch number `batch` of a run.
+/// Seed for drawing demonstrations for minibatch `batch` of a run.
 pub fn seed_of_demonstrations(seed: u64, batch: u64) -> u64 {
     SplitMix::new(SplitMix::new(seed, DEMONSTRATIONS).word(), batch).word()
 }
@@ -41,9 +41,9 @@ pub fn seed_of_demonstrations(seed: u64, batch: u64) -> u64 {
 pub struct SplitMix(u64);
 
 impl SplitMix {
-    /// A stream for a seed and a purpose or place: different arguments give unrelated streams.
+    /// A stream for a seed and a purpose or place. Different arguments give unrelated streams.
     pub fn new(seed: u64, stream: u64) -> Self {
-        // not the first word of anyone else's generator with the same seed
+        // differs from other generators with the same seed
         let mut mix = SplitMix(seed ^ 0x6c65_6172_6e65_7221);
         SplitMix(mix.word() ^ stream.wrapping_mul(0xd134_2543_de82_ef95))
     }
@@ -99,7 +99,7 @@ impl Noise {
         Self { state }
     }
 
-    /// The first streams in place of the others, where a block has fewer agents than lanes.
+    /// Repeats the first streams in the other lanes, for a block with fewer agents than lanes.
     pub fn mirrored(mut self, agents: usize) -> Self {
         mirror::rows(self.state.as_flattened_mut(), agents);
         self

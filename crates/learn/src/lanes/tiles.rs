@@ -1,11 +1,11 @@
 //! The inner loops of a network: register tiles over blocks of sixteen samples.
 //!
-//! A *column* is one vector of samples of one block: a block is one column of sixteen lanes, two of eight, four of four.
-//! Each tile keeps a small rectangle of results in registers while it runs over the inner dimension. Every result is
-//! a chain of fused products in an order that depends neither on the shape of the tile nor on the vector width, and the
-//! sums over samples end in [`sum16`], so all instruction sets give the same bits.
+//! A *column* is one vector of samples of one block: a block is one column of sixteen lanes, two of eight, four of
+//! four. Each tile keeps a small rectangle of results in registers while it runs over the inner dimension. Every result
+//! is a chain of fused products. Its order depends neither on the shape of the tile nor on the vector width. Sums over
+//! samples end in [`sum16`], so all instruction sets give the same bits.
 //!
-//! `x`, `y`, `dx`, `dy` are rows of sixteen, `[block][feature][16]`, blocks `*_stride` rows apart; weights are
+//! `x`, `y`, `dx` and `dy` are rows of sixteen, `[block][feature][16]`, with blocks `*_stride` rows apart. Weights are
 //! `[output][input]`.
 
 #![expect(clippy::needless_range_loop, reason = "plain counted loops over small arrays are what the compiler unrolls")]
@@ -18,10 +18,10 @@ pub type Rows<'a, S> = &'a [[S; BLOCK]];
 /// Mutable rows of sixteen samples.
 pub type RowsMut<'a, S> = &'a mut [[S; BLOCK]];
 
-/// Most rows of a tile; with four columns of AVX-512 they fill 24 of 32 registers.
+/// Maximum rows of a tile. With four columns of AVX-512 they fill 24 of 32 registers.
 const ROWS: usize = 6;
 
-/// Splits `n` into tiles of at most `max` and as equal as possible: size of the next one.
+/// Splits `n` into tiles of at most `max` that are as equal as possible. Returns the size of the next one.
 #[inline(always)]
 fn next_tile(n: usize, max: usize) -> usize {
     n.div_ceil(n.div_ceil(max))
@@ -60,7 +60,7 @@ fn store<T: Real>(v: T, row: &mut [T::Scalar; BLOCK], lane: usize) {
     v.store(&mut row[lane..lane + T::LANES])
 }
 
-/// Where `V` consecutive columns live: block and first lane of each.
+/// Places of `V` consecutive columns: block and first lane of each.
 #[derive(Clone, Copy)]
 struct Columns<const V: usize> {
     block: [usize; V],
@@ -88,7 +88,7 @@ fn column_rows<'a, S, const V: usize>(x: Rows<'a, S>, stride: usize, n: usize, a
     rows
 }
 
-/// A layer without its activation, `y = W x + b`, for `columns` of `first..`: call with `V` columns at a time.
+/// A layer without its activation, `y = W x + b`, for `V` columns from `first` on.
 #[inline(always)]
 fn affine_columns<T: Real, const V: usize>(
     (w, b): (&[T::Scalar], &[T::Scalar]),
@@ -192,7 +192,7 @@ fn transposed_tile<T: Real, const K: usize, const V: usize>(
     }
 }
 
-/// Columns that a tile of `affine` and `transposed` carries: what fits the registers.
+/// Number of columns per tile of `affine` and `transposed`, as many as fit the registers.
 macro_rules! by_columns {
     ($blocks:expr, $f:ident, $($arg:expr),*) => {{
         let n = $blocks * (BLOCK / T::LANES);
@@ -294,7 +294,7 @@ fn outer_tile<T: Real, const K: usize, const J: usize>(
         }
         return;
     }
-    // partial sums of the lanes of a block, one vector width after the other
+    // partial sums of the lanes of a block, one vector width after another
     let mut sums = [[[T::zero(); BLOCK]; K]; J];
     for part in 0..per_block {
         let acc = outer_part::<T, K, J>(x, x_stride, k, dy, dy_stride, j, blocks, part * T::LANES);

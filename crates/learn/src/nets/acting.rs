@@ -1,4 +1,4 @@
-//! What acts: the policy's network with the statistics of its inputs and the distribution of its actions.
+//! The acting network: the policy's network with its input statistics and its action distribution.
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -11,7 +11,7 @@ use crate::nets::squash::{Draw, Normals};
 use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
 
-/// The distribution that actions are drawn from.
+/// The distribution of sampled actions.
 pub enum Distribution {
     /// Normal, with deviations that do not depend on the state.
     Gaussian(Gaussian<f32>, Ratio),
@@ -19,19 +19,19 @@ pub enum Distribution {
     Squashed,
 }
 
-/// What the agents act with; the same for all workers.
+/// The network that all workers' agents act with.
 pub struct Acting<'a> {
     /// Instruction set.
     pub isa: Isa,
     /// Network.
     pub net: &'a Mlp,
-    /// Its parameters.
+    /// Parameters of the network.
     pub params: &'a [f32],
-    /// Map of raw observations to its inputs.
+    /// Map of raw observations to network inputs.
     pub normalizer: Normalizer,
-    /// What its outputs mean.
+    /// Meaning of the network's outputs.
     pub distribution: Distribution,
-    /// Multiplies the actions drawn before they are clipped.
+    /// Factor of the sampled actions, before they are clipped.
     pub action_scale: f32,
 }
 
@@ -45,7 +45,7 @@ pub struct ActingSpace {
 }
 
 impl Acting<'_> {
-    /// Work space.
+    /// Creates the work space.
     pub fn space(&self, actions: usize) -> ActingSpace {
         ActingSpace {
             input: self.net.input(),
@@ -69,8 +69,8 @@ impl Acting<'_> {
         }));
     }
 
-    /// Draws actions for the first blocks of `space.input`, one for each stream of noise: `[block][action][16]`, with their
-    /// log-probabilities, `[block][16]` or a row for each action.
+    /// Draws actions for the first blocks of `space.input`, one block per stream of noise: `[block][action][16]`, with
+    /// their log-probabilities, `[block][16]` or one row per action.
     pub fn draw(&self, noise: &mut [Noise], space: &mut ActingSpace, action: &mut [f32], log_prob: &mut [f32]) {
         let ActingSpace { input, tape, eps, z } = space;
         let blocks = noise.len();

@@ -32,7 +32,7 @@ impl Activation {
         }
     }
 
-    /// Whether the derivative cannot be had from the value and is stored by the forward pass.
+    /// Whether the derivative does not follow from the value, so the forward pass stores it.
     pub(crate) fn stores_slope(self) -> bool {
         self == Activation::Swish
     }
@@ -72,8 +72,8 @@ fn elu<T: Real>(x: T) -> T {
     T::select(zero.lt(x), x, x.min(zero).exp() - T::lit(1.0))
 }
 
-/// Applies an activation to the first `rows` rows of `blocks` blocks in place, storing the derivative where the way
-/// back will need it.
+/// Applies an activation to the first `rows` rows of `blocks` blocks in place. Stores the derivative where the backward
+/// pass needs it.
 #[inline(always)]
 pub(crate) fn apply<T: Real>(
     activation: Activation,

@@ -10,15 +10,15 @@ use std::marker::PhantomData;
 /// `ln(2 pi e) / 2`, the entropy of a standard normal number.
 pub const UNIT_ENTROPY: f64 = 1.418_938_533_204_672_7;
 
-/// Whose probability ratio the objective bounds, and with it what is kept of the probability of actions.
+/// Which probability ratio the objective bounds. It also determines the stored log-probabilities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ratio {
-    /// That of all actions together, as Schulman et al. have it.
+    /// One ratio for all actions together (Schulman et al.).
     #[default]
     Joint,
-    /// That of each action by itself, as ML-Agents has it: the objective is the mean over the actions. Each may move as far
-    /// as else all together, so steps are larger, the more so the more actions there are.
+    /// One ratio per action (ML-Agents). The objective is then the mean over the actions. Each action may move as far
+    /// as all together otherwise, so steps are larger, the more so with many actions.
     PerAction,
 }
 
@@ -26,7 +26,7 @@ impl Ratio {
     /// Names in configurations.
     pub const NAMED: [(&str, Self); 2] = [("joint", Self::Joint), ("per_action", Self::PerAction)];
 
-    /// Numbers that a sample's log-probability is kept as.
+    /// Log-probabilities stored per sample.
     pub fn rows(self, actions: usize) -> usize {
         match self {
             Ratio::Joint => 1,
@@ -35,10 +35,10 @@ impl Ratio {
     }
 }
 
-/// Standard deviations of the actions, ready for use.
+/// Standard deviations of the actions, precomputed.
 ///
-/// Log-probabilities leave out the constant `-ln(2 pi) / 2` per action: it cancels in every ratio, where its digits
-/// would only be lost.
+/// Log-probabilities leave out the constant `-ln(2 pi) / 2` per action. It cancels in every ratio and would only cost
+/// precision.
 #[derive(Clone, Debug)]
 pub struct Gaussian<S> {
     /// Standard deviation per action.
@@ -70,7 +70,7 @@ impl<T: Real<Scalar = T>> Kernel<T> for Prepare<'_, T> {
 }
 
 impl<S: Real<Scalar = S>> Gaussian<S> {
-    /// From the logarithms of the standard deviations (`S` is `f32` or `f64`).
+    /// Creates the distribution from the logarithms of the standard deviations (`S` is `f32` or `f64`).
     pub fn new(log_std: &[S]) -> Self {
         S::enter(Prepare(log_std))
     }
@@ -90,7 +90,7 @@ pub fn bound_std(log_std: &mut [f32], min: f64, max: f64) {
     log_std.iter_mut().for_each(|l| *l = l.clamp(low, high));
 }
 
-/// Log-probability of one column of actions: `-sum(z^2) / 2 - sum(log std)`; leaves `z = (action - mean) / std` in `z`.
+/// Log-probability of one column of actions: `-sum(z^2) / 2 - sum(log std)`. Stores `(action - mean) / std` in `z`.
 #[inline(always)]
 pub(crate) fn log_prob<T: Real>(
     gaussian: &Gaussian<T::Scalar>,
@@ -117,9 +117,9 @@ pub(crate) struct Sample<'a, T> {
     pub noise: &'a mut [Noise],
     /// Out: `[block][action][16]`.
     pub action: &'a mut [f32],
-    /// Out: `[block][16]`, or with a row for each action `[block][action][16]`.
+    /// Out: `[block][16]`, or `[block][action][16]` with one row per action.
     pub log_prob: &'a mut [f32],
-    /// Whether each action has a row there.
+    /// Selects one of the two forms of `log_prob`.
     pub ratio: Ratio,
     /// Work space: a row per action.
     pub eps: &'a mut [[f32; BLOCK]],

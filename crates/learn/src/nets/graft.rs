@@ -1,16 +1,16 @@
-//! A network within a larger one: what it makes of its inputs stays what it was.
+//! Copying a network into a larger one that computes the same outputs.
 
 use super::mlp::Mlp;
 use crate::error::Error;
 
-/// Puts a network's parameters into a larger one's: input number `i` becomes input number `sees[i]`. Its outputs do not see what
-/// else there is in the larger network at first; other units keep the parameters that they have.
+/// Copies a network's parameters into a larger one: input `i` becomes input `sees[i]`. At first, the outputs ignore all
+/// other inputs and units of the larger network. Other units keep their parameters.
 ///
 /// # Errors
-/// If the larger network has other layers, narrower ones, or another activation.
+/// If the larger network has other layers, narrower layers, or another activation.
 ///
 /// # Panics
-/// If there is no place for an input.
+/// If `sees` has the wrong length or an index beyond the inputs.
 pub fn graft(net: &Mlp, params: &mut [f32], small: &Mlp, of_small: &[f32], sees: &[usize]) -> Result<(), Error> {
     let (sizes, others) = (net.sizes(), small.sizes());
     let hidden = |sizes: &[usize]| format!("{:?}", &sizes[1..sizes.len() - 1]);
@@ -27,7 +27,7 @@ pub fn graft(net: &Mlp, params: &mut [f32], small: &Mlp, of_small: &[f32], sees:
         let [found, expected] = [small, net].map(|net| format!("{:?}", net.activation()).to_lowercase());
         return Err(Error::Mismatch { what: "activation of the policy to start from".into(), found, expected });
     }
-    assert!(sees.len() == others[0] && sees.iter().all(|i| *i < sizes[0]), "a place for each input");
+    assert!(sees.len() == others[0] && sees.iter().all(|i| *i < sizes[0]), "one valid index per input");
     for (l, ((weights, biases), (from, shifts))) in net.layers().zip(small.layers()).enumerate() {
         let rows = params[weights].chunks_exact_mut(sizes[l]);
         for (row, theirs) in rows.zip(of_small[from].chunks_exact(others[l])) {
@@ -59,7 +59,7 @@ mod tests {
         let want = small.forward_row(&theirs, &[0.3, -1.2, 0.7]);
         let got = large.forward_row(&own, &[-1.2, 9.0, 0.7, 9.0, 0.3, 9.0]);
         assert!(want.iter().zip(&got).all(|(a, b)| (a - b).abs() < 1e-6), "{got:?}, expected {want:?}");
-        // what is narrower, or has another number of layers, takes in nothing
+        // narrower networks and other numbers of layers are refused
         for sizes in [&[6, 4, 4, 2][..], &[6, 9, 2], &[6, 9, 4, 3]] {
             let net = Mlp::new(sizes, Activation::Tanh);
             assert!(graft(&net, &mut vec![0.0; net.len()], &small, &theirs, &[4, 0, 2]).is_err(), "{sizes:?}");

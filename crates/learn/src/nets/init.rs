@@ -1,18 +1,18 @@
-//! What networks start from: orthogonal weights (Saxe, McClelland and Ganguli, 2014), or those of ML-Agents.
+//! Initial weights: orthogonal (Saxe, McClelland and Ganguli, 2014), or those of ML-Agents.
 
 use crate::lanes::noise::SplitMix;
 use crate::nets::mlp::Mlp;
 use marathon_physics::lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// What the networks of policy and values start from.
+/// Initial weights of the policy and value networks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Init {
-    /// Orthogonal weights, a hundredth of that in the policy's last layer: actions hardly depend on the state.
+    /// Orthogonal weights, scaled by 0.01 in the policy's last layer, so that actions hardly depend on the state.
     #[default]
     Orthogonal,
-    /// Normal numbers as ML-Agents draws them: smaller in the hidden layers, larger in the policy's last.
+    /// Normal numbers as in ML-Agents: smaller in the hidden layers, larger in the policy's last layer.
     MlAgents,
 }
 
@@ -27,11 +27,11 @@ impl Init {
             Init::MlAgents => ml_agents(net, params, |inputs| 0.2 / inputs.sqrt(), random),
         }
     }
-    /// Fills the parameters of a network of values.
+    /// Fills the parameters of a value network.
     pub(crate) fn value(self, net: &Mlp, params: &mut [f32], random: &mut SplitMix) {
         match self {
             Init::Orthogonal => orthogonal(net, params, 1.0, random),
-            // each stream of rewards has an output layer there
+            // there, each stream of rewards has an output layer
             Init::MlAgents => ml_agents(net, params, |inputs| (2.0 / (inputs + 1.0)).sqrt(), random),
         }
     }
@@ -44,7 +44,7 @@ pub fn orthogonal(net: &Mlp, params: &mut [f32], last_gain: f64, random: &mut Sp
     for (l, (weights, biases)) in net.layers().enumerate() {
         let (inputs, outputs) = (net.sizes()[l], net.sizes()[l + 1]);
         let gain = if l == last { last_gain } else { std::f64::consts::SQRT_2 };
-        // the shorter side's vectors are made orthonormal
+        // orthonormalizes the vectors along the shorter side
         let (count, length) = (inputs.min(outputs), inputs.max(outputs));
         let basis = orthonormal(count, length, random);
         let w = &mut params[weights];
@@ -58,8 +58,9 @@ pub fn orthogonal(net: &Mlp, params: &mut [f32], last_gain: f64, random: &mut Sp
     }
 }
 
-/// Fills the parameters of a network as ML-Agents 1.1.0 does (`NetworkBody` and its heads): normal weights with deviation
-/// `1 / sqrt(inputs)` in hidden layers, and with that of `last`, a function of the inputs, in the last; biases zero. The heads of values are uniform there; here they are normal with the same deviation.
+/// Fills the parameters of a network as ML-Agents 1.1.0 does (`NetworkBody` and its heads). Hidden layers get normal
+/// weights with deviation `1 / sqrt(inputs)`. The last layer gets the deviation `last`, a function of the inputs.
+/// Biases are zero. ML-Agents draws the weights of value heads uniformly; here they are normal with the same deviation.
 pub fn ml_agents(net: &Mlp, params: &mut [f32], last: impl Fn(f64) -> f64, random: &mut SplitMix) {
     let sizes = net.sizes();
     for (l, (weights, biases)) in net.layers().enumerate() {
@@ -82,7 +83,7 @@ fn orthonormal(count: usize, length: usize, random: &mut SplitMix) -> Vec<Vec<f6
             }
         }
         let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // by chance in the span of the others: draw again
+        // the vector happens to lie in the span of the others: draw again
         if norm > 1e-6 {
             v.iter_mut().for_each(|x| *x /= norm);
             basis.push(v);

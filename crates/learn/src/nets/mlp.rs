@@ -1,11 +1,11 @@
 //! Multi-layer perceptrons in the lane layout of the physics.
 //!
 //! Parameters are one flat array: for each layer the weights `[output][input]`, then the biases (PyTorch's order).
-//! Samples come in blocks of sixteen, `[block][feature][16]`. The hidden layers share one [`Activation`]; the output is
+//! Samples come in blocks of sixteen, `[block][feature][16]`. The hidden layers share one [`Activation`]. The output is
 //! linear.
 //!
-//! The forward pass takes four columns (64 samples with AVX-512) through all layers before the next four, so they stay
-//! in the first-level cache; the backward pass works on a whole chunk of [`CHUNK`] blocks, which fits the second level.
+//! The forward pass takes four columns (64 samples with AVX-512) at a time through all layers, so they stay in the
+//! first-level cache. The backward pass works on a whole chunk of [`CHUNK`] blocks, which fits the second level.
 
 use crate::lanes::buffer::Blocks;
 use crate::lanes::f32_lanes;
@@ -35,7 +35,7 @@ pub(super) struct Layer {
     pub biases: Range<usize>,
 }
 
-/// A layer and its places in what [`Mlp::second_moments`] fills.
+/// A layer and its places in the output of [`Mlp::second_moments`].
 #[derive(Clone, Debug)]
 pub struct LayerMoments {
     /// Number of inputs.
@@ -56,13 +56,13 @@ pub struct LayerMoments {
     pub d: Range<usize>,
 }
 
-/// What the forward pass leaves for the backward pass, and the backward pass's own work space, for [`CHUNK`] blocks.
+/// Results of the forward pass for the backward pass, and the backward pass's own work space, for [`CHUNK`] blocks.
 pub struct Tape<S> {
     /// Output of each layer.
     values: Vec<Blocks<S>>,
-    /// Derivative of the activation, where it cannot be had from the value.
+    /// Derivative of the activation, where it does not follow from the value.
     slopes: Vec<Blocks<S>>,
-    /// Derivative of the loss with respect to the output of each layer, before its activation for hidden layers.
+    /// Derivative of the loss with respect to the output of each layer. For hidden layers: before the activation.
     deltas: Vec<Blocks<S>>,
 }
 
@@ -71,7 +71,7 @@ impl<S: Copy + Default> Tape<S> {
     pub fn output(&self) -> &Blocks<S> {
         &self.values[self.values.len() - 1]
     }
-    /// Derivative of the loss with respect to the output of the network, to be filled before the backward pass.
+    /// Derivative of the loss with respect to the output of the network. Fill it before the backward pass.
     pub fn output_delta(&mut self) -> &mut Blocks<S> {
         let last = self.deltas.len() - 1;
         &mut self.deltas[last]
@@ -84,10 +84,10 @@ impl<S: Copy + Default> Tape<S> {
 }
 
 impl Mlp {
-    /// A network of the given widths: inputs, hidden layers, outputs.
+    /// Creates a network with the given widths: inputs, hidden layers, outputs.
     ///
     /// # Panics
-    /// With fewer than two widths or a width of zero.
+    /// With fewer than two widths, or with a width of zero.
     pub fn new(sizes: &[usize], activation: Activation) -> Self {
         assert!(sizes.len() >= 2 && !sizes.contains(&0), "a network needs positive widths, not {sizes:?}");
         let mut at = 0;
@@ -114,7 +114,7 @@ impl Mlp {
     pub fn len(&self) -> usize {
         self.layers[self.layers.len() - 1].biases.end
     }
-    /// Never: a network has parameters.
+    /// Always false: a network has parameters.
     pub fn is_empty(&self) -> bool {
         false
     }
@@ -122,15 +122,15 @@ impl Mlp {
     pub fn layers(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + '_ {
         self.layers.iter().map(|l| (l.weights.clone(), l.biases.clone()))
     }
-    /// Multiplications and additions per sample of the forward and the backward pass.
+    /// Multiplications and additions per sample in the forward and the backward pass.
     pub fn flops(&self) -> f64 {
         let cost = |(i, l): (usize, &Layer)| (l.inputs * l.outputs) as f64 * if i == 0 { 4.0 } else { 6.0 };
         self.layers.iter().enumerate().map(cost).sum()
     }
 
-    /// Moves the first layer to other statistics of the inputs: what the network makes of a raw input stays the same. Where
-    /// a deviation has more than doubled, as that of an input that has never moved before, its weights are doubled only:
-    /// they were never learned at that size.
+    /// Adapts the first layer to new statistics of the inputs, so that the network's output for a raw input stays the
+    /// same. If the deviation of an input has more than doubled, for example because it never moved before, its weights
+    /// are only doubled. They were never trained at the larger scale.
     pub fn follow(&self, params: &mut [f32], before: &Normalizer, after: &Normalizer) {
         let layer = &self.layers[0];
         let (weights, biases) = params[..layer.biases.end].split_at_mut(layer.weights.end);
@@ -159,7 +159,7 @@ impl Mlp {
     fn work_space<S: Copy + Default>(&self) -> Vec<Blocks<S>> {
         self.layers.iter().map(|l| Blocks::new(CHUNK, l.outputs)).collect()
     }
-    /// Space for the inputs of a chunk.
+    /// Allocates the inputs of a chunk.
     pub fn input<S: Copy + Default>(&self) -> Blocks<S> {
         Blocks::new(CHUNK, self.sizes[0])
     }
@@ -170,7 +170,7 @@ impl Mlp {
     }
 
     /// Overwrites `gradient` with the gradient of the loss with respect to the parameters, summed over the first
-    /// `blocks` blocks, after [`Mlp::forward`] on the same input, given [`Tape::output_delta`].
+    /// `blocks` blocks. Requires [`Mlp::forward`] on the same input, and [`Tape::output_delta`].
     pub fn backward(
         &self,
         isa: Isa,
@@ -218,7 +218,7 @@ impl Mlp {
         }
     }
 
-    /// Overwrites `dx` with the derivative of the loss with respect to the input, after [`Mlp::backward_on`].
+    /// Overwrites `dx` with the derivative of the loss with respect to the input. Requires [`Mlp::backward_on`].
     pub fn input_delta_on<T: Real>(
         &self,
         params: &[T::Scalar],
@@ -230,8 +230,8 @@ impl Mlp {
         T::enter(Transposed::<T> { w, dy: &tape.deltas[0], dx, blocks });
     }
 
-    /// Overwrites `dx` with the derivative of the loss with respect to the input, after [`Mlp::forward`], given
-    /// [`Tape::output_delta`]; the parameters' gradient is left out.
+    /// Overwrites `dx` with the derivative of the loss with respect to the input, without the parameters' gradient.
+    /// Requires [`Mlp::forward`] and [`Tape::output_delta`].
     pub fn input_gradient(&self, isa: Isa, params: &[f32], tape: &mut Tape<f32>, dx: &mut Blocks<f32>, blocks: usize) {
         f32_lanes!(isa, T => {
             for (l, layer) in self.layers.iter().enumerate().skip(1).rev() {
@@ -271,8 +271,8 @@ impl Mlp {
         self.moments().last().map_or(0, |m| m.d.end)
     }
 
-    /// Overwrites `moments` with sums over the first `blocks` blocks of products of each layer's inputs, and of the
-    /// derivatives with respect to its outputs (before the activation), after [`Mlp::forward`] on the same input, given
+    /// Overwrites `moments` with sums of products over the first `blocks` blocks: of each layer's inputs, and of the
+    /// derivatives with respect to its outputs before the activation. Requires [`Mlp::forward`] on the same input, and
     /// [`Tape::output_delta`].
     pub fn second_moments(
         &self,

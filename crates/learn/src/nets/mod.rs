@@ -1,4 +1,4 @@
-//! Networks, what they start from, and the distributions of actions that they give.
+//! Networks, their initial weights, and the action distributions that they parameterize.
 
 pub mod acting;
 pub mod activation;
@@ -15,7 +15,7 @@ use activation::Activation;
 use init::Init;
 use serde::{Deserialize, Serialize};
 
-/// Shape and start of the networks of policy and values.
+/// Shape and initial weights of the policy and value networks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NetworkConfig {
@@ -25,7 +25,7 @@ pub struct NetworkConfig {
     pub critic_hidden: Vec<usize>,
     /// Activation of all hidden layers.
     pub activation: Activation,
-    /// What the networks start from.
+    /// Initial weights of the networks.
     pub initialization: Init,
 }
 

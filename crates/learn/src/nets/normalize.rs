@@ -1,15 +1,15 @@
 //! Running means and variances of observations and returns.
 //!
-//! A rollout adds up deviations from the current mean, rounded to single precision, block by block in lanes; the
-//! blocks' sums are then merged in double precision in the order of the blocks (Chan, Golub and LeVeque, 1979). A cap on
-//! the count keeps the statistics able to follow a policy that keeps changing.
+//! A rollout adds up deviations from the current mean, rounded to single precision, block by block in lanes. The sums
+//! of the blocks are then merged in double precision, in the order of the blocks (Chan, Golub and LeVeque, 1979). A cap
+//! on the count lets the statistics follow a policy that keeps changing.
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use marathon_physics::lanes::{Kernel, Real};
 use std::marker::PhantomData;
 
-/// How many samples statistics count as that are taken over: those of the first rollouts move them by little.
+/// Number of samples that adopted statistics count as, so that the first rollouts change them little.
 const ASSUMED: f64 = 100_000.0;
 
 /// Means and variances of a list of quantities.
@@ -24,13 +24,13 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Nothing seen: mean 0, variance 1.
+    /// Statistics without samples: mean 0, variance 1.
     pub fn new(n: usize) -> Self {
         Self { count: 0.0, mean: vec![0.0; n], var: vec![1.0; n] }
     }
 
-    /// Merges `count` samples whose deviations from `self.mean`, rounded to `f32`, have the sums `sums[i].0` and the
-    /// squared deviations `sums[i].1`. A quantity whose sums are not finite keeps its statistics.
+    /// Merges `count` samples. `sums[i]` holds the sum of their deviations from `self.mean`, rounded to `f32`, and the
+    /// sum of the squared deviations. A quantity whose sums are not finite keeps its statistics.
     pub fn merge(&mut self, count: f64, sums: &[(f64, f64)], cap: f64) {
         if count == 0.0 {
             return;
@@ -39,7 +39,7 @@ impl Moments {
         for ((mean, var), (sum, square)) in self.mean.iter_mut().zip(&mut self.var).zip(sums) {
             let shift = sum / count;
             let batch_var = (square / count - shift * shift).max(0.0);
-            // one bad number must not spoil the statistics for good
+            // one bad number must not spoil the statistics forever
             if !(shift.is_finite() && batch_var.is_finite() && square.is_finite()) {
                 continue;
             }
@@ -50,7 +50,7 @@ impl Moments {
         self.count = (self.count + count).min(cap);
     }
 
-    /// Takes the statistics of another map of observations over, whose number `i` is number `sees[i]` here. They count as
+    /// Adopts the statistics of another map of observations, whose number `i` is number `sees[i]` here. They count as
     /// 100,000 samples.
     pub fn assume(&mut self, known: &Normalizer, sees: &[usize]) {
         for (place, (mean, std)) in sees.iter().zip(known.mean().iter().zip(known.std())) {
@@ -59,7 +59,7 @@ impl Moments {
         self.count = ASSUMED;
     }
 
-    /// Standard deviations, not below 1e-4.
+    /// Standard deviations, at least 1e-4.
     pub fn std(&self) -> Vec<f32> {
         self.var.iter().map(|v| (v + 1e-8).sqrt().max(1e-4) as f32).collect()
     }
@@ -79,12 +79,12 @@ pub struct Normalizer {
 }
 
 impl Normalizer {
-    /// From means and standard deviations.
+    /// Creates the map from means and standard deviations.
     pub fn new(mean: Vec<f32>, std: Vec<f32>, clip: f32) -> Self {
         let inv_std = std.iter().map(|s| 1.0 / s).collect();
         Self { mean, std, inv_std, clip }
     }
-    /// The map that changes nothing but clips.
+    /// A map that only clips.
     pub fn identity(n: usize, clip: f32) -> Self {
         Self::new(vec![0.0; n], vec![1.0; n], clip)
     }
@@ -100,12 +100,12 @@ impl Normalizer {
     pub fn clip(&self) -> f32 {
         self.clip
     }
-    /// Number `i` of an observation, with the bits of the lanes.
+    /// Normalizes number `i` of an observation, with the bits of the lanes.
     #[inline(always)]
     pub fn number(&self, i: usize, raw: f32) -> f32 {
         Real::min(Real::max((raw - self.mean[i]) * self.inv_std[i], -self.clip), self.clip)
     }
-    /// One observation, with the bits of the lanes.
+    /// Normalizes one observation, with the bits of the lanes.
     pub fn row(&self, raw: &[f32]) -> Vec<f32> {
         let scales = self.mean.iter().zip(&self.inv_std);
         let one = |(x, (m, s)): (&f32, (&f32, &f32))| Real::min(Real::max((x - m) * s, -self.clip), self.clip);
@@ -113,8 +113,8 @@ impl Normalizer {
     }
 }
 
-/// Normalizes a chunk of raw blocks, `[block][obs][16]`, into a network's input and, if given, a flat copy and sums of
-/// deviations and squares from the mean.
+/// Normalizes a chunk of raw blocks, `[block][obs][16]`, into a network's input. On request, also fills a flat copy,
+/// and the sums of deviations from the mean and of their squares.
 pub(crate) struct Normalize<'a, T> {
     pub normalizer: &'a Normalizer,
     pub raw: &'a [f32],
@@ -172,7 +172,7 @@ mod tests {
         let var = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3000.0;
         assert!((m.mean[0] - mean).abs() < 1e-9 * mean && (m.var[0] - var).abs() < 1e-7 * var, "{m:?} {mean} {var}");
         assert_eq!(m.count, 3000.0);
-        // with a cap, later samples weigh more
+        // at the cap, later samples weigh more
         m.count = 100.0;
         m.merge(100.0, &[(100.0 * (mean + 4.0 - m.mean[0] as f32 as f64), 0.0)], 150.0);
         assert!((m.mean[0] - mean - 2.0).abs() < 1e-4 && m.count == 150.0, "{m:?}");

@@ -1,9 +1,9 @@
-//! Networks whose slope is penalized: the gradient of a loss that contains the derivative of the network with respect to its
-//! input.
+//! Gradient penalties: the gradient of a loss that contains the derivative of a network with respect to its input.
 //!
-//! For a network `d(x)` with one output, layers `a_l = W_l h_(l-1) + b_l`, `h_l = s(a_l)`, `h_0 = x`, and a weight `w` the
-//! penalty is `w/2 |grad_x d|^2`. Its gradient with respect to the parameters is that of `w (v . grad_x d)` with `v = grad_x d`
-//! held still, and `v . grad_x d` is the derivative of `d` along `v`, which a second forward pass computes beside the first:
+//! Take a network `d(x)` with one output, layers `a_l = W_l h_(l-1) + b_l`, `h_l = s(a_l)`, `h_0 = x`, and a weight
+//! `w`. The penalty is `w/2 |grad_x d|^2`. Its gradient with respect to the parameters is that of `w (v . grad_x d)`
+//! with `v = grad_x d` held constant. `v . grad_x d` is the derivative of `d` along `v`, which a second forward pass
+//! computes with the first:
 //!
 //! ```text
 //! t_0 = v      u_l = W_l t_(l-1)      t_l = s'(a_l) u_l                                  tangents
@@ -20,7 +20,7 @@ use crate::lanes::tiles;
 use marathon_physics::lanes::{Kernel, Real};
 use std::marker::PhantomData;
 
-/// Work space for a chunk of blocks; layers are those of the network.
+/// Work space for a chunk of blocks, per layer of the network.
 pub struct PenaltySpace<S> {
     /// Outputs `h_l` of the hidden layers, then `d`.
     values: Vec<Blocks<S>>,
@@ -38,7 +38,7 @@ pub struct PenaltySpace<S> {
     deltas: Vec<Blocks<S>>,
     /// `W_(l+1)^T p_(l+1)` of the hidden layers.
     pulled: Vec<Blocks<S>>,
-    /// No biases, and a gradient to be added.
+    /// Zeros in place of biases, and a gradient that is added.
     zeros: Vec<S>,
     gradient: Vec<S>,
 }
@@ -48,7 +48,7 @@ impl<S: Copy + Default> PenaltySpace<S> {
     pub fn output(&self) -> &Blocks<S> {
         &self.values[self.values.len() - 1]
     }
-    /// Derivative of the loss with respect to the output, to be filled before the backward pass.
+    /// Output, and the derivative of the loss with respect to it. Fill the latter before the backward pass.
     pub fn output_and_delta(&mut self) -> (&Blocks<S>, &mut Blocks<S>) {
         let last = self.values.len() - 1;
         (&self.values[last], &mut self.deltas[last])
@@ -60,7 +60,7 @@ impl<S: Copy + Default> PenaltySpace<S> {
 }
 
 impl Mlp {
-    /// Work space for a penalty.
+    /// Creates the work space for a penalty.
     pub fn penalty_space<S: Copy + Default>(&self) -> PenaltySpace<S> {
         let all = || self.layers.iter().map(|l| Blocks::new(CHUNK, l.outputs)).collect::<Vec<_>>();
         let hidden = || all().into_iter().take(self.layers.len() - 1).collect::<Vec<_>>();
@@ -79,7 +79,8 @@ impl Mlp {
         }
     }
 
-    /// Computes the output, its slope along the input, and what the way back needs, for the first blocks of `input`.
+    /// Computes the output, its derivative with respect to the input, and intermediate results for the backward pass,
+    /// for the first blocks of `input`.
     pub fn penalty_forward<T: Real>(
         &self,
         params: &[T::Scalar],
@@ -116,8 +117,8 @@ impl Mlp {
         }
     }
 
-    /// Overwrites `gradient` with that of the loss, given its derivative with respect to the output, and of
-    /// `weight / 2 |slope|^2`, summed over the blocks, after [`Mlp::penalty_forward`] on the same input.
+    /// Overwrites `gradient` with the gradient of the loss plus `weight / 2 |slope|^2`, summed over the blocks.
+    /// Requires [`Mlp::penalty_forward`] on the same input, and the derivative of the loss with respect to the output.
     pub fn penalty_backward<T: Real>(
         &self,
         params: &[T::Scalar],
@@ -280,7 +281,7 @@ impl<T: Real> Kernel<T> for AddTimes<'_, T> {
     }
 }
 
-/// `delta = slope delta + weight curve along pulled`, from the gradient after an activation to that before it.
+/// `delta = slope delta + weight curve along pulled`: from the gradient after an activation to that before it.
 struct Turn<'a, T: Real> {
     slope: &'a Blocks<T::Scalar>,
     curve: &'a Blocks<T::Scalar>,

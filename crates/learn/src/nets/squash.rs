@@ -1,8 +1,8 @@
-//! The policy of SAC: normal numbers through the hyperbolic tangent, with means and deviations that the network gives for
+//! The policy of SAC: normal numbers through the hyperbolic tangent, with means and deviations from the network for
 //! each state (Haarnoja et al., "Soft actor-critic", 2018).
 //!
-//! The network has two outputs per action: the mean `m` and the logarithm `l` of the deviation, bounded to
-//! [`LOG_STD`]. With a normal number `z`:
+//! The network has two outputs per action: the mean `m` and the logarithm `l` of the deviation, bounded to [`LOG_STD`].
+//! With a standard normal number `z`:
 //!
 //! ```text
 //! u = m + exp(l) z        a = tanh(u)        ln p(a) = sum(-z^2 / 2 - l - ln(2 pi) / 2 - ln(1 - a^2 + 1e-6))
@@ -54,7 +54,7 @@ pub struct Draw<'a, T: Real> {
     pub log_prob: &'a mut [T::Scalar],
     /// Number of blocks.
     pub blocks: usize,
-    /// The lanes.
+    /// The lane type.
     pub lanes: PhantomData<T>,
 }
 
@@ -91,12 +91,12 @@ pub struct Objective<'a, T: Real> {
     pub output: (&'a Blocks<T::Scalar>, &'a mut Blocks<T::Scalar>),
     /// As in [`Draw`].
     pub z: &'a [T::Scalar],
-    /// The actions drawn.
+    /// The sampled actions.
     pub action: &'a [T::Scalar],
-    /// Derivatives of `-Q` with respect to the inputs of two value networks, whose sum counts; actions begin at feature
+    /// Derivatives of `-Q` with respect to the inputs of two value networks. Their sum counts. Actions begin at feature
     /// `first`.
     pub minus_q: [&'a Blocks<T::Scalar>; 2],
-    /// See there.
+    /// First feature of the actions in `minus_q`.
     pub first: usize,
     /// Weight of the entropy.
     pub alpha: f64,
@@ -104,7 +104,7 @@ pub struct Objective<'a, T: Real> {
     pub act: usize,
     /// Number of blocks.
     pub blocks: usize,
-    /// The lanes.
+    /// The lane type.
     pub lanes: PhantomData<T>,
 }
 

@@ -21,17 +21,17 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// For `n` parameters.
+    /// Creates the state for `n` parameters.
     pub fn new(n: usize, epsilon: f64) -> Self {
         Self { m: vec![0.0; n], v: vec![0.0; n], powers: [1.0; 2], epsilon: epsilon as f32 }
     }
 
-    /// Starts the next step: call once before the [`Adam::update`]s of all parameters.
+    /// Starts the next step. Call it once before the [`Adam::update`]s of all parameters.
     pub fn advance(&mut self) {
         self.powers = [self.powers[0] * BETA1, self.powers[1] * BETA2];
     }
 
-    /// Updates the parameters `range` by `scale * gradient` (`gradient` covers the range alone).
+    /// Updates the parameters `range` by `scale * gradient`. `gradient` covers only this range.
     pub fn update(
         &mut self,
         isa: Isa,

@@ -1,14 +1,14 @@
 //! The Fisher matrix of a network, layer by layer, as a Kronecker product (Martens and Grosse, "Optimizing neural networks
 //! with Kronecker-factored approximate curvature", 2015).
 //!
-//! With `a` a layer's input, a constant 1 appended, and `g` the derivative of the log-likelihood with respect to its
-//! output, the layer's block of the Fisher matrix is `E[a a' (x) g g']`, taken for `A (x) G = E[a a'] (x) E[g g']`. For
-//! one sample that is exact. The natural gradient of a layer is then `G^-1 W A^-1`, `W` being its gradient with the biases as the
-//! last column.
+//! Let `a` be a layer's input with a constant 1 appended, and `g` the derivative of the log-likelihood with respect to
+//! its output. The layer's block of the Fisher matrix is `E[a a' (x) g g']`, approximated by `A (x) G = E[a a'] (x) E[g
+//! g']`. For one sample that is exact. The natural gradient of a layer is then `G^-1 W A^-1`, where `W` is its gradient
+//! with the biases as the last column.
 //!
-//! `g` belongs to a draw from the network's own distribution. For the policy, the actions of the rollout are such draws.
-//! For the value, a normal distribution of deviation 1, `g` is the derivative of the value times a normal number; of the number only its
-//! square enters, whose mean is 1, so it is left out.
+//! `g` belongs to a draw from the network's own distribution. For the policy, the actions of the rollout are such
+//! draws. The value has a normal distribution of deviation 1, so `g` is the derivative of the value times a normal
+//! number. Only the square of that number matters; its mean is 1, so it is left out.
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -29,7 +29,7 @@ pub struct Kfac {
 }
 
 impl Kfac {
-    /// Identities for the two networks; the value function's parameters begin at `value_start`.
+    /// Starts with identities for two networks. The value function's parameters begin at `value_start`.
     pub fn new(policy: &Mlp, value: &Mlp, value_start: usize) -> Self {
         let mut layers = Vec::new();
         let nets = [(policy, 0, 0), (value, value_start, policy.moments_len())];
@@ -43,18 +43,18 @@ impl Kfac {
     pub fn count(&self) -> usize {
         self.layers.len()
     }
-    /// A layer; the policy's come first.
+    /// Returns a layer. The policy's layers come first.
     pub fn layer(&self, l: usize) -> MutexGuard<'_, Layer> {
         self.layers[l].lock().expect("no worker has panicked")
     }
-    /// Numbers that [`Kfac::moments`] fills for two networks, a multiple of sixteen.
+    /// Length of the output of [`Kfac::moments`] for two networks, a multiple of sixteen.
     pub fn moments_len(policy: &Mlp, value: &Mlp) -> usize {
         (policy.moments_len() + value.moments_len()).next_multiple_of(BLOCK)
     }
 
-    /// Sums over samples of what the factors are means of, after the forward passes of both networks (their parameters,
-    /// tapes) on the same input; `actions` are those taken, `[action][16]` for each block.
-    #[expect(clippy::too_many_arguments, reason = "both networks with everything that the forward pass had")]
+    /// Sums the moments of the factors over samples, after the forward passes of both networks (their parameters,
+    /// tapes) on the same input. `actions` are the actions taken, `[action][16]` for each block.
+    #[expect(clippy::too_many_arguments, reason = "both networks with all inputs of the forward pass")]
     pub fn moments(
         &self,
         isa: Isa,
@@ -86,7 +86,7 @@ impl Kfac {
         (factors, inverses)
     }
 
-    /// The inverse of [`Kfac::save`]; false if the lengths are not those of these networks.
+    /// The inverse of [`Kfac::save`]. Returns false if the lengths do not fit these networks.
     pub fn load(&self, factors: &[f64], inverses: &[f32]) -> bool {
         let len: usize = (0..self.count()).map(|l| self.layer(l)).map(|l| l.a.len() + l.g.len()).sum();
         if factors.len() != len || inverses.len() != len {
@@ -134,22 +134,22 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Score<'_, T> {
 
 /// A layer with its factors.
 pub struct Layer {
-    /// 0 for the policy's, 1 for the value function's.
+    /// 0 for the policy, 1 for the value function.
     pub network: usize,
-    /// Where its parameters are among all.
+    /// Range of its weights among all parameters.
     pub weights: Range<usize>,
     /// Its biases, which follow its weights.
     pub biases: Range<usize>,
     /// Natural gradient of the weights and biases, see [`Layer::natural`].
     pub step: Vec<f32>,
-    /// Product of that with the gradient.
+    /// Product of `step` with the gradient.
     pub product: f64,
     /// Running means, symmetric: `[input and 1][input and 1]` and `[output][output]`.
     a: Vec<f64>,
     g: Vec<f64>,
     a_inverse: Vec<f32>,
     g_inverse: Vec<f32>,
-    /// Where its sums are among the moments.
+    /// Place of its sums among the moments.
     moments: LayerMoments,
     space: Space,
 }
@@ -164,7 +164,7 @@ struct Space {
 }
 
 impl Layer {
-    /// With identities for factors, for a layer whose network begins at parameter `params` and moment `moments`.
+    /// Starts with identities as factors, for a layer whose network begins at parameter `params` and moment `moments`.
     pub fn new(network: usize, of: &LayerMoments, params: usize, moments: usize) -> Self {
         let (inputs, outputs) = (of.inputs, of.outputs);
         let n = inputs + 1;
@@ -209,8 +209,8 @@ impl Layer {
         &self.g
     }
 
-    /// Takes the moments of `samples` samples, in parts that are added up in their order, into the running means, of
-    /// which `decay` is kept. Numbers that are not finite change nothing.
+    /// Merges the moments of `samples` samples into the running means, of which `decay` is kept. The parts are added up
+    /// in their order. Numbers that are not finite change nothing.
     pub fn merge<'p>(&mut self, parts: impl Iterator<Item = &'p [f32]>, samples: f64, decay: f64) {
         let (ni, no) = (self.moments.inputs, self.moments.outputs);
         let n = ni + 1;
@@ -237,9 +237,9 @@ impl Layer {
         }
     }
 
-    /// Inverts the factors with a damping of their product that is split so that both parts weigh the same: `A + pi
-    /// sqrt(damping)` and `G + sqrt(damping) / pi`, `pi^2` being the ratio of the factors' mean eigenvalues. Factors that
-    /// cannot be inverted keep their old inverses.
+    /// Inverts the factors. The damping is split so that both parts weigh the same: `A + pi sqrt(damping)` and `G +
+    /// sqrt(damping) / pi`, with `pi^2` the ratio of the factors' mean eigenvalues. Factors without an inverse keep
+    /// their old one.
     pub fn invert(&mut self, damping: f64) {
         let mean_eigenvalue = |x: &[f64], n: usize| (0..n).map(|i| x[i * (n + 1)]).sum::<f64>() / n as f64;
         let (n, no) = (self.moments.inputs + 1, self.moments.outputs);
@@ -251,8 +251,8 @@ impl Layer {
         }
     }
 
-    /// Fills `step` with the natural gradient, `G^-1 W A^-1` for the layer's part `W` of `scale * gradient`, and `product`
-    /// with its product with that part.
+    /// Fills `step` with the natural gradient `G^-1 W A^-1`, where `W` is the layer's part of `scale * gradient`. Fills
+    /// `product` with the product of `step` and `W`.
     pub fn natural(&mut self, isa: Isa, gradient: &[f32], scale: f64) {
         let (ni, no) = (self.moments.inputs, self.moments.outputs);
         let n = ni + 1;
@@ -272,7 +272,7 @@ impl Layer {
                 turned.block_mut(j / BLOCK)[at(k, j)] = left.block(k / BLOCK)[at(j, k)];
             }
         }
-        // A is its own transpose
+        // A is symmetric
         multiply(isa, &self.a_inverse, zeros, turned, both, no.div_ceil(BLOCK));
         self.product = 0.0;
         for j in 0..no {
@@ -285,11 +285,11 @@ impl Layer {
     }
 }
 
-/// Inverse of a symmetric positive definite matrix with a number added to its diagonal, by Cholesky's factorization.
+/// Inverse of a symmetric positive definite matrix with a number added to its diagonal, by Cholesky factorization.
 ///
-/// A library would choose the order of its sums by the processor; here it is the same everywhere.
+/// A library would choose the order of its sums by the processor. Here it is the same everywhere.
 fn inverse(matrix: &[f64], n: usize, damping: f64) -> Option<Vec<f32>> {
-    // M = L L', row by row; the part above the diagonal is not used
+    // M = L L', row by row; the upper triangle is not used
     let mut l = matrix.to_vec();
     for i in 0..n {
         l[i * n + i] += damping;

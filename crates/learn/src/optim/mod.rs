@@ -1,4 +1,4 @@
-//! Optimizers, and the sums of gradients that they work on.
+//! Optimizers, and sums of gradients.
 
 pub(crate) mod adam;
 pub mod kfac;

@@ -1,5 +1,5 @@
-//! RMSProp as TensorFlow has it: the constant is under the root, and the mean square starts at 1, or the first steps would be
-//! ten times the rate.
+//! RMSProp as in TensorFlow: the constant is under the root, and the mean square starts at 1. Otherwise the first steps
+//! would be ten times the rate.
 
 use crate::lanes::f32_lanes;
 use marathon_physics::lanes::{Isa, Kernel, Real};
@@ -15,12 +15,12 @@ pub struct RmsProp {
 }
 
 impl RmsProp {
-    /// For `n` parameters.
+    /// Creates the state for `n` parameters.
     pub fn new(n: usize, decay: f64, epsilon: f64) -> Self {
         Self { mean_square: vec![1.0; n], decay, epsilon }
     }
 
-    /// Updates the parameters `range` by `scale * gradient` (`gradient` covers the range alone).
+    /// Updates the parameters `range` by `scale * gradient`. `gradient` covers only this range.
     pub fn update(&mut self, isa: Isa, params: &mut [f32], range: Range<usize>, gradient: &[f32], scale: f64, lr: f64) {
         let step = Step {
             params: &mut params[range.clone()],

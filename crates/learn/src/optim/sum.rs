@@ -1,5 +1,5 @@
-//! Sums of partial gradients and their norm, in a fixed order: the same bits on every vector width and however many threads
-//! share the work. Lengths are multiples of sixteen, but for [`add`].
+//! Sums of partial gradients and their norm in a fixed order: the same bits for every vector width and number of
+//! threads. Lengths are multiples of sixteen, except for [`add`].
 
 use crate::lanes::BLOCK;
 use crate::lanes::f32_lanes;
@@ -47,7 +47,7 @@ pub fn add(isa: Isa, sum: &mut [f32], x: &[f32]) {
 pub struct Add<'a, T: Real> {
     /// The sum.
     pub sum: &'a mut [T::Scalar],
-    /// What is added.
+    /// The numbers that are added.
     pub x: &'a [T::Scalar],
 }
 

@@ -1,4 +1,4 @@
-//! Acting for many agents side by side.
+//! Acting for many agents at a time.
 
 use super::Policy;
 use crate::lanes::BLOCK;
@@ -11,7 +11,7 @@ use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
 use std::ops::Deref;
 
-/// A policy with work space to act for many blocks; it is borrowed, or shared.
+/// A policy, borrowed or shared, with work space to act for many blocks.
 pub struct BlockPolicy<P> {
     policy: P,
     isa: Isa,
@@ -20,10 +20,10 @@ pub struct BlockPolicy<P> {
 }
 
 impl<P: Deref<Target = Policy>> BlockPolicy<P> {
-    /// Work space for a policy.
+    /// Creates the work space for a policy.
     ///
     /// # Panics
-    /// If this processor lacks the instruction set, at the first use.
+    /// At the first use, if this processor lacks the instruction set.
     pub fn new(policy: P, isa: Isa) -> Self {
         Self { isa, input: policy.net.input(), tape: policy.net.inference_tape(), policy }
     }
@@ -40,7 +40,10 @@ impl<P: Deref<Target = Policy>> BlockPolicy<P> {
     pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
         let policy = &*self.policy;
         let (obs_row, act_row) = (policy.meta.obs * BLOCK, policy.meta.act * BLOCK);
-        assert!(obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row), "whole blocks");
+        assert!(
+            obs.len() / obs_row * act_row == action.len() && obs.len().is_multiple_of(obs_row),
+            "expected whole blocks"
+        );
         for (raw, action) in obs.chunks(CHUNK * obs_row).zip(action.chunks_mut(CHUNK * act_row)) {
             forward(policy, self.isa, raw, &mut self.input, &mut self.tape);
             for (b, out) in action.chunks_exact_mut(act_row).enumerate() {
@@ -52,15 +55,15 @@ impl<P: Deref<Target = Policy>> BlockPolicy<P> {
     }
 
     /// The best actions, `[n][act]`, for any number of raw observations, `[n][obs]`. With `noise`, `[n][act]` standard
-    /// normal numbers, the actions are drawn as in training.
+    /// normal numbers, the actions are sampled as in training.
     ///
     /// # Panics
     /// If the lengths do not fit each other.
     pub fn act_rows(&mut self, obs: &[f32], noise: Option<&[f32]>, action: &mut [f32]) {
         let policy = &*self.policy;
         let (n_obs, n_act) = (policy.meta.obs, policy.meta.act);
-        assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "whole rows");
-        assert!(noise.is_none_or(|noise| noise.len() == action.len()), "noise for every action");
+        assert!(obs.len() / n_obs * n_act == action.len() && obs.len().is_multiple_of(n_obs), "expected whole rows");
+        assert!(noise.is_none_or(|noise| noise.len() == action.len()), "expected noise for every action");
         let std = Gaussian::new(&policy.log_std).std;
         let rows = CHUNK * BLOCK;
         for (chunk, (obs, action)) in obs.chunks(rows * n_obs).zip(action.chunks_mut(rows * n_act)).enumerate() {

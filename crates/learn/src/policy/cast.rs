@@ -6,10 +6,10 @@ use crate::lanes::BLOCK;
 use marathon_envs::{BlockStep, Role, Spec};
 use marathon_physics::lanes::Isa;
 
-/// A policy for each role of a task, with work space to act for many blocks.
+/// One policy per role of a task, with work space to act for many blocks.
 pub struct Cast<'a> {
     parts: Vec<Part<'a>>,
-    /// Length of the whole observation and of the whole action.
+    /// Length of the full observation and of the full action.
     obs: usize,
     act: usize,
 }
@@ -18,25 +18,25 @@ pub struct Cast<'a> {
 struct Part<'a> {
     role: Role,
     policy: BlockPolicy<&'a Policy>,
-    /// Its part of the observations and actions, `[block][..][16]`, where it does not have them all.
+    /// Its part of the observations and actions, `[block][..][16]`, unless it has them all.
     obs: Vec<f32>,
     action: Vec<f32>,
-    /// Agents whose next action it chooses, a bit each, per block.
+    /// Agents whose next action this role chooses: one mask per block.
     decides: Vec<u16>,
 }
 
 impl<'a> Cast<'a> {
-    /// The roles of a task in their order, for so many blocks at the start of their episodes.
+    /// Creates the cast for `blocks` blocks at the start of their episodes, with policies in the order of the roles.
     ///
     /// # Errors
-    /// If there is not one policy for each role, or one is for another task or role.
+    /// If the number of policies differs from that of the roles, or a policy is for another task or role.
     pub fn new(spec: &Spec, policies: &[&'a Policy], isa: Isa, blocks: usize) -> Result<Self, Error> {
         let roles = spec.deciders();
         if roles.len() != policies.len() {
             return Err(Error::Mismatch {
                 what: format!("the cast of {}", spec.id),
                 found: format!("{} roles", policies.len()),
-                expected: format!("{}: a policy for each", roles.len()),
+                expected: format!("{}: one policy for each", roles.len()),
             });
         }
         let part = |(role, policy): (Role, &&'a Policy)| {
@@ -59,8 +59,8 @@ impl<'a> Cast<'a> {
         self.parts.iter().map(|part| &part.role)
     }
 
-    /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`. Where a role does not decide, the
-    /// action stays what it is.
+    /// The best actions, `[block][act][16]`, for raw observations, `[block][obs][16]`. Actions of roles that do not
+    /// decide stay unchanged.
     pub fn act(&mut self, obs: &[f32], action: &mut [f32]) {
         if let [part] = &mut self.parts[..]
             && part.decides.iter().all(|decides| *decides == !0)
@@ -87,7 +87,7 @@ impl<'a> Cast<'a> {
         }
     }
 
-    /// Takes note of what a decision of a block led to: who decides next. Ended episodes are followed by new ones.
+    /// Reads from the result of a block's decision which roles decide next. New episodes follow ended ones.
     pub fn follow(&mut self, block: usize, out: &BlockStep) {
         let ended = out.terminated | out.truncated | out.diverged;
         for (i, part) in self.parts.iter_mut().enumerate() {

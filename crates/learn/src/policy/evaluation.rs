@@ -1,4 +1,4 @@
-//! How a policy did, as it is stored in it.
+//! Results of an evaluation, as stored in a policy.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,13 +19,13 @@ pub struct Evaluation {
     pub length_mean: f64,
     /// Mean distance along +x, m.
     pub distance_mean: f64,
-    /// Mean over the episodes of distance along +x by time, m/s.
+    /// Mean over the episodes of distance along +x per time, m/s.
     pub speed_mean: f64,
     /// Episodes that ended in a terminal state.
     pub falls: u64,
-    /// Episodes whose simulation stopped being finite (they are falls too).
+    /// Episodes whose simulation became non-finite (they count as falls too).
     pub diverged: u64,
-    /// Mean of each metric of the task per decision, by name, but for the distance along +x.
+    /// Mean of each metric of the task per decision, by name, without the distance along +x.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub metrics: Vec<(String, f64)>,
 }

@@ -1,4 +1,4 @@
-//! Policies as files.
+//! Policy files.
 
 use super::{FORMAT, Policy, PolicyMeta, VERSION};
 use crate::error::Error;
@@ -16,7 +16,7 @@ impl Policy {
         write_atomic(path, &self.to_bytes())
     }
 
-    /// The bytes of a file with the policy; [`Policy::from_bytes`] is the way back.
+    /// The policy as the bytes of a file. [`Policy::from_bytes`] is the inverse.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut file = TensorWriter::default();
         file.list("obs_mean", self.normalizer.mean());
@@ -38,14 +38,14 @@ impl Policy {
         Self::from_bytes(path, &read(path)?)
     }
 
-    /// Reads a policy from the bytes of a file. `path` stands for it in messages.
+    /// Reads a policy from the bytes of a file. Messages name the file `path`.
     ///
     /// # Errors
-    /// If the bytes have no checksum or the wrong one, are incomplete, or have numbers that are not finite.
+    /// If the bytes have no checksum or a wrong one, are incomplete, or have numbers that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
         let file = TensorReader::new(path, bytes)?;
         if file.seal(bytes)?.is_none() {
-            // first report a file of another kind as such
+            // reports other kinds of files first
             Self::of_file(path, &file)?;
             let expected = format!("one; `marathon import {} --out NEW.safetensors` writes it", path.display());
             return Err(Error::file(path, "checksum", "none", expected));
@@ -53,7 +53,7 @@ impl Policy {
         Self::of_file(path, &file)
     }
 
-    /// Reads a policy that another program may have written without a checksum. An existing checksum is checked.
+    /// Reads a policy that another program may have written without a checksum. Checks an existing checksum.
     ///
     /// # Errors
     /// As [`Policy::load`], except for a missing checksum.

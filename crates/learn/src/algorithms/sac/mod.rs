@@ -1,5 +1,5 @@
-//! Soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018): learns from everything that
-//! was experienced, not from the last rollout alone.
+//! Soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018): learns from a replay of
+//! all rollouts, not from the last one alone.
 //!
 //! Each rollout of all agents goes into a replay. Then, `updates` times, a batch is drawn from it:
 //!
@@ -10,8 +10,9 @@
 //! alpha:   -ln alpha (ln pi(a|s) - number of actions),  so that the entropy becomes minus the number of actions
 //! ```
 //!
-//! `Q'` are slow copies of the value networks: `Q' <- Q' + tau (Q - Q')`. All parts take a step of Adam at once. A batch
-//! is made of blocks: sixteen agents at one moment, moments and blocks by chance. The parameters are `policy, Q1, Q2, ln alpha`.
+//! `Q'` are slow copies of the value networks: `Q' <- Q' + tau (Q - Q')`. All parts take a step of Adam at once. A
+//! batch consists of randomly drawn blocks: sixteen agents at one moment. The parameters are `policy, Q1, Q2, ln
+//! alpha`.
 
 mod networks;
 
@@ -42,25 +43,25 @@ use std::sync::{Arc, RwLock};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sac {
-    /// Learning rate of the policy and of the entropy's weight.
+    /// Learning rate of the policy and of the entropy weight.
     pub lr: f64,
     /// Learning rate of the value networks.
     pub value_lr: f64,
-    /// How both move.
+    /// Schedule of both learning rates.
     pub schedule: Schedule,
-    /// Added to the root of Adam's second moment.
+    /// Constant that Adam adds to the root of the second moment.
     pub adam_epsilon: f64,
-    /// Agent-steps that are kept, rounded down to whole decisions of all agents.
+    /// Agent-steps in the replay, rounded down to whole decisions of all agents.
     pub replay: usize,
     /// Agent-steps before the first update.
     pub warmup: u64,
-    /// Samples of an update, a multiple of 16.
+    /// Samples per update, a multiple of 16.
     pub batch: usize,
     /// Updates after each rollout.
     pub updates: usize,
-    /// Part of the way that the slow value networks go in an update.
+    /// Update rate of the slow value networks.
     pub tau: f64,
-    /// Rewards that count before the value of the state that they lead to.
+    /// Rewards that are summed before the value of the state that they lead to.
     pub n_step: usize,
     /// Weight of the entropy at the start.
     pub init_alpha: f64,
@@ -121,14 +122,14 @@ impl Sac {
             return Err(Error::config("scale_rewards", true, why));
         }
         if common.statistics.follow_statistics {
-            let why = "false with sac, whose replay is normalized anew whenever it is drawn from";
+            let why = "false with sac, which normalizes its replay at every draw";
             return Err(Error::config("follow_statistics", true, why));
         }
         check::task_alone(common, "sac")?;
         super::actor_critic::refuse_adaptive(self.schedule, "sac")
     }
 
-    /// What a run needs.
+    /// Memory that a run needs.
     pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
         let layout = Layout::new(setup);
         let (obs, act) = (setup.spec.obs as u64, setup.spec.act as u64);
@@ -142,7 +143,7 @@ impl Sac {
     }
 }
 
-/// What SAC learns with.
+/// SAC with its networks, optimizer and replay.
 pub struct SacLearner {
     settings: Sac,
     seed: u64,
@@ -154,13 +155,13 @@ pub struct SacLearner {
     adam: Adam,
     lr: f64,
     skipped: u64,
-    /// Of each worker's blocks; all workers read them.
+    /// One replay per worker, for its blocks. All workers read all of them.
     replays: Arc<Vec<RwLock<Replay>>>,
     space: Option<Box<Space>>,
 }
 
 impl SacLearner {
-    /// At the start of a run, for workers with so many blocks each.
+    /// Creates a learner at the start of a run, for workers with `blocks[i]` blocks each.
     pub fn new(settings: Sac, setup: &Setup<'_>, blocks: &[usize]) -> Self {
         let nets = Networks::new(setup, settings.init_alpha);
         let slots = (settings.replay / setup.common.agents).max(1);
@@ -181,7 +182,7 @@ impl SacLearner {
         }
     }
 
-    /// Takes the rollout in and makes the updates.
+    /// Adds the rollout to the replay and makes the updates.
     fn learn(
         &mut self,
         workers: &mut dyn Workers,
@@ -221,7 +222,7 @@ impl SacLearner {
                         let (worker, local) = experience.place(*block);
                         replays[worker].sample(local, *age, settings.n_step, gamma, &mut space.batch);
                     }
-                    // noise belongs to the update and the place in the batch
+                    // the noise depends on the update and the position in the batch
                     let first = group.start + i * CHUNK;
                     let noise = |b: usize| Noise::of(seed, draw, (first + b) as u64);
                     let mut noise: Vec<Noise> = (0..chunk.len()).map(noise).collect();
@@ -240,7 +241,7 @@ impl SacLearner {
         }
     }
 
-    /// One step of Adam of all parts, and of the slow value networks.
+    /// Takes one step of Adam of all parts, and moves the slow value networks.
     fn step(&mut self, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
         let Self { settings, nets, adam, lr, .. } = self;
         if !workers.squares().iter().all(|s| s.is_finite()) {
@@ -299,17 +300,17 @@ impl Learner for SacLearner {
             },
             streams: &self.streams,
             params: &self.nets.params,
-            // the replay keeps observations as they are
+            // the replay keeps raw observations
             values: None,
             reward_scale: statistics.reward_scale() * self.streams[0].strength,
             return_center: statistics.returns.mean[0] as f32,
         }
     }
-    /// A replay is normalized anew whenever it is drawn from.
+    /// Does nothing: the replay is normalized at every draw.
     fn follow(&mut self, _: &Normalizer, _: &Normalizer) {}
     fn describe(&self, _: &Totals, sums: &LossSums) -> Description {
         let per_sample = |x: f64| if sums.samples > 0.0 { x / sums.samples } else { 0.0 };
-        // the deviations depend on the state, and the values are not those of a rollout
+        // the deviations depend on the state, and the values do not belong to a rollout
         Description {
             lr: self.lr,
             skipped: self.skipped,
@@ -318,7 +319,7 @@ impl Learner for SacLearner {
             std_mean: per_sample(sums.std),
         }
     }
-    /// The means of the policy; its deviations depend on the state and are left out.
+    /// The means of the policy. Its deviations depend on the state and are left out.
     fn policy(&self, mut meta: PolicyMeta, normalizer: Normalizer) -> Policy {
         meta.squash = true;
         let layout = &self.nets.layout;
@@ -371,7 +372,7 @@ impl Learner for SacLearner {
                     return Err(Error::Mismatch {
                         what: "checkpoint: replay".into(),
                         found: format!("{} decisions", replay.filled),
-                        expected: "what the settings make room for".into(),
+                        expected: "as many numbers as the settings need".into(),
                     });
                 }
                 block += 1;

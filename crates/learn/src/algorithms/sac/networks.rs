@@ -20,13 +20,13 @@ use std::marker::PhantomData;
 pub(super) struct Layout {
     pub obs: usize,
     pub act: usize,
-    /// Gives means and deviations.
+    /// Outputs means and deviations.
     pub actor: Mlp,
-    /// Sees the action too.
+    /// Takes observation and action.
     pub critic: Mlp,
     /// First parameters of the two value networks.
     pub critic_starts: [usize; 2],
-    /// The logarithm of the entropy's weight.
+    /// Index of the logarithm of the entropy weight.
     pub alpha: usize,
     pub places: Places,
 }
@@ -37,7 +37,7 @@ impl Layout {
         let actor = Mlp::new(&[&[obs], &network.actor_hidden[..], &[2 * act]].concat(), network.activation);
         let critic = Mlp::new(&[&[obs + act], &network.critic_hidden[..], &[1]].concat(), network.activation);
         let mut places = Places::default();
-        // room for deviations as other algorithms have them: the networks' places are older than this code
+        // space for the deviations of other algorithms: saved files have the networks at these places
         places.add(actor.len() + act);
         let critic_starts = [(); 2].map(|()| places.add(critic.len()).start);
         let alpha = places.add(1).start;
@@ -46,11 +46,11 @@ impl Layout {
     pub fn shape(&self, lanes: usize) -> Shape {
         Shape { obs: self.obs, act: self.act, log_probs: 1, streams: 1, next_obs: true, lanes }
     }
-    /// The parameters of the two value networks.
+    /// Parameters of the two value networks.
     pub fn critics<'a>(&self, params: &'a [f32]) -> [&'a [f32]; 2] {
         self.critic_starts.map(|start| &params[start..start + self.critic.len()])
     }
-    /// The same of their slow copies.
+    /// Parameters of their slow copies.
     pub fn critics_of_targets<'a>(&self, targets: &'a [f32]) -> [&'a [f32]; 2] {
         self.critic_starts.map(|start| &targets[start - self.critic_starts[0]..][..self.critic.len()])
     }
@@ -67,7 +67,7 @@ pub(super) struct Networks {
 }
 
 impl Networks {
-    /// At the start of a run.
+    /// Creates the networks at the start of a run.
     pub fn new(setup: &Setup<'_>, init_alpha: f64) -> Self {
         let layout = Layout::new(setup);
         let mut params = vec![0.0; layout.places.total()];
@@ -117,7 +117,7 @@ impl Space {
     }
 }
 
-/// Gradient of all parts over a chunk of samples, in `gradient`, which is returned with the sums of the losses.
+/// Computes the gradient of all parts over a chunk of samples. Returns it with the sums of the losses.
 pub(super) fn gradient(
     nets: &Networks,
     normalizer: &Normalizer,
@@ -133,7 +133,7 @@ pub(super) fn gradient(
     let (z, action) = (&mut z[..n * act * BLOCK], &mut action[..n * act * BLOCK]);
     let log_prob = &mut log_prob[..n * BLOCK];
 
-    // what the value networks should say
+    // targets of the value networks
     normalize(isa, normalizer, &batch.next, obs);
     layout.actor.forward(isa, actor, obs, tape, n);
     draw(isa, tape.output(), noise, (z, action, log_prob), act);
@@ -197,7 +197,7 @@ pub(super) fn gradient(
     layout.actor.backward(isa, actor, obs, tape, part, n);
     rest[..act].fill(0.0);
 
-    // weight of the entropy, and the mean deviation
+    // gradient of the entropy weight, and mean deviation
     gradient[layout.alpha] = log_prob.iter().map(|lp| act as f64 - *lp as f64).sum::<f64>() as f32;
     for b in 0..n {
         let logs = &tape.output().block(b)[act * BLOCK..];
@@ -228,7 +228,7 @@ fn draw(
     });
 }
 
-/// Observations and actions side by side.
+/// Writes observations and actions side by side.
 fn join(obs: &Blocks<f32>, action: &[f32], act: usize, joined: &mut Blocks<f32>, n: usize) {
     for (b, action) in action.chunks_exact(act * BLOCK).take(n).enumerate() {
         let (first, second) = joined.block_mut(b).split_at_mut(obs.features() * BLOCK);
