@@ -15,7 +15,7 @@ use std::marker::PhantomData;
 pub enum Distribution {
     /// Normal, with deviations that do not depend on the state.
     Gaussian(Gaussian<f32>, Ratio),
-    /// Normal numbers through the hyperbolic tangent, with deviations that the network gives.
+    /// Normal numbers through the hyperbolic tangent, with deviations from the network.
     Squashed,
 }
 

@@ -1,16 +1,16 @@
-//! The mean of policies, number by number.
+//! The mean of several policies.
 
 use super::{Policy, agree};
 use crate::error::Error;
 use crate::nets::normalize::Normalizer;
 
 impl Policy {
-    /// The policy whose every number is the mean of those of `policies`: weights, statistics of observations, deviations.
-    /// That makes sense for policies near each other, as one run keeps them. The mean has the description of the last one,
+    /// The policy whose every number is the mean over `policies`: weights, statistics of observations, deviations. This
+    /// makes sense for similar policies, such as those of one run. The mean has the description of the last policy,
     /// without its evaluation.
     ///
     /// # Errors
-    /// If there are none, or they are not alike ([`Policy::check_alike`]).
+    /// If there are none, or if they do not match ([`Policy::check_alike`]).
     pub fn mean(policies: &[Policy]) -> Result<Policy, Error> {
         let Some(last) = policies.last() else {
             return Err(Error::Mismatch {
@@ -36,7 +36,7 @@ impl Policy {
         lists.into_iter().flatten().copied().map(f64::from)
     }
 
-    /// The same policy with other [`numbers`](Self::numbers), as many.
+    /// The same policy with other [`numbers`](Self::numbers) of the same count.
     pub(crate) fn with_numbers(&self, numbers: &[f64]) -> Policy {
         let mut rest = numbers.iter().map(|x| *x as f32);
         let mut next = |n: usize| rest.by_ref().take(n).collect::<Vec<_>>();
@@ -45,10 +45,10 @@ impl Policy {
         Policy::assemble(self.meta.clone(), self.net.clone(), params, normalizer, next(self.log_std.len()))
     }
 
-    /// Whether every number of the policy means what it means in another one: the same agent, network and map of actions.
+    /// Checks that every number has the same meaning in both policies: the same agent, network and map of actions.
     ///
     /// # Errors
-    /// Names what differs.
+    /// Names the difference.
     pub fn check_alike(&self, other: &Policy) -> Result<(), Error> {
         let pairs = self.form().into_iter().zip(other.form());
         agree(pairs.map(|((what, found), (_, expected))| (what, found, expected)))

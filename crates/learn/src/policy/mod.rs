@@ -1,7 +1,8 @@
-//! Deployable policies: one safetensors file with everything that is needed to act.
+//! Deployable policies: one safetensors file with everything that acting needs.
 //!
-//! The header's metadata hold one JSON document, [`PolicyMeta`] and a checksum; the tensors are `obs_mean`, `obs_std`, `log_std`, and
-//! `layer.<i>.weight` (`[output, input]`) and `layer.<i>.bias` for each layer. The action for an observation is
+//! The metadata of the header hold one JSON document, [`PolicyMeta`] and a checksum. The tensors are `obs_mean`,
+//! `obs_std`, `log_std`, and `layer.<i>.weight` (`[output, input]`) and `layer.<i>.bias` for each layer. The action for
+//! an observation is
 //!
 //! ```text
 //! x = clamp((obs - obs_mean) * (1 / obs_std), -observation_clip, observation_clip)
@@ -9,8 +10,8 @@
 //! action = (low + high) / 2 + nominal (high - low) / 2
 //! ```
 //!
-//! with `[low, high]` from `action_range`. The action is in the units of the environment ([`Spec::action_low`]), so that
-//! the policy plays in the original of a task as it does here. A file without `action_range` means [-1, 1].
+//! with `[low, high]` from `action_range`. The action has the units of the environment ([`Spec::action_low`]), so the
+//! policy also plays in the original of a task. A file without `action_range` means [-1, 1].
 //!
 //! The last key of the document, `checksum`, is the FNV-1a hash of all bytes of the file, computed with sixteen zeros
 //! in its place.
@@ -46,19 +47,19 @@ const MOST_WIDTH: usize = 1 << 16;
 const MOST_HIDDEN: usize = 64;
 const MOST_PARAMETERS: u64 = 1 << 28;
 
-/// What a policy is for, and where it comes from.
+/// Description of a policy: its task and its origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PolicyMeta {
     /// Kind of file: `marathon-policy`.
     pub format: String,
     /// Version of the format.
     pub version: u32,
-    /// Name of the agent and its task, such as `Hopper-v0`.
+    /// Name of the agent with its task, such as `Hopper-v0`.
     pub agent: String,
-    /// Arguments of the task, with the values that the policy is for; empty for a task without arguments.
+    /// Options of the task, with the values that the policy was trained for. Empty for a task without options.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
-    /// Motion clips that the arguments name and that do not come with Marathon: names, and texts of `.motion` files.
+    /// Motion clips that the options name and that do not ship with Marathon: names, and texts of `.motion` files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clips: BTreeMap<String, String>,
     /// Observation length.
@@ -79,20 +80,20 @@ pub struct PolicyMeta {
     pub observation_clip: f32,
     /// Bound of the network's output.
     pub action_clip: f32,
-    /// Whether the network's output goes through the hyperbolic tangent before all else.
+    /// Whether the network's output first goes through the hyperbolic tangent.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub squash: bool,
-    /// What an output of -1 and 1 means to the environment, per actuator; empty: just that.
+    /// Actions of the environment for outputs of -1 and 1, per actuator. Empty: the outputs themselves.
     #[serde(default)]
     pub action_range: Vec<[f32; 2]>,
-    /// How the policy was trained, if by Marathon.
+    /// Summary of the training, if Marathon trained the policy.
     pub training: Option<Training>,
-    /// How it did when it was last evaluated.
+    /// Results of the last evaluation.
     pub evaluation: Option<Evaluation>,
 }
 
 impl PolicyMeta {
-    /// Of a policy for a task, with nothing known about its training; actions of the network in [-1, 1].
+    /// Describes a policy for a task, without training. Actions of the network are in [-1, 1].
     pub fn of(spec: &Spec, hidden: Vec<usize>, activation: Activation) -> Self {
         PolicyMeta {
             format: FORMAT.into(),
@@ -117,10 +118,10 @@ impl PolicyMeta {
     }
 }
 
-/// Summary of a policy's training: nothing that would tell equal policies apart, so without the time that it took.
+/// Summary of a policy's training. Equal policies have equal summaries, so it has no times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Training {
-    /// Configuration, with 0 for the number of threads. It is for people to read: no program depends on its keys.
+    /// Configuration, with 0 for the number of threads. It is for people: no program depends on its keys.
     pub config: Value,
     /// Agent-steps.
     pub steps: u64,
@@ -139,7 +140,7 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// Of parts that are known to fit.
+    /// Creates a policy from parts that fit.
     pub(crate) fn assemble(
         meta: PolicyMeta,
         net: Mlp,
@@ -150,8 +151,8 @@ impl Policy {
         Self { meta, net, params, normalizer, log_std }
     }
 
-    /// A policy from its parts: parameters of the network in the order of [`Mlp`], means and deviations of observations,
-    /// logarithms of the standard deviations of actions.
+    /// Creates a policy from its parts: parameters of the network in the order of [`Mlp`], means and deviations of
+    /// observations, logarithms of the standard deviations of actions.
     ///
     /// # Errors
     /// If a length does not fit the widths in `meta`.
@@ -180,15 +181,15 @@ impl Policy {
         Ok(Self { net: Mlp::new(&sizes, meta.activation), meta, params, normalizer, log_std })
     }
 
-    /// What the policy is for, and where it comes from.
+    /// Description of the policy.
     pub fn meta(&self) -> &PolicyMeta {
         &self.meta
     }
-    /// Notes how the policy did.
+    /// Stores the results of an evaluation.
     pub fn set_evaluation(&mut self, evaluation: Evaluation) {
         self.meta.evaluation = Some(evaluation);
     }
-    /// Notes the arguments of the task that the policy is for, and the clips that they name.
+    /// Stores the options of the policy's task, and the clips that they name.
     pub fn set_task(&mut self, options: Options, clips: BTreeMap<String, String>) {
         (self.meta.options, self.meta.clips) = (options, clips);
     }
@@ -204,7 +205,7 @@ impl Policy {
     pub fn normalizer(&self) -> &Normalizer {
         &self.normalizer
     }
-    /// Logarithms of the standard deviations that the actions had in training.
+    /// Logarithms of the standard deviations of the actions in training.
     pub fn log_std(&self) -> &[f32] {
         &self.log_std
     }
@@ -229,10 +230,11 @@ impl Policy {
         self.meta.action_range.get(i).map_or(nominal, |range| scale_action(*range, nominal))
     }
 
-    /// Whether the policy fits a task: its own, or, if it is that of a role, the task of the same name in which one has it all.
+    /// Checks that the policy fits a task: its own, or, for the policy of a role, the single-role task of the same
+    /// name.
     ///
     /// # Errors
-    /// Names what differs.
+    /// Names the difference.
     pub fn check(&self, spec: &Spec) -> Result<(), Error> {
         let meta = &self.meta;
         let agent = if spec.roles.is_empty() && task_of_role(&meta.agent) == spec.id { &spec.id } else { &meta.agent };
@@ -264,7 +266,7 @@ pub(crate) fn check_widths(meta: &PolicyMeta) -> Result<u64, Error> {
     Ok(count)
 }
 
-/// Whether what is found is what is expected, each under its name.
+/// Checks that each found value equals the expected one of the same name.
 fn agree(pairs: impl IntoIterator<Item = (&'static str, String, String)>) -> Result<(), Error> {
     match pairs.into_iter().find(|(_, found, expected)| found != expected) {
         Some((what, found, expected)) => Err(Error::Mismatch { what: what.into(), found, expected }),

@@ -1,7 +1,7 @@
-//! Arguments of a task as JSON: an object with a boolean, a number, two numbers or a text for each. Infinite numbers, which
-//! JSON does not have, are the texts `inf` and `-inf`.
+//! Options of a task as JSON: an object of booleans, numbers, pairs of numbers or texts. Infinite numbers, which JSON
+//! lacks, become the texts `inf` and `-inf`.
 //!
-//! For serde's `with`.
+//! For serde's `with` attribute.
 
 use marathon_envs::Options;
 use marathon_envs::options::Value;
@@ -11,7 +11,7 @@ use serde::{Deserializer, Serializer};
 use serde_json::{Value as Json, json};
 use std::fmt;
 
-/// Writes arguments.
+/// Writes options.
 ///
 /// # Errors
 /// Those of the serializer.
@@ -23,10 +23,10 @@ pub fn serialize<S: Serializer>(options: &Options, serializer: S) -> Result<S::O
     map.end()
 }
 
-/// Reads arguments.
+/// Reads options.
 ///
 /// # Errors
-/// If a value is none that an argument can have.
+/// If an option cannot have such a value.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Options, D::Error> {
     struct Arguments;
     impl<'de> Visitor<'de> for Arguments {

@@ -1,14 +1,15 @@
-//! Curiosity (Pathak et al., 2017): the reward is the error of a forecast.
+//! Curiosity (Pathak et al., 2017): the reward is the error of a prediction.
 //!
-//! An encoder makes features `f` of an observation. One network tells the action from the features before and after it,
-//! which keeps what the agent cannot influence out of them; another foretells the features that follow:
+//! An encoder computes features `f` of an observation. One network predicts the action from the features before and
+//! after it, which excludes everything that the agent cannot influence. Another predicts the features that follow:
 //!
 //! ```text
 //! forward = |P(f, a) - f'|^2 / 2        inverse = |I(f, f') - a|^2
 //! loss    = 10 (0.2 forward + 0.8 inverse)        reward = forward
 //! ```
 //!
-//! All three learn from the whole loss (ML-Agents' weights). Actions are bounded to [-1, 1], as the environment takes them.
+//! All three learn from the whole loss (with ML-Agents' weights). Actions are bounded to [-1, 1], as the environment
+//! uses them.
 
 use super::kernels::{Distance, Gather, place};
 use super::{Judge, Lesson, Reward, Step};
@@ -30,7 +31,7 @@ const INVERSE: f64 = 10.0 * 0.8;
 /// Width of the hidden layer of the two predictors.
 const HIDDEN: usize = 256;
 
-/// The three networks; their parameters follow one another in this order.
+/// The three networks. Their parameters follow one another in this order.
 #[derive(Clone, Debug)]
 pub struct Curiosity {
     encoder: Mlp,
@@ -46,13 +47,13 @@ pub struct CuriositySpace<S> {
     action: Blocks<S>,
     before: Tape<S>,
     after: Tape<S>,
-    /// Features and action, and the features foretold.
+    /// Features and action, then the predicted features.
     forward_input: Blocks<S>,
     forward: Tape<S>,
-    /// Features before and after, and the action told from them.
+    /// Features before and after, then the predicted action.
     inverse_input: Blocks<S>,
     inverse: Tape<S>,
-    /// Derivatives with respect to the two inputs.
+    /// Derivatives with respect to the inputs of both predictors.
     forward_delta: Blocks<S>,
     inverse_delta: Blocks<S>,
     half: Vec<S>,
@@ -72,7 +73,7 @@ impl Reward for Curiosity {
     }
 }
 
-/// The networks at work.
+/// The networks with their work space.
 struct CuriosityJudge {
     nets: Curiosity,
     space: CuriositySpace<f32>,
@@ -92,7 +93,7 @@ impl Judge for CuriosityJudge {
 }
 
 impl Curiosity {
-    /// For lengths of observations and actions; the last of the widths is the number of features.
+    /// Creates the networks for the given observation and action lengths. The last width is the number of features.
     pub fn new(obs: usize, act: usize, hidden: &[usize]) -> Self {
         let features = hidden.last().copied().unwrap_or(obs);
         let net = |sizes: &[usize]| Mlp::new(sizes, Activation::Swish);
@@ -107,12 +108,12 @@ impl Curiosity {
     pub fn count(&self) -> usize {
         self.encoder.len() + self.forward.len() + self.inverse.len()
     }
-    /// Places of the networks' parameters.
+    /// Places of the three networks' parameters.
     fn parts(&self) -> [Range<usize>; 3] {
         let (e, f) = (self.encoder.len(), self.forward.len());
         [0..e, e..e + f, e + f..self.count()]
     }
-    /// Fills the parameters for the start of a run.
+    /// Initializes the parameters.
     pub(crate) fn init(&self, params: &mut [f32], random: &mut SplitMix) {
         for (net, part) in [&self.encoder, &self.forward, &self.inverse].into_iter().zip(self.parts()) {
             init::orthogonal(net, &mut params[part], 1.0, random);
@@ -140,7 +141,7 @@ impl Curiosity {
         }
     }
 
-    /// Runs all networks on the steps and leaves the errors with their derivatives.
+    /// Runs all networks on the steps and stores the errors with their derivatives.
     pub fn losses<T: Real>(
         &self,
         params: &[T::Scalar],
@@ -187,7 +188,7 @@ impl Curiosity {
         });
     }
 
-    /// The forecast's error after [`Curiosity::losses`].
+    /// The prediction error after [`Curiosity::losses`].
     pub fn reward(&self, space: &CuriositySpace<f32>, blocks: usize, out: &mut [f32]) {
         out[..blocks * BLOCK].copy_from_slice(&space.half[..blocks * BLOCK]);
     }
@@ -204,14 +205,14 @@ impl Curiosity {
         let [encoder, forward, inverse] = parts.clone().map(|part| &params[part]);
         let [of_encoder, of_forward, of_inverse] = parts;
         let s = &mut *space;
-        // the predictors, down to their inputs
+        // both predictors, down to their inputs
         let part = &mut gradient[of_forward];
         self.forward.backward_on::<T>(forward, &s.forward_input, &mut s.forward, part, blocks);
         self.forward.input_delta_on::<T>(forward, &s.forward, &mut s.forward_delta, blocks);
         let part = &mut gradient[of_inverse];
         self.inverse.backward_on::<T>(inverse, &s.inverse_input, &mut s.inverse, part, blocks);
         self.inverse.input_delta_on::<T>(inverse, &s.inverse, &mut s.inverse_delta, blocks);
-        // the features before enter both, those after the inverse and the forecast's error
+        // the features before enter both predictors; the features after enter the inverse one and the prediction error
         let gather = |from: &Blocks<T::Scalar>, first: usize, factor: f64, to: &mut Blocks<T::Scalar>| {
             T::enter(Gather::<T> { from, first, factor, to, blocks, lanes: PhantomData });
         };

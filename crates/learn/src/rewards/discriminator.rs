@@ -1,8 +1,9 @@
-//! Imitation by a discriminator: a network learns to tell the agent's decisions from demonstrated ones, and the reward is how
-//! well the agent deceives it.
+//! Imitation by a discriminator: a network learns to distinguish the agent's decisions from demonstrated ones. The
+//! reward is high where it fails.
 //!
-//! [`Form::Amp`] is "AMP: Adversarial motion priors" (Peng et al., 2021): the network `d` sees two observations in a row.
-//! [`Form::Gail`] is "Generative adversarial imitation learning" (Ho and Ermon, 2016) with ML-Agents' reward: it sees one.
+//! [`Form::Amp`] is "AMP: Adversarial motion priors" (Peng et al., 2021): the network `d` takes two consecutive
+//! observations. [`Form::Gail`] is "Generative adversarial imitation learning" (Ho and Ermon, 2016) with ML-Agents'
+//! reward: it takes one.
 //!
 //! ```text
 //! amp    loss: (d(demonstrated) - 1)^2 + (d(own) + 1)^2        reward: max(0, 1 - (d - 1)^2 / 4)
@@ -10,8 +11,8 @@
 //! both   loss: + gradient_penalty / 2 |grad d(demonstrated)|^2 + logit_decay |weights of the last layer|^2
 //! ```
 //!
-//! With each decision of a minibatch goes a demonstrated one, drawn by the number of the minibatch and of the decision. It is
-//! normalized as the agent's observations are at that time.
+//! Each decision of a minibatch is paired with a demonstrated one, drawn by the indices of the minibatch and the
+//! decision. Demonstrations are normalized with the current statistics of the agent's observations.
 
 use super::kernels::place;
 use super::{Judge, Lesson, Purpose, Reward, Step};
@@ -33,21 +34,21 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a discriminator sees, and what its verdict is worth.
+/// Input of a discriminator, and its loss and reward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
-    /// Two observations in a row; least squares.
+    /// Two consecutive observations; least squares.
     Amp,
     /// One observation; logistic.
     Gail,
 }
 
-/// Settings of imitation; the defaults are those of AMP for a character with clips.
+/// Settings of imitation. The defaults are those of AMP for a character with clips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imitation {
-    /// What it sees, and what its verdict is worth.
+    /// Input, loss and reward.
     pub form: Form,
     /// Widths of the discriminator's hidden layers.
     pub hidden: Vec<usize>,
@@ -55,17 +56,17 @@ pub struct Imitation {
     pub activation: Activation,
     /// Learning rate.
     pub lr: f64,
-    /// Named parts of the observation that it sees; none: all of it. Commands and phases are no matter of style.
+    /// Named parts of the observation that it sees. None means all. Commands and phases are not part of a style.
     pub observations: Vec<String>,
-    /// Whether it sees the action, too.
+    /// Whether it also sees the action.
     pub actions: bool,
-    /// Weight of the penalty on the slope at demonstrations.
+    /// Weight of the gradient penalty at demonstrations.
     pub gradient_penalty: f64,
     /// Weight of the squared weights of the last layer.
     pub logit_decay: f64,
-    /// Part of each minibatch that it learns from: it needs fewer samples than the policy.
+    /// Fraction of each minibatch that it learns from. It needs fewer samples than the policy.
     pub share: f64,
-    /// File of demonstrations; without one, they are the task's own.
+    /// File of demonstrations. Without it, the task's own demonstrations are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub demonstrations: Option<String>,
 }
@@ -88,7 +89,7 @@ impl Default for Imitation {
 }
 
 impl Imitation {
-    /// Checks every field of its own.
+    /// Checks every field.
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
@@ -106,10 +107,10 @@ impl Imitation {
         }
     }
 
-    /// Which numbers of a task's observation it sees.
+    /// Indices of the observation that it sees.
     ///
     /// # Errors
-    /// If the observation has no part of a name.
+    /// If the observation has no part of that name.
     pub fn sees(&self, spec: &Spec) -> Result<Vec<usize>, Error> {
         if self.observations.is_empty() {
             return Ok((0..spec.obs).collect());
@@ -130,20 +131,20 @@ impl Imitation {
         Ok(sees)
     }
 
-    /// Refuses demonstrations that do not fit a task, or are none.
+    /// Refuses missing demonstrations and those that do not fit a task.
     ///
     /// # Errors
-    /// Says what was found and what would do.
+    /// Says what was found and what is valid.
     pub fn check(&self, spec: &Spec, demonstrations: Option<&Demonstrations>) -> Result<(), Error> {
         self.sees(spec)?;
         let what = |found: String, expected: String| Err(Error::Mismatch { what: "imitation".into(), found, expected });
         let Some(all) = demonstrations.filter(|all| all.motions.iter().any(|motion| !motion.is_empty())) else {
             let expected = "an agent that follows motion clips, or a file of demonstrations (demo_path)".into();
-            return what(format!("{}, which knows of no demonstrations", spec.id), expected);
+            return what(format!("{}, which has no demonstrations", spec.id), expected);
         };
         if all.source != self.demonstrations {
             let name = |source: &Option<String>| match source {
-                Some(file) => format!("those of '{file}', which a front end reads"),
+                Some(file) => format!("those of '{file}', which were not read"),
                 None => "those of the task's own".into(),
             };
             return what(name(&all.source), name(&self.demonstrations));
@@ -156,7 +157,7 @@ impl Imitation {
         }
         if self.actions && all.act_len != spec.act {
             let found = if all.act_len == 0 {
-                "clips, which tell no actions".into()
+                "clips, which have no actions".into()
             } else {
                 format!("demonstrations of {} actions", all.act_len)
             };
@@ -166,7 +167,7 @@ impl Imitation {
     }
 }
 
-/// Decisions to be imitated, as far as the discriminator sees them.
+/// Demonstrated decisions, restricted to the discriminator's input.
 struct Expert {
     /// `[row][feature]`, raw.
     rows: Vec<f32>,
@@ -176,16 +177,16 @@ struct Expert {
     actions: Vec<f32>,
 }
 
-/// The network with what it is to learn.
+/// The network with the data that it learns from.
 #[derive(Clone)]
 pub struct Discriminator {
     net: Mlp,
     settings: Imitation,
-    /// Numbers of the observation that it sees.
+    /// Indices of the observation that it sees.
     sees: Vec<usize>,
-    /// Length of the action, as far as it sees it.
+    /// Length of the action if it sees the action, else 0.
     act: usize,
-    /// What makes an action drawn one in [-1, 1].
+    /// Factor that maps sampled actions to [-1, 1].
     action_scale: f32,
     seed: u64,
     expert: Option<Arc<Expert>>,
@@ -201,15 +202,15 @@ pub struct DiscriminatorSpace<S> {
 }
 
 impl<S: Copy + Default> DiscriminatorSpace<S> {
-    /// The agent's decisions, and the demonstrated ones.
+    /// Inputs for the agent's decisions and for the demonstrated ones.
     pub fn inputs(&mut self) -> [&mut Blocks<S>; 2] {
         [&mut self.own, &mut self.expert]
     }
 }
 
 impl Discriminator {
-    /// For an observation of which it sees these numbers, and an action of a length. Without demonstrations it can judge, but
-    /// not learn.
+    /// Creates a discriminator that sees the given indices of the observation. Without demonstrations it can give
+    /// rewards but not learn.
     pub fn new(settings: &Imitation, sees: Vec<usize>, purpose: Purpose<'_>) -> Self {
         let Purpose { spec: Spec { act, .. }, seed, action_scale, demonstrations } = purpose;
         let act = *act;
@@ -219,7 +220,7 @@ impl Discriminator {
         let net = Mlp::new(&[&[inputs], &settings.hidden[..], &[1]].concat(), settings.activation);
         let expert = demonstrations.map(|all| {
             let rows = all.obs.chunks_exact(all.obs_len.max(1)).flat_map(|row| sees.iter().map(|i| row[*i])).collect();
-            // a motion without decisions has nothing to draw
+            // a motion without decisions cannot be drawn
             let motions = all.motions.iter().filter(|motion| !motion.is_empty()).cloned().collect();
             Arc::new(Expert { rows, decisions: all.decisions.clone(), motions, actions: all.actions.clone() })
         });
@@ -240,7 +241,7 @@ impl Discriminator {
         }
     }
 
-    /// Puts what it sees of a step into a block of its input.
+    /// Writes the visible part of a step to a block of its input.
     fn see(&self, step: &Step<'_, f32>, block: &mut [f32]) {
         let states: &[&[f32]] = if self.settings.form == Form::Amp { &[step.obs, step.next] } else { &[step.obs] };
         let rows = states.iter().flat_map(|obs| self.sees.iter().map(|i| &obs[i * BLOCK..(i + 1) * BLOCK]));
@@ -271,8 +272,8 @@ impl Discriminator {
         }
     }
 
-    /// Overwrites `gradient` with that of the loss, summed over the first blocks of the [inputs](DiscriminatorSpace::inputs);
-    /// the tape keeps what [`Discriminator::loss`] reads.
+    /// Overwrites `gradient` with that of the loss, summed over the first blocks of the
+    /// [inputs](DiscriminatorSpace::inputs). The tape keeps the data for [`Discriminator::loss`].
     pub fn learn<T: Real>(
         &self,
         params: &[T::Scalar],
@@ -312,7 +313,7 @@ impl Discriminator {
         verdict + 0.5 * gradient_penalty * slope + logit_decay * weight
     }
 
-    /// What verdicts on the space's own input are worth.
+    /// Rewards for the network's output on its own input.
     fn reward<T: Real<Scalar = f32>>(
         &self,
         params: &[f32],
@@ -343,7 +344,7 @@ impl Reward for Discriminator {
     }
 }
 
-/// The network at work.
+/// The network with its work space.
 struct DiscriminatorJudge {
     nets: Discriminator,
     space: DiscriminatorSpace<f32>,
@@ -366,7 +367,7 @@ impl Judge for DiscriminatorJudge {
         gradient: &mut [f32],
     ) {
         let Self { nets, space } = self;
-        let expert = nets.expert.clone().expect("a run without demonstrations does not begin");
+        let expert = nets.expert.clone().expect("runs without demonstrations are refused");
         let seed = seed_of_demonstrations(nets.seed, lesson.batch);
         let used = ((steps.len() as f64 * nets.settings.share).ceil() as usize).clamp(1, steps.len());
         for (b, (step, item)) in steps[..used].iter().zip(lesson.items).enumerate() {
@@ -375,7 +376,7 @@ impl Judge for DiscriminatorJudge {
             nets.draw(&expert, lesson, &mut random, space.expert.block_mut(b));
         }
         f32_lanes!(isa, T => nets.learn::<T>(params, used, space, gradient));
-        // as much as if it had learned from all
+        // scales up to all samples
         let part = (steps.len() as f64 / used as f64) as f32;
         if part != 1.0 {
             gradient.iter_mut().for_each(|g| *g *= part);
@@ -383,7 +384,7 @@ impl Judge for DiscriminatorJudge {
     }
 }
 
-/// Derivative of the loss with respect to verdicts `d` that should be the target, 1 or -1.
+/// Derivative of the loss with respect to outputs `d` whose target is 1 or -1.
 struct Verdict<'a, T: Real> {
     form: Form,
     target: f64,
@@ -415,7 +416,7 @@ impl<T: Real> Kernel<T> for Verdict<'_, T> {
     }
 }
 
-/// What verdicts are worth, a row of sixteen per block.
+/// Rewards for outputs `d`, a row of sixteen per block.
 struct Worth<'a, T: Real<Scalar = f32>> {
     form: Form,
     d: &'a Blocks<f32>,

@@ -1,4 +1,4 @@
-//! What the networks of rewards share.
+//! Kernels that the networks of rewards share.
 
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;

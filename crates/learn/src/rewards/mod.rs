@@ -1,10 +1,10 @@
-//! The rewards that a policy learns from: the task's own, and those that a learner gives itself. Each has a discount, a
-//! strength and a stream of values of its own, as in ML-Agents, and any number of them are added up.
+//! The rewards that a policy learns from: the task's own and intrinsic ones. As in ML-Agents, each has its own
+//! discount, strength and stream of values. You can combine any number of them.
 //!
-//! Rewards for novelty, [curiosity] and [random network distillation](rnd), have networks of their own. They judge each step
-//! of a rollout ([`Judge::reward`]), and learn from the same minibatches as policy and value function
-//! ([`Judge::gradient`]): where they have learned, the reward fades. A reward for [imitation](discriminator) learns to tell the
-//! agent's decisions from demonstrated ones. A new kind of reward implements [`Reward`].
+//! Rewards for novelty, [curiosity] and [random network distillation](rnd), have their own networks. These compute a
+//! reward for each step of a rollout ([`Judge::reward`]), and learn from the same minibatches as policy and value
+//! function ([`Judge::gradient`]). The reward fades where they have learned. A reward for [imitation](discriminator)
+//! learns to distinguish the agent's decisions from demonstrated ones. To add a kind of reward, implement [`Reward`].
 
 pub mod curiosity;
 pub mod discriminator;
@@ -23,19 +23,19 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What is rewarded.
+/// Kind of a reward.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RewardKind {
-    /// What the task gives.
+    /// The task's reward.
     Task,
-    /// The error of a prediction of the next state's features from this one's and the action; the features are those that
-    /// tell the action (Pathak et al., "Curiosity-driven exploration by self-supervised prediction", 2017).
+    /// The error of a prediction of the next features from the current ones and the action. Features are those that
+    /// determine the action (Pathak et al., "Curiosity-driven exploration by self-supervised prediction", 2017).
     Curiosity(Novelty),
-    /// The error of a network that learns what another one with random parameters makes of the observation (Burda et al.,
-    /// "Exploration by random network distillation", 2018).
+    /// The error of a network that learns the output of a fixed random network (Burda et al., "Exploration by random
+    /// network distillation", 2018).
     Rnd(Novelty),
-    /// How well the agent deceives a network that tells its decisions from demonstrated ones.
+    /// Failure of a network to distinguish the agent's decisions from demonstrated ones.
     Imitation(Imitation),
 }
 
@@ -50,7 +50,7 @@ impl RewardKind {
             RewardKind::Imitation(Imitation { form: Form::Gail, .. }) => "gail",
         }
     }
-    /// Widths of the hidden layers of its networks and their learning rate, if it has any.
+    /// Widths of the hidden layers of its networks and their learning rate, if it has networks.
     pub fn networks(&self) -> Option<(&[usize], f64)> {
         match self {
             RewardKind::Task => None,
@@ -60,7 +60,7 @@ impl RewardKind {
             RewardKind::Imitation(Imitation { hidden, lr, .. }) => Some((hidden, *lr)),
         }
     }
-    /// Imitation, if it is that.
+    /// The imitation settings, if this reward is imitation.
     pub fn imitation(&self) -> Option<&Imitation> {
         match self {
             RewardKind::Imitation(settings) => Some(settings),
@@ -76,11 +76,11 @@ impl RewardKind {
     }
 }
 
-/// Networks of a reward for novelty; the defaults are ML-Agents'.
+/// Networks of a reward for novelty. The defaults are ML-Agents'.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Novelty {
-    /// Widths of the network that makes features of an observation; the last is their number.
+    /// Widths of the network that computes features of an observation. The last is the number of features.
     pub hidden: Vec<usize>,
     /// Learning rate.
     pub lr: f64,
@@ -92,21 +92,20 @@ impl Default for Novelty {
     }
 }
 
-/// A reward; the defaults are ML-Agents'.
+/// A reward. The defaults are ML-Agents'.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RewardConfig {
-    /// What is rewarded.
+    /// Kind of the reward.
     pub kind: RewardKind,
-    /// Factor of the reward; that of the task's matters beside others.
+    /// Factor of the reward. For the task's reward it matters only with other rewards.
     pub strength: f64,
-    /// Discount per decision. Rewards for novelty do not end with an episode: its last state is worth what the value
-    /// function says.
+    /// Discount per decision. Rewards for novelty do not end with an episode: the value function estimates the rest.
     pub gamma: f64,
 }
 
 impl RewardConfig {
-    /// With ML-Agents' defaults.
+    /// A reward with ML-Agents' defaults.
     pub fn new(kind: RewardKind) -> Self {
         Self { kind, strength: 1.0, gamma: 0.99 }
     }
@@ -140,31 +139,31 @@ pub struct Step<'a, S> {
     pub obs: &'a [S],
     /// Actions as drawn, `[action][16]`.
     pub action: &'a [S],
-    /// What was observed next, before a reset.
+    /// Next observations, before a reset.
     pub next: &'a [S],
 }
 
-/// A reward that a learner gives itself, by networks.
+/// An intrinsic reward, computed by networks.
 pub trait Reward: Send + Sync {
-    /// Number of parameters that are learned.
+    /// Number of trained parameters.
     fn count(&self) -> usize;
-    /// Fills them for the start of a run.
+    /// Initializes the parameters.
     fn init(&self, params: &mut [f32], random: &mut SplitMix);
-    /// What gives the reward and learns, with its work space: one for each worker.
+    /// Creates the networks with their work space, one for each worker.
     fn judge(&self) -> Box<dyn Judge>;
-    /// Whether the reward goes on beyond the end of an episode.
+    /// Whether the reward continues beyond the end of an episode.
     fn ignores_done(&self) -> bool {
         true
     }
-    /// The most that a step is worth, times the strength.
+    /// Upper bound of the reward of a step, after the factor `strength`.
     fn bound(&self) -> f64 {
         1.0
     }
 }
 
-/// The networks of a [`Reward`] at work.
+/// The networks of a [`Reward`] with their work space.
 pub trait Judge: Send {
-    /// Rewards of at most [`CHUNK`](crate::nets::mlp::CHUNK) blocks of steps, a row of sixteen each.
+    /// Computes rewards of at most [`CHUNK`](crate::nets::mlp::CHUNK) blocks of steps, a row of sixteen each.
     fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]);
     /// Overwrites `gradient` with that of the networks' loss, summed over the steps.
     fn gradient(
@@ -177,57 +176,57 @@ pub trait Judge: Send {
     );
 }
 
-/// What a [`Judge`] is told about the steps that it learns from.
+/// Context of the steps that a [`Judge`] learns from.
 #[derive(Clone, Copy)]
 pub struct Lesson<'a> {
-    /// What their observations were normalized with.
+    /// Map that normalized their observations.
     pub normalizer: &'a Normalizer,
-    /// Number of the minibatch in the run.
+    /// Index of the minibatch in the run.
     pub batch: u64,
-    /// Numbers of the steps in the rollout.
+    /// Indices of the steps in the rollout.
     pub items: &'a [u32],
 }
 
-/// What the rewards of a run are for.
+/// Context for the rewards of a run.
 #[derive(Clone, Copy)]
 pub struct Purpose<'a> {
     /// The task.
     pub spec: &'a Spec,
     /// Seed of the run.
     pub seed: u64,
-    /// What makes an action drawn one in [-1, 1], before it is clipped to that.
+    /// Factor that maps sampled actions to [-1, 1], before they are clipped.
     pub action_scale: f32,
-    /// What is to be imitated, if it is known here.
+    /// Demonstrations to imitate, if this process has them.
     pub demonstrations: Option<&'a Demonstrations>,
 }
 
-/// A stream of rewards with its properties.
+/// A stream of rewards.
 #[derive(Clone)]
 pub struct Stream {
     /// Factor.
     pub strength: f64,
     /// Discount per decision.
     pub gamma: f64,
-    /// Whether it goes on beyond the end of an episode.
+    /// Whether it continues beyond the end of an episode.
     pub ignores_done: bool,
-    /// Its networks, unless it is the task's.
+    /// Its networks, unless it is the task's reward.
     pub networks: Option<Networks>,
 }
 
-/// Networks of a reward among a learner's parameters.
+/// Networks of a reward, as part of a learner's parameters.
 #[derive(Clone)]
 pub struct Networks {
     /// The networks.
     pub reward: Arc<dyn Reward>,
-    /// Their parameters' places.
+    /// Place of their parameters.
     pub place: Range<usize>,
     /// Their learning rate.
     pub lr: f64,
 }
 
 impl Stream {
-    /// Of configured rewards for an agent; `place` finds places for so many parameters. Parameters that are not learned
-    /// come from the seed.
+    /// Creates the streams of the configured rewards for an agent. `place` reserves places for parameters. Parameters
+    /// that are not trained depend on the seed.
     pub fn all(
         rewards: &[RewardConfig],
         purpose: Purpose<'_>,
@@ -238,7 +237,7 @@ impl Stream {
         let (obs, act) = (spec.obs, spec.act);
         let stream = |config: &RewardConfig| {
             let networks = config.kind.networks().map(|(hidden, lr)| {
-                let [fixed, _] = &mut random.next().expect("there is no last one");
+                let [fixed, _] = &mut random.next().expect("the iterator is endless");
                 let reward: Arc<dyn Reward> = match &config.kind {
                     RewardKind::Rnd(_) => Arc::new(Rnd::new(obs, hidden, fixed)),
                     RewardKind::Imitation(settings) => {
@@ -255,7 +254,7 @@ impl Stream {
         rewards.iter().map(stream).collect()
     }
 
-    /// Fills the parameters of all networks for the start of a run.
+    /// Initializes the parameters of all networks.
     pub fn init(streams: &[Stream], params: &mut [f32], seed: u64) {
         let networks = streams.iter().filter_map(|stream| stream.networks.as_ref());
         for (networks, [_, mut random]) in networks.zip(streams_of_random_numbers(seed)) {
@@ -264,7 +263,7 @@ impl Stream {
     }
 }
 
-/// For each reward with networks: random numbers for parameters that are not learned, and for those that are.
+/// Random numbers for each reward with networks: for fixed parameters, and for trained ones.
 fn streams_of_random_numbers(seed: u64) -> impl Iterator<Item = [SplitMix; 2]> {
     (0..).map(move |i: u64| [2 * i, 2 * i + 1].map(|n| SplitMix::new(seed, SIGNALS + n)))
 }

@@ -1,5 +1,5 @@
-//! Random network distillation (Burda et al., 2018): a network learns what another one with fixed random parameters makes
-//! of an observation. Where observations are new, it errs, and the squared error is the reward.
+//! Random network distillation (Burda et al., 2018): a network learns the output of a second network with fixed random
+//! parameters. Its squared error is large for new observations, and is the reward.
 
 use super::kernels::{Distance, place};
 use super::{Judge, Lesson, Reward, Step};
@@ -13,7 +13,7 @@ use crate::nets::mlp::{CHUNK, Mlp, Tape};
 use marathon_physics::lanes::{Isa, Real};
 use std::marker::PhantomData;
 
-/// The two networks, which have one shape, and the parameters of the fixed one.
+/// The two networks, which have the same shape, and the parameters of the fixed one.
 #[derive(Clone, Debug)]
 pub struct Rnd {
     net: Mlp,
@@ -43,7 +43,7 @@ impl Reward for Rnd {
     }
 }
 
-/// The networks at work.
+/// The networks with their work space.
 struct RndJudge {
     nets: Rnd,
     space: RndSpace<f32>,
@@ -63,22 +63,22 @@ impl Judge for RndJudge {
 }
 
 impl Rnd {
-    /// For observations of a length, with the fixed parameters of a seed.
+    /// Creates the networks for observations of length `obs`, with fixed parameters from a seed.
     pub fn seeded(obs: usize, hidden: &[usize], seed: u64) -> Self {
         Self::new(obs, hidden, &mut SplitMix::new(seed, SIGNALS))
     }
-    /// As [`Rnd::seeded`], from a stream of random numbers; the last of the widths is the number of features.
+    /// Like [`Rnd::seeded`], from a stream of random numbers. The last width is the number of features.
     pub(crate) fn new(obs: usize, hidden: &[usize], random: &mut SplitMix) -> Self {
         let net = Mlp::new(&[&[obs], hidden].concat(), Activation::Swish);
         let mut target = vec![0.0; net.len()];
         init::orthogonal(&net, &mut target, 1.0, random);
         Self { net, target }
     }
-    /// Number of parameters that are learned.
+    /// Number of trained parameters.
     pub fn count(&self) -> usize {
         self.net.len()
     }
-    /// Fills them for the start of a run.
+    /// Initializes the parameters.
     pub(crate) fn init(&self, params: &mut [f32], random: &mut SplitMix) {
         init::orthogonal(&self.net, params, 1.0, random);
     }
@@ -124,7 +124,7 @@ impl Rnd {
         out[..blocks * BLOCK].iter_mut().zip(&space.half).for_each(|(out, half)| *out = 2.0 * half);
     }
 
-    /// Gradient of its sum after [`Rnd::losses`].
+    /// Gradient of the sum of that error after [`Rnd::losses`].
     pub fn gradient<T: Real>(
         &self,
         params: &[T::Scalar],

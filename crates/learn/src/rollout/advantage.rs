@@ -7,15 +7,15 @@ use crate::lanes::f32_lanes;
 use marathon_physics::lanes::{Isa, Kernel, Real};
 use std::marker::PhantomData;
 
-/// Fills the advantages `A = sum (gamma lambda)^k delta_{t+k}` with `delta_t = r_t + gamma V_{t+1} - V_t`, broken off
-/// where an episode ends, the value targets `A + V`, and their sums. With several streams of rewards, each has its own
+/// Fills the advantages `A = sum (gamma lambda)^k delta_{t+k}` with `delta_t = r_t + gamma V_{t+1} - V_t`, cut off at
+/// the end of an episode, the value targets `A + V`, and their sums. With several streams of rewards, each has its own
 /// values, and the advantages of all are added up.
 ///
-/// Agents that did not decide at an item go on with their last decision: what they earn there is added to what it earned,
-/// undiscounted, as in ML-Agents. What was earned before the first decision of a rollout is left out, since the last value of
-/// the rollout before has foreseen it.
+/// Agents that do not decide at an item keep their last action. As in ML-Agents, their rewards there are added to that
+/// decision's reward, undiscounted. Rewards before the first decision of a rollout are left out, because the last value
+/// of the previous rollout has predicted them.
 ///
-/// `gamma` has the discount per decision of each stream, `lambda` is the decay of the estimator.
+/// `gamma` has the discount per decision of each stream; `lambda` is the decay of the estimator.
 pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
     let mut rows = rollout.rewards();
     let intermittent = rows.decided.iter().any(|decided| *decided != !0);
@@ -42,7 +42,7 @@ pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
                 aa += advantage * advantage;
                 r += target;
                 rr += target * target;
-                // the error of a value is its advantage, which is not known by itself where there are several
+                // the error of a value is its advantage, which is not known separately for several streams
                 let error = if rows.streams == 1 { advantage } else { target - *value as f64 };
                 e += error;
                 ee += error * error;
@@ -56,7 +56,7 @@ pub fn estimate(isa: Isa, gamma: &[f64], lambda: f64, rollout: &mut Rollout) {
 
 struct Estimate<'a, 'b, T> {
     rows: &'a mut Rewards<'b>,
-    /// Whether agents do not decide every time.
+    /// Whether agents skip decisions.
     intermittent: bool,
     gamma: &'a [f64],
     lambda: f64,
@@ -76,7 +76,7 @@ impl<T: Real<Scalar = f32>> Kernel<T> for Estimate<'_, '_, T> {
             for lane in (0..BLOCK).step_by(T::LANES) {
                 let mut next = T::load(&rows.last_value[(b * streams + stream) * BLOCK + lane..]);
                 let mut advantage = T::zero();
-                // earned since the last decision
+                // rewards since the last decision
                 let mut earned = T::zero();
                 for item in (b..rows.done.len()).step_by(blocks).rev() {
                     let at = (item * streams + stream) * BLOCK + lane;
@@ -116,7 +116,7 @@ mod tests {
     use crate::rollout::sums::BlockSums;
     use marathon_physics::lanes::Isa;
 
-    /// The definition, for one agent, in double precision.
+    /// The definition for one agent, in double precision.
     fn reference(reward: &[f64], value: &[f64], last: f64, done: &[bool], gamma: f64, lambda: f64) -> Vec<f64> {
         let n = reward.len();
         let mut out = vec![0.0; n];

@@ -1,10 +1,10 @@
-//! RolloutContext: a worker's agents play one horizon, and what happened is kept for learning.
+//! Collecting rollouts: a worker's agents play one horizon, and the results are stored for learning.
 //!
-//! A worker owns a run of consecutive blocks and goes through the whole rollout without waiting for anyone. Everything
-//! it adds up is kept per block, so that the totals, taken in the order of the blocks, do not depend on how blocks are
-//! spread over workers.
+//! A worker owns consecutive blocks and plays the whole rollout without waiting for other workers. All sums are kept
+//! per block. Totals are taken in the order of the blocks, so they do not depend on how blocks are distributed over
+//! workers.
 //!
-//! Each role of the task has a [`Seat`], with a rollout of its own; most tasks have one.
+//! Each role of the task has a [`Seat`] with its own rollout. Most tasks have one role.
 
 use super::context::RolloutContext;
 use super::data::Rollout;
@@ -20,18 +20,19 @@ pub struct Collector {
     shard: Box<dyn Shard>,
     first_block: usize,
     blocks: usize,
-    /// Agents of a block.
+    /// Agents per block.
     lanes: usize,
     seats: Vec<Seat>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
-    /// Observation of a block, `[obs][16]`, where several roles see parts of it.
+    /// Observation of a block, `[obs][16]`, if several roles see parts of it.
     whole: Vec<f32>,
     out: BlockStep,
 }
 
 impl Collector {
-    /// Agents of `blocks` blocks from `first_block`, each at the start of its first episode, for all roles of the task.
+    /// Creates agents of `blocks` blocks from `first_block`, each at the start of its first episode, for all roles of
+    /// the task.
     pub fn new(
         factory: &dyn ShardFactory,
         (first_block, blocks): (usize, usize),
@@ -81,19 +82,19 @@ impl Collector {
     pub fn seats_mut(&mut self) -> &mut [Seat] {
         &mut self.seats
     }
-    /// The actions that a block is carrying out, in the environment's units, `[act][16]`.
+    /// The current actions of a block, in the environment's units, `[act][16]`.
     pub fn action(&self, block: usize) -> &[f32] {
         let row = self.action.len() / self.blocks;
         &self.action[block * row..(block + 1) * row]
     }
-    /// The actions that a block is carrying out.
+    /// The current actions of a block, mutable.
     pub fn action_mut(&mut self, block: usize) -> &mut [f32] {
         let row = self.action.len() / self.blocks;
         &mut self.action[block * row..(block + 1) * row]
     }
 
     /// Plays one horizon and fills the rollouts of all roles, advantages included. Returns the seconds spent in the
-    /// environments, by the clock `now`.
+    /// environments, measured by the clock `now`.
     pub fn collect<R: DerefMut<Target = Rollout>>(
         &mut self,
         with: &[RolloutContext<'_>],
@@ -124,7 +125,7 @@ impl Collector {
         env_seconds
     }
 
-    /// Tells the environments the actions of all blocks, in their own units.
+    /// Passes the actions of all blocks to the environments, in their own units.
     fn announce<R: DerefMut<Target = Rollout>>(&mut self, with: &[RolloutContext<'_>], rollouts: &[R], t: usize) {
         let Self { shard, seats, action, blocks, .. } = self;
         let spec = shard.spec();
@@ -137,7 +138,7 @@ impl Collector {
             {
                 let own = &mut action[act.start * BLOCK..act.end * BLOCK];
                 for (i, (own, drawn)) in own.iter_mut().zip(drawn).enumerate() {
-                    // the others go on with their last action
+                    // other agents keep their last action
                     if *decides == !0 || decides >> (i % BLOCK) & 1 == 1 {
                         *own = spec.action_of(act.start + i / BLOCK, drawn * scale);
                     }
@@ -147,7 +148,7 @@ impl Collector {
         shard.announce(action);
     }
 
-    /// One decision of one block, with all bookkeeping.
+    /// Makes one decision of one block, with all bookkeeping.
     fn step<R: DerefMut<Target = Rollout>>(
         &mut self,
         with: &[RolloutContext<'_>],
@@ -159,7 +160,7 @@ impl Collector {
         let row = shard.spec().act * BLOCK;
         let obs = observation(seats, b, whole);
         shard.step(b, &action[b * row..(b + 1) * row], obs, out);
-        // lanes without an agent live on too
+        // lanes without an agent also continue
         let ended = out.terminated | out.truncated | out.diverged;
         if *lanes < BLOCK {
             mirror::step(out, obs, *lanes);
@@ -176,7 +177,7 @@ impl Collector {
         }
     }
 
-    /// Starts new episodes of agents of a block.
+    /// Starts new episodes for agents of a block.
     fn reset(&mut self, b: usize, mask: u16) {
         let Self { shard, seats, whole, lanes, .. } = self;
         let obs = observation(seats, b, whole);
@@ -188,7 +189,7 @@ impl Collector {
     }
 }
 
-/// Where the environments write the observations of a block: to the one who sees them all, or to a place for the whole.
+/// Buffer for the observations of a block: that of the single role, or one for the whole observation.
 fn observation<'a>(seats: &'a mut [Seat], b: usize, whole: &'a mut [f32]) -> &'a mut [f32] {
     match seats {
         [seat] => seat.obs_mut(b),

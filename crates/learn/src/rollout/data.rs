@@ -1,4 +1,4 @@
-//! What agents experienced in a horizon, kept for learning.
+//! The experience of agents in a rollout.
 
 use super::sums::{BlockSums, Totals};
 use crate::lanes::BLOCK;
@@ -6,60 +6,61 @@ use crate::lanes::buffer::Aligned;
 use crate::rewards::Step;
 use std::ops::Deref;
 
-/// What is kept of a decision.
+/// Sizes of the data that is kept per decision.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Length of an observation.
     pub obs: usize,
     /// Length of an action.
     pub act: usize,
-    /// Numbers that a log-probability is kept as.
+    /// Log-probabilities per sample.
     pub log_probs: usize,
     /// Streams of rewards.
     pub streams: usize,
-    /// Whether what was observed next is kept.
+    /// Whether next observations are kept.
     pub next_obs: bool,
-    /// Agents in a block: sixteen, or fewer, which the other lanes mirror.
+    /// Agents per block: sixteen, or fewer, which the other lanes mirror.
     pub lanes: usize,
 }
 
 impl Shape {
-    /// Numbers that a [`Rollout`] keeps of an agent's decision.
+    /// Numbers that a [`Rollout`] keeps per decision of an agent.
     pub fn numbers(&self) -> usize {
         let next = if self.next_obs { self.obs } else { 0 };
         self.obs + self.act + next + self.log_probs + 1 + 3 * self.streams
     }
 }
 
-/// What the rollout knows about a block of samples; rows of sixteen.
+/// Data of a block of samples, in rows of sixteen.
 #[derive(Clone, Copy)]
 pub struct Samples<'a, S> {
-    /// Agents who decided, a bit each; the others' rows mean nothing.
+    /// Mask of the agents that decided. The rows of the others have no meaning.
     pub decided: u16,
     /// Actions taken, `[action][16]`.
     pub action: &'a [S],
-    /// Their log-probabilities then (see [`Gaussian`](crate::nets::gaussian::Gaussian) for the constant): of all actions, or with a ratio for each of each.
+    /// Their log-probabilities during the rollout, without a constant (see
+    /// [`Gaussian`](crate::nets::gaussian::Gaussian)): for all actions together, or with one row per action.
     pub log_prob: &'a [S],
     /// Advantages, not normalized.
     pub advantage: &'a [S],
-    /// Values then, `[stream][16]`.
+    /// Values during the rollout, `[stream][16]`.
     pub value: &'a [S],
-    /// Returns that the value function learns, `[stream][16]`.
+    /// Returns that the value function is trained on, `[stream][16]`.
     pub target: &'a [S],
 }
 
-/// What a worker's agents experienced in one horizon; item `t * blocks + b` is block `b` at decision `t`.
+/// The experience of a worker's agents in one horizon. Item `t * blocks + b` is block `b` at decision `t`.
 pub struct Rollout {
     blocks: usize,
     pub(super) obs_len: usize,
     pub(super) act_len: usize,
-    /// Normalized, or as they are where they are kept for later, `[item][obs][16]`.
+    /// Observations, `[item][obs][16]`: normalized, or raw if they are kept for later.
     pub(super) obs: Aligned<f32>,
     /// `[item][act][16]`.
     pub(super) action: Aligned<f32>,
-    /// What was observed next, in the same form, where it is asked for; else nothing.
+    /// Next observations in the same form, or empty if they are not kept.
     pub(super) next_obs: Aligned<f32>,
-    /// `[item][16]`, or with a ratio for each action `[item][act][16]`.
+    /// `[item][16]`, or `[item][act][16]` with a ratio per action.
     pub(super) log_prob: Aligned<f32>,
     /// `[item][16]`.
     pub(super) advantage: Aligned<f32>,
@@ -69,25 +70,25 @@ pub struct Rollout {
     pub(super) target: Aligned<f32>,
     /// Streams of rewards.
     pub(super) streams: usize,
-    /// Agents in a block, which the other lanes mirror.
+    /// Agents per block, which the other lanes mirror.
     pub lanes: usize,
-    /// Agents who decided at the item; what the others earn counts for their last decision.
+    /// Agents that decided at the item. Rewards of the others count for their last decision.
     pub(super) decided: Vec<u16>,
-    /// Agents whose episode ended with the item, and whose episode failed.
+    /// Agents whose episode ended with the item, and agents whose episode failed.
     pub(super) done: Vec<u16>,
     pub(super) failed: Vec<u16>,
-    /// Ended episodes whose last observation has a value: item, agents that were truncated, agents whose simulation did not
-    /// break, and the observation that they ended at. Where no reward goes on beyond the end, truncated ones alone.
+    /// Ended episodes whose last observation has a value: item, truncated agents, agents whose simulation stayed
+    /// finite, and the last observation. If no reward continues beyond the end, only truncated ones.
     pub(super) cut: Vec<(usize, [u16; 2])>,
     pub(super) cut_obs: Vec<f32>,
     /// Value of the observation after the last decision, `[block][stream][16]`.
     pub(super) last_value: Aligned<f32>,
-    /// Per block.
+    /// Sums per block.
     pub sums: Vec<BlockSums>,
 }
 
 impl Rollout {
-    /// Room for `horizon` decisions of `blocks` blocks.
+    /// Allocates `horizon` decisions of `blocks` blocks.
     pub fn new(blocks: usize, horizon: usize, shape: &Shape) -> Self {
         let Shape { obs: obs_len, act: act_len, streams, .. } = *shape;
         let items = blocks * horizon;
@@ -129,7 +130,7 @@ impl Rollout {
     pub fn obs(&self, item: usize) -> &[f32] {
         &self.obs[item * self.obs_len * BLOCK..][..self.obs_len * BLOCK]
     }
-    /// What a learner needs to know, `[item][..][16]`, by name.
+    /// The data that a learner needs, `[item][..][16]`, by name.
     pub fn rows(&self) -> [(&'static str, &[f32]); 7] {
         [
             ("normalized_obs", &self.obs),
@@ -141,7 +142,7 @@ impl Rollout {
             ("target", &self.target),
         ]
     }
-    /// The same, to be filled.
+    /// The same data, mutable.
     pub fn rows_mut(&mut self) -> [(&'static str, &mut [f32]); 7] {
         [
             ("normalized_obs", &mut self.obs),
@@ -153,7 +154,7 @@ impl Rollout {
             ("target", &mut self.target),
         ]
     }
-    /// Copies what a learner needs to know about a block, and adds its sums to the list of sums.
+    /// Copies the data of a block that a learner needs, and adds its sums to the list of sums.
     pub fn copy_block(&mut self, block: usize, from: &Rollout, its: usize) {
         let (blocks, items) = (self.blocks, self.items());
         for ((_, to), (_, rows)) in self.rows_mut().into_iter().zip(from.rows()) {
@@ -165,7 +166,7 @@ impl Rollout {
         }
         self.sums.push(from.sums[its].clone());
     }
-    /// What the objective needs to know about an item.
+    /// Data of an item for the objective.
     pub fn samples(&self, item: usize) -> Samples<'_, f32> {
         let row = item * BLOCK..(item + 1) * BLOCK;
         let log_prob = self.log_prob.len() / self.items();
@@ -179,15 +180,15 @@ impl Rollout {
             target: &self.target[rows],
         }
     }
-    /// Rewards of an item, scaled, of the task alone.
+    /// Scaled rewards of an item, from the task only.
     pub fn reward(&self, item: usize) -> &[f32] {
         &self.reward[item * self.streams * BLOCK..][..BLOCK]
     }
-    /// Agents whose episode ended with each item, and whose episode failed.
+    /// Agents whose episode ended with each item, and agents whose episode failed.
     pub fn ends(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
         self.done.iter().copied().zip(self.failed.iter().copied())
     }
-    /// What the reward signals need to know about an item.
+    /// Data of an item for the reward signals.
     pub fn step(&self, item: usize) -> Step<'_, f32> {
         Step {
             obs: self.obs(item),
@@ -197,7 +198,7 @@ impl Rollout {
     }
 }
 
-/// Rows that the advantage estimator works on, as in [`Rollout`].
+/// Rows for the advantage estimator, as in [`Rollout`].
 pub(super) struct Rewards<'a> {
     pub streams: usize,
     pub reward: &'a [f32],
@@ -211,7 +212,7 @@ pub(super) struct Rewards<'a> {
 }
 
 impl Rollout {
-    /// What the advantage estimator reads and writes.
+    /// Rows that the advantage estimator reads and writes.
     pub(super) fn rewards(&mut self) -> Rewards<'_> {
         Rewards {
             streams: self.streams,
@@ -230,16 +231,16 @@ impl Rollout {
 /// The rollouts of all workers.
 pub struct Experience<'a> {
     rollouts: Vec<&'a Rollout>,
-    /// Which worker has each block, and its place there.
+    /// The worker of each block, and its index there.
     places: Vec<(usize, usize)>,
     /// Sums over them.
     pub totals: &'a Totals,
-    /// Whose view this is.
+    /// The worker that has this view.
     worker: usize,
 }
 
 impl<'a> Experience<'a> {
-    /// Of the workers' rollouts, in order, for one of them.
+    /// Creates one worker's view of the workers' rollouts, in order.
     pub fn new(rollouts: Vec<&'a Rollout>, totals: &'a Totals, worker: usize) -> Self {
         let places = rollouts.iter().enumerate().flat_map(|(r, x)| (0..x.blocks()).map(move |b| (r, b))).collect();
         Self { rollouts, places, totals, worker }
@@ -248,28 +249,28 @@ impl<'a> Experience<'a> {
     pub fn items(&self) -> usize {
         self.rollouts.iter().map(|rollout| rollout.items()).sum()
     }
-    /// The rollout with an item, and its place there.
+    /// The rollout with an item, and its index there.
     pub fn item(&self, item: u32) -> (&'a Rollout, usize) {
         let (t, b) = (item as usize / self.places.len(), item as usize % self.places.len());
         let (r, local) = self.places[b];
         (self.rollouts[r], t * self.rollouts[r].blocks() + local)
     }
-    /// Which worker has a block, and its place there.
+    /// The worker of a block, and the block's index there.
     pub fn place(&self, block: usize) -> (usize, usize) {
         self.places[block]
     }
-    /// The worker whose view this is.
+    /// The worker that has this view.
     pub fn worker(&self) -> usize {
         self.worker
     }
-    /// Its own rollout.
+    /// The rollout of this worker.
     pub fn own(&self) -> &'a Rollout {
         self.rollouts[self.worker]
     }
 }
 
 impl Totals {
-    /// Of the workers' rollouts, in order.
+    /// Sums the workers' rollouts, in order.
     pub fn new<R: Deref<Target = Rollout>>(rollouts: &[R], horizon: usize) -> Self {
         let mut t = Totals::default();
         for rollout in rollouts {

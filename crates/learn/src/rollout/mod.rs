@@ -1,4 +1,4 @@
-//! What agents experience: collected, kept, and made into advantages.
+//! Experience of agents: collecting, storing, and computing advantages.
 
 pub(crate) mod advantage;
 pub mod collect;

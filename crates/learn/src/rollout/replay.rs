@@ -1,4 +1,4 @@
-//! What agents have experienced, for learning from it later: a ring of decisions, each of all blocks of a worker.
+//! A replay of past experience: a ring of decisions of all blocks of a worker.
 
 use super::data::Rollout;
 use crate::lanes::BLOCK;
@@ -8,41 +8,41 @@ pub struct Replay {
     blocks: usize,
     obs_len: usize,
     act_len: usize,
-    /// Decisions that there is room for, that there are, and where the next one goes.
+    /// Capacity and number of decisions, and the index of the next one.
     slots: usize,
     filled: usize,
     next_slot: usize,
     /// Raw observations, `[slot][block][obs][16]`.
     obs: Vec<f32>,
-    /// What followed them, before a reset.
+    /// Next observations, before a reset.
     next: Vec<f32>,
     /// `[slot][block][act][16]`.
     action: Vec<f32>,
-    /// Scaled by the task's factor, `[slot][block][16]`.
+    /// Rewards, scaled by the task's factor, `[slot][block][16]`.
     reward: Vec<f32>,
-    /// Agents whose episode ended, and whose episode failed, `[slot][block]`.
+    /// Agents whose episode ended, and agents whose episode failed, `[slot][block]`.
     done: Vec<u16>,
     failed: Vec<u16>,
 }
 
 /// Names of the lists of [`Saved`].
 pub const NUMBERS: [&str; 4] = ["replay_obs", "replay_next", "replay_action", "replay_reward"];
-/// Names of its flags.
+/// Names of the lists of flags.
 pub const FLAGS: [&str; 2] = ["replay_done", "replay_failed"];
 
-/// Numbers of a replay, for a file.
+/// Data of a replay, for a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Saved {
-    /// Numbers of all blocks in their order, each block's decisions from the oldest on: observations, next ones, actions,
-    /// rewards.
+    /// Numbers of all blocks in their order, each block's decisions from the oldest on: observations, next
+    /// observations, actions, rewards.
     pub numbers: [Vec<f32>; 4],
     /// Ended and failed episodes in the same order.
     pub flags: [Vec<u32>; 2],
-    /// Decisions of a block.
+    /// Number of decisions per block.
     pub filled: u64,
 }
 
-/// A place for a chunk of samples, rows of sixteen as in [`Replay`].
+/// A chunk of samples, in rows of sixteen as in [`Replay`].
 #[derive(Default)]
 pub struct Batch {
     pub obs: Vec<f32>,
@@ -50,12 +50,12 @@ pub struct Batch {
     pub action: Vec<f32>,
     /// Discounted sum of the rewards.
     pub reward: Vec<f32>,
-    /// Discount of the value of what followed; 0 where the episode failed.
+    /// Discount of the value of the next observation; 0 if the episode failed.
     pub discount: Vec<f32>,
 }
 
 impl Batch {
-    /// Makes it empty.
+    /// Removes all samples.
     pub fn clear(&mut self) {
         let Batch { obs, next, action, reward, discount } = self;
         [obs, next, action, reward, discount].into_iter().for_each(Vec::clear);
@@ -63,7 +63,7 @@ impl Batch {
 }
 
 impl Replay {
-    /// Room for `slots` decisions.
+    /// Allocates `slots` decisions.
     pub fn new(blocks: usize, slots: usize, (obs_len, act_len): (usize, usize)) -> Self {
         let items = blocks * slots;
         Self {
@@ -86,17 +86,17 @@ impl Replay {
     pub fn blocks(&self) -> usize {
         self.blocks
     }
-    /// Decisions that there are.
+    /// Number of stored decisions.
     pub fn filled(&self) -> usize {
         self.filled
     }
 
-    /// Place of the decision of a block that is `age` decisions old.
+    /// Index of the decision of a block that is `age` decisions old.
     fn item(&self, block: usize, age: usize) -> usize {
         (self.next_slot + 2 * self.slots - 1 - age) % self.slots * self.blocks + block
     }
 
-    /// Takes a rollout in.
+    /// Adds a rollout.
     pub fn push(&mut self, rollout: &Rollout) {
         let (obs_row, act_row) = (self.obs_len * BLOCK, self.act_len * BLOCK);
         for (item, (done, failed)) in rollout.ends().enumerate() {
@@ -114,8 +114,8 @@ impl Replay {
         }
     }
 
-    /// Appends the decision of a block that is `age` decisions old to a batch, with the rewards of up to `n` decisions from
-    /// there on; `age` is at least `n - 1`.
+    /// Appends the decision of a block that is `age` decisions old to a batch, with the rewards of up to `n` decisions
+    /// from there on. `age` is at least `n - 1`.
     pub fn sample(&self, block: usize, age: usize, n: usize, gamma: f64, batch: &mut Batch) {
         let item = |age: usize| self.item(block, age);
         let (obs_row, act_row, first) = (self.obs_len * BLOCK, self.act_len * BLOCK, item(age));
@@ -145,7 +145,7 @@ impl Replay {
         }
     }
 
-    /// Appends what is to be kept of a block.
+    /// Appends the data of a block.
     pub fn save(&self, block: usize, saved: &mut Saved) {
         saved.filled = self.filled as u64;
         for age in (0..self.filled).rev() {
@@ -164,8 +164,8 @@ impl Replay {
         }
     }
 
-    /// Takes back what [`Replay::save`] kept of block `of_all` of all blocks, as block `block` here; false if it does not
-    /// fit.
+    /// Restores block `block` from the data that [`Replay::save`] stored as block `of_all` of all blocks. Returns false
+    /// if it does not fit.
     pub fn load(&mut self, block: usize, of_all: usize, saved: &Saved) -> bool {
         let filled = saved.filled as usize;
         let lens = [self.obs_len, self.obs_len, self.act_len, 1];

@@ -1,4 +1,4 @@
-//! A role's seat at a worker's agents: it acts, and keeps what it has seen and earned.
+//! A role's part in a worker's rollouts: it acts, and stores observations and rewards.
 
 use super::advantage;
 use super::context::{RolloutContext, Values};
@@ -13,26 +13,26 @@ use crate::rewards::{Judge, Step};
 use marathon_envs::{BlockStep, Metric, Role};
 use marathon_physics::lanes::{Isa, Real};
 
-/// What a role plays with.
+/// Settings of a role's seat.
 pub struct SeatPlan<'a> {
     /// The role.
     pub role: Role,
     /// Seed of its random streams.
     pub seed: u64,
-    /// Agents of a block.
+    /// Agents per block.
     pub lanes: usize,
-    /// Numbers that tell how well the task is done.
+    /// Metrics of the task.
     pub metrics: Vec<Metric>,
-    /// Networks like those.
+    /// Networks of the same shape.
     pub with: RolloutContext<'a>,
 }
 
-/// A role's part in the playing of a run of blocks.
+/// A role's part in the rollouts of consecutive blocks.
 pub struct Seat {
     /// The role.
     pub role: Role,
     metrics: Vec<Metric>,
-    /// Its number.
+    /// Index of the role.
     number: usize,
     /// Random streams, one per block.
     pub(crate) noise: Vec<Noise>,
@@ -40,9 +40,9 @@ pub struct Seat {
     pub(crate) obs: Aligned<f32>,
     /// Per agent, `[block][16]`: discounted return, and return, length and distance of the episode so far.
     pub(crate) tallies: [Vec<[f32; BLOCK]>; 4],
-    /// Agents whose next action it chooses, a bit each, per block.
+    /// Agents whose next action it chooses: one mask per block.
     pub(crate) decides: Vec<u16>,
-    /// Agents in whose episode its part is over, a bit each, per block.
+    /// Agents in whose episode the role has finished: one mask per block.
     pub(crate) left: Vec<u16>,
     /// Work space.
     obs_sums: [Aligned<f32>; 2],
@@ -52,14 +52,14 @@ pub struct Seat {
 }
 
 impl Seat {
-    /// Of role `number` at so many blocks from `first_block`.
+    /// Creates the seat of role `number` at `blocks` blocks from `first_block`.
     pub fn new(number: usize, plan: SeatPlan<'_>, (first_block, blocks): (usize, usize)) -> Self {
         let SeatPlan { role, seed, lanes, metrics, with } = plan;
         let n = role.obs.len() * BLOCK;
         let noise = |b| Noise::new(seed, first_block + b).mirrored(lanes);
         Self {
             number,
-            // they tell of the task, whoever decides: added up once
+            // metrics belong to the task, so only role 0 sums them
             metrics: if number == 0 { metrics } else { Vec::new() },
             noise: (0..blocks).map(noise).collect(),
             obs: Aligned::new(blocks * n),
@@ -87,13 +87,13 @@ impl Seat {
         let n = self.role.obs.len() * BLOCK;
         &mut self.obs[block * n..(block + 1) * n]
     }
-    /// Takes its part out of the whole observation of a block.
+    /// Copies its part out of the full observation of a block.
     pub fn see(&mut self, block: usize, whole: &[f32]) {
         let own = self.role.obs.start * BLOCK..self.role.obs.end * BLOCK;
         self.obs_mut(block).copy_from_slice(&whole[own]);
     }
 
-    /// Makes a rollout ready for a horizon.
+    /// Prepares a rollout for a horizon.
     pub fn begin(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let rewards = vec![0.0; with.streams.len() - 1];
         let terms = vec![0.0; self.role.terms.len()];
@@ -128,7 +128,7 @@ impl Seat {
         with.acting.draw(&mut self.noise[first..first + n], &mut self.space, action, log_prob);
     }
 
-    /// Keeps what a decision of block `b` led to.
+    /// Stores the result of a decision of block `b`.
     pub fn take(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout, item: usize, b: usize, out: &BlockStep) {
         let obs_row = rollout.obs_len * BLOCK;
         let earned = out.reward_of(self.number, &self.role);
@@ -176,7 +176,7 @@ impl Seat {
         // ended episodes
         let over = out.terminated | out.truncated | out.diverged;
         let [fallen, finished] = out.leaving(self.number);
-        // its part may be over before the episode
+        // the role may finish before the episode ends
         let left = self.left[b];
         let failed = out.terminated | out.diverged | fallen;
         let done = over | fallen | finished;
@@ -203,11 +203,11 @@ impl Seat {
             }
             (discounted[i], returns[i], lengths[i], distances[i]) = (0.0, 0.0, 0.0, 0.0);
         }
-        // all decide at the start of an episode
+        // all roles decide at the start of an episode
         self.decides[b] |= over;
     }
 
-    /// Completes a rollout: values, and with them advantages.
+    /// Completes a rollout: values, then advantages.
     pub fn end(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         self.add_up_observations(rollout);
         let Some(values) = &with.values else { return };
@@ -215,7 +215,7 @@ impl Seat {
         self.evaluate(with, values, rollout);
         let gamma: Vec<f64> = with.streams.iter().map(|stream| stream.gamma).collect();
         advantage::estimate(with.acting.isa, &gamma, values.lambda, rollout);
-        // exact, since the number of agents is a power of two
+        // exact, because the number of agents is a power of two
         let part = rollout.lanes as f64 / BLOCK as f64;
         rollout.sums.iter_mut().for_each(|sums| sums.scale(part));
     }
@@ -231,7 +231,7 @@ impl Seat {
         }
     }
 
-    /// Rewards that networks give.
+    /// Computes the rewards that come from networks.
     fn judge(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
@@ -254,8 +254,8 @@ impl Seat {
         }
     }
 
-    /// Values of all observations; adds the discounted value of what would have come to the rewards of truncated
-    /// episodes, and in the streams that go on beyond an episode's end to those of all.
+    /// Computes the values of all observations. Adds the discounted value of the last observation to the rewards of
+    /// truncated episodes. In streams that continue beyond an episode's end, does so for all episodes.
     fn evaluate(&mut self, with: &RolloutContext<'_>, values: &Values<'_>, rollout: &mut Rollout) {
         let Self { space: ActingSpace { input, .. }, tape: Some(tape), .. } = self else { return };
         let Rollout { obs, obs_len, value, last_value, cut, cut_obs, reward, streams, .. } = rollout;
@@ -268,7 +268,7 @@ impl Seat {
             }
             values.of(isa, input, tape, value);
         }
-        // values of raw ones
+        // values of raw observations
         let mut cut_value = vec![0.0; cut.len() * streams * BLOCK];
         for (raw, value) in [(&self.obs[..], &mut last_value[..]), (&cut_obs[..], &mut cut_value[..])] {
             for (raw, value) in raw.chunks(CHUNK * row).zip(value.chunks_mut(CHUNK * streams * BLOCK)) {

@@ -1,4 +1,4 @@
-//! The state of agents between two rollouts: part of a checkpoint, and what travels to those who play elsewhere.
+//! The state of agents between two rollouts, for checkpoints and for processes that play rollouts elsewhere.
 
 use super::collect::Collector;
 use crate::error::Error;
@@ -9,17 +9,17 @@ use std::ops::{Deref, Range};
 /// States of the agents of consecutive blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AgentStates {
-    /// What each role has of them.
+    /// State of each role.
     pub seats: Vec<SeatStates>,
-    /// The actions that they are carrying out, in the environment's units, `[block][act][16]`; nothing where one role decides
-    /// about them all, every time.
+    /// The current actions, in the environment's units, `[block][act][16]`. Empty if one role decides for all agents
+    /// every time.
     pub action: Vec<f32>,
-    /// What the environments saved, block after block, and where each block's part ends.
+    /// The saved environments, block after block, and the end of each block's part.
     pub env: Vec<u8>,
     pub env_ends: Vec<u64>,
 }
 
-/// What a role has of the agents.
+/// State of a role.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeatStates {
     /// Words of the random streams, `[block][64]`.
@@ -28,12 +28,12 @@ pub struct SeatStates {
     pub obs: Vec<f32>,
     /// Running sums of the agents, `[tally][block][16]`.
     pub tallies: Vec<f32>,
-    /// Agents whose next action it chooses, a bit each, per block, and above them those in whose episode its part is over; nothing
-    /// where one role chooses all.
+    /// Agents whose next action it chooses, one mask per block, and in the upper bits those in whose episode it has
+    /// finished. Empty if one role chooses all actions.
     pub decides: Vec<u32>,
 }
 
-/// How long the lists of some agents' states are.
+/// Sizes of the lists of agents' states.
 #[derive(Clone, Copy)]
 pub struct StatesShape<'a> {
     /// Blocks.
@@ -45,7 +45,7 @@ pub struct StatesShape<'a> {
 }
 
 impl AgentStates {
-    /// Of those blocks in a range that collectors have; the collectors come in the order of their blocks.
+    /// The states of the blocks in a range. The collectors come in the order of their blocks.
     pub fn of<A: Deref<Target = Collector>>(collectors: impl IntoIterator<Item = A>, blocks: Range<usize>) -> Self {
         let mut states = Self::default();
         let mut tallies: Vec<[Vec<f32>; 4]> = Vec::new();
@@ -75,7 +75,7 @@ impl AgentStates {
         states
     }
 
-    /// Refuses states that do not have a shape; `what` has them.
+    /// Refuses states of another shape. `what` names their source.
     pub fn check(&self, what: &str, shape: StatesShape<'_>) -> Result<(), Error> {
         let StatesShape { blocks, obs, act } = shape;
         let several = obs.len() > 1;
@@ -103,8 +103,8 @@ impl AgentStates {
         }
     }
 
-    /// Puts those of a collector's agents that are in `blocks`, to which these states belong, into their states. The states
-    /// have been [checked](AgentStates::check); `what` has them.
+    /// Restores the agents of a collector that are in `blocks`, the range of these states. The states have been
+    /// [checked](AgentStates::check). `what` names their source.
     pub fn put(&self, what: &str, blocks: Range<usize>, collector: &mut Collector) -> Result<(), Error> {
         let tally = blocks.len() * BLOCK;
         for b in 0..collector.blocks() {
@@ -135,7 +135,7 @@ impl AgentStates {
             let wrong = |why: &str| Error::Mismatch {
                 what: format!("{what}: environment"),
                 found: format!("{size} bytes of block {block}'s environment{why}"),
-                expected: "what this version of the task saves".into(),
+                expected: "the state that this version of the task saves".into(),
             };
             let loaded = collector.shard_mut().load(b, bytes.ok_or_else(|| wrong(""))?);
             if !loaded.map_err(|error| wrong(&format!(" ({error})")))?.is_empty() {

@@ -1,25 +1,25 @@
-//! Running statistics of observations and returns, which normalize what networks see and learn.
+//! Running statistics of observations and returns, which normalize network inputs and targets.
 
 use super::sums::Totals;
 use crate::error::Error;
 use crate::nets::normalize::{Moments, Normalizer};
 use serde::{Deserialize, Serialize};
 
-/// How observations and rewards are normalized.
+/// Normalization of observations and rewards.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StatisticsConfig {
     /// Whether observations are normalized by their running mean and deviation.
     pub normalize_observations: bool,
-    /// Whether the networks' first layers follow the statistics that normalize observations, so that what the networks make
-    /// of an observation stays what it was when a rollout has moved them. Few agents with long rollouts feel the move most.
-    /// Not with SAC.
+    /// Whether the first layers of the networks follow the observation statistics. The network's output for an
+    /// observation then stays the same when a rollout changes the statistics. This matters most for few agents with
+    /// long rollouts. Not with SAC.
     pub follow_statistics: bool,
     /// Bound of the normalized observations.
     pub observation_clip: f64,
     /// Whether rewards are divided by the running deviation of the discounted return.
     pub scale_rewards: bool,
-    /// Most samples that the running statistics remember.
+    /// Maximum number of samples that the running statistics remember.
     pub statistics_cap: f64,
 }
 
@@ -42,7 +42,7 @@ impl StatisticsConfig {
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
         for (field, x) in [("observation_clip", self.observation_clip), ("statistics_cap", self.statistics_cap)] {
-            // in single precision, too, in which they are used
+            // checked in single precision too, where they are used
             if !((x as f32).is_finite() && x > 0.0) {
                 return Err(Error::config(field, x, "a positive number"));
             }
@@ -55,14 +55,14 @@ impl StatisticsConfig {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics {
     config: StatisticsConfig,
-    /// Of raw observations.
+    /// Statistics of raw observations.
     pub observations: Moments,
-    /// Of the discounted return.
+    /// Statistics of the discounted return.
     pub returns: Moments,
 }
 
 impl Statistics {
-    /// Nothing seen yet of observations of a length.
+    /// Statistics without samples, for observations of length `obs`.
     pub fn new(obs: usize, config: StatisticsConfig) -> Self {
         Self { config, observations: Moments::new(obs), returns: Moments::new(1) }
     }
@@ -82,8 +82,8 @@ impl Statistics {
         if self.config.scale_rewards { 1.0 / (self.returns.var[0] + 1e-8).sqrt().max(1e-3) } else { 1.0 }
     }
 
-    /// Takes in a rollout. Returns the maps of observations before and after, if networks are to follow them; they do not
-    /// follow the very first samples, whose statistics are what new weights are meant for.
+    /// Merges a rollout. Returns the maps of observations before and after, if networks should follow them. They do not
+    /// follow the first samples: new weights are meant for the statistics after those.
     pub fn absorb(&mut self, totals: &Totals) -> Option<[Normalizer; 2]> {
         let StatisticsConfig { normalize_observations, follow_statistics, statistics_cap: cap, .. } = self.config;
         let mut moved = None;

@@ -1,4 +1,5 @@
-//! What is added up over a rollout, block by block: totals taken in the order of the blocks do not depend on workers.
+//! Sums over a rollout, block by block. Totals are taken in the order of the blocks, so they do not depend on the
+//! workers.
 
 /// Sums over the episodes that ended in a block, and over its rewards.
 #[derive(Clone, Debug, Default)]
@@ -29,14 +30,14 @@ pub struct BlockSums {
     pub targets: (f64, f64),
     /// Errors of the values against them, and their squares.
     pub errors: (f64, f64),
-    /// Sum of each reward over the rollout, but for the task's.
+    /// Sum of each reward over the rollout, except the task's.
     pub rewards: Vec<f64>,
     /// Sum of each metric of the task's own over the rollout.
     pub metrics: Vec<f64>,
 }
 
 impl BlockSums {
-    /// Adds those of another block or rollout.
+    /// Adds the sums of another block or rollout.
     pub fn add(&mut self, other: &BlockSums) {
         fn pair(a: &mut (f64, f64), b: &(f64, f64)) {
             a.0 += b.0;
@@ -63,7 +64,7 @@ impl BlockSums {
         self.metrics.iter_mut().zip(&other.metrics).for_each(|(a, b)| *a += b);
     }
 
-    /// Multiplies all by a factor.
+    /// Multiplies all sums by a factor.
     pub fn scale(&mut self, factor: f64) {
         let Self { episodes, returns, lengths, speeds, falls, diverged, decisions, terms, .. } = self;
         let Self { discounted, observations, advantages, targets, errors, rewards, metrics, .. } = self;
@@ -84,7 +85,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Takes in those of another rollout.
+    /// Adds the totals of another rollout.
     pub fn add(&mut self, other: &Totals) {
         self.samples += other.samples;
         self.sums.add(&other.sums);
@@ -93,7 +94,7 @@ impl Totals {
     pub fn advantage(&self) -> (f64, f64) {
         self.moments(self.sums.advantages)
     }
-    /// Part of the variance of the value targets of the task's reward that the value function had foreseen.
+    /// Fraction of the variance of the task's value targets that the value function predicted.
     pub fn explained_variance(&self) -> f64 {
         1.0 - self.moments(self.sums.errors).1 / self.moments(self.sums.targets).1.max(1e-12)
     }

@@ -4,17 +4,17 @@
 //! [Scale] [Clip] (Dense Activation)* Dense [Tanh] [Clip] [Scale]
 //! ```
 //!
-//! Scales that stand elsewhere are taken into the layers next to them.
+//! Scales elsewhere are merged into the layers next to them.
 
 use super::graph::Stage;
 use crate::nets::activation::Activation;
 
 type Result<T> = std::result::Result<T, String>;
 
-/// No bound at all, in a format that wants one.
+/// Stands for no bound in a format that requires one.
 pub const UNBOUNDED: f32 = f32::MAX;
 
-/// What a policy is made of.
+/// The parts of a policy.
 #[derive(Debug)]
 pub struct Parts {
     pub obs_mean: Vec<f32>,
@@ -28,11 +28,11 @@ pub struct Parts {
     pub squash: bool,
     pub action_clip: f32,
     pub action_range: Vec<[f32; 2]>,
-    /// What the outputs were multiplied by, and with them the spread of drawn actions; empty for 1.
+    /// Factors of the outputs, which also scale the spread of sampled actions. Empty means 1.
     pub spread: Vec<f64>,
 }
 
-/// A layer and what follows it.
+/// A layer and the activation after it.
 struct Layer {
     weights: Vec<f64>,
     bias: Vec<f64>,
@@ -40,7 +40,7 @@ struct Layer {
 }
 
 impl Layer {
-    /// Multiplies the outputs and adds to them.
+    /// Scales and shifts the outputs.
     fn scale_outputs(&mut self, factor: &[f64], shift: &[f64]) {
         let inputs = self.weights.len() / self.bias.len();
         for (o, row) in self.weights.chunks_exact_mut(inputs).enumerate() {
@@ -49,7 +49,7 @@ impl Layer {
         }
     }
 
-    /// Works on inputs that have not been multiplied and added to yet.
+    /// Absorbs a scale and shift of the inputs.
     fn scale_inputs(&mut self, factor: &[f64], shift: &[f64]) {
         for (o, row) in self.weights.chunks_exact_mut(factor.len()).enumerate() {
             for (i, w) in row.iter_mut().enumerate() {
@@ -60,10 +60,10 @@ impl Layer {
     }
 }
 
-/// Numbers that multiply and numbers that are added, per feature.
+/// Factors and shifts, per feature.
 type Scale = (Vec<f64>, Vec<f64>);
 
-/// Brings stages, in their order, into the form of a policy for `obs` numbers.
+/// Converts stages, in their order, to the form of a policy for `obs` numbers.
 pub fn arrange(stages: &[Stage], obs: usize) -> Result<Parts> {
     let stages = merge_scales(stages);
     let first = stages.iter().position(|s| matches!(s, Stage::Dense { .. })).ok_or("no layer with weights")?;
@@ -71,7 +71,7 @@ pub fn arrange(stages: &[Stage], obs: usize) -> Result<Parts> {
     let (mut norm, bound) = input(&stages[..first])?;
     let mut layers = body(&stages[first..=last])?;
     if bound.is_none() && norm.as_ref().is_some_and(|(factor, _)| factor.iter().any(|f| !(*f > 0.0))) {
-        // not a normalization; the first layer can do it
+        // not a normalization: the first layer absorbs it
         if let Some((factor, shift)) = norm.take() {
             layers[0].scale_inputs(&factor, &shift);
         }
@@ -106,7 +106,7 @@ pub fn arrange(stages: &[Stage], obs: usize) -> Result<Parts> {
     })
 }
 
-/// Scales in a row become one, and those after a layer part of it.
+/// Merges consecutive scales, and those after a layer into the layer.
 fn merge_scales(stages: &[Stage]) -> Vec<Stage> {
     let mut merged: Vec<Stage> = Vec::new();
     for stage in stages {
@@ -129,7 +129,7 @@ fn merge_scales(stages: &[Stage]) -> Vec<Stage> {
     merged
 }
 
-/// What happens to the observation before the first layer.
+/// Normalization and clip of the observation before the first layer.
 fn input(stages: &[Stage]) -> Result<(Option<Scale>, Option<f64>)> {
     let scale = |factor: &[f64], shift: &[f64]| Some((factor.to_vec(), shift.to_vec()));
     match stages {
@@ -177,7 +177,7 @@ fn body(stages: &[Stage]) -> Result<Vec<Layer>> {
     Ok(layers)
 }
 
-/// What happens to the output of the last layer, which may take a part of it over.
+/// Bounds and scale of the output of the last layer, which may absorb a part of them.
 fn output(stages: &[Stage], layers: &mut [Layer]) -> Result<Parts> {
     let last = layers.len() - 1;
     let act = layers[last].bias.len();
@@ -222,7 +222,7 @@ fn output(stages: &[Stage], layers: &mut [Layer]) -> Result<Parts> {
         [] => return Ok(tail),
         [Stage::Clip(low, high)] => (*low, *high, None),
         [Stage::Clip(low, high), Stage::Scale { factor, shift }] => (*low, *high, Some((factor, shift))),
-        // a scale between clips, as of a network whose actions are clipped again
+        // a scale between clips, as of a network whose actions are clipped twice
         [Stage::Clip(low, high), Stage::Scale { factor, shift }, Stage::Clip(l, h)]
             if factor.iter().zip(shift).all(|(f, s)| *f > 0.0 && low * f + s >= *l && high * f + s <= *h) =>
         {
@@ -238,7 +238,7 @@ fn output(stages: &[Stage], layers: &mut [Layer]) -> Result<Parts> {
     if middle == 0.0 && factor == one && shift == zero {
         tail.action_clip = half as f32;
     } else {
-        // the network's output in [-1, 1], what it means in the range
+        // outputs in [-1, 1], mapped to the range
         layers[last].scale_outputs(&vec![1.0 / half; act], &vec![-middle / half; act]);
         tail.action_clip = 1.0;
         tail.spread = vec![1.0 / half; act];

@@ -1,4 +1,4 @@
-//! A policy as an ONNX model by the contract of ML-Agents.
+//! Export of a policy as an ONNX model that follows ML-Agents' contract.
 
 use super::proto::{
     ATTRIBUTE_FLOAT, ATTRIBUTE_INT, Attribute, Dimension, FLOAT, Graph, Model, Node, OperatorSet, Property, Shape,
@@ -9,7 +9,7 @@ use crate::nets::activation::Activation;
 use crate::policy::Policy;
 use prost::Message;
 
-/// What ML-Agents' exporter writes: any runtime since 2019 reads it.
+/// The operator set of ML-Agents' exporter: any runtime since 2019 reads it.
 const OPSET: i64 = 9;
 const IR_VERSION: i64 = 4;
 /// ML-Agents' `ModelApiVersion` 2.0.
@@ -44,7 +44,7 @@ pub fn encode(policy: &Policy) -> Vec<u8> {
         }
     }
 
-    // the best action, and one drawn as in training
+    // the best action, and one sampled as in training
     g.actions(policy, &x, DETERMINISTIC);
     let log_std = g.constant("log_std", &[1, meta.act], policy.log_std());
     let std = g.op("Exp", &[&log_std], "std");
@@ -86,7 +86,7 @@ pub fn encode(policy: &Policy) -> Vec<u8> {
     model.encode_to_vec()
 }
 
-/// A graph being made, in the order of execution.
+/// A graph under construction, in the order of execution.
 #[derive(Default)]
 struct Builder {
     nodes: Vec<Node>,
@@ -146,7 +146,7 @@ impl Builder {
         }
     }
 
-    /// From the network's output to actions in the environment's units.
+    /// Maps the network's output to actions in the environment's units.
     fn actions(&mut self, policy: &Policy, x: &str, output: &str) {
         let meta = policy.meta();
         let squashed = if meta.squash { self.op("Tanh", &[x], &format!("{output}.squashed")) } else { x.into() };

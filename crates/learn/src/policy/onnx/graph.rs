@@ -1,4 +1,4 @@
-//! What the operations of a graph do to the observation: each value is a constant, or a stage of the network.
+//! Evaluation of a graph's operations: each value is a constant, or a stage of the network.
 
 use super::proto::{Attribute, Node};
 use super::tensor::{Array, Neighbors};
@@ -11,12 +11,12 @@ pub enum Value {
     /// An array, or a batch of the same one.
     Constant(Rc<Array>),
     Network(Rc<Net>),
-    /// Something computed from the network of which only the number of features matters, and why no more is known.
+    /// A value that depends on the network, but of which only the number of features is used. Keeps the reason.
     Opaque {
         width: usize,
         reason: String,
     },
-    /// The shape of a batch with so many features.
+    /// The shape of a batch with this number of features.
     Shape(usize),
 }
 
@@ -35,16 +35,16 @@ impl Value {
     }
 }
 
-/// Functions of single numbers that no policy has; what is computed with them may be beside the point.
+/// Elementwise functions that policies do not use. Their results may be irrelevant.
 const ELEMENTWISE: [&str; 9] = ["Exp", "Log", "Softplus", "Abs", "Neg", "Sqrt", "Pow", "Reciprocal", "Erf"];
-/// What keeps the number of features.
+/// Operations that keep the number of features.
 const ARITHMETIC: [&str; 10] = ["Add", "Sub", "Mul", "Div", "Clip", "Min", "Max", "Tanh", "Sigmoid", "Identity"];
 
-/// A function of the observation: a stage after the stages before it; the observation itself has none.
+/// A function of the observation: a stage after the previous stages. The observation itself has none.
 #[derive(Debug)]
 pub struct Net {
     pub stage: Option<(Stage, Rc<Net>)>,
-    /// Number of features; none where the file does not say how long the observation is.
+    /// Number of features, or zero if the file does not give the length of the observation.
     pub width: usize,
 }
 
@@ -53,7 +53,7 @@ pub struct Net {
 pub enum Stage {
     /// `x * factor + shift`, feature by feature.
     Scale { factor: Vec<f64>, shift: Vec<f64> },
-    /// Between two numbers, which may be infinite.
+    /// Clips to two bounds, which may be infinite.
     Clip(f64, f64),
     /// Weights, `[output][input]`, and biases.
     Dense { weights: Vec<f64>, bias: Vec<f64> },
@@ -65,7 +65,7 @@ pub enum Stage {
 
 type Result<T> = std::result::Result<T, String>;
 
-/// The value of a node, given the values of its inputs (none for one that is left out). The error says why there is none.
+/// Computes the value of a node from the values of its inputs (`None` for omitted ones). The error gives the reason.
 pub fn evaluate(node: &Node, inputs: &[Option<Value>], neighbors: &Neighbors) -> Result<Value> {
     let op = node.op_type.as_str();
     if !matches!(node.domain.as_str(), "" | "ai.onnx") {
@@ -85,7 +85,7 @@ pub fn evaluate(node: &Node, inputs: &[Option<Value>], neighbors: &Neighbors) ->
     }
 }
 
-/// What is about shapes, or about values of which nothing but their shape is known: exporters leave much of it behind.
+/// Operations on shapes, or on values of which only the shape is known. Exporters leave many of them behind.
 fn shapes(node: &Node, inputs: &[Option<Value>]) -> Option<Result<Value>> {
     let op = node.op_type.as_str();
     let width = |value: &Option<Value>| match value {
@@ -155,7 +155,7 @@ fn constant(node: &Node, neighbors: &Neighbors) -> Result<Value> {
     Ok(Value::Constant(array.into()))
 }
 
-/// Operations on constants alone.
+/// Operations on constants only.
 fn fold(node: &Node, a: &Rc<Array>, rest: &[Option<Value>]) -> Result<Value> {
     let op = node.op_type.as_str();
     let two = |f: fn(f64, f64) -> f64| match rest {
@@ -167,7 +167,7 @@ fn fold(node: &Node, a: &Rc<Array>, rest: &[Option<Value>]) -> Result<Value> {
     let array = match op {
         "Identity" | "Cast" => return Ok(Value::Constant(a.clone())),
         "Transpose" => a.transposed().ok_or_else(|| format!("operation {op} on shape {:?}", a.shape))?,
-        // where the ones are does not matter, see `spread`
+        // the position of dimensions of length 1 does not matter, see `spread`
         "Squeeze" | "Unsqueeze" if a.single().is_some() => Array::scalar(a.data[0]),
         "Unsqueeze" if a.shape.len() == 1 => Array { shape: vec![1, a.data.len()], data: a.data.clone() },
         "Sqrt" => a.map(f64::sqrt),
@@ -183,7 +183,7 @@ fn fold(node: &Node, a: &Rc<Array>, rest: &[Option<Value>]) -> Result<Value> {
     Ok(Value::Constant(array.into()))
 }
 
-/// A constant on the left of the network.
+/// Operations with a constant on the left of the network.
 fn reversed(op: &str, a: &Array, x: &Rc<Net>) -> Result<Value> {
     let list = || a.spread(x.width).ok_or_else(|| widths(op, a, x));
     match op {
@@ -195,7 +195,7 @@ fn reversed(op: &str, a: &Array, x: &Rc<Net>) -> Result<Value> {
     }
 }
 
-/// Operations on the network, with constants on its right.
+/// Operations on the network, with constants on the right.
 fn network(node: &Node, x: &Rc<Net>, rest: &[Option<Value>]) -> Result<Value> {
     let op = node.op_type.as_str();
     let after = |stage: Stage| Ok(Value::Network(Rc::new(Net { stage: Some((stage, x.clone())), width: x.width })));
@@ -268,7 +268,7 @@ fn bound(op: &str, a: &Array, x: &Rc<Net>) -> Result<Value> {
 }
 
 fn clip(x: &Rc<Net>, low: f64, high: f64) -> Result<Value> {
-    // one clip after the other is one clip, if the ranges overlap
+    // two clips in a row are one clip, if the ranges overlap
     let (low, high, x) = match &x.stage {
         Some((Stage::Clip(l, h), before)) if low.max(*l) <= high.min(*h) => (low.max(*l), high.min(*h), before),
         _ => (low, high, x),

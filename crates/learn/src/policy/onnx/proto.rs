@@ -1,5 +1,5 @@
-//! The part of ONNX's protobuf schema that small networks need. Fields that are not listed are skipped when a file is
-//! read. The numbers are those of `onnx.proto`, which is public and versioned.
+//! The part of ONNX's protobuf schema that small networks need. Reading skips fields that are not listed. The field
+//! numbers are those of `onnx.proto`, which is public and versioned.
 
 use prost::Message;
 
@@ -111,7 +111,7 @@ pub struct Tensor {
     pub raw_data: Vec<u8>,
     #[prost(double, repeated, tag = "10")]
     pub double_data: Vec<f64>,
-    /// Where the numbers are if they are in another file: its name, offset and length.
+    /// Location of numbers in another file: its name, offset and length.
     #[prost(message, repeated, tag = "13")]
     pub external_data: Vec<Property>,
     /// 1: the numbers are in another file.
@@ -147,7 +147,7 @@ pub struct Shape {
     pub dim: Vec<Dimension>,
 }
 
-/// A dimension: a number, or a name (that of the batch).
+/// A dimension: a number, or a name (for the batch).
 #[derive(Clone, PartialEq, Message)]
 pub struct Dimension {
     #[prost(oneof = "Size", tags = "1, 2")]

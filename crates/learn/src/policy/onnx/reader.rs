@@ -1,4 +1,4 @@
-//! An ONNX network as a policy.
+//! Import of an ONNX network as a policy.
 
 use super::graph::{Net, Stage, Value, evaluate};
 use super::proto::{Graph, Model, Size, ValueInfo};
@@ -14,26 +14,26 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Most operations of a graph: a policy has dozens.
+/// Maximum number of operations of a graph. A policy has dozens.
 const MOST_NODES: usize = 4096;
 /// Memory for decoding a file, as a multiple of its length. Two bytes can encode an operation without inputs.
 const DECODED: f64 = 64.0;
-/// Most numbers of an observation or an action.
+/// Maximum length of an observation or an action.
 const LARGEST: usize = 1 << 16;
-/// Outputs that hold actions, by preference, in lower case; then whatever has their length.
+/// Names of outputs with actions, by preference, in lower case. Other outputs of the right length follow.
 const ACTIONS: [&str; 8] =
     [DETERMINISTIC, "actions", "action", "mean", "mu", "mean_actions", "output", "continuous_actions"];
-/// Names of the logarithm of the actions' standard deviation, as Marathon and ML-Agents write it.
+/// Names of the logarithm of the actions' standard deviation in files by Marathon and ML-Agents.
 const LOG_STD: [&str; 2] = ["log_std", "log_sigma"];
 /// Input of ML-Agents' recurrent policies.
 const MEMORY: &str = "recurrent_in";
-/// Logarithm of the standard deviation where the file does not tell it: hardly any.
+/// Logarithm of the standard deviation for files without one: almost no spread.
 const SMALL: f32 = -10.0;
 
-/// Why a value of the graph is not there, or the value.
+/// Values of the graph by name, or the reason why one is missing.
 type Values = BTreeMap<String, Result<Value, String>>;
 
-/// What Marathon has noted in a file's metadata.
+/// Reads Marathon's metadata of a file.
 pub fn meta(bytes: &[u8]) -> Option<PolicyMeta> {
     noted(&model(Path::new(""), bytes).ok()?)
 }
@@ -47,12 +47,12 @@ fn model(path: &Path, bytes: &[u8]) -> Result<Model, Error> {
 fn noted(model: &Model) -> Option<PolicyMeta> {
     let document = model.metadata_props.iter().find(|property| property.key == KEY)?;
     let meta: PolicyMeta = serde_json::from_str(&document.value).ok()?;
-    // whatever else is wrong shows in the network
+    // other errors show up in the network
     let practical = |n: usize| (1..=LARGEST).contains(&n);
     (practical(meta.obs) && practical(meta.act) && practical(meta.frame_skip)).then_some(meta)
 }
 
-/// As much of a policy's task as its file knows.
+/// The task of a policy, as far as the file describes it.
 fn task(meta: &PolicyMeta) -> Spec {
     let range = |i: usize| meta.action_range.get(i).copied().unwrap_or([-1.0, 1.0]);
     Spec {
@@ -74,7 +74,7 @@ fn task(meta: &PolicyMeta) -> Spec {
     }
 }
 
-/// The policy of a file, for a task or the one that the file names.
+/// Reads the policy of a file, for a given task or the one that the file names.
 pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, Error> {
     let wrong = |place: &str, found: String, expected: &str| Error::file(path, place, found, expected);
     let model = model(path, bytes)?;
@@ -112,7 +112,7 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
         neighbors.count(numbers).map_err(|e| Error::budget(path, &format!("operation {}", node.op_type), e))?;
         let Some(output) = node.output.first() else { continue };
         values.insert(output.clone(), value);
-        // further outputs, such as a dropout's mask, are for training
+        // further outputs, such as a dropout's mask, are for training only
         for other in &node.output[1..] {
             values.insert(other.clone(), Err(format!("output '{other}' of operation {}", node.op_type)));
         }
@@ -137,14 +137,14 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     let of_mlagents = noted.is_none() && name == DETERMINISTIC && graph.output.iter().any(|o| o.name == API_VERSION);
     let nominal = parts.action_range.iter().all(|range| *range == [-1.0, 1.0]);
     meta.action_range = match nominal {
-        // ML-Agents acts in [-1, 1], which its player maps to what the task has
+        // ML-Agents acts in [-1, 1], which its player maps to the task's range
         true if of_mlagents => (0..spec.act).map(|i| spec.action_range(i)).collect(),
         true => vec![[-1.0, 1.0]; spec.act],
         false => parts.action_range,
     };
     meta.squash = parts.squash;
     if of_mlagents && parts.action_clip == chain::UNBOUNDED && is_squashed(&graph, SAMPLED) {
-        // its SAC trains the tangent of this output, but writes the output itself
+        // ML-Agents' SAC trains the tangent of this output, but exports the output itself
         (meta.squash, meta.action_clip) = (true, 1.0);
     }
     if let Some(noted) = noted.filter(|noted| noted.agent == spec.id) {
@@ -162,7 +162,7 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
 /// Whether an output is a hyperbolic tangent.
 fn is_squashed(graph: &Graph, output: &str) -> bool {
     let mut name = output;
-    // a node computes from what is before it, so this ends
+    // a node's inputs come before it, so this ends
     for node in graph.node.iter().rev() {
         if node.output.iter().any(|output| output == name) {
             match (node.op_type.as_str(), node.input.first()) {
@@ -189,7 +189,7 @@ fn observation(graph: &Graph, obs: usize) -> Result<String, String> {
     }
 }
 
-/// The last dimension of an input of two dimensions; the inner value is none if the file leaves it open.
+/// The last dimension of an input with two dimensions. The inner value is `None` if the file leaves it open.
 fn last_dimension(input: &ValueInfo) -> Option<Option<i64>> {
     let shape = input.kind.as_ref()?.tensor_type.as_ref()?.shape.as_ref()?;
     match &shape.dim[..] {
@@ -205,7 +205,7 @@ fn width(input: &ValueInfo) -> Option<usize> {
     last_dimension(input)?.and_then(|n| usize::try_from(n).ok())
 }
 
-/// Values of a node's inputs; an input without a name is left out.
+/// Values of a node's inputs. An input without a name is omitted.
 fn inputs(values: &Values, names: &[String]) -> Result<Vec<Option<Value>>, String> {
     let of = |name: &String| match (name.is_empty(), values.get(name)) {
         (true, _) => Ok(None),
@@ -215,7 +215,7 @@ fn inputs(values: &Values, names: &[String]) -> Result<Vec<Option<Value>>, Strin
     names.iter().map(of).collect()
 }
 
-/// The output with the best actions; the error has its place and what is there.
+/// Finds the output with the best actions. The error has its place and what was found there.
 fn actions(graph: &Graph, values: &Values, act: usize) -> Result<(String, Rc<Net>), (String, String)> {
     let rank = |name: &str| ACTIONS.iter().position(|a| *a == name.to_lowercase()).unwrap_or(ACTIONS.len());
     let mut names: Vec<&str> = graph.output.iter().map(|output| output.name.as_str()).collect();

@@ -20,7 +20,7 @@ pub struct Neighbors {
 }
 
 impl Neighbors {
-    /// Of a model's file.
+    /// The neighbors of a model's file.
     pub fn of(model: &Path) -> Self {
         let folder = model.parent().unwrap_or(Path::new("")).into();
         Neighbors { folder, read: RefCell::default(), numbers: Cell::new(0.0) }
@@ -35,13 +35,13 @@ impl Neighbors {
         budget::MEMORY.check(COPIES * size_of::<f64>() as f64 * self.numbers.get())
     }
 
-    /// The numbers of a tensor.
+    /// Reads the numbers of a tensor as bytes.
     fn bytes(&self, tensor: &Tensor) -> Result<Vec<u8>, String> {
         let entry = |key: &str| tensor.external_data.iter().find(|e| e.key == key).map(|e| e.value.as_str());
         let number = |key: &str| entry(key).map(str::parse::<usize>).transpose();
         let name = entry("location").unwrap_or_default();
         let mut parts = Path::new(name).components();
-        // a model must not reach for files elsewhere
+        // a model must not read files elsewhere
         if !matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None)) {
             return Err(format!("tensor '{}' in file '{name}', expected one in the model's folder", tensor.name));
         }
@@ -75,7 +75,7 @@ impl Array {
         Array { shape: Vec::new(), data: vec![x] }
     }
 
-    /// Reads a tensor of the file, or of a file beside it; the text says what is wrong with it.
+    /// Reads a tensor of the file, or of a file in the same folder. The error says what is wrong with it.
     pub fn read(tensor: &Tensor, neighbors: &Neighbors) -> Result<Self, String> {
         let raw = match tensor.data_location {
             0 => Cow::Borrowed(&tensor.raw_data),
@@ -103,12 +103,12 @@ impl Array {
         }
     }
 
-    /// The only number, if there is just one.
+    /// The number of an array with a single element.
     pub fn single(&self) -> Option<f64> {
         if let [x] = self.data[..] { Some(x) } else { None }
     }
 
-    /// The numbers as a list of a length: one for all, or as many as there are.
+    /// The numbers as a list of length `n`: a single number is repeated.
     pub fn spread(&self, n: usize) -> Option<Vec<f64>> {
         match self.single() {
             Some(x) => Some(vec![x; n]),
@@ -117,24 +117,24 @@ impl Array {
         }
     }
 
-    /// Rows and columns, if it is a matrix.
+    /// Rows and columns, if the array is a matrix.
     pub fn matrix(&self) -> Option<(usize, usize)> {
         if let [rows, columns] = self.shape[..] { Some((rows, columns)) } else { None }
     }
 
-    /// With rows and columns exchanged.
+    /// The transposed matrix.
     pub fn transposed(&self) -> Option<Array> {
         let (rows, columns) = self.matrix()?;
         let data = (0..rows * columns).map(|i| self.data[i % rows * columns + i / rows]).collect();
         Some(Array { shape: vec![columns, rows], data })
     }
 
-    /// Number by number.
+    /// Applies a function to every number.
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Array {
         Array { shape: self.shape.clone(), data: self.data.iter().map(|x| f(*x)).collect() }
     }
 
-    /// Number by number with another of the same shape, or with a single number.
+    /// Combines two arrays elementwise. The other one has the same shape or a single number.
     pub fn zip(&self, other: &Array, f: impl Fn(f64, f64) -> f64) -> Option<Array> {
         match (self.single(), other.single()) {
             (_, Some(b)) => Some(self.map(|a| f(a, b))),
