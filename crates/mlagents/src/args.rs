@@ -1,8 +1,8 @@
-//! The words of a command line.
+//! Parsing of the command line.
 //!
-//! A player is started by Python in the way of Unity's players: the engine's own flags have one dash, and which of them there
-//! are depends on versions, so one that is not known here is skipped with its value. The flags with two dashes are ours; one that
-//! is misspelled is refused with the nearest that exists.
+//! Python starts a player in the way of Unity's players. The engine's own flags have one dash and vary between
+//! versions, so the parser skips unknown ones with their values. Flags with two dashes belong to this player. A
+//! misspelled one is refused with the nearest valid flag.
 
 use crate::behavior::BehaviorOptions;
 use crate::error::PlayerError;
@@ -11,38 +11,38 @@ use marathon_physics::hint::{did_you_mean, nearest};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How to use it.
+/// Help text.
 pub const HELP: &str = "\
-Serves Marathon's environments to ML-Agents, as a player built with Unity does.
+Serves Marathon's environments to ML-Agents, as a player built with Unity.
 
   marathon-player --mlagents-port N [flags]
 
-Usually Python starts it:
+Python usually starts it:
   mlagents-learn CONFIG.yaml --env=marathon-player --env-args --spawn-env=Hopper-v0 --num-spawn-envs=16
-or it connects to an mlagents-learn that was started without --env and waits:
+Or connect it to an mlagents-learn that was started without --env and waits:
   marathon-player --mlagents-port 5004 --spawn-env=Hopper-v0 --num-spawn-envs=16
 
   --mlagents-port N        port on which the trainer listens, on this computer
-  --spawn-env ID           agent, such as Hopper-v0 [Hopper-v0]; again for a further behavior, whose flags follow it
+  --spawn-env ID           agent [Hopper-v0]; repeat it for further behaviors, each followed by its flags
   --num-spawn-envs N       number of its agents in each area [64]
   --behavior-name NAME     name of the behavior, or of the first role's [the agent's]
-  --option NAME=VALUE      argument of the agent
+  --option NAME=VALUE      option of the agent
   --max-episode-steps N    decisions after which an episode is truncated [the task's]
-  --threads N              threads that simulate; 0: one per processor [1]
-  --fresh-agent-ids        a new agent id with every episode, which UnityParallelEnv and UnityAECEnv need
+  --threads N              simulation threads; 0: one per processor [1]
+  --fresh-agent-ids        new agent ids with every episode (for UnityParallelEnv and UnityAECEnv)
   --connect-timeout S      seconds to wait for a trainer and its first answer [60]
-  --answer-timeout S       seconds of silence, without even an answer to a ping, after which the trainer counts as gone;
+  --answer-timeout S       seconds without messages or answers to pings after which the trainer counts as gone;
                            0: never [300]
-  -logFile FILE            write the log there instead of to the standard error
+  -logFile FILE            write the log to this file instead of stderr
   --help, --version
 
 Flags with one dash are Unity's and have no effect here.
 ";
 
-/// Shortest silence after which a trainer may count as gone, s. A busy one may take seconds to answer a ping.
+/// Shortest silence after which a trainer may count as gone, s. A busy trainer may take seconds to answer a ping.
 const SHORTEST_SILENCE: u64 = 10;
 
-/// Flags of ours that take a value.
+/// Flags of this player that take a value.
 const VALUED: [&str; 9] = [
     "--mlagents-port",
     "--spawn-env",
@@ -54,33 +54,33 @@ const VALUED: [&str; 9] = [
     "--connect-timeout",
     "--answer-timeout",
 ];
-/// Those that do not.
+/// Flags of this player without a value.
 const BARE: [&str; 3] = ["--fresh-agent-ids", "--help", "--version"];
 
-/// What a command line asks for.
+/// Result of parsing a command line.
 #[derive(Clone, Debug)]
 pub enum Request {
-    /// A text on the standard output: help, or the version.
+    /// Print a text on stdout: help, or the version.
     Print(String),
-    /// To play.
+    /// Play.
     Play(Args),
 }
 
-/// What a command line says.
+/// Values of a command line.
 #[derive(Clone, Debug)]
 pub struct Args {
-    /// The player.
+    /// Options of the player.
     pub player: PlayerOptions,
-    /// Where to write the log; `None`: to the standard error.
+    /// File for the log; `None` for stderr.
     pub log: Option<PathBuf>,
     /// Flags that have no effect here.
     pub ignored: Vec<String>,
 }
 
-/// Reads the words of a command line, without the program's own name.
+/// Parses a command line, without the program's own name.
 ///
 /// # Errors
-/// If a flag of ours is unknown or has no sensible value, or there is no port.
+/// If a flag of this player is unknown or has an invalid value, or there is no port.
 pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerError> {
     let mut words = words.into_iter().peekable();
     let mut options = PlayerOptions { behaviors: Vec::new(), ..Default::default() };
@@ -96,7 +96,7 @@ pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerE
                     ignored.push(word);
                     ignored.extend(words.next_if(|next| !next.starts_with('-')));
                 }
-                None => return Err(usage(format!("'{word}' belongs to no flag; see --help"))),
+                None => return Err(usage(format!("'{word}' does not follow a flag; see --help"))),
             }
             continue;
         };
@@ -105,7 +105,7 @@ pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerE
             None => (&word[..], None),
         };
         if flag.starts_with("--mlagents-") && flag != "--mlagents-port" {
-            // ML-Agents' own, of a version that this player has not heard of
+            // ML-Agents' own flag, of a version that this player does not support
             ignored.push(word);
             continue;
         }
@@ -159,7 +159,7 @@ pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Request, PlayerE
     Ok(Request::Play(Args { player: options, log, ignored }))
 }
 
-/// Sets one of a behavior's flags.
+/// Sets a flag of a behavior.
 fn set(behavior: &mut BehaviorOptions, flag: &str, value: String) -> Result<(), PlayerError> {
     match flag {
         "--num-spawn-envs" => behavior.agents = number(flag, &value, 1..=1_000_000)? as usize,
@@ -243,7 +243,7 @@ mod tests {
             ("--mlagents-port 1 --num-spawn-envs 0", "expected a whole number from 1 to 1000000"),
             ("--mlagents-port 1 --option mass", "expected NAME=VALUE"),
             ("--mlagents-port 1 --behavior-name a?team=1", "expected a name without '?'"),
-            ("--mlagents-port 1 hopper", "'hopper' belongs to no flag"),
+            ("--mlagents-port 1 hopper", "'hopper' does not follow a flag"),
             ("--mlagents-port 1 --answer-timeout 3", "expected 0 or from 10 to 86400"),
             ("-logFile", "-logFile needs"),
         ] {

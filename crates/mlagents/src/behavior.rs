@@ -1,4 +1,5 @@
-//! Agents of one kind under one of ML-Agents' behavior names, or one for each role of their task: from actions to infos.
+//! Agents of one kind under one of ML-Agents' behavior names, or one name per role of their task: from actions to
+//! infos.
 
 use crate::channels::{Aggregation, write_stat};
 use crate::error::PlayerError;
@@ -11,19 +12,19 @@ use marathon_physics::lanes::Isa;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What a [`Behavior`] is made of.
+/// Options of a [`Behavior`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BehaviorOptions {
     /// Agent, such as `Hopper-v0`.
     pub env: String,
     /// Number of agents in one area.
     pub agents: usize,
-    /// Name for the trainer; `None`: the agent's registry name. Of a task with several roles, the first one's; that of another
-    /// has a point and the role's name besides.
+    /// Name for the trainer; `None` for the agent's registry name. With several roles, it is the first role's. Names of
+    /// the others append a point and the role's name.
     pub name: Option<String>,
-    /// Named arguments of the agent.
+    /// Options of the agent.
     pub options: Options,
-    /// Decisions after which an episode is truncated; `None`: the task's own number.
+    /// Decisions after which an episode is truncated; `None` for the task's own number.
     pub max_episode_steps: Option<usize>,
 }
 
@@ -50,10 +51,10 @@ pub(crate) struct Sizes {
 }
 
 impl Sizes {
-    /// The sizes for a behavior that does not exist yet.
+    /// Computes the sizes for a behavior before it is created.
     ///
     /// # Errors
-    /// If there is no such agent, or the agent does not take the arguments.
+    /// If the agent does not exist or does not take the options.
     pub fn of(options: &BehaviorOptions) -> Result<Self, PlayerError> {
         let agent = registry::global().agent_with(&options.env, &options.options)?;
         let shards = agent.shards(Isa::best())?;
@@ -78,24 +79,24 @@ impl Sizes {
     }
 }
 
-/// Totals of an agent's present episode, for statistics.
+/// Totals of an agent's current episode, for statistics.
 #[derive(Clone, Default)]
 struct Episode {
     /// Decisions.
     steps: u32,
-    /// Along +x, m.
+    /// Distance along +x, m.
     distance: f32,
-    /// Per term of the reward.
+    /// Sum per term of the reward.
     terms: Vec<f32>,
 }
 
-/// Agents of one kind: one behavior to the trainer, or one for each role of their task.
+/// Agents of one kind. The trainer sees one behavior, or one per role of their task.
 pub struct Behavior {
-    /// One for each role.
+    /// One per role.
     faces: Vec<Face>,
     spec: Spec,
     env: VecEnv,
-    /// What the environment is to be made with but for parameters, and what it was made with.
+    /// Options of the environment without parameters, and with the current ones.
     plain: VecEnvOptions,
     made: VecEnvOptions,
     names: Names,
@@ -104,21 +105,21 @@ pub struct Behavior {
     actions: Vec<f32>,
     ended: Vec<bool>,
     episodes: Vec<Episode>,
-    /// Episodes that each agent has begun.
+    /// Number of episodes of each agent.
     begun: Vec<u64>,
-    /// Times that all episodes were begun anew.
+    /// Number of resets.
     resets: u64,
-    /// Whether any agent has ever been varied.
+    /// Whether any agent has been varied.
     varied: bool,
-    /// Whether parameters have ever told an agent what to do.
+    /// Whether parameters have commanded any agent.
     commanded: bool,
 }
 
 impl Behavior {
-    /// `areas` times as many agents as the options say, whose numbers begin at `first_id`.
+    /// Creates `areas` times as many agents as the options say. Their numbers begin at `first_id`.
     ///
     /// # Errors
-    /// If there is no such agent, or it does not take its arguments.
+    /// If the agent does not exist or does not take its options.
     pub fn new(options: &BehaviorOptions, areas: usize, threads: usize, first_id: i32) -> Result<Self, PlayerError> {
         let made = VecEnvOptions {
             agents: options.agents.saturating_mul(areas),
@@ -163,12 +164,12 @@ impl Behavior {
         self.faces.iter().map(Face::name)
     }
 
-    /// How many numbers the agents have: one for each and each of its roles.
+    /// Number of agent numbers: one per agent and role.
     pub fn ids(&self) -> usize {
         self.faces.len() * self.env.agents()
     }
 
-    /// Facts of the task.
+    /// Description of the task.
     pub fn spec(&self) -> &Spec {
         &self.spec
     }
@@ -178,7 +179,7 @@ impl Behavior {
         &self.model
     }
 
-    /// The agents, to be looked at.
+    /// The environments, for reading.
     pub fn env(&self) -> &VecEnv {
         &self.env
     }
@@ -188,26 +189,26 @@ impl Behavior {
         &self.out
     }
 
-    /// Names of the environment parameters that mean something here.
+    /// Names of the environment parameters that have an effect here.
     pub fn parameter_names(&self) -> &Names {
         &self.names
     }
 
-    /// Bytes of the longest message part that the agents can need: when all their episodes end at once, there are two infos
-    /// for each and each of its roles.
+    /// Bytes of the longest message part that the agents can need. If all their episodes end at once, there are two
+    /// infos per agent and role.
     pub fn largest(&self) -> usize {
         Sizes::of_faces(&self.faces).largest(self.env.agents())
     }
 
-    /// How many agents there may be if a message may have so many bytes.
+    /// Number of agents whose messages fit into this many bytes.
     pub fn most_agents(&self, bytes: usize) -> usize {
         Sizes::of_faces(&self.faces).most_agents(bytes)
     }
 
-    /// Begins all episodes anew; the first time under a seed.
+    /// Starts all episodes again. The first call also sets the seed.
     ///
     /// # Errors
-    /// If parameters make no sense; the text says so. Episodes have begun nevertheless.
+    /// If parameters are invalid; the text names them. The episodes have started nevertheless.
     pub fn reset(&mut self, seed: Option<u64>, parameters: &Parameters) -> Result<(), PlayerError> {
         self.resets += 1;
         let configured = self.configure(parameters);
@@ -221,18 +222,17 @@ impl Behavior {
         configured.and(varied)
     }
 
-    /// Takes in parameters that hold in the middle of episodes, too: what agents are told, and what they say of all agents
-    /// alike.
+    /// Applies parameters that also take effect within episodes: commands, and options that all agents share.
     ///
     /// # Errors
-    /// If a command is out of its range; an argument makes no sense, or would change the observations or actions. The old
-    /// ones stay.
+    /// If a command is out of range, or an option is invalid or would change the observations or actions. The previous
+    /// values stay.
     pub fn change(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
         let configured = self.configure(parameters);
         (0..self.ended.len()).map(|i| self.command(i, parameters)).fold(configured, Result::and)
     }
 
-    /// Takes in what parameters say of all agents alike.
+    /// Applies parameters that all agents share.
     fn configure(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
         let mut wanted = VecEnvOptions { seed: self.made.seed, ..self.plain.clone() };
         parameters.configure(&self.names, self.resets, &mut wanted);
@@ -254,7 +254,7 @@ impl Behavior {
         self.env = env;
         self.made = wanted;
         if self.varied {
-            // what agents are like is no part of a snapshot
+            // snapshots do not include variations
             self.ended.fill(true);
             let varied = self.vary(parameters);
             self.ended.fill(false);
@@ -263,11 +263,12 @@ impl Behavior {
         Ok(())
     }
 
-    /// Acts, advances to the next decision, and begins new episodes where they ended. `chosen` has the actions of each behavior,
-    /// for the agents for which its role decides. A role that does not decide goes on with its last action.
+    /// Acts, advances to the next decision, and starts new episodes after ended ones. `chosen` has the actions of each
+    /// behavior, for the agents for which its role decides. A role that does not decide keeps its last action.
     ///
     /// # Errors
-    /// If the actions are not as many as those agents or have another length; or parameters make no sense.
+    /// If the number of actions differs from that of these agents, an action has another length, or parameters are
+    /// invalid.
     pub fn step(
         &mut self,
         chosen: &BTreeMap<String, AgentActionList>,
@@ -298,7 +299,7 @@ impl Behavior {
         self.look().and(varied)
     }
 
-    /// Takes note of who decides next.
+    /// Reads which roles decide next.
     fn look(&mut self) -> Result<(), PlayerError> {
         for face in &mut self.faces {
             face.look(&self.env)?;
@@ -306,7 +307,7 @@ impl Behavior {
         Ok(())
     }
 
-    /// Draws what the agents whose episodes ended are like in the next.
+    /// Draws the properties of agents whose episodes ended, for their next episode.
     fn vary(&mut self, parameters: &Parameters) -> Result<(), PlayerError> {
         let mut result = Ok(());
         for i in 0..self.ended.len() {
@@ -317,7 +318,7 @@ impl Behavior {
             if own.is_some() || self.varied {
                 self.varied = true;
                 let own = own.unwrap_or_else(|| self.env.unvaried().clone());
-                // the others must not suffer from one impossible draw
+                // one invalid draw must not affect the other agents
                 result = result.and(self.env.vary(i, &own).map_err(PlayerError::from));
             }
             result = result.and(self.command(i, parameters));
@@ -325,7 +326,7 @@ impl Behavior {
         result
     }
 
-    /// Tells an agent what parameters say, or gives it back to its schedule if they no longer say anything.
+    /// Sets an agent's command from parameters, or returns it to its schedule if no parameter sets it.
     fn command(&mut self, agent: usize, parameters: &Parameters) -> Result<(), PlayerError> {
         let command = parameters.command(&self.names, &self.spec.command, agent as u64, self.begun[agent]);
         if command.is_some() || self.commanded {
@@ -335,7 +336,7 @@ impl Behavior {
         Ok(())
     }
 
-    /// Forgets which episodes ended, and what they amounted to.
+    /// Clears the ended episodes and their totals.
     fn clear_ended(&mut self) {
         for (ended, episode) in self.ended.iter_mut().zip(&mut self.episodes) {
             if std::mem::take(ended) {
@@ -345,14 +346,15 @@ impl Behavior {
         }
     }
 
-    /// What the trainer has to know of the behaviors.
+    /// Descriptions of the behaviors for the trainer.
     pub fn parameters(&self) -> impl Iterator<Item = BrainParameters> {
         self.faces.iter().map(Face::parameters)
     }
 
-    /// Writes the infos of all roles, for each behavior an encoded [`AgentInfoList`](crate::wire::AgentInfoList), and appends
-    /// statistics about the episodes that ended. Must be called once after every [`Behavior::reset`] and [`Behavior::step`].
-    /// With `fresh_ids`, the number for the next new episode, agents change their numbers between episodes.
+    /// Writes the infos of all roles, for each behavior an encoded [`AgentInfoList`](crate::wire::AgentInfoList), and
+    /// appends statistics about the episodes that ended. Call it once after every [`Behavior::reset`] and
+    /// [`Behavior::step`]. With `fresh_ids`, the number for the next new episode, agents change their numbers between
+    /// episodes.
     pub fn report(
         &mut self,
         infos: &mut BTreeMap<String, Vec<u8>>,
@@ -360,7 +362,7 @@ impl Behavior {
         mut fresh_ids: Option<&mut i32>,
     ) {
         for face in &mut self.faces {
-            // looked up without making a new key
+            // a lookup that does not create a new key
             if !infos.contains_key(face.name()) {
                 infos.insert(face.name().to_string(), Vec::new());
             }
@@ -377,7 +379,7 @@ impl Behavior {
         self.clear_ended();
     }
 
-    /// What an episode amounted to, for TensorBoard: what the task reports under the first role's name.
+    /// Writes statistics of an episode for TensorBoard: the task's metrics under the first role's name.
     fn write_stats(&self, i: usize, stats: &mut Vec<u8>) {
         let episode = &self.episodes[i];
         let mut average = |label: &str, name: &str, value: f32| {
@@ -408,7 +410,7 @@ mod tests {
     use prost::Message;
 
     const NAME: &str = "Hopper-v0?team=0";
-    /// Actions of nobody.
+    /// An empty map of actions.
     const NOBODY: BTreeMap<String, AgentActionList> = BTreeMap::new();
 
     fn hoppers(agents: usize, max_episode_steps: usize) -> Behavior {

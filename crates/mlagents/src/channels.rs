@@ -1,12 +1,12 @@
-//! Side channels: what trainer and player tell each other besides observations and actions.
+//! Side channels: messages between trainer and player besides observations and actions.
 //!
-//! The bytes are `{16 bytes of channel, i32 length, payload}` one after another, all little-endian; a text is an `i32` length
-//! and its characters, a list an `i32` count and its numbers. Channels that a player does not know are skipped, since users
-//! of Python may open channels of their own.
+//! The bytes are `{16 bytes of channel, i32 length, payload}` one after another, all little-endian. A text is an `i32`
+//! length and its characters, a list an `i32` count and its numbers. Unknown channels are skipped, because Python users
+//! may open channels of their own.
 
 use thiserror::Error;
 
-/// A channel's identifier, with its first three fields little-endian as they are on the wire.
+/// A channel's identifier. Its first three fields are little-endian as on the wire.
 pub type ChannelId = [u8; 16];
 
 /// Engine configuration, to the player: e951342c-4f7e-11ea-b238-784f4387d1f7.
@@ -26,12 +26,12 @@ const fn id(a: u32, b: u16, c: u16, d: u64) -> ChannelId {
 /// Limit on the intervals of a sampler. Every draw searches all of them.
 const INTERVALS: usize = 1024;
 
-/// What a trainer says beside its actions.
+/// A message of the trainer besides its actions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
-    /// How the engine shall run.
+    /// Engine settings.
     Engine(Engine),
-    /// An environment parameter. It is kept until replaced.
+    /// An environment parameter. It is kept until it is replaced.
     Parameter(String, Sampler),
     /// Facts about the training, which a player may ignore.
     Analytics,
@@ -39,7 +39,7 @@ pub enum Message {
     Unknown(ChannelId),
 }
 
-/// How the engine shall run.
+/// Engine settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Engine {
     /// Width and height of the window, pixels.
@@ -48,16 +48,16 @@ pub enum Engine {
     Quality(i32),
     /// Seconds simulated per second.
     TimeScale(f32),
-    /// Frames per second shown; -1: as many as can be.
+    /// Frames per second shown; -1 for as many as possible.
     TargetFrameRate(i32),
     /// Frames per simulated second.
     CaptureFrameRate(i32),
 }
 
-/// Where the values of an environment parameter come from.
+/// Distribution of an environment parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sampler {
-    /// Always this.
+    /// Always the same value.
     Constant(f32),
     /// Uniformly between two numbers.
     Uniform {
@@ -86,20 +86,20 @@ pub enum Sampler {
     },
 }
 
-/// A side channel that says something that makes no sense.
+/// An invalid side channel message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("side channels, byte {at}: {problem}")]
 pub struct ChannelError {
-    /// Where in all bytes.
+    /// Position in all bytes.
     pub at: usize,
-    /// What was found and what was expected.
+    /// The found and the expected value.
     pub problem: &'static str,
 }
 
 /// Reads all messages.
 ///
 /// # Errors
-/// At the first message that is cut short or makes no sense; those before it have been handed to `each`.
+/// At the first message that is cut short or invalid. `each` has received the messages before it.
 pub fn read(bytes: &[u8], mut each: impl FnMut(Message)) -> Result<(), ChannelError> {
     let mut all = Reader { bytes, at: 0 };
     while all.at < bytes.len() {
@@ -157,7 +157,7 @@ impl<'a> Reader<'a> {
         nan
     }
 
-    /// As many items as a count in front of them says.
+    /// Takes a count and as many items of `size` bytes.
     fn counted(&mut self, size: usize) -> Result<&'a [u8], ChannelError> {
         let count = self.int()?;
         let length = usize::try_from(count).ok().and_then(|n| n.checked_mul(size));
@@ -215,7 +215,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// How the trainer sums up the values that a statistic has between two summaries.
+/// How the trainer aggregates the values of a statistic between two summaries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aggregation {
     /// Their mean.

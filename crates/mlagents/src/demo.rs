@@ -1,8 +1,9 @@
-//! Demonstrations: `.demo` files of recorded decisions, from which ML-Agents learns by imitation.
+//! Demonstrations: `.demo` files of recorded decisions for ML-Agents' imitation learning.
 //!
-//! A file is the length of a head and the head, padded to 33 bytes; the length of the behavior's description and that; and so
-//! on for each decision: what the agent saw, what it got for the decision before, what it did. Lengths are protocol buffers'
-//! variable integers. The last entry of an episode is the state in which it ended, with an action that nobody took.
+//! A file starts with the length of a head and the head, padded to 33 bytes, then the length of the behavior's
+//! description and the description. An entry per decision follows in the same way: observation, reward of the previous
+//! decision, action. Lengths are protocol buffers' variable integers. The last entry of an episode is the state in
+//! which it ended, with a dummy action.
 
 use crate::face::{TEAM, observation};
 use crate::wire::{ActionSpec, AgentInfo, AgentInfoActionPair, BrainParameters, DemonstrationMeta, RecordedAction};
@@ -11,7 +12,7 @@ use prost::Message;
 use prost::bytes::Buf;
 use std::path::{Path, PathBuf};
 
-/// Bytes in front of the behavior's description.
+/// Bytes before the behavior's description.
 const HEAD: usize = 33;
 /// Version of the format.
 const API_VERSION: i32 = 1;
@@ -20,20 +21,20 @@ const API_VERSION: i32 = 1;
 const ENTRY: usize = 1 << 16;
 const ENTRY_NUMBER: usize = 16;
 
-/// An episode as it was played, from its first observation to its last.
+/// A recorded episode, from its first observation to its last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Episode {
-    /// Observations, `[steps + 1][obs]`: the last is that of the state in which the episode ended.
+    /// Observations, `[steps + 1][obs]`. The last one is that of the state in which the episode ended.
     pub obs: Vec<f32>,
     /// Actions in the environment's units, `[steps][act]`.
     pub actions: Vec<f32>,
     /// Rewards, `[steps]`.
     pub rewards: Vec<f32>,
-    /// It ended by its time limit.
+    /// Whether it ended by its time limit.
     pub truncated: bool,
 }
 
-/// A demonstration file in the making.
+/// A demonstration file under construction.
 #[derive(Clone, Debug)]
 pub struct Demonstration {
     name: String,
@@ -46,7 +47,7 @@ pub struct Demonstration {
 }
 
 impl Demonstration {
-    /// An empty demonstration of a task.
+    /// Creates an empty demonstration of a task.
     pub fn new(name: &str, spec: &Spec) -> Self {
         Demonstration {
             name: name.into(),
@@ -62,11 +63,11 @@ impl Demonstration {
     /// Adds an episode.
     ///
     /// # Panics
-    /// If the episode's lengths do not fit each other and the task.
+    /// If the lengths of the episode do not fit each other or the task.
     pub fn push(&mut self, episode: &Episode) {
         let (obs, act, steps) = (self.spec.obs, self.spec.act, episode.rewards.len());
-        assert_eq!(episode.obs.len(), (steps + 1) * obs, "an observation for every decision and the end");
-        assert_eq!(episode.actions.len(), steps * act, "an action for every decision");
+        assert_eq!(episode.obs.len(), (steps + 1) * obs, "one observation per decision and one for the end");
+        assert_eq!(episode.actions.len(), steps * act, "one action per decision");
         for i in 0..=steps {
             let done = i == steps;
             let info = AgentInfo {
@@ -116,13 +117,13 @@ impl Demonstration {
     pub fn front(&self) -> Vec<u8> {
         let mut meta = DemonstrationMeta {
             api_version: API_VERSION,
-            // a word, as Unity's editor makes of it
+            // Unity's editor keeps only letters and digits, too
             name: self.name.chars().filter(char::is_ascii_alphanumeric).collect(),
             number_steps: self.steps.try_into().unwrap_or(i32::MAX),
             number_episodes: self.episodes.try_into().unwrap_or(i32::MAX),
             mean_reward: self.mean_return() as f32,
         };
-        // the head has a fixed length, and only the name can give way
+        // the head has a fixed length, and only the name can be shortened
         while meta.encode_length_delimited_to_vec().len() > HEAD && meta.name.pop().is_some() {}
         let action_spec = ActionSpec { num_continuous: self.spec.act as i32 };
         let behavior =
@@ -134,24 +135,24 @@ impl Demonstration {
     }
 }
 
-/// What is wrong with a demonstration file.
+/// An error in a demonstration file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {place}: found {found}, expected {expected}", path.display())]
 pub struct DemoError {
     /// The file.
     pub path: PathBuf,
-    /// Where in it.
+    /// Place in the file.
     pub place: String,
-    /// What is there.
+    /// Contents at that place.
     pub found: String,
-    /// What should be there.
+    /// Valid contents.
     pub expected: String,
 }
 
-/// Reads the decisions of a demonstration file of a task: of ours, or of Unity's recorder.
+/// Reads the decisions of a demonstration file by Marathon or Unity's recorder.
 ///
 /// # Errors
-/// If it is none, or of a task that observes or does something else.
+/// If the file is not a demonstration, or its observations or actions do not fit the task.
 pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Demonstrations, DemoError> {
     let wrong = |place: &str, found: String, expected: &str| DemoError {
         path: path.into(),
@@ -170,7 +171,7 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
         .map_err(|error| wrong("behavior", error.to_string(), "a behavior's description"))?;
     let source = Some(path.to_string_lossy().into_owned());
     let mut out = Demonstrations { obs_len: spec.obs, act_len: spec.act, source, ..Demonstrations::default() };
-    // the action of the decision that the next entry is the outcome of
+    // the action whose result the next entry holds
     let mut before: Option<Vec<f32>> = None;
     let mut entry = 0;
     while rest.has_remaining() {
@@ -202,7 +203,7 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
             out.actions.extend(action);
         }
         out.obs.extend(obs);
-        // the last entry of an episode has an action that nobody took
+        // the last entry of an episode has a dummy action
         before = (!info.done).then_some(action);
         entry += 1;
     }
@@ -213,9 +214,9 @@ pub fn read_demonstrations(path: &Path, bytes: &[u8], spec: &Spec) -> Result<Dem
     Ok(out)
 }
 
-/// The action in [-1, 1] that one in an actuator's own units stands for.
+/// Maps an action in an actuator's own units to [-1, 1].
 fn nominal([low, high]: [f32; 2], action: f32) -> f32 {
-    // the same bits where there is nothing to map
+    // the same bits if there is nothing to map
     let x = if low == -1.0 && high == 1.0 { action } else { (action - 0.5 * (low + high)) / (0.5 * (high - low)) };
     x.clamp(-1.0, 1.0)
 }
@@ -276,7 +277,7 @@ mod tests {
         assert_eq!(read.decisions, [[0, 1], [1, 2], [3, 4], [4, 5]]);
         assert_eq!(read.actions, [&actions[..], &actions].concat());
         assert_eq!((read.motions.len(), &read.motions[0], read.source), (1, &(0..4), Some("hop.demo".into())));
-        // whatever is cut off or changed, nothing panics
+        // no truncation or change causes a panic
         for n in 0..bytes.len() {
             let _ = read_demonstrations(path, &bytes[..n], &spec);
             let mut changed = bytes.clone();

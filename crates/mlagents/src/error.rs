@@ -1,4 +1,4 @@
-//! What ends a player.
+//! Errors that end a player.
 
 use crate::rpc::RpcError;
 use marathon_envs::EnvError;
@@ -8,10 +8,10 @@ use thiserror::Error;
 /// Errors of a player.
 #[derive(Debug, Error)]
 pub enum PlayerError {
-    /// A flag that makes no sense.
+    /// An invalid flag.
     #[error("{0}")]
     Usage(String),
-    /// Of the environments: an unknown agent, most likely.
+    /// An environment error, usually an unknown agent.
     #[error(transparent)]
     Env(#[from] EnvError),
     /// The log file cannot be written.
@@ -19,10 +19,10 @@ pub enum PlayerError {
     Log {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Its cause.
         source: std::io::Error,
     },
-    /// Nobody listens.
+    /// No trainer listens.
     #[error(
         "no trainer listens on port {port} of this computer ({source}); start `mlagents-learn CONFIG.yaml` first, which waits \
          on port 5004"
@@ -30,7 +30,7 @@ pub enum PlayerError {
     Connect {
         /// The port.
         port: u16,
-        /// Why.
+        /// Its cause.
         source: std::io::Error,
     },
     /// A program listens on the port but does not answer.
@@ -55,34 +55,34 @@ pub enum PlayerError {
         /// How the connection ended.
         source: RpcError,
     },
-    /// The trainer is gone or refuses.
+    /// The trainer is gone or refuses the message.
     #[error(transparent)]
     Rpc(#[from] RpcError),
-    /// What the trainer sent is no message.
+    /// The trainer's message cannot be decoded.
     #[error("the trainer's message cannot be read: {0}")]
     Decode(#[from] prost::DecodeError),
-    /// The trainer left something out.
+    /// The trainer's message is incomplete.
     #[error("the trainer's message {0}")]
     Message(&'static str),
-    /// Another major version of the protocol.
-    #[error("the trainer speaks version {found} of ML-Agents' protocol, expected {expected}")]
+    /// The trainer uses another major version of the protocol.
+    #[error("the trainer uses version {found} of ML-Agents' protocol, expected {expected}")]
     Version {
-        /// What it speaks.
+        /// Version of the trainer.
         found: String,
-        /// What we speak.
+        /// Version of this player.
         expected: &'static str,
     },
-    /// Actions that do not fit the agents.
-    #[error("{} actions of {} numbers came for {name}, expected {} of {}", found.0, found.1, expected.0, expected.1)]
+    /// The actions do not fit the agents.
+    #[error("received {} actions of {} numbers for {name}, expected {} of {}", found.0, found.1, expected.0, expected.1)]
     Actions {
         /// Behavior.
         name: String,
         /// Number of actions, and their length.
         found: (usize, usize),
-        /// The same as they should be.
+        /// Expected number and length.
         expected: (usize, usize),
     },
-    /// An environment parameter would change what a behavior sees or does.
+    /// An environment parameter would change a behavior's observations or actions.
     #[error(
         "environment parameters would change {name} from {} observations and {} actions to {} and {}, which a trainer cannot \
          follow; they stay as they are",
@@ -91,12 +91,12 @@ pub enum PlayerError {
     Sizes {
         /// Behavior.
         name: String,
-        /// Observations and actions as they are.
+        /// Current numbers of observations and actions.
         expected: (usize, usize),
-        /// As they would be.
+        /// Numbers after the change.
         found: (usize, usize),
     },
-    /// An environment parameter would change who decides in a behavior's task.
+    /// An environment parameter would change which roles of a behavior's task decide.
     #[error(
         "environment parameters would change the roles of {name} from {expected} to {found}, which a trainer cannot follow; they \
          stay as they are"
@@ -104,27 +104,27 @@ pub enum PlayerError {
     Roles {
         /// Behavior of the first role.
         name: String,
-        /// The roles as they are.
+        /// Current roles.
         expected: String,
-        /// As they would be.
+        /// Roles after the change.
         found: String,
     },
-    /// More agents than fit into a message.
+    /// The messages of so many agents would be too long.
     #[error(
         "{agents} agents of {name} are too many: when all their episodes end at once, a message takes {bytes} bytes, and \
          ML-Agents accepts {limit}; use at most {most} in one player (--num-spawn-envs, times --num-areas), or more players \
          (mlagents-learn --num-envs)"
     )]
     TooManyAgents {
-        /// Agents of the behavior with most bytes.
+        /// Agents of the behavior with the most bytes.
         agents: usize,
         /// The behavior.
         name: String,
-        /// Bytes of a longest message.
+        /// Bytes of the longest message.
         bytes: usize,
-        /// Bytes that the trainer takes.
+        /// Bytes that the trainer accepts.
         limit: usize,
-        /// How many agents of the behavior there may be.
+        /// Maximum number of agents of the behavior.
         most: usize,
     },
 }

@@ -1,42 +1,42 @@
-//! One role of a task as a behavior of its own: for which agents it decides, what it is told to do, what it observes and earns.
+//! One role of a task as a behavior: its deciding agents, its name, its observations and its rewards.
 //!
-//! A task without roles has one face, which has it all. A role that does not decide every time has no infos in between: its
-//! last action goes on, and what it earns is summed until its next info.
+//! A task without roles has one face for everything. A role that skips decisions has no infos in between: its last
+//! action stays, and its rewards are summed until its next info.
 
 use crate::error::PlayerError;
 use crate::wire::{ActionSpec, AgentActionList, AgentInfo, BrainParameters, FloatData, Observation};
 use marathon_envs::{EnvError, Role, Spec, Step, VecEnv};
 use std::ops::Range;
 
-/// ML-Agents' suffix of all behaviors that do not play against themselves.
+/// ML-Agents' suffix of all behaviors without self-play.
 pub(crate) const TEAM: &str = "?team=0";
-/// Bytes of an entry of a message's map besides its key and its infos.
+/// Bytes of an entry of a message's map, besides its key and its infos.
 const ENTRY: usize = 32;
 
-/// A role to a trainer.
+/// A role, as the trainer sees it.
 pub(crate) struct Face {
-    /// With the team, as ML-Agents wants it.
+    /// Name with the team suffix, as ML-Agents expects it.
     name: String,
-    /// Which of the task's roles.
+    /// Index of the role in the task.
     number: usize,
     role: Role,
-    /// For which agents it decides next.
+    /// Agents for which it decides next.
     decides: Vec<bool>,
-    /// For which agents its part of the episode has just ended: where it has failed, and where it has not.
+    /// Agents for which its part of the episode has just ended: by failure, and otherwise.
     leaves: [Vec<bool>; 2],
-    /// In whose episodes it has no part any more.
+    /// Agents in whose episode the role has finished.
     left: Vec<bool>,
-    /// What it has earned since its last info.
+    /// Rewards since its last info.
     earned: Vec<f32>,
     ids: Vec<i32>,
-    /// An info to write into.
+    /// Reused info.
     info: AgentInfo,
 }
 
 impl Face {
-    /// One for each role of a task. The first has the name; the name of another has the role's behind a point. (Marathon's own
-    /// configurations have a slash there. ML-Agents takes that for a folder, and fails to write its first checkpoint.) Numbers
-    /// of their agents begin at `first_id`.
+    /// Creates one face per role of a task. The first has the name `name`; the others append a point and the role's
+    /// name. (Marathon's own configurations use a slash. ML-Agents would take it for a folder and fail to write its
+    /// first checkpoint.) Agent numbers begin at `first_id`.
     pub fn all(name: &str, spec: &Spec, agents: usize, first_id: i32) -> Vec<Face> {
         let mut ids = first_id..;
         let face = |(number, role): (usize, Role)| Face {
@@ -71,38 +71,38 @@ impl Face {
         &self.role
     }
 
-    /// Takes over where the parts of the role lie in the task after an argument of it has changed.
+    /// Updates the ranges of the role in the task after one of its options has changed.
     pub fn set_role(&mut self, role: Role) {
         self.role = role;
     }
 
-    /// What the trainer has to know of the behavior.
+    /// Description of the behavior for the trainer.
     pub fn parameters(&self) -> BrainParameters {
         let action_spec = ActionSpec { num_continuous: self.role.act.len() as i32 };
         BrainParameters { brain_name: self.name.clone(), is_training: true, action_spec: Some(action_spec) }
     }
 
-    /// Bytes of the behavior's part of a message without any infos.
+    /// Bytes of the behavior's part of a message without infos.
     pub fn frame_bytes(&self) -> usize {
         self.name.len() + ENTRY
     }
 
-    /// Bytes that an agent can need: where an episode ends, there are two infos.
+    /// Maximum bytes per agent: at the end of an episode there are two infos.
     pub fn bytes_per_agent(&self) -> usize {
         let info = AgentInfo { reward: 1.0, done: true, max_step_reached: true, id: i32::MAX, ..self.info.clone() };
         2 * prost::encoding::message::encoded_len(1, &info)
     }
 
-    /// Writes what the trainer chose into the actions of all agents, `[agents][act]`.
+    /// Writes the trainer's choice into the actions of all agents, `[agents][act]`.
     ///
     /// # Errors
-    /// If it did not choose for exactly the agents for which the role decides, or not all their actions.
+    /// If it did not choose for exactly the agents for which the role decides, or not all of their actions.
     pub fn act(&self, chosen: Option<&AgentActionList>, spec: &Spec, actions: &mut [f32]) -> Result<(), PlayerError> {
         let Range { start, end } = self.role.act;
         let rows = actions.chunks_exact_mut(spec.act).zip(&self.decides).filter(|(_, decides)| **decides);
         let rows = rows.map(|(row, _)| &mut row[start..end]);
         let Some(list) = chosen else {
-            // nobody decided: at rest
+            // no decision: rest
             rows.for_each(|row| row.fill(0.0));
             return Ok(());
         };
@@ -121,7 +121,7 @@ impl Face {
         Ok(())
     }
 
-    /// Adds up what the role earned with a decision.
+    /// Adds the role's rewards of a decision.
     pub fn earn(&mut self, spec: &Spec, out: &Step) {
         if self.number == 0 {
             self.earned.iter_mut().zip(&out.reward).for_each(|(sum, x)| *sum += x);
@@ -133,22 +133,22 @@ impl Face {
         }
     }
 
-    /// Takes note of who decides next, and whose part has ended.
+    /// Reads which agents decide next, and for which the role has finished.
     pub fn look(&mut self, env: &VecEnv) -> Result<(), EnvError> {
         env.leaves(self.number, self.leaves.each_mut().map(|leaves| &mut leaves[..]))?;
         env.decides(self.number, &mut self.decides)
     }
 
-    /// All episodes have begun anew.
+    /// Resets the state after all episodes have restarted.
     pub fn begin(&mut self) {
         self.decides.fill(true);
         self.leaves.iter_mut().chain([&mut self.left]).for_each(|list| list.fill(false));
         self.earned.fill(0.0);
     }
 
-    /// Appends an encoded [`AgentInfoList`](crate::wire::AgentInfoList): infos of the agents for which the role decides, and of
-    /// those whose episode, or the role's part of it, ended one more. With `fresh_ids`, the number for the next new episode,
-    /// agents change their numbers between episodes.
+    /// Appends an encoded [`AgentInfoList`](crate::wire::AgentInfoList). It has an info for each agent for which the
+    /// role decides, and one more for each agent whose episode, or the role's part of it, ended. With `fresh_ids`, the
+    /// number for the next new episode, agents change their numbers between episodes.
     pub fn report(
         &mut self,
         spec: &Spec,
@@ -161,7 +161,7 @@ impl Face {
             let row = i * spec.obs..(i + 1) * spec.obs;
             let leaves = self.leaves[0][i] || self.leaves[1][i];
             if (*ended || leaves) && !self.left[i] {
-                // whether it is over for another reason than a failure
+                // whether it ended for a reason other than failure
                 let late = if *ended { out.truncated[i] } else { self.leaves[1][i] };
                 self.describe(i, &out.final_obs[row.clone()], Some(late));
                 put(infos, &self.info);
@@ -181,8 +181,8 @@ impl Face {
         }
     }
 
-    /// Writes an agent's info: of the end of its episode, and whether that was the time limit, or of its present state. What was
-    /// got before the end belongs to the end.
+    /// Writes an agent's info: for its current state, or for the end of its episode and whether that was the time
+    /// limit. Rewards before the end belong to the end.
     fn describe(&mut self, i: usize, obs: &[f32], end: Option<bool>) {
         let info = &mut self.info;
         info.reward = std::mem::take(&mut self.earned[i]);
@@ -195,7 +195,7 @@ impl Face {
     }
 }
 
-/// The roles of a task as errors tell them.
+/// Text of a task's roles for error messages.
 pub(crate) fn roles(spec: &Spec) -> String {
     let one = |role: &Role| {
         let Role { name, obs, act, terms, .. } = role;
@@ -211,7 +211,7 @@ fn put(list: &mut Vec<u8>, info: &AgentInfo) {
     prost::encoding::message::encode(1, info, list);
 }
 
-/// A vector of numbers as a sensor gives it.
+/// A vector of numbers as a sensor's observation.
 pub(crate) fn observation(data: &[f32]) -> Observation {
     Observation {
         shape: vec![data.len() as i32],

@@ -1,23 +1,23 @@
-//! Marathon's environments as a player of Unity's ML-Agents.
+//! Marathon's environments as a player for Unity's ML-Agents.
 //!
-//! `mlagents-learn` and everything else that is built on `mlagents_envs` (its Gymnasium and PettingZoo wrappers, TorchRL,
-//! RLlib) train on whatever speaks ML-Agents' protocol. [`Player`] does, so they train on Marathon unmodified. The program
-//! `marathon-player` is this crate on a command line.
+//! `mlagents-learn` and all software based on `mlagents_envs` (its Gymnasium and PettingZoo wrappers, TorchRL, RLlib)
+//! train on programs that implement ML-Agents' protocol. [`Player`] does, so they train on Marathon unmodified. The
+//! program `marathon-player` runs this crate from a command line.
 //!
-//! * [`Player`] serves [behaviors](Behavior), one per agent type and each of its roles, each any number of agents, to a trainer
-//!   on this computer.
+//! * [`Player`] serves [behaviors](Behavior) to a trainer on this computer: one per agent type and role, each with any
+//!   number of agents.
 //! * [`Demonstration`] is a file of recorded decisions for ML-Agents' imitation learning.
-//! * [`wire`], [`rpc`], [`channels`] are the protocol: messages, transport, side channels. Its readers take any bytes
-//!   without a panic.
+//! * [`wire`], [`rpc`], [`channels`] are the protocol: messages, transport, side channels. Its readers never panic on
+//!   invalid bytes.
 //!
-//! # What a trainer may rely on
+//! # Guarantees for trainers
 //!
-//! * **Every batch has a decision of every agent**, but for roles that do not decide every time: they are in a batch when they
-//!   do, and where an episode ends. There the message has its last observation and reward, and beside it the first observation
-//!   of the next episode. (Unity sends ends of episodes between decisions, in batches of their own.)
-//! * **Failure and time limit differ**: `max_step_reached` (in Python `interrupted`) tells the time limit, at which trainers
-//!   bootstrap.
-//! * **The same seed, the same run**: with `mlagents-learn --seed`, the exported policy is the same, byte for byte.
+//! * **Every batch has a decision of every agent.** Roles that skip decisions are an exception: they are in a batch
+//!   when they decide, and when an episode ends. The message then has its last observation and reward, and also the
+//!   first observation of the next episode. (Unity sends ends of episodes between decisions, in batches of their own.)
+//! * **Failure and time limit differ**: `max_step_reached` (in Python `interrupted`) marks the time limit, at which
+//!   trainers bootstrap.
+//! * **Runs are reproducible**: with the same `mlagents-learn --seed`, the exported policy is the same, byte for byte.
 //! * **Environment parameters are drawn for each agent and episode** from the distributions that the trainer sends.
 
 pub mod args;

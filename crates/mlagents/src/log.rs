@@ -1,4 +1,4 @@
-//! Where a player says what it does: Python gives it no terminal, but a file.
+//! The log of a player. Python gives it no terminal, but a file.
 
 use crate::error::PlayerError;
 use std::fmt;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Limit on the length of an external text in the log, characters.
 const SHOWN: usize = 100;
 
-/// An external text made safe for a terminal: without control characters, and shortened.
+/// Makes an external text safe for a terminal: removes control characters and shortens it.
 pub(crate) fn shown(text: &str) -> String {
     let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
     if text.chars().nth(SHOWN).is_some() {
@@ -19,20 +19,20 @@ pub(crate) fn shown(text: &str) -> String {
     shown
 }
 
-/// A log file, or the standard error. Copies write to the same.
+/// A log on stderr or in a file. Copies write to the same one.
 #[derive(Clone, Debug)]
 pub struct Log(Option<Arc<File>>);
 
 impl Log {
-    /// To the standard error.
+    /// Logs to stderr.
     pub fn to_stderr() -> Self {
         Log(None)
     }
 
-    /// To a file, which is begun anew.
+    /// Logs to a file, which is overwritten.
     ///
     /// # Errors
-    /// If it cannot be made.
+    /// If the file cannot be created.
     pub fn to_file(path: &Path) -> Result<Self, PlayerError> {
         match File::create(path) {
             Ok(file) => Ok(Log(Some(Arc::new(file)))),
@@ -40,7 +40,7 @@ impl Log {
         }
     }
 
-    /// Writes a line. A log that cannot be written is no reason to end a training.
+    /// Writes a line. Errors are ignored: training must not end because of a log.
     pub fn line(&self, text: fmt::Arguments<'_>) {
         let line = format!("marathon-player: {text}\n");
         let _ = match &self.0 {

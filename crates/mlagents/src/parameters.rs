@@ -1,7 +1,7 @@
-//! Environment parameters: what a trainer varies from episode to episode, agent by agent.
+//! Environment parameters, which a trainer varies by agent and episode.
 //!
-//! ML-Agents sends a number or a distribution for each; the player draws. Every draw is a function of the sampler's seed, the
-//! parameter's name, the agent and its episode alone, so a training run is the same whenever it is repeated.
+//! ML-Agents sends a number or a distribution for each parameter, and the player draws. Every draw depends only on the
+//! sampler's seed, the parameter's name, the agent and its episode, so training runs are reproducible.
 
 use crate::channels::Sampler;
 use fnv::FnvHasher;
@@ -12,7 +12,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::hash::Hasher;
 
-/// What a parameter changes.
+/// Target of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 enum Target {
     /// Factor of all masses and inertias.
@@ -27,21 +27,21 @@ enum Target {
     MotorStrength(usize),
     /// Gravity, m/s^2, in the model's own direction.
     Gravity,
-    /// A number of what the agents are told.
+    /// One number of the agents' command.
     Command(usize),
     /// Decisions after which an episode is truncated.
     MaxEpisodeSteps,
-    /// A named argument of the agent.
+    /// An option of the agent.
     Option(String),
 }
 
-/// Which parameters there are for an agent.
+/// The parameters of an agent.
 pub struct Names {
     known: Vec<(String, Target)>,
 }
 
 impl Names {
-    /// Those of an agent with this model, this command and these named arguments, of which only the numbers count.
+    /// The parameters of an agent with this model, this command and these options. Only numeric options count.
     pub fn new(
         model: &Model,
         actuators: &[String],
@@ -56,7 +56,7 @@ impl Names {
             ("max_episode_steps", Target::MaxEpisodeSteps),
         ];
         let mut known: Vec<_> = plain.into_iter().map(|(name, target)| (name.to_string(), target)).collect();
-        // the world does not weigh
+        // the world has no mass
         let bodies = model.bodies.iter().enumerate().skip(1);
         known.extend(bodies.map(|(i, body)| (format!("mass.{}", body.name), Target::BodyMass(i))));
         let motors = actuators.iter().enumerate();
@@ -83,14 +83,14 @@ impl Names {
     }
 }
 
-/// The parameters that a trainer has set.
+/// The parameters that the trainer has set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameters {
     samplers: BTreeMap<String, Sampler>,
 }
 
 impl Parameters {
-    /// Sets a parameter, until it is set again; NaN takes it back.
+    /// Sets a parameter until the next call. NaN removes it.
     pub fn set(&mut self, name: String, sampler: Sampler) {
         match sampler {
             Sampler::Constant(x) if x.is_nan() => drop(self.samplers.remove(&name)),
@@ -98,15 +98,15 @@ impl Parameters {
         }
     }
 
-    /// Whether none is set.
+    /// Whether no parameter is set.
     pub fn is_empty(&self) -> bool {
         self.samplers.is_empty()
     }
 
-    /// What an agent is like in an episode of its own; `None` if no parameter speaks of that.
+    /// Draws the variation of an agent for an episode. `None` if no parameter affects it.
     pub fn variation(&self, names: &Names, unvaried: &Variation, agent: u64, episode: u64) -> Option<Variation> {
         let mut own: Option<Variation> = None;
-        // what is set for one part goes on top of what is set for all
+        // values for one part multiply values for all parts
         let mut parts = Vec::new();
         for (name, sampler) in &self.samplers {
             let Some(target) = names.find(name) else { continue };
@@ -135,8 +135,8 @@ impl Parameters {
         own
     }
 
-    /// What an agent is told in an episode of its own, in place of its schedule; `None` if no parameter speaks of that.
-    /// Numbers that none speaks of are at [rest](CommandRange::rest).
+    /// Draws an agent's command for an episode, which replaces its schedule. `None` if no parameter sets it. Numbers
+    /// without a parameter are at [rest](CommandRange::rest).
     pub fn command(&self, names: &Names, ranges: &[CommandRange], agent: u64, episode: u64) -> Option<Vec<f64>> {
         let mut told: Option<Vec<f64>> = None;
         for (name, sampler) in &self.samplers {
@@ -150,8 +150,8 @@ impl Parameters {
         told
     }
 
-    /// Writes into `options` what holds for all agents of an environment alike: the length of episodes and named arguments,
-    /// drawn for the `reset`th time.
+    /// Writes values that all agents of an environment share into `options`: the length of episodes and options of the
+    /// agent, drawn for the `reset`th time.
     pub fn configure(&self, names: &Names, reset: u64, options: &mut VecEnvOptions) {
         for (name, sampler) in &self.samplers {
             let x = || draw(sampler, name, u64::MAX, reset);
@@ -164,7 +164,7 @@ impl Parameters {
     }
 }
 
-/// A vector of another length; downwards if it has none.
+/// Scales a vector to another length. A zero vector becomes downward.
 fn of_length(vector: [f64; 3], length: f64) -> [f64; 3] {
     let present = libm::sqrt(vector.iter().map(|x| x * x).sum());
     if present > 0.0 { vector.map(|x| x / present * length) } else { [0.0, 0.0, -length] }
@@ -182,19 +182,19 @@ fn draw(sampler: &Sampler, name: &str, agent: u64, episode: u64) -> f32 {
         bytes.copy_from_slice(&part.to_le_bytes());
     }
     let mut random = ChaCha8Rng::from_seed(key);
-    // in [0, 1), with the 53 bits that a double has
+    // in [0, 1), with the 53 bits of a double
     let mut uniform = || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
     let between = |[low, high]: [f32; 2], u: f64| (f64::from(low) + (f64::from(high) - f64::from(low)) * u) as f32;
     match sampler {
         Sampler::Constant(x) => *x,
         Sampler::Uniform { min, max, .. } => between([*min, *max], uniform()),
-        // Box and Muller
+        // Box-Muller
         Sampler::Gaussian { mean, std, .. } => {
             let radius = libm::sqrt(-2.0 * libm::log(1.0 - uniform()));
             let angle = libm::cos(std::f64::consts::TAU * uniform());
             (f64::from(*mean) + f64::from(*std) * radius * angle) as f32
         }
-        // a long interval is drawn from more often than a short one
+        // the probability of an interval is proportional to its length
         Sampler::MultiRange { ranges, .. } => {
             let width = |[low, high]: [f32; 2]| (f64::from(high) - f64::from(low)).abs();
             let total: f64 = ranges.iter().map(|r| width(*r)).sum();
@@ -208,7 +208,7 @@ fn draw(sampler: &Sampler, name: &str, agent: u64, episode: u64) -> f32 {
     }
 }
 
-/// Tells the streams of parameters with the same seed apart.
+/// Hash that separates the streams of parameters with the same seed.
 fn fnv1a(text: &str) -> u64 {
     let mut hash = FnvHasher::default();
     hash.write(text.as_bytes());
@@ -244,7 +244,7 @@ mod tests {
         parameters.configure(&names, 1, &mut options);
         assert_eq!(options.max_episode_steps, Some(100));
         assert_eq!(options.options, Options::new().with("ctrl_cost_weight", 0.25));
-        // an argument that is no number is no parameter
+        // options that are not numbers are not parameters
         assert!(!names.iter().any(|name| name == "xml_file"));
     }
 
@@ -264,14 +264,14 @@ mod tests {
         // 0.1 in single precision is more than 0.1
         parameters.set("command.speed".into(), Sampler::Constant(0.1));
         assert_eq!(command(&parameters, 0).unwrap(), [0.1, drawn[0][1]]);
-        // what is out of range is refused where it is set
+        // values out of range are refused by the setter
         parameters.set("command.speed".into(), Sampler::Constant(4.0));
         assert_eq!(command(&parameters, 0).unwrap()[0], 4.0);
         for name in ["command.speed", "command.turn"] {
             parameters.set(name.into(), Sampler::Constant(f32::NAN));
         }
         assert_eq!(command(&parameters, 0), None);
-        // a command is no variation
+        // a command is not a variation
         assert_eq!(parameters.variation(&names, &Variation::none(&model), 0, 1).unwrap().mass[1], 2.0);
     }
 

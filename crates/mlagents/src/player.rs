@@ -1,4 +1,4 @@
-//! A Unity player to Python: [`Player::connect`], then [`Player::advance`] until the trainer closes.
+//! A player for Python: [`Player::connect`], then [`Player::advance`] until the trainer closes.
 
 use crate::behavior::{Behavior, BehaviorOptions, Sizes};
 use crate::channels::{self, Engine};
@@ -16,11 +16,11 @@ use std::time::Duration;
 /// Bytes of a message that are neither infos nor statistics: headers, names, behaviors.
 const ALLOWANCE: usize = 4096;
 
-/// Limit on the number of different remarks, each of which is logged once. A trainer may name any number of unknown
+/// Limit on the number of different warnings, each of which is logged once. A trainer may name any number of unknown
 /// things.
 const REMARKS: usize = 1000;
 
-/// What a player is made of.
+/// Options of a player.
 #[derive(Clone, Debug)]
 pub struct PlayerOptions {
     /// Port on which the trainer listens.
@@ -29,17 +29,17 @@ pub struct PlayerOptions {
     pub patience: Duration,
     /// Silence after which a trainer counts as gone, if it does not answer a ping either; `None` disables the check.
     pub silence: Option<Duration>,
-    /// Its behaviors.
+    /// Behaviors.
     pub behaviors: Vec<BehaviorOptions>,
-    /// Threads that simulate; 0: one per processor.
+    /// Number of simulation threads; 0 for one per processor.
     pub threads: usize,
-    /// Whether an agent gets a new number with every episode. Unity's do not, but `UnityParallelEnv` 1.1.0 otherwise misses
-    /// the ends of episodes.
+    /// Whether an agent gets a new number with every episode. Unity's do not, but without this `UnityParallelEnv` 1.1.0
+    /// misses the ends of episodes.
     pub fresh_ids: bool,
 }
 
 impl Default for PlayerOptions {
-    /// A player for `mlagents-learn` as it waits for an editor.
+    /// A player for an `mlagents-learn` that waits for an editor.
     fn default() -> Self {
         PlayerOptions {
             port: 5004,
@@ -52,18 +52,18 @@ impl Default for PlayerOptions {
     }
 }
 
-/// What [`Player::advance`] did.
+/// Result of [`Player::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// All episodes were begun anew.
+    /// All episodes restarted.
     Reset,
     /// All agents made a decision.
     Step,
-    /// The trainer has closed; nothing was done.
+    /// The trainer has closed, so nothing was done.
     Closed,
 }
 
-/// How the trainer wants the engine to run, as far as it has said so.
+/// The engine settings that the trainer has sent so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EngineSettings {
     /// Width and height of the window, pixels.
@@ -72,13 +72,13 @@ pub struct EngineSettings {
     pub quality: Option<i32>,
     /// Seconds simulated per second.
     pub time_scale: Option<f32>,
-    /// Frames per second shown; -1: as many as can be.
+    /// Frames per second shown; -1 for as many as possible.
     pub target_frame_rate: Option<i32>,
     /// Frames per simulated second.
     pub capture_frame_rate: Option<i32>,
 }
 
-/// A player in conversation with a trainer.
+/// A player connected to a trainer.
 pub struct Player {
     trainer: Trainer,
     setup: Setup,
@@ -87,9 +87,9 @@ pub struct Player {
     engine: EngineSettings,
     fresh_ids: bool,
     next_id: i32,
-    /// What to do next.
+    /// The next command.
     order: Option<RlInput>,
-    /// The last message, whose memory is used again.
+    /// The last message. Its memory is reused.
     message: UnityMessage,
     begun: bool,
     told: BTreeSet<String>,
@@ -97,12 +97,12 @@ pub struct Player {
 }
 
 impl Player {
-    /// Finds the trainer, makes the agents that it asks for and waits for the first reset.
+    /// Connects to the trainer, creates the requested agents and waits for the first reset.
     ///
     /// # Errors
-    /// If there is no trainer, an agent does not exist, or there are more agents than fit into a message.
+    /// If there is no trainer, an agent does not exist, or the agents do not fit into a message.
     pub fn connect(options: &PlayerOptions, log: Log) -> Result<Self, PlayerError> {
-        // what cannot work with one area is told before anybody is waited for
+        // report what cannot work even with one area before waiting
         check(options, 1)?;
         let one_area = make(options, 1)?;
         log.line(format_args!("connecting to a trainer on port {}", options.port));
@@ -135,26 +135,26 @@ impl Player {
         })
     }
 
-    /// What the trainer asked for at the beginning.
+    /// The trainer's initial request.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// The behaviors, whose agents may be looked at between two turns, and within one after [`Player::act`].
+    /// The behaviors. You can read their agents between two turns, and after [`Player::act`] within one.
     pub fn behaviors(&self) -> &[Behavior] {
         &self.behaviors
     }
 
-    /// How the trainer wants the engine to run.
+    /// The engine settings of the trainer.
     pub fn engine(&self) -> EngineSettings {
         self.engine
     }
 
-    /// Does what the trainer said, tells it what came of that, and waits for what it says next: [`Player::act`] and
+    /// Executes the trainer's command, sends the results, and waits for the next command: [`Player::act`] and
     /// [`Player::answer`].
     ///
     /// # Errors
-    /// If the trainer is gone or says something that makes no sense.
+    /// If the trainer is gone or its command is invalid.
     pub fn advance(&mut self) -> Result<Turn, PlayerError> {
         let turn = self.act()?;
         if turn != Turn::Closed {
@@ -163,10 +163,10 @@ impl Player {
         Ok(turn)
     }
 
-    /// Does what the trainer said, which waits for the answer: the moment to look at the agents.
+    /// Executes the trainer's command without answering yet. You can then read the agents.
     ///
     /// # Errors
-    /// If what it said makes no sense.
+    /// If the command is invalid.
     pub fn act(&mut self) -> Result<Turn, PlayerError> {
         let Some(order) = self.order.take() else { return Ok(Turn::Closed) };
         let changed = self.listen(&order.side_channel);
@@ -187,7 +187,7 @@ impl Player {
                 _ => behavior.reset(seed, &self.parameters),
             };
             match done {
-                // a parameter that is out of range: training can go on, its author must know
+                // a parameter out of range does not end training, but is reported
                 Err(e @ (PlayerError::Env(_) | PlayerError::Sizes { .. } | PlayerError::Roles { .. })) => {
                     let text = e.to_string();
                     if first(&mut self.told, &text) {
@@ -200,7 +200,7 @@ impl Player {
         Ok(turn)
     }
 
-    /// Tells the trainer what came of [`Player::act`], and waits for what it says next.
+    /// Sends the results of [`Player::act`] to the trainer, and waits for its next command.
     ///
     /// # Errors
     /// If the trainer is gone.
@@ -211,7 +211,7 @@ impl Player {
         Ok(())
     }
 
-    /// Goes on until the trainer closes.
+    /// Runs until the trainer closes.
     ///
     /// # Errors
     /// As [`Player::advance`].
@@ -223,7 +223,7 @@ impl Player {
     /// Writes the infos of all behaviors into the message.
     fn report(&mut self) {
         let output = self.message.output.get_or_insert_default();
-        // a behavior introduces itself beside its first infos
+        // the first infos of a behavior come with its description
         output.initialization = (!self.begun).then(|| RlInitializationOutput {
             brain_parameters: self.behaviors.iter().flat_map(Behavior::parameters).collect(),
             ..Default::default()
@@ -235,7 +235,7 @@ impl Player {
         }
         let statistics = side_channel.len();
         if statistics > 0 && self.message.encoded_len() > MESSAGE_LIMIT {
-            // infos fit in any case; the trainer can do without these
+            // infos always fit; statistics are optional
             if let Some(UnityOutput { rl: Some(rl), .. }) = &mut self.message.output {
                 rl.side_channel.clear();
             }
@@ -246,7 +246,7 @@ impl Player {
         }
     }
 
-    /// Takes in what came over the side channels. Returns whether a parameter came.
+    /// Reads the side channels. Returns whether a parameter was set.
     fn listen(&mut self, bytes: &[u8]) -> bool {
         if bytes.is_empty() {
             return false;
@@ -257,7 +257,7 @@ impl Player {
         for message in messages {
             match message {
                 channels::Message::Engine(engine) => self.set_engine(engine),
-                // a parameter that no behavior has is ignored and not stored
+                // parameters that no behavior has are ignored and not stored
                 channels::Message::Parameter(name, _) if !self.is_known(&name) => self.warn_of_unknown(&name),
                 channels::Message::Parameter(name, sampler) => {
                     self.log.line(format_args!("environment parameter {name}: {sampler:?}"));
@@ -310,12 +310,12 @@ impl Player {
     }
 }
 
-/// Whether a remark is new and the limit on remarks is not reached.
+/// Whether a warning is new and the limit on warnings is not reached.
 fn first(told: &mut BTreeSet<String>, remark: &str) -> bool {
     told.len() < REMARKS && told.insert(remark.to_owned())
 }
 
-/// All behaviors, and the first number that no agent has.
+/// Creates all behaviors. Also returns the first unused agent number.
 fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), PlayerError> {
     let mut behaviors: Vec<Behavior> = Vec::new();
     let mut next_id = 0;
@@ -335,7 +335,7 @@ fn make(options: &PlayerOptions, areas: usize) -> Result<(Vec<Behavior>, i32), P
     Ok((behaviors, next_id))
 }
 
-/// Refuses more agents than fit into a message, before any agent is created.
+/// Refuses agents that do not fit into a message, before any agent is created.
 fn check(options: &PlayerOptions, areas: usize) -> Result<(), PlayerError> {
     let sizes = options.behaviors.iter().map(Sizes::of).collect::<Result<Vec<_>, _>>()?;
     let agents = |i: usize| options.behaviors[i].agents.saturating_mul(areas);

@@ -7,8 +7,8 @@ use crate::player::Player;
 use crate::rpc::RpcError;
 use std::process::ExitCode;
 
-/// Plays as the words of a command line say, without the program's own name. A program that has registered agents of its
-/// own serves them like those of the suite.
+/// Plays as the command line says, which excludes the program's own name. A program that has registered its own agents
+/// serves them like the built-in ones.
 pub fn main(words: impl IntoIterator<Item = String>) -> ExitCode {
     let args = match parse(words) {
         Ok(Request::Play(args)) => args,
@@ -38,7 +38,7 @@ pub fn main(words: impl IntoIterator<Item = String>) -> ExitCode {
             log.line(format_args!("the trainer has closed"));
             ExitCode::SUCCESS
         }
-        // a trainer that was killed says nothing more
+        // a killed trainer sends nothing more
         Err(PlayerError::Rpc(e @ (RpcError::Io(_) | RpcError::GoAway(_)))) => {
             log.line(format_args!("error: the trainer is gone: {e}"));
             ExitCode::FAILURE

@@ -1,35 +1,35 @@
-//! gRPC's unary call over one blocking HTTP/2 connection, as much of it as one method needs.
+//! gRPC's unary call over one blocking HTTP/2 connection, limited to the needs of one method.
 //!
-//! A player makes one call at a time to one server that was started a moment ago on the same machine. Frames are as in
-//! [RFC 9113](https://www.rfc-editor.org/rfc/rfc9113), messages as in
-//! [gRPC over HTTP/2](https://github.com/grpc/grpc/blob/master/doc/PROTOCOL-HTTP2.md). The header of a request is written
-//! with indices of HPACK's static table only, and headers of replies are skipped, so that no table has to be kept.
+//! A player makes one call at a time to one server that has just started on the same machine. Frames follow [RFC
+//! 9113](https://www.rfc-editor.org/rfc/rfc9113), messages [gRPC over
+//! HTTP/2](https://github.com/grpc/grpc/blob/master/doc/PROTOCOL-HTTP2.md). The request header only uses indices of
+//! HPACK's static table, and reply headers are skipped. No dynamic table is therefore needed.
 
 use marathon_physics::budget::{self, OverBudget};
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// The one method of ML-Agents' service.
+/// The only method of ML-Agents' service.
 const PATH: &[u8] = b"/communicator_objects.UnityToExternalProto/Exchange";
-/// Begins every connection.
+/// Start of every connection.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
-/// Of a frame, in front of its payload.
+/// Length of a frame's header.
 const FRAME_HEAD: usize = 9;
-/// Longest frame that a peer may send to somebody who has not asked for longer ones.
+/// Maximum frame length of a peer without an agreement on longer ones.
 const MAX_FRAME: usize = 16384;
-/// Window that we grant: as large as can be, since replies are waited for and read at once.
+/// Receive window, as large as possible, because replies are awaited and read at once.
 const WINDOW: u32 = 0x7fff_ffff;
-/// Window of both sides before anybody has said anything.
+/// Initial window of both sides.
 const FIRST_WINDOW: u32 = 65535;
-/// Bytes after which the connection's window is filled up again.
+/// Bytes after which the connection's window is refilled.
 const REFILL: u32 = 1 << 30;
 /// Memory per byte of a decoded reply. A list of empty messages uses two bytes for each message.
 const MEMORY_PER_BYTE: f64 = 128.0;
 /// Minimum time between two pings during one wait. A gRPC server closes the connection of a client that pings more
 /// often.
 const PING_PAUSE: Duration = Duration::from_secs(300);
-/// In front of a message: one byte that says whether it is compressed, and its length.
+/// Length of a message's header: a byte for compression, and the message's length.
 const MESSAGE_HEAD: usize = 5;
 
 /// Types of frames.
@@ -56,7 +56,7 @@ mod flag {
     pub const PADDED: u8 = 8;
 }
 
-/// Reasons for which a peer ends a connection.
+/// Error codes for ended connections.
 mod code {
     pub const NO_ERROR: u32 = 0;
     pub const INTERNAL_ERROR: u32 = 2;
@@ -69,7 +69,7 @@ mod setting {
     pub const MAX_FRAME_SIZE: u16 = 5;
 }
 
-/// Why a call got no reply.
+/// Reason for a call without a reply.
 #[derive(Debug, Error)]
 pub enum RpcError {
     /// The connection broke.
@@ -81,7 +81,7 @@ pub enum RpcError {
     /// The peer ended the call.
     #[error("the trainer broke off the exchange of a message of {bytes} bytes (code {code})")]
     Reset {
-        /// Length of our message.
+        /// Length of the sent message.
         bytes: usize,
         /// HTTP/2's error code.
         code: u32,
@@ -101,13 +101,14 @@ pub enum RpcError {
     /// The peer's message needs too much memory.
     #[error("the trainer's message {0}")]
     Budget(#[from] OverBudget),
-    /// What the peer sent is not HTTP/2, or not a gRPC reply.
-    #[error("the peer does not speak ML-Agents' protocol: {0}")]
+    /// The peer's data is not HTTP/2, or not a gRPC reply.
+    #[error("the peer does not use ML-Agents' protocol: {0}")]
     Protocol(&'static str),
 }
 
 impl RpcError {
-    /// Whether the peer has closed. gRPC's server says NO_ERROR when it ends in order, and INTERNAL_ERROR when it stops amid a call.
+    /// Whether the peer has closed. gRPC's server sends NO_ERROR when it ends normally, and INTERNAL_ERROR when it
+    /// stops during a call.
     pub fn is_farewell(&self) -> bool {
         matches!(self, RpcError::GoAway(code::NO_ERROR | code::INTERNAL_ERROR))
     }
@@ -116,27 +117,27 @@ impl RpcError {
 /// A connection to a server.
 pub struct Channel<S> {
     stream: S,
-    /// The header of every request, in HPACK's encoding.
+    /// The header of every request in HPACK's encoding.
     request: Vec<u8>,
-    /// Number of the stream of the present call: 1, 3, 5 ...
+    /// Stream number of the current call: 1, 3, 5 ...
     call: u32,
-    /// Bytes that we may send over the connection.
+    /// Remaining send window of the connection, bytes.
     window: i64,
-    /// Bytes that we may send over the stream of the present call.
+    /// Remaining send window of the current call's stream, bytes.
     call_window: i64,
-    /// The same when a stream begins.
+    /// Initial send window of a stream, bytes.
     initial_window: i64,
-    /// Longest frame that the peer takes.
+    /// Maximum frame length that the peer accepts.
     max_frame: usize,
-    /// The peer has said that it ends the connection.
+    /// The peer has announced the end of the connection.
     leaving: bool,
-    /// Bytes received since the connection's window was filled up.
+    /// Bytes received since the last refill of the connection's window.
     taken: u32,
-    /// Room for bytes received; those in `at..end` have not been looked at yet.
+    /// Buffer for received bytes. Those in `at..end` are unread.
     received: Vec<u8>,
     at: usize,
     end: usize,
-    /// Bytes to be sent.
+    /// Bytes to send.
     sending: Vec<u8>,
     wait: Wait,
 }
@@ -183,7 +184,7 @@ impl Wait {
 }
 
 impl<S: Read + Write> Channel<S> {
-    /// Greets a server. `authority` is its name, such as `localhost:5005`.
+    /// Opens a connection to a server. `authority` is its name, such as `localhost:5005`.
     ///
     /// # Errors
     /// If the stream cannot be written to.
@@ -255,10 +256,10 @@ impl<S: Read + Write> Channel<S> {
         Ok(())
     }
 
-    /// Sends a message and waits for the reply, which replaces what is in `reply`.
+    /// Sends a message and waits for the reply, which replaces the contents of `reply`.
     ///
     /// # Errors
-    /// If there is none.
+    /// If there is no reply.
     pub fn call(&mut self, message: &[u8], reply: &mut Vec<u8>) -> Result<(), RpcError> {
         reply.clear();
         self.call = if self.call == 0 { 1 } else { self.call + 2 };
@@ -276,7 +277,7 @@ impl<S: Read + Write> Channel<S> {
         while sent < total {
             let room = self.window.min(self.call_window).min(self.max_frame as i64);
             if room <= 0 {
-                // the peer has to make room first
+                // the peer must open its window first
                 self.send(&sending)?;
                 sending.clear();
                 if self.pump(reply, message.len())? {
@@ -300,7 +301,7 @@ impl<S: Read + Write> Channel<S> {
         unpack(reply, message.len())
     }
 
-    /// Takes in one frame. Returns whether it was the last of the present call.
+    /// Handles one frame. Returns whether it was the last one of the current call.
     fn pump(&mut self, reply: &mut Vec<u8>, sent: usize) -> Result<bool, RpcError> {
         self.need(FRAME_HEAD)?;
         let head = &self.received[self.at..self.at + FRAME_HEAD];
@@ -354,7 +355,7 @@ impl<S: Read + Write> Channel<S> {
                 if code != code::NO_ERROR || last < self.call {
                     return Err(RpcError::GoAway(code));
                 }
-                // a peer that leaves in order answers this call before
+                // a peer that leaves normally answers this call first
                 self.leaving = true;
             }
             frame::WINDOW_UPDATE => {
@@ -374,7 +375,7 @@ impl<S: Read + Write> Channel<S> {
         Ok(ended)
     }
 
-    /// Reads on until there are `n` bytes from `at` on. No frame is longer than the room for them.
+    /// Reads until `n` bytes from `at` on are available. No frame is longer than the buffer.
     fn need(&mut self, n: usize) -> Result<(), RpcError> {
         while self.end - self.at < n {
             self.received.copy_within(self.at..self.end, 0);
@@ -408,7 +409,7 @@ fn timed_out(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }
 
-/// Length of a reply, from its header; 0 until the header has arrived.
+/// Length of a reply, from its header. 0 until the header has arrived.
 fn declared(reply: &[u8]) -> usize {
     match reply {
         [_, a, b, c, d, ..] => MESSAGE_HEAD + u32::from_be_bytes([*a, *b, *c, *d]) as usize,
@@ -416,8 +417,8 @@ fn declared(reply: &[u8]) -> usize {
     }
 }
 
-/// The header of a request. A first byte is an index of the static table, as a whole field (with bit 7) or as the name of
-/// one whose value follows.
+/// The header of a request. A first byte is an index of the static table: as a whole field (with bit 7), or as the name
+/// of a field whose value follows.
 fn request_header(authority: &str) -> Vec<u8> {
     let mut header = vec![
         0x83, // :method POST
@@ -425,7 +426,7 @@ fn request_header(authority: &str) -> Vec<u8> {
     ];
     let mut field = |name: &[u8], value: &[u8]| {
         header.extend(name);
-        // a length of 127 and more takes further bytes; these are shorter
+        // lengths of 127 or more would need further bytes; these are shorter
         header.push(value.len().min(126) as u8);
         header.extend(&value[..value.len().min(126)]);
     };
@@ -447,16 +448,16 @@ fn put_frame(out: &mut Vec<u8>, kind: u8, flags: u8, stream: u32, payload: &[u8]
     out.extend(payload);
 }
 
-/// What precedes a message that is not compressed.
+/// Header of an uncompressed message.
 fn message_head(message: &[u8]) -> [u8; MESSAGE_HEAD] {
     let [a, b, c, d] = (message.len() as u32).to_be_bytes();
     [0, a, b, c, d]
 }
 
-/// Takes the head off a reply.
+/// Removes the header from a reply.
 fn unpack(reply: &mut Vec<u8>, sent: usize) -> Result<(), RpcError> {
     let Some(([compressed, length @ ..], rest)) = reply.split_first_chunk::<MESSAGE_HEAD>() else {
-        // an error is told in headers alone
+        // errors come in headers only
         return Err(RpcError::Refused(sent));
     };
     if *compressed != 0 {
@@ -490,7 +491,7 @@ mod tests {
     use prost::Message;
     use std::collections::VecDeque;
 
-    /// A peer that says what was written for it beforehand, and keeps what it is told.
+    /// A peer with prepared output that stores its input.
     #[derive(Default)]
     struct Script {
         said: VecDeque<u8>,
@@ -499,7 +500,7 @@ mod tests {
 
     impl Read for Script {
         fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-            // in small pieces, as a network may
+            // in small pieces, as on a network
             let n = out.len().min(7);
             self.said.read(&mut out[..n])
         }
@@ -599,7 +600,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whole frames with any contents, and bytes that are none: a call ends with a reply or an error.
+        /// Whole frames with random contents, and invalid bytes: a call ends with a reply or an error.
         #[test]
         fn bytes_never_panic(
             whole in vec((0u8..10, any::<u8>(), 0u32..4, vec(any::<u8>(), 0..40)), 0..8),

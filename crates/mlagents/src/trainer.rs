@@ -1,8 +1,8 @@
-//! The conversation with a trainer: who speaks when.
+//! The conversation with a trainer.
 //!
-//! The player is the client. Its first call says who it is, and is answered with a seed; its second says nothing, and is
-//! answered when the trainer resets its environments. From then on every call brings the results of a decision, and its
-//! answer says what to do next.
+//! The player is the client. Its first call describes it, and the answer has a seed. Its second call is empty, and is
+//! answered when the trainer resets its environments. From then on every call sends the results of a decision, and the
+//! answer has the next command.
 
 use crate::error::PlayerError;
 use crate::log::shown;
@@ -15,16 +15,16 @@ use std::time::{Duration, Instant};
 
 /// Version of the protocol. Python compares the first number.
 pub const COMMUNICATION_VERSION: &str = "1.5.0";
-/// The release of Unity's package that a player of this protocol belongs to.
+/// The release of Unity's package that matches this protocol.
 const PACKAGE_VERSION: &str = "3.0.0";
-/// Longest message that a trainer takes: gRPC's default, which Python does not change.
+/// Longest message that a trainer accepts: gRPC's default, which Python does not change.
 pub const MESSAGE_LIMIT: usize = 4 << 20;
 /// Interval between attempts to connect, and between checks of the time during a wait.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Minimum waiting time for a trainer's first answer.
 const FIRST_ANSWER: Duration = Duration::from_secs(2);
 
-/// What the trainer asked for at the beginning.
+/// The trainer's initial request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setup {
     /// Seed of everything random.
@@ -35,7 +35,7 @@ pub struct Setup {
     pub package_version: String,
 }
 
-/// A trainer that has been greeted.
+/// A connected trainer.
 pub struct Trainer {
     channel: Channel<TcpStream>,
     sending: Vec<u8>,
@@ -43,9 +43,9 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// Connects to the trainer on a port of this computer, waiting until it has started, and greets it. After its first
-    /// answer, the trainer counts as gone if it sends nothing for `silence` and does not answer a ping; `None` disables
-    /// this check. Pings are at least 5 minutes apart.
+    /// Connects to the trainer on a port of this computer. Waits until it has started, and exchanges the initial
+    /// messages. After its first answer, the trainer counts as gone if it sends nothing for `silence` and does not
+    /// answer a ping; `None` disables this check. Pings are at least 5 minutes apart.
     ///
     /// # Errors
     /// If no trainer answers within `patience`, or another program listens on the port.
@@ -104,13 +104,13 @@ impl Trainer {
         self.exchange(&message(None))
     }
 
-    /// Tells what a decision led to; returns what to do next. `None`: the trainer has closed.
+    /// Sends the results of a decision and returns the next command. `None` if the trainer has closed.
     ///
     /// # Errors
     /// If the trainer is gone, or refuses the message.
     pub fn exchange(&mut self, output: &UnityMessage) -> Result<Option<RlInput>, PlayerError> {
         let answer = match self.call(output) {
-            // it has left without waiting for this call
+            // the trainer has left without waiting for this call
             Err(PlayerError::Rpc(e)) if e.is_farewell() => return Ok(None),
             answer => answer?,
         };

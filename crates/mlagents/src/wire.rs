@@ -1,15 +1,15 @@
-//! The messages of ML-Agents' protocol, communication version 1.5: names and field numbers are the contract.
+//! The messages of ML-Agents' protocol, communication version 1.5. Names and field numbers are fixed.
 //!
-//! Only what a player needs is declared; a reader of protocol buffers skips the rest. Numbers and shapes are as the released
-//! `mlagents-envs` 1.1.0 has them.
+//! Only the fields that a player needs are declared. Readers of protocol buffers skip the rest. Numbers and shapes
+//! follow the released `mlagents-envs` 1.1.0.
 
 use prost::Message;
 use std::collections::BTreeMap;
 
-/// What travels in both directions.
+/// A message in either direction.
 #[derive(Clone, PartialEq, Message)]
 pub struct UnityMessage {
-    /// Whether to go on.
+    /// Whether to continue.
     #[prost(message, optional, tag = "1")]
     pub header: Option<Header>,
     /// From the player.
@@ -20,7 +20,7 @@ pub struct UnityMessage {
     pub input: Option<UnityInput>,
 }
 
-/// Whether to go on.
+/// Whether to continue.
 #[derive(Clone, PartialEq, Message)]
 pub struct Header {
     /// [`Header::OK`], or something else when the sender closes.
@@ -29,7 +29,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// The conversation goes on.
+    /// The conversation continues.
     pub const OK: i32 = 200;
 }
 
@@ -55,7 +55,7 @@ pub struct UnityInput {
     pub initialization: Option<RlInitializationInput>,
 }
 
-/// Who the player is, and which behaviors it has.
+/// The player and its behaviors.
 #[derive(Clone, PartialEq, Message)]
 pub struct RlInitializationOutput {
     /// Name of the player.
@@ -64,18 +64,18 @@ pub struct RlInitializationOutput {
     /// Version of this protocol.
     #[prost(string, tag = "2")]
     pub communication_version: String,
-    /// Behaviors that speak for the first time in this message.
+    /// Behaviors that appear for the first time in this message.
     #[prost(message, repeated, tag = "5")]
     pub brain_parameters: Vec<BrainParameters>,
-    /// Version of Unity's package that the player is like.
+    /// Version of Unity's package that the player corresponds to.
     #[prost(string, tag = "7")]
     pub package_version: String,
-    /// What the player can do.
+    /// Capabilities of the player.
     #[prost(message, optional, tag = "8")]
     pub capabilities: Option<Capabilities>,
 }
 
-/// What the trainer asks for.
+/// The trainer's request.
 #[derive(Clone, PartialEq, Message)]
 pub struct RlInitializationInput {
     /// Seed of everything random.
@@ -92,7 +92,7 @@ pub struct RlInitializationInput {
     pub num_areas: i32,
 }
 
-/// What one of the two can do.
+/// Capabilities of a player or trainer.
 #[derive(Clone, PartialEq, Message)]
 pub struct Capabilities {
     /// Reinforcement learning as such.
@@ -118,13 +118,13 @@ pub struct Capabilities {
     pub multi_agent_groups: bool,
 }
 
-/// A behavior: its name and its actions. Its observations are told by the agents themselves.
+/// A behavior: its name and its actions. Agents describe their observations themselves.
 #[derive(Clone, PartialEq, Message)]
 pub struct BrainParameters {
     /// Such as `Hopper-v0?team=0`.
     #[prost(string, tag = "7")]
     pub brain_name: String,
-    /// Whether the trainer shall act for it.
+    /// Whether the trainer acts for it.
     #[prost(bool, tag = "8")]
     pub is_training: bool,
     /// Its actions.
@@ -143,7 +143,7 @@ pub struct ActionSpec {
 /// A decision's results.
 #[derive(Clone, PartialEq, Message)]
 pub struct RlOutput {
-    /// By behavior, each an encoded [`AgentInfoList`]: on the wire that is the same as a message, and it spares lists of lists.
+    /// Per behavior, an encoded [`AgentInfoList`]. On the wire this equals a message, and it avoids lists of lists.
     #[prost(btree_map = "string, bytes", tag = "2")]
     pub agent_infos: BTreeMap<String, Vec<u8>>,
     /// See [`crate::channels`].
@@ -154,15 +154,15 @@ pub struct RlOutput {
 /// Agents of a behavior.
 #[derive(Clone, PartialEq, Message)]
 pub struct AgentInfoList {
-    /// One for each, and one more for each whose episode ended.
+    /// One per agent, and one more for each agent whose episode ended.
     #[prost(message, repeated, tag = "1")]
     pub value: Vec<AgentInfo>,
 }
 
-/// What an agent sees and got.
+/// Observation and reward of an agent.
 #[derive(Clone, PartialEq, Message)]
 pub struct AgentInfo {
-    /// Since its last info.
+    /// Reward since its last info.
     #[prost(float, tag = "7")]
     pub reward: f32,
     /// The episode ended here.
@@ -179,7 +179,7 @@ pub struct AgentInfo {
     pub observations: Vec<Observation>,
 }
 
-/// What a sensor gives.
+/// Observation of a sensor.
 #[derive(Clone, PartialEq, Message)]
 pub struct Observation {
     /// Dimensions.
@@ -197,7 +197,7 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// A dimension along which nothing can be assumed.
+    /// A dimension without special properties.
     pub const NO_PROPERTY: i32 = 1;
 }
 
@@ -209,10 +209,10 @@ pub struct FloatData {
     pub data: Vec<f32>,
 }
 
-/// What to do next.
+/// The next command.
 #[derive(Clone, PartialEq, Message)]
 pub struct RlInput {
-    /// By behavior, in the order of the agents that were not done.
+    /// Actions per behavior, in the order of the agents that were not done.
     #[prost(btree_map = "string, message", tag = "1")]
     pub agent_actions: BTreeMap<String, AgentActionList>,
     /// One of [`command`].
@@ -227,7 +227,7 @@ pub struct RlInput {
 pub mod command {
     /// Act and advance to the next decision.
     pub const STEP: i32 = 0;
-    /// Begin all episodes anew.
+    /// Restart all episodes.
     pub const RESET: i32 = 1;
     /// Leave.
     pub const QUIT: i32 = 2;
@@ -244,7 +244,7 @@ pub struct AgentActionList {
 /// An action.
 #[derive(Clone, PartialEq, Message)]
 pub struct AgentAction {
-    /// Nominally in [-1, 1].
+    /// Numbers, nominally in [-1, 1].
     #[prost(float, repeated, tag = "6")]
     pub continuous_actions: Vec<f32>,
 }
@@ -283,10 +283,10 @@ pub struct DemonstrationMeta {
 /// A decision in a demonstration file.
 #[derive(Clone, PartialEq, Message)]
 pub struct AgentInfoActionPair {
-    /// What the agent saw.
+    /// Observation.
     #[prost(message, optional, tag = "1")]
     pub agent_info: Option<AgentInfo>,
-    /// What it did then.
+    /// The action taken.
     #[prost(message, optional, tag = "2")]
     pub action_info: Option<RecordedAction>,
 }

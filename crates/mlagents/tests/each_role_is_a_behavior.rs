@@ -339,7 +339,7 @@ fn actions_for_others_than_those_that_were_asked_are_refused() {
             trainer.answer(&act(&[(RUNNER, rows(AGENTS, 2)), (OPPONENT, rows(opponents, length))], Vec::new()));
             trainer.receive();
         });
-        let expected = format!("{opponents} actions of {length} numbers came for {OPPONENT}, expected 0 of 2");
+        let expected = format!("received {opponents} actions of {length} numbers for {OPPONENT}, expected 0 of 2");
         assert_eq!(result.unwrap_err().to_string(), expected);
     }
 }

@@ -125,8 +125,8 @@ fn what_does_not_fit_is_an_error() {
         });
         result.unwrap_err().to_string()
     };
-    assert_eq!(fails(step(NAME, 4, &[0.0; 4])), format!("4 actions of 4 numbers came for {NAME}, expected 5 of 4"));
-    assert_eq!(fails(step(NAME, 5, &[0.0; 3])), format!("5 actions of 3 numbers came for {NAME}, expected 5 of 4"));
+    assert_eq!(fails(step(NAME, 4, &[0.0; 4])), format!("received 4 actions of 4 numbers for {NAME}, expected 5 of 4"));
+    assert_eq!(fails(step(NAME, 5, &[0.0; 3])), format!("received 5 actions of 3 numbers for {NAME}, expected 5 of 4"));
     let mut odd = reset(Vec::new());
     odd.input.as_mut().unwrap().rl.as_mut().unwrap().command = 9;
     assert!(fails(odd).contains("a command that is none of"));
