@@ -82,7 +82,7 @@ def test_what_is_wrong_is_said_in_pythons_terms(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     train("hopper", steps=4096, out=folder, **SMALL)
     for wrong, message in [
-        (lambda: train("hopper", steps=4096, out=folder), f"out {folder} holds a run already.* by train(resume="),
+        (lambda: train("hopper", steps=4096, out=folder), f"out {folder} already holds a run.* by train(resume="),
         (lambda: train(resume=folder), "the run is complete with 4,096 steps; .* such as steps=8_192"),
         (lambda: train(resume=folder, steps=100), "steps is 100, but 4,096 steps are done"),
         (lambda: train(resume=tmp_path), "resume"),
@@ -144,9 +144,9 @@ def test_what_is_wrong_is_said() -> None:
         train("hopper", agents=17)
     with pytest.raises(ValueError, match="task is missing"):
         train()
-    with pytest.raises(ValueError, match="config belongs to a new run, not to one that resume goes on with"):
+    with pytest.raises(ValueError, match="config is for new runs, not for one that resume continues"):
         train("hopper", CONFIG, resume="runs/hopper-1")
-    with pytest.raises(ValueError, match="seed belongs to a new run"):
+    with pytest.raises(ValueError, match="seed is for new runs"):
         train(resume="runs/hopper-1", seed=1)
     with pytest.raises(ValueError, match="no such file"):
         load_policy("nowhere.safetensors")
@@ -244,5 +244,5 @@ def test_a_run_may_start_from_a_policy(tmp_path: Path) -> None:
     assert first.evaluation is not None and again.evaluation is not None and fresh.evaluation is not None
     assert again.evaluation["return_mean"] > 2 * fresh.evaluation["return_mean"]
     assert again.evaluation["return_mean"] > 0.3 * first.evaluation["return_mean"]
-    with pytest.raises(ValueError, match="initialize_from belongs to a new run"):
+    with pytest.raises(ValueError, match="initialize_from is for new runs"):
         train(resume=tmp_path / "first", initialize_from=tmp_path / "first")

@@ -310,7 +310,7 @@ fn mistakes_are_named() {
         (
             &["controller", HOPPER],
             1,
-            "Hopper-v0 cannot be told a speed; expected a policy for one of HopperController-v0,",
+            "Hopper-v0 has no speed command; expected a policy for one of HopperController-v0,",
         ),
         (&["controller", HOPPER, "--episodes", "0"], 2, "1..=100000"),
         (&["train", "--isa", "f64"], 2, "single precision"),

@@ -26,7 +26,7 @@ fn what_cannot_be_kept_is_refused_before_the_first_step() {
         ("a", &[], "--out is a, expected a name that ends with"),
         ("folder.safetensors", &[], "--out is folder.safetensors, a folder; expected a file"),
         ("none/a.safetensors", &[], "--out is none/a.safetensors, but there is no folder none"),
-        ("./teacher.safetensors", &[], "--out is ./teacher.safetensors, a file that is read; expected another"),
+        ("./teacher.safetensors", &[], "--out is ./teacher.safetensors, which is also an input; expected another file"),
         ("a.safetensors", &["--lr", "nan"], "--lr is NaN, expected a positive number"),
         ("a.safetensors", &["--lr", "inf"], "--lr is inf, expected a positive number"),
         ("a.safetensors", &["--lr=-1"], "--lr is -1, expected a positive number"),
@@ -46,7 +46,7 @@ fn what_cannot_be_kept_is_refused_before_the_first_step() {
     std::fs::copy(&teacher, path.join("start.safetensors")).unwrap();
     let initial = ["--initialize-from", "start.safetensors"];
     let error = fail(path, 2, &long("teacher.safetensors", "./start.safetensors", &initial));
-    assert!(error.contains("a file that is read; expected another"), "{error}");
+    assert!(error.contains("which is also an input; expected another file"), "{error}");
     assert!(begun.elapsed() < Duration::from_secs(60), "no step is made");
     assert_no_leftovers(path);
 }

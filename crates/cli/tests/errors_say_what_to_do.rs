@@ -43,7 +43,7 @@ fn runs_are_not_overwritten() {
     let train = [&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat();
     succeed(temp.path(), &train);
     let policy = std::fs::read(temp.path().join("a/policy.safetensors")).unwrap();
-    says(&fail(temp.path(), 2, &train), &["--out a holds a run already", "train --resume a"]);
+    says(&fail(temp.path(), 2, &train), &["--out a already holds a run", "train --resume a"]);
     assert_eq!(std::fs::read(temp.path().join("a/policy.safetensors")).unwrap(), policy);
 
     says(&fail(temp.path(), 1, &["train", "--resume", "b"]), &["b: --resume", "no such folder", "did you mean 'a'?"]);

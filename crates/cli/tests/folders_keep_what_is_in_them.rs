@@ -53,7 +53,7 @@ fn new_and_empty_folders_are_taken() {
     for out in ["empty", "new", "deep/er/new", "new/"] {
         if out == "new/" {
             let text = fail(temp.path(), 2, &train(out));
-            assert!(text.contains("--out new/ holds a run already"), "{text}");
+            assert!(text.contains("--out new/ already holds a run"), "{text}");
         } else {
             succeed(temp.path(), &train(out));
         }
@@ -147,7 +147,7 @@ fn a_run_without_an_iteration_is_begun_anew() {
     }
     let rows = std::fs::read_to_string(run.join("progress.csv")).unwrap();
     let text = fail(temp.path(), 2, &train("a"));
-    assert!(text.contains("--out a holds a run already"), "the rows are worth something: {text}");
+    assert!(text.contains("--out a already holds a run"), "the rows are worth something: {text}");
 
     std::fs::remove_dir_all(run.join("checkpoint")).unwrap();
     std::fs::write(run.join("progress.csv"), &rows[..=rows.find('\n').unwrap()]).unwrap();

@@ -104,7 +104,11 @@ fn what_has_no_mean_is_refused() {
         ),
         (&[&hopper, "run"], 1, "hopper.safetensors: hidden layers: found [32, 32], expected [24, 24]"),
         (&["run", "run/polices.safetensors"], 1, "run/polices.safetensors: policy: found no such file"),
-        (&["run", "--out", "./run/policies/policy-8192.safetensors"], 2, "a file that is read; expected another"),
+        (
+            &["run", "--out", "./run/policies/policy-8192.safetensors"],
+            2,
+            "which is also an input; expected another file",
+        ),
     ];
     let before: Vec<_> = kept.iter().map(|path| std::fs::read(path).unwrap()).collect();
     for (words, code, expected) in cases {
@@ -115,7 +119,7 @@ fn what_has_no_mean_is_refused() {
     assert!(!folder.join("x.safetensors").exists());
     // nor is the policy of a run overwritten by what is made of it
     let error = fail(folder, 2, &["import", "run", "--out", "run/policy.safetensors"]);
-    assert!(error.contains("a file that is read; expected another"), "{error}");
+    assert!(error.contains("which is also an input; expected another file"), "{error}");
     assert!(before == kept.iter().map(|path| std::fs::read(path).unwrap()).collect::<Vec<_>>());
     assert_no_leftovers(folder);
 }

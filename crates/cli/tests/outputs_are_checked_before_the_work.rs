@@ -44,7 +44,7 @@ fn every_command_looks_at_its_output_first() {
     }
     for words in [&["average", "p.safetensors", "w.safetensors"][..], &["import", "p.safetensors"]] {
         let error = fail(path, 2, &[words, &["--out", "./p.safetensors"]].concat());
-        assert!(error.contains("a file that is read; expected another"), "{error}");
+        assert!(error.contains("which is also an input; expected another file"), "{error}");
     }
     assert!(begun.elapsed() < Duration::from_secs(60), "no work is done");
     assert_eq!(before, ["p.safetensors", "w.safetensors"].map(|name| std::fs::read(path.join(name)).unwrap()));

@@ -64,7 +64,7 @@ fn mistakes_are_told() {
         [["import", "hopper.onnx", "--out", "./hopper.onnx"], ["export", "hopper.onnx", "--out", "hopper.onnx"]]
     {
         let error = fail(folder, 2, &command);
-        assert!(error.contains("hopper.onnx, a file that is read; expected another"), "{error}");
+        assert!(error.contains("hopper.onnx, which is also an input; expected another file"), "{error}");
         assert!(std::fs::read(folder.join("hopper.onnx")).unwrap() == bytes);
     }
     let error = fail(folder, 1, &["import", "hopper.onnx", "--agent", "ant"]);

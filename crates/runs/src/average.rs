@@ -1,4 +1,5 @@
-//! The mean of policies that a run has kept. Steps of learning are noisy to the end; the mean of what they lead to is less so.
+//! The mean of several policies of a run. Training steps are noisy to the end; the mean of the resulting policies is
+//! less so.
 
 use crate::error::RunError;
 use crate::folder::POLICIES;
@@ -8,12 +9,12 @@ use crate::setting::TaskOptions;
 use marathon_learn::Policy;
 use std::path::{Path, PathBuf};
 
-/// The mean of policies, and their files. A folder is that of a run, and stands for all that the run has kept in `policies/`, in
-/// the order of their steps. The mean is for the task of the last policy, with the arguments that the user gives.
+/// Returns the mean of policies, and their files. A folder is that of a run, and stands for all policies in its
+/// `policies/`, in the order of their steps. The mean is for the task of the last policy, with the user's options.
 ///
 /// # Errors
-/// If a file is no policy, there are fewer than two, one has another task, network or map of actions than the last, or the task
-/// does not take the arguments.
+/// If a file is not a policy, there are fewer than two policies, one has another task, network or map of actions than
+/// the last one, or the task does not take the options.
 pub fn average(given: &[PathBuf], options: &TaskOptions) -> Result<(Policy, Vec<PathBuf>), RunError> {
     let mut paths = Vec::new();
     for path in given {
@@ -39,7 +40,7 @@ pub fn average(given: &[PathBuf], options: &TaskOptions) -> Result<(Policy, Vec<
     Ok((Policy::mean(&policies)?, paths))
 }
 
-/// The policies that a run has kept, in the order of their steps.
+/// The policies in a run's folder, in the order of their steps.
 fn kept_by(run: &Path) -> Result<Vec<PathBuf>, RunError> {
     let kept = kept_policies(run);
     if kept.is_empty() {

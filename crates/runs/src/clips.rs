@@ -1,4 +1,4 @@
-//! Motion clips in files, for agents that follow clips.
+//! Files with motion clips for agents that follow clips.
 
 use crate::error::RunError;
 use crate::text::nearest_path;
@@ -15,24 +15,24 @@ use std::path::{Component, Path};
 const LOST: f64 = 0.15;
 const ASTRAY: f64 = 0.6;
 
-/// Clips that do not come with Marathon: names, and texts of `.motion` files. A name ends in `.motion`, so that it is never
-/// one of those that come with Marathon.
+/// Clips that do not ship with Marathon: names, and texts of `.motion` files. Their names end in `.motion`, so they
+/// differ from the names of Marathon's clips.
 pub type Clips = BTreeMap<String, String>;
 
-/// Ending of a clip's file and of its name.
+/// Extension of a clip's file and of its name.
 const MOTION: &str = "motion";
-/// Endings of files that are read.
+/// Extensions of supported files.
 const ENDINGS: [&str; 8] = [MOTION, "bvh", "glb", "gltf", "vrm", "vrma", "json", "txt"];
-/// Frames per second of a clip that is made of a recording.
+/// Frames per second of a clip from a recording.
 const FPS: f64 = 60.0;
 
-/// Reads the clips that an argument names: names with commas between them, or files. Returns the argument with names in
-/// place of files, and adds what it read to `clips`.
+/// Reads the clips in an option's value: names separated by commas, or files. Returns the value with names in place of
+/// files, and adds the clips from files to `clips`.
 ///
 /// # Errors
-/// If a file cannot be read, or is no clip for the model.
+/// If a file cannot be read, or is not a clip for the model.
 pub fn read_all(argument: &str, agent: &str, model: &Model, clips: &mut Clips) -> Result<String, RunError> {
-    // a file's name may have commas
+    // a file name may contain commas
     let items: Vec<&str> = match Path::new(argument).is_file() {
         true => vec![argument],
         false => argument.split(',').map(str::trim).collect(),
@@ -55,10 +55,10 @@ pub fn read_all(argument: &str, agent: &str, model: &Model, clips: &mut Clips) -
     Ok(names.join(","))
 }
 
-/// Makes clips known under their names.
+/// Registers clips under their names.
 ///
 /// # Errors
-/// If a name is none for a clip of one's own, or a text is no clip.
+/// If a name is not valid for a user's clip, or a text is not a clip.
 pub fn name(clips: &Clips) -> Result<(), RunError> {
     for (name, text) in clips {
         check_name(name)?;
@@ -67,10 +67,10 @@ pub fn name(clips: &Clips) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Refuses a name that would hide a clip that comes with Marathon, or lead out of a run's folder.
+/// Refuses a name that would hide one of Marathon's clips, or lead out of a run's folder.
 ///
 /// # Errors
-/// If it does.
+/// If the name is refused.
 pub fn check_name(name: &str) -> Result<(), RunError> {
     let path = Path::new(name);
     let plain = path.file_name().is_some_and(|file| file == name) && !name.contains(['/', '\\', ',']);
@@ -80,7 +80,7 @@ pub fn check_name(name: &str) -> Result<(), RunError> {
     }
 }
 
-/// A clip's text: of a `.motion` file as it is, of a recording what `marathon motion import` makes of it by default.
+/// The text of a clip: a `.motion` file as it is, a recording as `marathon motion import` converts it by default.
 fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError> {
     if !path.is_file() {
         let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
@@ -100,14 +100,14 @@ fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError>
     String::from_utf8(text).map_err(|e| RunError::file(path, "text", e, "UTF-8"))
 }
 
-/// What to say of a path that is neither a file of `what` nor the name of a clip. `near`: what may have been meant.
+/// The error for a path that is neither a file of `what` nor the name of a clip. `near` is a suggestion.
 pub fn missing(path: &Path, what: &str, near: Option<String>) -> RunError {
     let found = if path.is_dir() { "a folder" } else { "no such file" };
     let (near, names) = (did_you_mean(near), known::all_names().join(", "));
     RunError::file(path, "clip", found, format!("a file of {what}{near} or the name of a clip: {names}"))
 }
 
-/// What a character makes of a recording, with the mapping that comes with Marathon.
+/// Retargets a recording to a character, with Marathon's built-in mapping.
 fn of_recording(path: &Path, bytes: &[u8], model: &Model) -> Result<Clip, MotionError> {
     let beside = |name: &str| beside(path, name);
     let reading = Reading { beside: Some(&beside), ..Reading::default() };
@@ -155,9 +155,9 @@ pub fn beside(recording: &Path, name: &str) -> Result<Vec<u8>, String> {
     budget::read(&file, &RECORDING_FILE).map_err(text)
 }
 
-/// The file's name with the ending `.motion`; with a number, if another clip has it.
+/// The file's name with the ending `.motion`. It gets a number if another clip has that name.
 fn free_name(path: &Path, text: &str, others: &Clips) -> String {
-    // commas stand between names
+    // commas separate names
     let stem = stem(path).replace(',', "_");
     let numbered = (2..).map(|i| format!("{stem}-{i}.{MOTION}"));
     let mut names = std::iter::once(format!("{stem}.{MOTION}")).chain(numbered);
@@ -173,7 +173,7 @@ fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// Whether a text looks like a file's name, which no name of a clip does.
+/// Whether a text looks like a file name, which names of clips never do.
 fn is_file_name(path: &Path) -> bool {
     ENDINGS.contains(&ending(path).as_str()) || path.components().count() > 1
 }

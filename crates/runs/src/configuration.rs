@@ -9,13 +9,13 @@ use marathon_physics::hint::{did_you_mean, nearest};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads what a file says about an agent, which may go by any of its names.
+/// Reads the configuration of an agent from a file, which may use any of the agent's names.
 ///
 /// # Errors
-/// If the file cannot be read, or is no configuration for the agent; see [`parse`].
+/// If the file cannot be read, or is not a configuration for the agent; see [`parse`].
 pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
     let loaded = parse(path, &read(path)?, agent)?;
-    // tasks that a front end makes are not registered, and take no options
+    // tasks of a front end are not registered and take no options
     if let Ok(agent) = registry::agent(agent) {
         let known: Vec<&str> = agent.options().iter().map(|option| option.name).collect();
         if let Some((name, value)) = loaded.options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
@@ -27,10 +27,10 @@ pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
     Ok(loaded)
 }
 
-/// Reads what a file says about roles of a task but the first.
+/// Reads the configuration of all roles but the first.
 ///
 /// # Errors
-/// If the file cannot be read, or speaks of a role that there is not; see [`parse_roles`].
+/// If the file cannot be read, or names a role that does not exist; see [`parse_roles`].
 pub fn load_roles(path: &Path, task: &str, roles: &[&str]) -> Result<BTreeMap<String, RoleConfig>, RunError> {
     Ok(parse_roles(path, &read(path)?, task, roles)?)
 }

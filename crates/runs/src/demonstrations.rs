@@ -1,4 +1,4 @@
-//! Demonstrations that a configuration names.
+//! Demonstrations in a configuration.
 
 use crate::error::RunError;
 use crate::inputs;
@@ -9,7 +9,7 @@ use marathon_physics::budget;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A task with demonstrations of somebody else's.
+/// A task with demonstrations from a file.
 struct Shown {
     task: Arc<dyn ShardFactory>,
     demonstrations: Demonstrations,
@@ -30,10 +30,10 @@ impl ShardFactory for Shown {
     }
 }
 
-/// The task with the demonstrations of the file that the configuration's rewards name, if they name one.
+/// The task with the demonstrations of the file that the rewards of the configuration name, if any.
 ///
 /// # Errors
-/// If the file cannot be read or does not fit the task, or rewards name several.
+/// If the file cannot be read or does not fit the task, or rewards name several files.
 pub fn with_demonstrations(
     task: Arc<dyn ShardFactory>,
     config: &TrainConfig,

@@ -1,8 +1,9 @@
-//! One policy that does what several do: it plays, its teachers say what they would do where it gets to, and it learns that.
+//! Distillation of several policies into one. The student plays, its teachers give their actions for its observations,
+//! and it learns these.
 //!
-//! Each teacher has agents of its own in the student's task. If the task takes a `clip` and a teacher follows one, the
-//! teacher's agents follow that. Teachers may observe less than the student, never more: the named parts of a teacher's
-//! observation are looked up in the student's.
+//! Each teacher has its own agents in the student's task. If the task takes a `clip` and a teacher follows one, the
+//! teacher's agents follow that clip. Teachers may observe less than the student, but not more: each named part of a
+//! teacher's observation is found in the student's.
 //!
 //! [`resumable`] saves its state regularly, so that it can resume with the same bits.
 
@@ -24,44 +25,45 @@ use std::time::{Duration, Instant};
 
 /// Decisions of each agent between two rounds of learning.
 const HORIZON: usize = 32;
-/// Rounds at the start in which the teachers play alone, and nobody learns: what they see makes the statistics.
+/// First rounds, in which the teachers play alone and the student does not learn. They provide the normalization
+/// statistics.
 const SHOWN: u64 = 4;
-/// Share of the run after which the student plays alone.
+/// Fraction of the run after which the student plays alone.
 const ALONE: f64 = 0.1;
-/// Rounds whose lessons are kept.
+/// Rounds whose data is kept.
 const KEPT: usize = 16;
-/// Rows of an update.
+/// Rows per update.
 const ROWS: usize = 2048;
-/// How often a row is learned from, on average.
+/// Average number of updates per row.
 const PASSES: usize = 4;
 /// Time between two saves of the state.
 const NOTED: Duration = Duration::from_secs(60);
 /// Memory of environments and the rest, relative to the lessons. This is the largest ratio measured.
 const REST: f64 = 1.0;
 
-/// How to learn from others.
+/// Options of a distillation.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct DistillOptions {
     /// Widths of the policy's hidden layers.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = Self::default().hidden))]
     pub hidden: Vec<usize>,
-    /// Policy to start from in place of random weights, with no wider layers: a file or the folder of a run.
+    /// Policy to start from instead of random weights: a file or the folder of a run. Its layers must not be wider.
     #[cfg_attr(feature = "clap", arg(long, value_name = "POLICY"))]
     pub initialize_from: Option<PathBuf>,
-    /// Decisions of all agents together.
+    /// Decisions of all agents in total.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().steps, value_parser = parse_steps))]
     pub steps: u64,
-    /// Agents of each teacher.
+    /// Agents per teacher.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().agents))]
     pub agents: usize,
     /// Learning rate at the start; it falls to zero.
     #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", default_value_t = Self::default().lr))]
     pub lr: f64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[cfg_attr(feature = "clap", arg(long, value_name = "S", default_value_t = Self::default().seed))]
     pub seed: u64,
-    /// Threads that play. The result does not depend on it.
+    /// Threads that simulate. The result does not depend on it.
     #[cfg_attr(feature = "clap", arg(long, value_name = "T", default_value_t = Self::default().threads))]
     pub threads: usize,
 }
@@ -80,22 +82,22 @@ impl Default for DistillOptions {
     }
 }
 
-/// How far it is.
+/// Progress of a distillation.
 #[derive(Clone, Copy, Debug)]
 pub struct Distilled {
-    /// Decisions that have been made.
+    /// Number of decisions.
     pub steps: u64,
     /// Mean squared distance of an action's numbers from the teachers', in the last round.
     pub loss: f64,
-    /// Share of the student's decisions that ended an episode by failure, in the last round.
+    /// Fraction of the student's decisions that ended an episode by failure, in the last round.
     pub failures: f64,
 }
 
 impl DistillOptions {
-    /// Refuses options that make learning impossible.
+    /// Refuses invalid options.
     ///
     /// # Errors
-    /// Names the option, its value and what was expected.
+    /// Names the option, its value and the valid values.
     pub fn validate(&self) -> Result<(), RunError> {
         let wrong = |name, found: String, expected: &str| {
             Err(RunError::option(name, format!("is {found}, expected {expected}")))
@@ -116,7 +118,7 @@ impl DistillOptions {
         Ok(())
     }
 
-    /// Refuses a student or lessons that do not fit into memory.
+    /// Refuses a student or data that do not fit into memory.
     fn check_memory(&self, teachers: usize, meta: &PolicyMeta) -> Result<(), RunError> {
         let refused = |name, problem: String| Err(RunError::option(name, problem));
         let student = Distiller::memory(meta);
@@ -144,16 +146,16 @@ struct Class {
     env: VecEnv,
     step: Step,
     teacher: Policy,
-    /// Where the numbers that the teacher observes are in the student's observation.
+    /// Index of each number of the teacher's observation in the student's.
     sees: Vec<usize>,
 }
 
-/// Learns from the policies in files; returns the student's. `watch` is told of each round and may end it all.
+/// Distills the policies in files and returns the student's. `watch` sees each round and may stop the distillation.
 ///
 /// # Errors
-/// If there is no teacher, an option is invalid, or a file is no policy. If a teacher has observations that the student
-/// lacks, or differs in actions or decision interval. If the task cannot be created, or the learning rate is so large
-/// that numbers become infinite.
+/// If there is no teacher, an option is invalid, or a file is not a policy. If a teacher has observations that the
+/// student lacks, or differs in actions or decision interval. If the task cannot be created, or the learning rate is so
+/// large that numbers become infinite.
 pub fn distill(
     task: Setting,
     teachers: &[PathBuf],
@@ -243,7 +245,7 @@ struct School {
     classes: Vec<Class>,
     student: Distiller,
     lessons: Lessons,
-    /// Everything that the result depends on, by name.
+    /// Everything that affects the result, by name.
     about: BTreeMap<String, String>,
 }
 
@@ -300,7 +302,7 @@ impl School {
     }
 }
 
-/// Everything that the result of a distillation depends on, by name.
+/// Everything that affects the result of a distillation, by name.
 fn about(
     task: &Setting,
     teachers: &[(&PathBuf, Policy)],
@@ -326,8 +328,8 @@ fn about(
 }
 
 impl Class {
-    /// A round: the teacher moves the first agents, the student the others, and all that is seen is a lesson. Returns how often
-    /// the student failed, and how often it decided.
+    /// Plays a round: the teacher controls the first agents, the student the others, and all observations become
+    /// training data. Returns the number of the student's failures and decisions.
     fn play(
         &mut self,
         student: &Policy,
@@ -348,7 +350,7 @@ impl Class {
             lessons.push(&step.obs, &best);
             noise.draw(&mut drawn);
             student.act_rows(&step.obs, Some(&drawn), &mut actions);
-            // those who are shown the way need to see what is beside it, too
+            // noise on the teacher's actions also shows the states next to its own
             let mut shown = vec![0.0; leads * act];
             teacher.act_rows(&seen[..leads * sees.len()], Some(&drawn[..leads * act]), &mut shown);
             actions[..leads * act].copy_from_slice(&shown);
@@ -360,7 +362,7 @@ impl Class {
     }
 }
 
-/// The clips that a teacher follows, if the student's task takes some.
+/// The clips that a teacher follows, if the student's task takes clips.
 fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<String>, RunError> {
     if !registry::agent(&task.agent)?.has_option(CLIP) {
         return Ok(None);
@@ -374,7 +376,7 @@ fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<String>, RunError
     Ok((!names.is_empty()).then(|| names.join(",")))
 }
 
-/// A task whose agents follow these clips.
+/// The task with agents that follow these clips.
 fn follow(task: &Setting, clips: &str) -> Result<Setting, RunError> {
     task.clone().with(&TaskOptions { given: vec![(CLIP.into(), Value::Text(clips.into()))] })
 }

@@ -1,4 +1,4 @@
-//! What keeps a run from beginning, going on or being read. Errors carry the names of options, not their spelling.
+//! Errors of runs. They carry the names of options, not their spelling.
 
 use crate::text::{path_word, thousands};
 use marathon_config::ConfigError;
@@ -9,17 +9,17 @@ use marathon_physics::hint::did_you_mean;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// How a front end spells what a message speaks of.
+/// How a front end spells options and advice in messages.
 pub trait Spelling {
-    /// An option by its name, such as `steps`.
+    /// The spelling of an option, such as `--steps` for `steps`.
     fn option(&self, name: &str) -> String;
-    /// An option with a value that it could be given.
+    /// The spelling of an option with a suggested value.
     fn with_value(&self, name: &str, value: &str) -> String;
-    /// What goes on with the run in a folder.
+    /// The advice on how to resume the run in a folder.
     fn resume(&self, folder: &Path) -> String;
 }
 
-/// Names as they are.
+/// Plain names.
 pub struct Plain;
 
 impl Spelling for Plain {
@@ -52,33 +52,33 @@ impl Spelling for Flags<'_> {
 /// An error with a text for the user: which file or option, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// Of the environments: an unknown agent, most likely.
+    /// An error of the environments, usually an unknown agent.
     Env(#[from] EnvError),
-    /// Of the trainer; or of a file, whose errors are worded there.
+    /// An error of the trainer, or of a file, whose text comes from there.
     Learn(#[from] Error),
-    /// Of a configuration file.
+    /// An error of a configuration file.
     Config(#[from] ConfigError),
-    /// An option has a value that makes no sense here.
+    /// An option has an invalid value.
     Option {
         /// Name of the option.
         name: &'static str,
-        /// What is said of it: what it is and what was expected.
+        /// The problem: the found value and the valid values.
         problem: String,
     },
-    /// An option of new runs was given for one that is to go on.
+    /// An option of new runs was given when resuming.
     NewRunOnly {
         /// Name of the option.
         name: &'static str,
     },
-    /// The folder of a new run holds another.
+    /// The folder of a new run already holds one.
     HoldsRun(PathBuf),
-    /// There is no run to go on with.
+    /// There is no run to resume.
     NoRun {
-        /// Where it was looked for.
+        /// The folder.
         folder: PathBuf,
-        /// What is there.
+        /// Its contents.
         found: &'static str,
-        /// A run whose folder is called almost like that.
+        /// The folder of a run with a similar name.
         nearest: Option<String>,
     },
     /// The run has done all its steps.
@@ -88,50 +88,50 @@ pub enum RunError {
         /// Its steps.
         steps: u64,
     },
-    /// A task cannot be told how fast to go.
+    /// The task has no speed command.
     NoSpeed {
         /// The task.
         task: String,
-        /// Tasks that can.
+        /// Tasks with a speed command.
         others: Vec<String>,
     },
     /// A picture of the results cannot be drawn.
     Draw {
         /// The picture.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// Of a motion clip or a recording.
+    /// An error of a motion clip or a recording.
     Motion(#[from] MotionError),
-    /// A recording does not become a clip by itself.
+    /// A recording cannot be converted to a clip automatically.
     Recording {
-        /// Why.
+        /// Reason.
         error: MotionError,
         /// The recording.
         path: PathBuf,
-        /// Name of the agent that is to follow it.
+        /// Name of the agent that should follow it.
         agent: String,
     },
-    /// A process that plays has failed.
+    /// A rollout process has failed.
     Process(String),
     /// The system does not report Ctrl-C.
     Signal(String),
     /// Training stopped because its results could no longer be written.
     Stopped {
-        /// What failed first.
+        /// The first failure.
         cause: Box<RunError>,
         /// The folder of the run.
         folder: PathBuf,
-        /// Steps that were done.
+        /// Number of steps done.
         steps: u64,
-        /// Steps of the last whole checkpoint; none if there is none.
+        /// Steps of the last complete checkpoint. `None` without a checkpoint.
         saved: Option<u64>,
     },
 }
 
 impl RunError {
-    /// For `map_err` after something was tried on a file.
+    /// Converts an I/O error of an action on a file, for `map_err`.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Error::Io { path: path.into(), action, source }.into()
     }
@@ -147,7 +147,7 @@ impl RunError {
         RunError::Option { name, problem: problem.into() }
     }
 
-    /// Whether the options are at fault, not the files or the machine.
+    /// Whether the error lies in the options, not in files or the machine.
     pub fn is_usage(&self) -> bool {
         matches!(
             self,
@@ -155,7 +155,7 @@ impl RunError {
         )
     }
 
-    /// The text with options and advice as a front end spells them.
+    /// The text, with options and advice in a front end's spelling.
     pub fn spelled(&self, spelling: &dyn Spelling) -> String {
         match self {
             RunError::Env(error) => error.to_string(),
@@ -163,12 +163,12 @@ impl RunError {
             RunError::Config(error) => error.to_string(),
             RunError::Option { name, problem } => format!("{} {problem}", spelling.option(name)),
             RunError::NewRunOnly { name } => format!(
-                "{} belongs to a new run, not to one that {} goes on with",
+                "{} is for new runs, not for one that {} continues",
                 spelling.option(name),
                 spelling.option("resume")
             ),
             RunError::HoldsRun(folder) => format!(
-                "{} {} holds a run already; go on with it by {}, or choose another folder",
+                "{} {} already holds a run; continue it by {}, or choose another folder",
                 spelling.option("out"),
                 path_word(folder),
                 spelling.resume(folder)
@@ -182,13 +182,13 @@ impl RunError {
                 )
             }
             RunError::Complete { folder, steps } => format!(
-                "{}: the run is complete with {} steps; to let it learn on, give it more, such as {}",
+                "{}: the run is complete with {} steps; to train longer, set more, such as {}",
                 folder.display(),
                 thousands(*steps),
                 spelling.with_value("steps", &thousands(steps.saturating_mul(2)))
             ),
             RunError::NoSpeed { task, others } => {
-                format!("{task} cannot be told a speed; expected a policy for one of {}", others.join(", "))
+                format!("{task} has no speed command; expected a policy for one of {}", others.join(", "))
             }
             RunError::Draw { path, reason } => format!("{}: {reason}", path.display()),
             RunError::Motion(error) => error.to_string(),
@@ -202,14 +202,18 @@ impl RunError {
                 let (done, resume) = (thousands(*steps), spelling.resume(folder));
                 let advice = match saved {
                     Some(saved) if saved == steps => {
-                        format!("training stopped; its {done} steps are saved: mend that and go on by {resume}")
+                        format!(
+                            "training stopped; its {done} steps are saved: fix the problem and continue by {resume}"
+                        )
                     }
                     Some(saved) => format!(
-                        "training stopped; the last whole checkpoint has {} of {done} steps: mend that and go on by {resume}",
+                        "training stopped; the last complete checkpoint has {} of {done} steps: fix the problem and continue by {resume}",
                         thousands(*saved)
                     ),
                     None => {
-                        format!("training stopped before its first checkpoint: mend that and start again by {resume}")
+                        format!(
+                            "training stopped before its first checkpoint: fix the problem and start again by {resume}"
+                        )
                     }
                 };
                 format!("{}\n{advice}", cause.spelled(spelling))

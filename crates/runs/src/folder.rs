@@ -1,4 +1,4 @@
-//! The folder of a run: what is in it, who may write to it, and how files get there whole.
+//! The folder of a run: its contents, its lock, and writing files completely or not at all.
 
 use crate::clips::{self, Clips};
 use crate::error::RunError;
@@ -25,9 +25,9 @@ const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";
 /// Folder of the checkpoint.
 const CHECKPOINT: &str = "checkpoint";
-/// Folder of the policies on the way.
+/// Folder of policies from during the run.
 pub const POLICIES: &str = "policies";
-/// Where runs go unless the user says otherwise.
+/// Default folder of runs.
 const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
 pub const EVENTS: &str = "events.out.tfevents";
@@ -35,7 +35,7 @@ pub const EVENTS: &str = "events.out.tfevents";
 /// Files outside the run's folder, with their checksums.
 pub type Inputs = BTreeMap<PathBuf, String>;
 
-/// What a run is: everything that a resumed run must agree on.
+/// The description of a run. A resumed run must agree on all of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
@@ -45,10 +45,10 @@ pub struct RunFile {
     pub version: u32,
     /// Registry name of the agent.
     pub agent: String,
-    /// Arguments of its task; empty for a task without arguments.
+    /// Options of its task. Empty for a task without options.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
-    /// Clips that the arguments name and that do not come with Marathon: files beside this one, with their checksums.
+    /// Clips that the options name and that do not ship with Marathon: files in the run's folder, with their checksums.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clips: BTreeMap<String, String>,
     /// Files outside the run's folder that the run depends on, with their checksums.
@@ -60,18 +60,18 @@ pub struct RunFile {
     /// Checksum of that policy. It no longer matters once there is a checkpoint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initialize_from_checksum: Option<String>,
-    /// Steps between progress lines where there is no terminal.
+    /// Steps between progress lines without a terminal.
     pub summary_freq: u64,
     /// Steps between checkpoints.
     pub checkpoint_interval: u64,
-    /// Policies kept in `policies/`.
+    /// Number of policies kept in `policies/`.
     pub keep_checkpoints: usize,
     /// The trainer's configuration.
     pub config: TrainConfig,
 }
 
 impl RunFile {
-    /// Of a new run.
+    /// Describes a new run.
     pub fn new(task: &Setting, loaded: &Loaded) -> Self {
         Self {
             format: FORMAT.into(),
@@ -89,7 +89,7 @@ impl RunFile {
         }
     }
 
-    /// Reads a description and looks at every value.
+    /// Reads a description and checks every value.
     fn read(path: &Path) -> Result<Self, RunError> {
         let run: RunFile = read_description(path, FORMAT, VERSION)?;
         run.config.validate_in(path, "config")?;
@@ -102,7 +102,7 @@ impl RunFile {
         Ok(run)
     }
 
-    /// Refuses a configuration that is not the one of a checkpoint of the run: only steps and threads may differ.
+    /// Refuses a configuration that differs from that of a checkpoint of the run. Only steps and threads may differ.
     fn check(&self, path: &Path, checkpoint: &Checkpoint) -> Result<(), RunError> {
         let known = checkpoint.config();
         let RunConfig { total_steps, threads, .. } = self.config.run;
@@ -136,7 +136,7 @@ pub fn difference_of_runs(found: &RunFile, expected: &RunFile) -> Option<(String
     difference("run", &found, &expected).map(|(place, a, b)| (place, a.clone(), b.clone()))
 }
 
-/// The first place where two documents differ, and what is there.
+/// The first place where two documents differ, with both values.
 fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<(String, &'v Value, &'v Value)> {
     match (found, expected) {
         (Value::Object(keys), Value::Object(_)) => {
@@ -150,20 +150,20 @@ fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<
     }
 }
 
-/// The folder of a run, locked against a second writer while this value lives.
+/// The folder of a run, locked against other writers while this value lives.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
-    /// Of a new run: folders that were made for it, the deepest first.
+    /// For a new run: folders that were created for it, the deepest first.
     made: Option<Vec<PathBuf>>,
     _lock: File,
 }
 
 impl RunFolder {
-    /// Makes the folder of a new run: `out`, or the first free `runs/<agent>-<n>`.
+    /// Creates the folder of a new run: `out`, or the first free `runs/<agent>-<n>`.
     ///
     /// # Errors
-    /// If `out` holds anything, but for a run without an iteration, or the folder cannot be made or written to.
+    /// If `out` holds anything other than a run without an iteration, or the folder cannot be created or written to.
     pub fn create(out: Option<&Path>, agent: &str) -> Result<Self, RunError> {
         let (path, made) = match out {
             Some(out) => {
@@ -176,14 +176,14 @@ impl RunFolder {
             None => free_folder(agent)?,
         };
         let folder = Self { made: Some(made), ..Self::lock(path)? };
-        // another process may have been here in between
+        // another process may have used the folder in between
         refuse(&folder.path)?;
         refuse_links(&folder.path)?;
         folder.clear();
         Ok(folder)
     }
 
-    /// Opens the folder of a run to go on with it.
+    /// Opens the folder of a run to resume it.
     ///
     /// # Errors
     /// If it holds no run or contains links, or another process is writing to it.
@@ -209,7 +209,7 @@ impl RunFolder {
         #[cfg(unix)]
         {
             use std::os::unix::fs::OpenOptionsExt;
-            // a link created a moment ago, or a pipe without a reader
+            // refuses a link that was created a moment ago, or a pipe without a reader
             options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
         }
         let lock = options.open(&name).map_err(RunError::io(&path, "write to folder"))?;
@@ -217,15 +217,15 @@ impl RunFolder {
             Err(TryLockError::WouldBlock) => {
                 Err(RunError::file(&path, "run", "another process that is writing to it", "no other"))
             }
-            // some network file systems know no locks; then nobody else can have one
+            // some network file systems have no locks: then no other process can have one
             Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path, made: None, _lock: lock }),
         }
     }
 
-    /// Reads the last checkpoint of a run; a run that ended before its first has none.
+    /// Reads the last checkpoint of a run. A run that ended before its first checkpoint has none.
     ///
     /// # Errors
-    /// If it is damaged, of another run, or lost.
+    /// If it is damaged, lost, or belongs to another run.
     pub fn last_checkpoint(&self, run: &RunFile) -> Result<Option<Checkpoint>, RunError> {
         let file = self.checkpoint().join("checkpoint.json");
         if file.exists() {
@@ -233,7 +233,7 @@ impl RunFolder {
             run.check(&self.path.join(RUN), &checkpoint)?;
             return Ok(Some(checkpoint));
         }
-        // these are written after it
+        // these files are written after the checkpoint
         match [self.policy(), self.summary()].into_iter().find(|later| later.exists()) {
             None => Ok(None),
             Some(later) => {
@@ -245,19 +245,19 @@ impl RunFolder {
         }
     }
 
-    /// Takes back the folder of a new run that could not begin: what it holds, and the folders that were made for it.
+    /// Removes the folder of a new run that could not start: its contents, and the folders that were created for it.
     pub fn discard(self) {
         let Some(made) = self.made.as_ref().filter(|_| is_blank(&self.path)) else { return };
         self.clear();
         let _ = fs::remove_file(self.path.join(RUN));
         let _ = fs::remove_file(self.path.join(LOCK));
         for folder in made {
-            // one that somebody else has put something into stays
+            // fails for folders that meanwhile hold other files
             let _ = fs::remove_dir(folder);
         }
     }
 
-    /// Removes what a run without an iteration has left, but for its description.
+    /// Removes the files of a run without an iteration, except its description.
     fn clear(&self) {
         self.remove_leftovers();
         let _ = fs::remove_file(self.progress());
@@ -277,7 +277,7 @@ impl RunFolder {
     pub fn policy(&self) -> PathBuf {
         self.path.join("policy.safetensors")
     }
-    /// The policy of a role but the first.
+    /// The policy of a role other than the first.
     pub fn policy_of(&self, role: &str) -> PathBuf {
         policy_of_role(&self.policy(), role)
     }
@@ -285,7 +285,7 @@ impl RunFolder {
     pub fn checkpoint(&self) -> PathBuf {
         self.path.join(CHECKPOINT)
     }
-    /// Numbers of all iterations.
+    /// The table with the numbers of all iterations.
     pub fn progress(&self) -> PathBuf {
         self.path.join(PROGRESS)
     }
@@ -293,16 +293,16 @@ impl RunFolder {
     pub fn curve(&self) -> PathBuf {
         self.path.join("curve.png")
     }
-    /// The run in numbers.
+    /// The summary of the run.
     pub fn summary(&self) -> PathBuf {
         self.path.join("summary.json")
     }
-    /// Policies on the way.
+    /// Policies from during the run.
     pub fn policies(&self) -> PathBuf {
         self.path.join(POLICIES)
     }
 
-    /// Files with events for TensorBoard, in their order.
+    /// Event files for TensorBoard, in their order.
     ///
     /// # Errors
     /// If the folder cannot be read.
@@ -319,11 +319,11 @@ impl RunFolder {
         Ok(files)
     }
 
-    /// Writes the files of a new run: `run.json`, and the clips that do not come with Marathon. If the process is
+    /// Writes the files of a new run: `run.json`, and the clips that do not ship with Marathon. If the process is
     /// killed here, the folder has a run that can resume, or only files that do not block a new run.
     ///
     /// # Errors
-    /// If that fails.
+    /// If a file cannot be written.
     pub fn begin(&self, run: &RunFile, clips: &Clips) -> Result<(), RunError> {
         for (i, (name, text)) in clips.iter().enumerate() {
             // temporary names until `run.json` lists the clips
@@ -343,7 +343,7 @@ impl RunFolder {
     /// Writes `run.json`.
     ///
     /// # Errors
-    /// If that fails.
+    /// If the file cannot be written.
     pub fn write_run(&self, run: &RunFile) -> Result<(), RunError> {
         Ok(write_description(&self.path.join(RUN), run)?)
     }
@@ -367,7 +367,7 @@ impl RunFolder {
     /// The task of a run, with its clips.
     ///
     /// # Errors
-    /// If a clip is not there, or has changed since the run began.
+    /// If a clip is missing, or has changed since the run began.
     pub fn setting(&self, run: &RunFile) -> Result<Setting, RunError> {
         let mut setting = Setting { agent: run.agent.clone(), options: run.options.clone(), clips: Clips::new() };
         for (name, sum) in &run.clips {
@@ -387,7 +387,7 @@ impl RunFolder {
         Ok(setting)
     }
 
-    /// Removes temporary files of a writer that was killed; failing to harms nobody.
+    /// Removes temporary files of a killed writer. Errors are ignored.
     fn remove_leftovers(&self) {
         for folder in [self.path.clone(), self.checkpoint(), self.policies()] {
             for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -399,7 +399,7 @@ impl RunFolder {
     }
 }
 
-/// Refuses a folder that holds anything but a run without an iteration, which is as good as empty.
+/// Refuses a folder that holds anything other than a run without an iteration.
 fn refuse(out: &Path) -> Result<(), RunError> {
     if is_blank(out) {
         return Ok(());
@@ -421,7 +421,7 @@ fn refuse(out: &Path) -> Result<(), RunError> {
     Err(RunError::option("out", problem))
 }
 
-/// Whether the program writes an entry of this name into a run's folder, and whether the entry is a folder.
+/// Whether the program writes an entry of this name to a run's folder, and whether the entry is a folder.
 fn kind_of_entry(name: &OsStr) -> Option<bool> {
     let name = name.to_str()?;
     let files = [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png"];
@@ -499,7 +499,7 @@ fn is_leftover(name: &OsStr) -> bool {
     number.is_some_and(|number| !number.is_empty() && number.iter().all(u8::is_ascii_digit))
 }
 
-/// Claims the first free `runs/<agent>-<n>`; also the folders that were made for it.
+/// Creates the first free `runs/<agent>-<n>`. Also returns the folders that were created for it.
 fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), RunError> {
     let runs = Path::new(RUNS);
     let first = !runs.exists();
@@ -520,15 +520,15 @@ fn free_folder(agent: &str) -> Result<(PathBuf, Vec<PathBuf>), RunError> {
     }
 }
 
-/// The folder of a run that is called almost like `path`, such as `runs/hopper-3`.
+/// The folder of a run with a name similar to `path`, such as `runs/hopper-3`.
 fn nearest_run(path: &Path) -> Option<String> {
     text::nearest_path(path, &[Path::new(RUNS)], |entry| entry.join(RUN).is_file())
 }
 
-/// The policy that a user means: the file, or the one in a run's folder.
+/// The policy file at a path, or in the folder of a run.
 ///
 /// # Errors
-/// If there is neither.
+/// If there is none.
 pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
     let path = if given.is_dir() { given.join("policy.safetensors") } else { given.to_path_buf() };
     if path.exists() {
@@ -544,7 +544,7 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
     Err(RunError::file(given, "policy", found, expected))
 }
 
-/// Where the policy of a role but the first lies, beside that of the first.
+/// Path of the policy of a role other than the first, next to that of the first.
 pub fn policy_of_role(first: &Path, role: &str) -> PathBuf {
     let part = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     first.with_file_name(format!("{}-{role}.{}", part(first.file_stem()), part(first.extension())))
@@ -553,7 +553,7 @@ pub fn policy_of_role(first: &Path, role: &str) -> PathBuf {
 /// Writes a JSON document.
 ///
 /// # Errors
-/// If that fails.
+/// If the file cannot be written.
 pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), RunError> {
     let bad = |e: serde_json::Error| RunError::file(path, "JSON", e, "plain data");
     let mut json = serde_json::to_string_pretty(document).map_err(bad)?;
@@ -565,7 +565,7 @@ pub fn write_json(path: &Path, document: &impl Serialize) -> Result<(), RunError
 mod tests {
     use super::*;
 
-    /// One bit of the description is another, as a bad disk leaves it: that is seen, or it means the same.
+    /// A flipped bit in the description, as from a bad disk, is either detected or has no effect.
     #[test]
     fn a_flipped_bit_of_a_description_is_refused_or_changes_nothing() {
         let temp = tempfile::tempdir().unwrap();
@@ -575,7 +575,7 @@ mod tests {
         assert_eq!(RunFile::read(&path).unwrap(), run);
         let bytes = fs::read(&path).unwrap();
         let mut refused = 0;
-        // two bits of every byte, all eight in turn
+        // two bits of every byte, covering all eight in turn
         for (place, bit) in (0..bytes.len()).flat_map(|place| [place % 4, place % 4 + 4].map(|bit| (place, bit))) {
             let mut flipped = bytes.clone();
             flipped[place] ^= 1 << bit;

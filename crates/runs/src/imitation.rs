@@ -1,4 +1,4 @@
-//! How well a policy follows motion clips: from their first frame and from anywhere, in the measures of the field.
+//! Measures how well a policy follows motion clips, from their first frame and from random frames.
 
 use crate::error::RunError;
 use crate::play::Play;
@@ -12,48 +12,48 @@ use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use serde::{Deserialize, Serialize};
 
-/// Episodes whose pose errors are averaged: those of table 3 of the AMP paper.
+/// Episodes whose pose errors are averaged, as in table 3 of the AMP paper.
 const WARPED: usize = 32;
 
-/// How well a policy follows one clip.
+/// Results for one clip.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imitation {
-    /// The clip; empty if the task has no choice.
+    /// The clip. Empty if the task has no choice.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub clip: String,
-    /// Episodes of each kind of start.
+    /// Episodes per kind of start.
     pub episodes: u64,
-    /// From the clip's first frame.
+    /// Starts at the clip's first frame.
     pub first: Followed,
-    /// From anywhere in the clip.
+    /// Starts anywhere in the clip.
     pub random: Followed,
 }
 
-/// Episodes that start alike, up to the longest time or the end of a clip that does not loop.
+/// Episodes with the same kind of start, up to the longest time or the end of a clip that does not loop.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Followed {
-    /// Episodes that were followed to the end, without a fall and without losing the clip.
+    /// Episodes that followed the clip to the end, without a fall and without losing the clip.
     pub completed: u64,
     /// Mean length of the episodes, s.
     pub seconds: f64,
-    /// Mean over the decisions of the mean absolute difference of the joints' angles, rad.
+    /// Mean absolute difference of the joint angles, averaged over the decisions, rad.
     pub joint_error: f64,
-    /// Mean distance of joints, hands and feet from where the clip has them, as seen from the pelvis, after dynamic time
-    /// warping: table 3 of the AMP paper (Peng et al., 2021), m. Of the first 32 episodes.
+    /// Mean distance of joints, hands and feet from those of the clip, relative to the pelvis, after dynamic time
+    /// warping, m. This is the measure of table 3 of the AMP paper (Peng et al., 2021), over the first 32 episodes.
     pub pose_error: f64,
-    /// Times that the pelvis was upside down and upright again, before a fall: mean over the episodes.
+    /// Number of times that the pelvis was upside down and upright again before a fall: mean over the episodes.
     pub flips: f64,
-    /// Fewest flips of an episode.
+    /// Smallest number of flips in an episode.
     pub flips_least: u64,
-    /// Mean way that a part of a sole slides each time that it stands on the ground, m.
+    /// Mean distance that a part of a sole slides per ground contact, m.
     pub slide: f64,
 }
 
-/// How well a policy follows each clip of its task: with its own options but for the starts. None for tasks that follow no
-/// clip.
+/// Measures how well a policy follows each clip of its task, with its own options except for the starts. Empty for
+/// tasks that follow no clip.
 ///
 /// # Errors
-/// If the task cannot be made.
+/// If the task cannot be created.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
     let (setting, clips) = clips_of(policy)?;
     let of_clip = |clip: String| {
@@ -64,16 +64,16 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>,
     clips.into_iter().map(of_clip).collect()
 }
 
-/// The half of [`measure`] that begins at each clip's first frame.
+/// The part of [`measure`] that starts at each clip's first frame.
 ///
 /// # Errors
-/// If the task cannot be made.
+/// If the task cannot be created.
 pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Followed>, RunError> {
     let (setting, clips) = clips_of(policy)?;
     clips.iter().map(|clip| follow_from(FIRST, clip, policy, &setting, options)).collect()
 }
 
-/// A policy's task and the clips that it follows; an empty name where the task has no choice.
+/// A policy's task and the clips that it follows. The name is empty if the task has no choice.
 fn clips_of(policy: &Policy) -> Result<(Setting, Vec<String>), RunError> {
     let setting = Setting::of(policy.meta());
     let Ok(agent) = registry::agent(&setting.agent) else { return Ok((setting, Vec::new())) };
@@ -101,7 +101,7 @@ fn follow_from(
     follow(policy, &setting.clone().with(&TaskOptions { given })?, options)
 }
 
-/// One episode each of so many agents.
+/// Plays one episode per agent.
 fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<Followed, RunError> {
     let vec_options = VecEnvOptions {
         agents: options.episodes,
@@ -137,13 +137,13 @@ fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<F
     Ok(summarize(&episodes, &tracking, dt))
 }
 
-/// What one agent has done.
+/// Results of one agent.
 #[derive(Default)]
 struct Episode {
     frames: Vec<Vec<f64>>,
     places: Vec<Places>,
     clip: Vec<Places>,
-    /// Sum of the decisions' joint errors.
+    /// Sum of the joint errors over the decisions.
     angles: f64,
     over: bool,
     completed: bool,
@@ -167,7 +167,7 @@ fn summarize(episodes: &[Episode], tracking: &Tracking<'_>, dt: f64) -> Followed
     }
 }
 
-/// Mean absolute difference of two poses' angles, rad.
+/// Mean absolute difference of the angles of two poses, rad.
 fn joint_error(model: &Model, qpos: &[f64], clip: &[f64]) -> f64 {
     let hinges = model.joints.iter().filter(|joint| joint.kind == JointType::Hinge);
     let errors: Vec<f64> = hinges.map(|joint| (qpos[joint.qpos_adr] - clip[joint.qpos_adr]).abs()).collect();
@@ -175,7 +175,7 @@ fn joint_error(model: &Model, qpos: &[f64], clip: &[f64]) -> f64 {
 }
 
 impl Imitation {
-    /// As a few lines for a person.
+    /// The results as a few lines of text.
     pub fn table(&self) -> String {
         let clip = if self.clip.is_empty() { String::new() } else { format!(" {}", self.clip) };
         let row = |from: &str, f: &Followed| {

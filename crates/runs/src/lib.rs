@@ -1,9 +1,9 @@
-//! Training runs: their options, folders, reports and policies, and processes that play for them.
+//! Training runs: their options, folders, reports and policies, and processes that play rollouts for them.
 //!
-//! The command, the studies, the game and the Python package are front ends of this crate. [`RunOptions`], [`PolicySource`] and
-//! [`FilmOptions`] are plain structs; the feature `clap` makes them arguments of a command line. The feature `terminal` adds
-//! output, Ctrl-C and exit codes for programs in a terminal. A [`RunError`] carries the names of options; each front end spells
-//! them in its own way ([`Spelling`]).
+//! The command line, the studies, the game and the Python package are front ends of this crate. [`RunOptions`],
+//! [`PolicySource`] and [`FilmOptions`] are plain structs. The feature `clap` turns them into arguments of a command
+//! line. The feature `terminal` adds output, Ctrl-C and exit codes for programs in a terminal. A [`RunError`] carries
+//! the names of options, and each front end spells them in its own way ([`Spelling`]).
 
 pub mod average;
 pub mod clips;

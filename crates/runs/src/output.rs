@@ -6,9 +6,9 @@ use crate::text::path_word;
 use marathon_learn::AtomicFile;
 use std::path::Path;
 
-/// Refuses an output file that cannot be written. Reasons are another ending, a missing or read-only folder, a folder
-/// of that name, or a file that is also one of the `inputs`. Inputs are files, or folders of runs, which stand for
-/// their policies.
+/// Refuses an output file that cannot be written. Possible reasons: another ending, a missing or read-only folder, a
+/// folder of that name, or a file that is also one of the `inputs`. Inputs are files, or folders of runs, which stand
+/// for their policies.
 ///
 /// # Errors
 /// Names the option `out`, its value and what was expected.
@@ -26,11 +26,11 @@ pub fn check<P: AsRef<Path>>(out: &Path, endings: &[&str], inputs: &[P]) -> Resu
     if let Ok(old) = out.canonicalize()
         && inputs.iter().any(|input| file(input.as_ref()).as_ref() == Some(&old))
     {
-        return wrong("a file that is read; expected another".into());
+        return wrong("which is also an input; expected another file".into());
     }
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return wrong(format!("but there is no folder {}; make it, or choose another", path_word(folder)));
+        return wrong(format!("but there is no folder {}; create it, or choose another", path_word(folder)));
     }
     // the folder may be read-only, or the disk full
     AtomicFile::create(out)?;

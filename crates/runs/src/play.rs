@@ -1,4 +1,4 @@
-//! A policy at play: agents side by side that it moves with its best actions.
+//! Playing a policy: agents side by side, controlled by its best actions.
 
 use crate::error::RunError;
 use crate::setting::Setting;
@@ -6,11 +6,11 @@ use marathon_envs::{AgentState, Role, Spec, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Error, Policy};
 use marathon_physics::lanes::Isa;
 
-/// Agents of a policy's task, and what became of their last decision. A decision has two halves: [`Play::decide`] chooses
-/// actions, [`Play::step`] carries them out.
+/// Agents of a policy's task, and the results of their last decision. A decision has two steps: [`Play::decide`]
+/// chooses actions, [`Play::step`] carries them out.
 pub struct Play<'a> {
     env: VecEnv,
-    /// One for each role.
+    /// One per role.
     pilots: Vec<Pilot<'a>>,
     actions: Vec<f32>,
     step: Step,
@@ -20,25 +20,25 @@ pub struct Play<'a> {
 struct Pilot<'a> {
     role: Role,
     policy: BlockPolicy<&'a Policy>,
-    /// What it sees and does, `[agents][..]`, and for which agents it decides.
+    /// Its observations and actions, `[agents][..]`, and the agents for which it decides.
     obs: Vec<f32>,
     actions: Vec<f32>,
     decides: Vec<bool>,
 }
 
 impl<'a> Play<'a> {
-    /// Agents at the start of their first episodes, in the task that the policy notes.
+    /// Creates agents at the start of their first episodes, in the task that the policy notes.
     ///
     /// # Errors
-    /// If the policy's task does not exist, or the options make no sense.
+    /// If the policy's task does not exist, or the options are invalid.
     pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
         Self::of(&Setting::of(policy.meta()), &[policy], options)
     }
 
-    /// The same in a task with other arguments, with a policy for each role of the task, in their order.
+    /// Creates agents in a task with other options. `policies` has one policy per role of the task, in their order.
     ///
     /// # Errors
-    /// The same, and if there is not one policy for each role.
+    /// Like [`Play::new`], and if the number of policies differs from that of the roles.
     pub fn of(setting: &Setting, policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
         let mut env = setting.vec_env(options)?;
         let mut step = env.buffers();
@@ -60,7 +60,7 @@ impl<'a> Play<'a> {
         Ok(Play { pilots, actions: vec![0.0; n * env.spec().act], step, env })
     }
 
-    /// Chooses the best actions, `[agents][act]`, for what the agents observe now. A role that does not decide goes on with its
+    /// Chooses the best actions, `[agents][act]`, for the current observations. A role that does not decide keeps its
     /// last action.
     pub fn decide(&mut self) -> &[f32] {
         let Self { env, pilots, actions, step } = self;
@@ -83,7 +83,7 @@ impl<'a> Play<'a> {
         actions
     }
 
-    /// Carries the chosen actions out.
+    /// Carries out the chosen actions.
     ///
     /// # Errors
     /// If the environments refuse them.
@@ -92,7 +92,7 @@ impl<'a> Play<'a> {
         Ok(&self.step)
     }
 
-    /// Observations, rewards and ends of the last decision; before the first, only observations.
+    /// Observations, rewards and ends of the last decision. Before the first decision, only observations.
     pub fn last(&self) -> &Step {
         &self.step
     }
@@ -113,7 +113,7 @@ impl<'a> Play<'a> {
         Ok(self.env.state(agent)?)
     }
 
-    /// Controls of an agent during its last decision, as [`VecEnv::ctrl`] tells.
+    /// Controls of an agent during its last decision; see [`VecEnv::ctrl`].
     ///
     /// # Errors
     /// If there is no such agent.
@@ -121,12 +121,12 @@ impl<'a> Play<'a> {
         Ok(self.env.ctrl(agent)?)
     }
 
-    /// Facts of the task.
+    /// Description of the task.
     pub fn spec(&self) -> &Spec {
         self.env.spec()
     }
 
-    /// Ground of an agent: elevations of each of the model's height fields, as [`VecEnv::ground`] has them.
+    /// Ground of an agent: elevations of each of the model's height fields; see [`VecEnv::ground`].
     ///
     /// # Errors
     /// If there is no such agent.
@@ -134,7 +134,7 @@ impl<'a> Play<'a> {
         (0..fields).map(|field| Ok(self.env.ground(agent, field)?)).collect()
     }
 
-    /// The command that an agent observed last.
+    /// The last observed command of an agent.
     ///
     /// # Errors
     /// If there is no such agent.
@@ -142,15 +142,15 @@ impl<'a> Play<'a> {
         Ok(self.env.context(agent)?.command())
     }
 
-    /// Tells an agent what to do, as [`VecEnv::set_command`] has it.
+    /// Sets an agent's command; see [`VecEnv::set_command`].
     ///
     /// # Errors
-    /// If there is no such agent, or it cannot be told this.
+    /// If there is no such agent, or it does not take this command.
     pub fn set_command(&mut self, agent: usize, command: Option<&[f64]>) -> Result<(), RunError> {
         Ok(self.env.set_command(agent, command)?)
     }
 
-    /// Pushes a body of an agent with a force, N, until told otherwise, as [`VecEnv::push`] has it.
+    /// Pushes a body of an agent with a constant force, N; see [`VecEnv::push`].
     ///
     /// # Errors
     /// If there is no such agent or body.
@@ -158,7 +158,7 @@ impl<'a> Play<'a> {
         Ok(self.env.push(agent, body, force, [0.0; 3])?)
     }
 
-    /// Feet of an agent that touched the ground during its last decision, a bit each, as [`VecEnv::feet`] tells.
+    /// Feet of an agent that touched the ground during its last decision, a bit each; see [`VecEnv::feet`].
     ///
     /// # Errors
     /// If there is no such agent.
@@ -166,7 +166,8 @@ impl<'a> Play<'a> {
         Ok(self.env.feet(agent)?)
     }
 
-    /// Generalized positions of the clip that an agent follows, where it is now; none if the task follows no clip.
+    /// Generalized positions of the clip that an agent follows, at the current time. `None` if the task follows no
+    /// clip.
     ///
     /// # Errors
     /// If there is no such agent.

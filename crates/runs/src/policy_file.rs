@@ -1,4 +1,4 @@
-//! Policies on disk: Marathon's own files, and ONNX.
+//! Policy files: Marathon's own, and ONNX.
 
 use crate::error::RunError;
 use crate::folder::{policy_of_role, policy_path};
@@ -10,12 +10,11 @@ use marathon_physics::budget;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads a policy and its task: the file, `.safetensors` or `.onnx`, or the one in a run's folder. The task is the one that
-/// the user names, or the one that the file is for; its arguments are those that the user gives, and else those of the file.
-/// The policy notes what the task has.
+/// Reads a policy and its task from a `.safetensors` or `.onnx` file, or from a run's folder. The user's task and
+/// options have precedence over those of the file. The returned policy notes the resulting options.
 ///
 /// # Errors
-/// If there is no such file, it is no policy, it is for another agent, or the agent does not take the arguments.
+/// If there is no such file, it is not a policy, it is for another agent, or the agent does not take the options.
 pub fn load(
     given: &Path,
     agent: Option<&str>,
@@ -32,7 +31,7 @@ pub fn load_unsealed(given: &Path, agent: Option<&str>, options: &TaskOptions) -
     Ok(load_with(given, agent, options, Policy::load_unsealed)?.0)
 }
 
-/// A function that reads a policy file of Marathon.
+/// A function that reads one of Marathon's policy files.
 type Load = fn(&Path) -> Result<Policy, Error>;
 
 fn load_with(
@@ -48,11 +47,11 @@ fn load_with(
     Ok((policy, factory))
 }
 
-/// The same with the policies of all roles of the task, in their order. Those of the others lie beside the first one, as training
-/// leaves them: `policy.safetensors`, `policy-builder.safetensors`.
+/// Like [`load`], with the policies of all roles of the task, in their order. Those of the other roles lie next to the
+/// first one, where training writes them: `policy.safetensors`, `policy-builder.safetensors`.
 ///
 /// # Errors
-/// The same, and if one of them is missing or is for another role.
+/// Like [`load`], and if a policy is missing or is for another role.
 pub fn load_all(
     given: &Path,
     agent: Option<&str>,
@@ -75,7 +74,7 @@ pub fn load_all(
     Ok((policies, factory))
 }
 
-/// The task that a policy is to play in.
+/// The task for a policy.
 fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load) -> Result<Setting, RunError> {
     let noted = task_with(given, load)?;
     let setting = match (agent.map(Setting::named).transpose()?, noted) {
@@ -88,10 +87,10 @@ fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load)
     setting.with(options)
 }
 
-/// The task that a file notes for its policy; none, if another program has written it.
+/// The task that a file notes for its policy. `None` for files by other programs.
 ///
 /// # Errors
-/// If there is no such file, or it is no policy.
+/// If there is no such file, or it is not a policy.
 pub fn task_of(given: &Path) -> Result<Option<Setting>, RunError> {
     task_with(given, Policy::load)
 }
@@ -103,10 +102,10 @@ fn task_with(given: &Path, load: Load) -> Result<Option<Setting>, RunError> {
     Ok(noted.map(|meta| Setting::of(&meta)))
 }
 
-/// Reads a policy for a task, or, without one, for whatever task its file names: this program may not know that.
+/// Reads a policy for a task, or, without one, for the task that the file names, which may be unknown.
 ///
 /// # Errors
-/// If there is no such file, it is no policy, or it is for another agent.
+/// If there is no such file, it is not a policy, or it is for another agent.
 pub fn read(given: &Path, spec: Option<&Spec>) -> Result<Policy, RunError> {
     read_with(given, spec, Policy::load)
 }
@@ -127,11 +126,11 @@ fn bytes(path: &Path) -> Result<Vec<u8>, RunError> {
     budget::read(path, &budget::POLICY_FILE).map_err(RunError::io(path, "read"))
 }
 
-/// Where the numbers that a policy observes are in the observation of another task, which may have more; parts are looked up
-/// by their names.
+/// Indices of the numbers that a policy observes in the observation of another task, which may have more. Parts are
+/// matched by name.
 ///
 /// # Errors
-/// If the task has no such part, or decides otherwise.
+/// If the task lacks a part, or has other actions or another decision interval.
 pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, RunError> {
     let whole = Setting::of(policy.meta()).factory()?.spec().clone();
     // the policy may be that of a role
@@ -169,10 +168,10 @@ pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, 
 /// File endings that [`save`] supports.
 pub const ENDINGS: [&str; 2] = ["safetensors", "onnx"];
 
-/// Writes a policy in the format that the file's name ends with.
+/// Writes a policy in the format given by the file's ending.
 ///
 /// # Errors
-/// If it is not `.safetensors` or `.onnx`, or the file cannot be written.
+/// If the ending is not `.safetensors` or `.onnx`, or the file cannot be written.
 pub fn save(policy: &Policy, path: &Path) -> Result<(), RunError> {
     match extension(path).as_str() {
         "onnx" => Ok(write_atomic(path, &policy.to_onnx())?),
@@ -181,7 +180,7 @@ pub fn save(policy: &Policy, path: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Whether a file is named as ONNX's are.
+/// Whether a file has ONNX's ending.
 pub fn is_onnx(path: &Path) -> bool {
     extension(path) == "onnx"
 }

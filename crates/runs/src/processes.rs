@@ -1,9 +1,10 @@
-//! Rollouts played by processes of this program, a slice of the agents each: `marathon train --processes N`.
+//! Rollouts in several processes of this program, each with a slice of the agents: `marathon train --processes N`.
 //!
-//! A process is the program with the word `rollout-worker` ([`serve`]). It reads a line of JSON, which says what it plays. Then,
-//! for every rollout, it reads two messages of the learner ([`Players::play`]) and answers with one; before each stands its
-//! length, 8 bytes, little-endian. It ends when its input ends. The policy has the same bits as without processes. If a
-//! process is lost or does not answer in time, the run ends and can be resumed.
+//! A worker process is the program with the argument `rollout-worker` ([`serve`]). It first reads a line of JSON with
+//! its setup. For every rollout, it then reads two messages of the learner ([`Players::play`]) and answers with one.
+//! Before each message stands its length, 8 bytes, little-endian. The process ends when its input ends. The policy has
+//! the same bits as without processes. If a process is lost or does not answer in time, the run ends and can be
+//! resumed.
 
 use crate::error::RunError;
 use crate::setting::Setting;
@@ -16,7 +17,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// What a process plays.
+/// Setup of a worker process.
 #[derive(Serialize, Deserialize)]
 struct Part {
     task: Setting,
@@ -25,30 +26,30 @@ struct Part {
     slices: usize,
 }
 
-/// Processes that play.
+/// The worker processes of a run.
 pub struct Processes {
     workers: Vec<Worker>,
-    /// Longest time for a rollout.
+    /// Time limit for a rollout.
     patience: Duration,
-    /// Why the run could not go on.
+    /// Reason why the run could not continue.
     pub error: Option<RunError>,
 }
 
 struct Worker {
     child: Child,
-    /// Both ends are gone when the process is told to leave.
+    /// Both ends are closed to stop the process.
     pipes: Option<(ChildStdin, BufReader<ChildStdout>)>,
 }
 
-/// Longest time for a rollout. A process that was stopped from outside would hold up the run without end.
+/// Time limit for a rollout. Without it, a suspended process would block the run forever.
 const PATIENCE: Duration = Duration::from_secs(1800);
-/// How long processes may take to leave by themselves, and then to die.
+/// Time for processes to exit by themselves, and then to die.
 const GRACE: Duration = Duration::from_millis(500);
-/// Time between two looks at a process that is to leave.
+/// Interval between two checks of an exiting process.
 const LOOK: Duration = Duration::from_millis(2);
 
 impl Processes {
-    /// Refuses what processes cannot play.
+    /// Refuses configurations that processes cannot play.
     ///
     /// # Errors
     /// If the algorithm is SAC.
@@ -57,14 +58,14 @@ impl Processes {
             Algorithm::Sac(_) if count > 0 => Err(RunError::option(
                 "processes",
                 format!(
-                    "is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr take it"
+                    "is {count}, expected 0 with sac, whose replay stays with its agents; ppo, a2c and acktr support it"
                 ),
             )),
             _ => Ok(()),
         }
     }
 
-    /// Starts so many processes of a program for a run, at most one for every sixteen agents.
+    /// Starts `count` processes of a program for a run, at most one for every sixteen agents.
     ///
     /// # Errors
     /// If one cannot be started.
@@ -72,7 +73,7 @@ impl Processes {
         Self::check(config, count)?;
         let slices = count.clamp(1, config.run.blocks());
         let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));
-        // those that have been started leave with it
+        // dropping it also stops the processes that have been started
         let mut all = Processes { workers: Vec::new(), patience: PATIENCE, error: None };
         for slice in 0..slices {
             let mut worker = Worker::start(Command::new(program).arg("rollout-worker")).map_err(|e| failed(&e))?;
@@ -93,7 +94,7 @@ impl Worker {
         Ok(Worker { child, pipes })
     }
 
-    /// Waits until a moment for the process to end; whether it has.
+    /// Waits until a moment for the process to end. Returns whether it has ended.
     fn ended_by(&mut self, moment: Instant) -> bool {
         loop {
             match self.child.try_wait() {
@@ -114,7 +115,7 @@ impl Players for Processes {
         let parts = self.workers.iter_mut().map(|worker| (&mut worker.child, &mut worker.pipes));
         let (mut children, mut pipes): (Vec<_>, Vec<_>) = parts.unzip();
         let mut exchange = || -> Result<(), (usize, String)> {
-            // a process reads all before it answers, so none waits for another
+            // a process reads everything before it answers, so none waits for another
             for (i, (pipes, state)) in pipes.iter_mut().zip(states).enumerate() {
                 let Some((requests, _)) = pipes else { continue };
                 send(requests, &[orders, state]).map_err(|e| (i, e.to_string()))?;
@@ -130,7 +131,7 @@ impl Players for Processes {
         let patience = self.patience;
         let (finished, wait) = channel::<()>();
         let (result, late) = std::thread::scope(|scope| {
-            // a pipe cannot be read with a time limit, but it ends with its process
+            // reading a pipe has no time limit, but it ends with its process
             let watch = scope.spawn(move || {
                 let late = wait.recv_timeout(patience) == Err(RecvTimeoutError::Timeout);
                 if late {
@@ -163,12 +164,12 @@ impl Players for Processes {
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        // a process ends with its input, and one that is writing, with its reader
+        // a process ends with its input; one that is writing ends with its reader
         self.workers.iter_mut().for_each(|worker| worker.pipes = None);
         let moment = Instant::now() + GRACE;
         for worker in &mut self.workers {
             if !worker.ended_by(moment) {
-                // it keeps nothing that could be lost
+                // the process has no state to lose
                 let _ = worker.child.kill();
             }
         }
@@ -177,18 +178,18 @@ impl Drop for Processes {
     }
 }
 
-/// Plays what the learner on the other side of stdin and stdout asks for, until stdin ends. The program lets Ctrl-C pass: it
-/// is for the learner, which finishes its iteration.
+/// Plays the rollouts that the learner requests over stdin, until stdin ends. The program ignores Ctrl-C: the learner
+/// handles it and finishes its iteration.
 ///
 /// # Errors
-/// If what is asked for makes no sense.
+/// If a request is invalid.
 pub fn serve() -> Result<(), RunError> {
-    let broken = |e: io::Error| RunError::Process(format!("the learner cannot be talked to: {e}"));
+    let broken = |e: io::Error| RunError::Process(format!("the connection to the learner failed: {e}"));
     let (mut requests, mut answers) = (io::stdin().lock(), io::stdout().lock());
     let mut line = String::new();
     requests.read_line(&mut line).map_err(broken)?;
     let part: Part = serde_json::from_str(&line)
-        .map_err(|e| RunError::Process(format!("stdin: {e}; expected what a run with processes sends")))?;
+        .map_err(|e| RunError::Process(format!("stdin: {e}; expected messages of a run with processes")))?;
     let factory = part.task.factory()?;
     let mut player = Player::new(&*factory, Isa::best(), &part.config, (part.slice, part.slices))?;
     while let Some(orders) = receive(&mut requests).map_err(broken)? {
@@ -207,7 +208,7 @@ fn send(pipe: &mut impl Write, messages: &[&[u8]]) -> io::Result<()> {
     pipe.flush()
 }
 
-/// The next message; none at the end.
+/// The next message, or `None` at the end.
 fn receive(pipe: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     let mut length = [0; 8];
     match pipe.read_exact(&mut length) {
@@ -216,7 +217,7 @@ fn receive(pipe: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     }
     let length = u64::from_le_bytes(length);
     let mut message = Vec::new();
-    // what is not there is not made room for
+    // a false length does not allocate memory
     pipe.take(length).read_to_end(&mut message)?;
     if (message.len() as u64) < length { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(Some(message)) }
 }
@@ -225,7 +226,7 @@ fn receive(pipe: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
 mod tests {
     use super::*;
 
-    /// Processes that do not listen, or write without end, hold nobody up.
+    /// Processes that ignore the end of input, or write without end, do not block the exit.
     #[cfg(unix)]
     #[test]
     fn a_process_that_does_not_leave_is_ended() {
@@ -250,7 +251,7 @@ mod tests {
         }
     }
 
-    /// A process that was stopped ends the run in time, whether it stopped before it read or before it answered.
+    /// A suspended process ends the run in time, whether it was suspended before reading or before answering.
     #[cfg(unix)]
     #[test]
     fn a_process_that_does_not_answer_ends_the_run() {
@@ -275,7 +276,7 @@ mod tests {
         assert_eq!(receive(&mut all).unwrap().as_deref(), Some(&b""[..]));
         assert_eq!(receive(&mut all).unwrap(), None);
         assert!(receive(&mut &pipe[..10]).is_err());
-        // a length out of nowhere takes no memory
+        // a false length does not allocate memory
         assert!(receive(&mut &u64::MAX.to_le_bytes()[..]).is_err());
     }
 }

@@ -1,15 +1,15 @@
-//! The Python interpreter for programs of other projects, such as MuJoCo and Stable-Baselines3.
+//! The Python interpreter for external programs, such as MuJoCo and Stable-Baselines3.
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Environment variable that names the Python to use.
+/// Environment variable with the Python to use.
 pub const VARIABLE: &str = "MARATHON_PYTHON";
 /// Characters that [`complaint`] keeps.
 const COMPLAINT: usize = 2000;
 
-/// The Python that [`VARIABLE`] names, else that of `.venv` in the working directory or the root of its repository, else the
+/// The Python in [`VARIABLE`], else that of `.venv` in the working directory or the root of its repository, else the
 /// system's.
 pub fn find() -> PathBuf {
     if let Some(named) = env::var_os(VARIABLE).filter(|name| !name.is_empty()) {

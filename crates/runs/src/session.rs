@@ -1,4 +1,4 @@
-//! A training run: begun or gone on with, carried out, written to its folder.
+//! A training run: started or resumed, executed, and written to its folder.
 
 use crate::configuration;
 use crate::demonstrations::with_demonstrations;
@@ -26,41 +26,41 @@ use marathon_physics::lanes::Isa;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A run about to begin or to go on.
+/// A run before it starts or resumes.
 pub struct Session {
-    /// What the run is.
+    /// Description of the run.
     pub run: RunFile,
-    /// Its folder; without one, nothing is written.
+    /// Its folder. Without one, nothing is written.
     pub folder: Option<RunFolder>,
     /// Its task.
     pub factory: Arc<dyn ShardFactory>,
-    /// What makes that again, if it is one of the registry.
+    /// Recreates the task, if it is registered.
     pub setting: Setting,
-    /// Where it goes on from.
+    /// The checkpoint that it resumes from.
     pub checkpoint: Option<Checkpoint>,
 }
 
-/// What a run has led to.
+/// Results of a run.
 pub struct Outcome {
-    /// The policy, which knows its evaluation: of a task with several roles, the first one's.
+    /// The policy with its evaluation. With several roles, the first one's.
     pub policy: Policy,
     /// The other roles' policies, by the roles' names.
     pub others: Vec<(String, Policy)>,
     /// Agent-steps done.
     pub steps: u64,
-    /// How its best actions do; none if the run was stopped before its last step.
+    /// Evaluation of its best actions. `None` if the run was stopped before its last step.
     pub evaluation: Option<Evaluation>,
-    /// The run in numbers.
+    /// Summary of the run.
     pub summary: Summary,
-    /// The folder, which stays locked as long as this lives.
+    /// The folder, which stays locked as long as this value lives.
     pub folder: Option<RunFolder>,
 }
 
-/// Where a new run starts, if it is to start from a policy.
+/// The start of a new run that starts from a policy.
 fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkpoint>, RunError> {
     let Some(path) = &run.initialize_from else { return Ok(None) };
     let policy = policy_file::read(path, None)?;
-    // of a task with several roles, the first one starts from it
+    // with several roles, the first one starts from the policy
     let spec = factory.spec();
     let [role, ..] = &spec.deciders()[..] else { return Ok(None) };
     let sees = policy_file::seen_by(&policy, path, &spec.of_role(role))?;
@@ -68,14 +68,14 @@ fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkp
 }
 
 impl Session {
-    /// Starts a new run, or resumes the run in the folder that `resume` names from its last checkpoint. A new run uses
-    /// the configuration `loaded`, the one in the options' file, or the agent's own fast one. It has its own folder
-    /// unless `dry`. A resumed run has its task and arguments from `run.json`; pass the task only if a front end
-    /// created it. Also returns notes on the configuration for the user.
+    /// Starts a new run, or resumes the run in the folder `resume` from its last checkpoint. A new run uses the
+    /// configuration `loaded`, the one in the options' file, or the agent's default one. It has its own folder unless
+    /// `dry`. A resumed run has its task and options from `run.json`; pass the task only if a front end created it.
+    /// Also returns notes on the configuration for the user.
     ///
     /// # Errors
-    /// If the options or the configuration are not usable, the task or the folder cannot be made, or there is no such run, or
-    /// it is of another task, complete or damaged.
+    /// If the options or the configuration are invalid, the task or the folder cannot be created, or there is no such
+    /// run, or the run has another task, is complete or is damaged.
     pub fn open(
         task: Option<Task<'_>>,
         options: &RunOptions,
@@ -117,7 +117,7 @@ impl Session {
         run.threads = learn.threads.unwrap_or(run.threads);
         loaded.config.validate()?;
         Processes::check(&loaded.config, options.processes)?;
-        // what is given by hand comes later, and counts
+        // the user's options come later and have precedence
         let given = loaded.options.iter().chain(&options.task.given).cloned().collect();
         let (factory, setting) = task.with(&TaskOptions { given })?.factory(loaded.config.run.agents)?;
         if let (Some(path), [_, others @ ..]) = (&learn.config, &factory.spec().roles[..]) {
@@ -157,7 +157,7 @@ impl Session {
         };
         inputs::check(&run.files)?;
         Processes::check(&run.config, options.processes)?;
-        // a run that ended before its first checkpoint begins again, which gives the same bits
+        // a run that ended before its first checkpoint starts again, which gives the same bits
         let checkpoint = folder.last_checkpoint(&run)?;
         if let (None, Some(policy), Some(sum)) = (&checkpoint, &run.initialize_from, &run.initialize_from_checksum) {
             inputs::check_start(policy, sum)?;
@@ -183,31 +183,31 @@ impl Session {
         Ok(Session { folder: Some(folder), run, factory, setting, checkpoint })
     }
 
-    /// Agent-steps done before.
+    /// Number of agent-steps done before.
     pub fn steps(&self) -> u64 {
         self.checkpoint.as_ref().map_or(0, Checkpoint::steps)
     }
 
-    /// Takes back a run that could not begin: nothing is left of its folder, unless there was a run before.
+    /// Removes the folder of a run that could not start, unless there was a run before.
     pub fn abandon(self) {
         if let Some(folder) = self.folder {
             folder.discard();
         }
     }
 
-    /// Trains to the last step, or until `watch` wants to stop, evaluates, and writes everything to the folder.
-    /// `show`: with a bar or lines on stderr.
+    /// Trains to the last step or until `watch` stops the run, evaluates, and writes everything to the folder. `show`:
+    /// show a bar or lines on stderr.
     ///
     /// # Errors
-    /// If files cannot be written; the text says what is left and how to go on.
+    /// If files cannot be written. The text says what is left and how to continue.
     pub fn carry_out(self, show: bool, watch: &mut Watch) -> Result<Outcome, RunError> {
         self.carry_out_with(None, show, watch)
     }
 
-    /// The same with rollouts that `players` play.
+    /// Like [`Session::carry_out`], with rollouts that `players` play.
     ///
     /// # Errors
-    /// The same.
+    /// Like [`Session::carry_out`].
     pub fn carry_out_with(
         mut self,
         players: Option<&mut dyn Players>,
@@ -217,7 +217,7 @@ impl Session {
         let resume = self.checkpoint.take();
         let TrainOutput { mut policy, mut others, checkpoint, .. } = match self.learn(players, resume, show, watch) {
             Ok(output) => output,
-            // it says how to go on
+            // this error says how to continue
             Err(error @ RunError::Stopped { .. }) => return Err(error),
             Err(error) => {
                 self.abandon();
@@ -233,7 +233,7 @@ impl Session {
                 curve::draw(folder, &run, &history)
             });
             if result.is_err() {
-                // the run is not complete without its curve
+                // a run without its curve counts as incomplete
                 let _ = std::fs::remove_file(folder.curve());
             }
             drawn = result;
@@ -262,7 +262,7 @@ impl Session {
         Ok(Outcome { policy, others, steps, evaluation, summary, folder })
     }
 
-    /// Trains and saves what was learned.
+    /// Trains and saves the results.
     fn learn(
         &self,
         players: Option<&mut dyn Players>,
@@ -288,7 +288,7 @@ impl Session {
         let mut output = result?;
         note_clips(&mut output, &setting.clips);
         let steps = output.checkpoint.steps();
-        // what was learned is safe before anything else happens; an iteration that is not told of is to come again
+        // save the results first; an iteration that was not reported is repeated on resume
         let saved = if told { save(folder, &output).map(|()| true) } else { Ok(false) };
         match (error, saved) {
             (Some(cause), saved) => Err(stopped(folder, cause, saved.unwrap_or(false), steps)),
@@ -298,8 +298,8 @@ impl Session {
     }
 }
 
-/// Whether a run has done the last thing that it does with so many steps: its summary has an evaluation, and its curve is
-/// there.
+/// Whether a run has completed its last action for this number of steps: its summary has an evaluation, and its curve
+/// exists.
 fn is_finished(folder: &RunFolder, steps: u64) -> Result<bool, RunError> {
     let path = folder.summary();
     if !path.exists() || !folder.curve().exists() {

@@ -1,4 +1,4 @@
-//! The task of a run: one of the registry, or one that a front end has made.
+//! The task of a run: registered, or created by a front end.
 
 use crate::error::RunError;
 use crate::setting::{Setting, TaskOptions};
@@ -7,28 +7,28 @@ use std::sync::Arc;
 
 type Make<'a> = Box<dyn FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a>;
 
-/// A task whose environments are yet to be made.
+/// A task whose environments do not exist yet.
 pub struct Task<'a> {
     setting: Setting,
-    /// Of a task that a front end makes.
+    /// Factory of a task that a front end creates.
     make: Option<Make<'a>>,
 }
 
 impl<'a> Task<'a> {
-    /// One of the registry, by any of its names.
+    /// A registered task, by any of its names.
     ///
     /// # Errors
-    /// If there is none; the text names the nearest.
+    /// If the task does not exist. The text names the nearest.
     pub fn named(name: &str) -> Result<Self, RunError> {
         Ok(Self::set(Setting::named(name)?))
     }
 
-    /// One of the registry with its arguments.
+    /// A registered task with its options.
     pub fn set(setting: Setting) -> Self {
         Task { setting, make: None }
     }
 
-    /// Another one. `make` is told with how many agents the run is.
+    /// A task of a front end. `make` gets the number of agents of the run.
     pub fn made(id: String, make: impl FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a) -> Self {
         Task { setting: Setting { agent: id, ..Setting::default() }, make: Some(Box::new(make)) }
     }
@@ -43,25 +43,25 @@ impl<'a> Task<'a> {
         &self.setting.agent
     }
 
-    /// The task with more arguments.
+    /// The task with more options.
     ///
     /// # Errors
-    /// If it does not take them, or a file that they name cannot be read.
+    /// If the task does not take them, or a file that they name cannot be read.
     pub fn with(self, options: &TaskOptions) -> Result<Self, RunError> {
         match self.make {
             _ if options.given.is_empty() => Ok(self),
             None => Ok(Self::set(self.setting.with(options)?)),
             Some(_) => {
-                let problem = format!("is for tasks of the registry; {} takes its arguments itself", self.id());
+                let problem = format!("is for registered tasks; set the options of {} where you create it", self.id());
                 Err(RunError::option("option", problem))
             }
         }
     }
 
-    /// Its environments, for a run with so many agents, and all that makes them again.
+    /// Creates its environments for a run with `agents` agents, and the setting that recreates them.
     ///
     /// # Errors
-    /// If they cannot be made.
+    /// If they cannot be created.
     pub fn factory(self, agents: usize) -> Result<(Arc<dyn ShardFactory>, Setting), RunError> {
         let Task { mut setting, make } = self;
         let factory = match make {

@@ -1,4 +1,4 @@
-//! Numbers and paths as people read them.
+//! Formatting of numbers and paths.
 
 use serde::Serializer;
 use std::borrow::Cow;
@@ -17,13 +17,13 @@ pub fn thousands(n: u64) -> String {
     out
 }
 
-/// `Hopper-v0` as `hopper`: the first version is what people mean by the bare name.
+/// `Hopper-v0` as `hopper`: the bare name means the first version.
 pub fn short_name(agent: &str) -> String {
     let name = agent.to_lowercase();
     name.strip_suffix("-v0").unwrap_or(&name).to_string()
 }
 
-/// A number with its thousands or millions as `k` and `M`: `512 k`, `1.25 M`.
+/// A number with `k` for thousands or `M` for millions: `512 k`, `1.25 M`.
 pub fn short(x: f64) -> String {
     match x {
         x if x >= 9.995e8 => format!("{:.2} G", x / 1e9),
@@ -44,7 +44,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// What to say of agents whose state was no longer finite; nothing if there were none.
+/// A note on agents whose state became non-finite. `None` if there were none.
 pub fn broken(agents: u64) -> Option<String> {
     let times = match agents {
         0 => return None,
@@ -54,7 +54,7 @@ pub fn broken(agents: u64) -> Option<String> {
     Some(format!("note: {times} the simulation of an agent broke down (its state was not finite)"))
 }
 
-/// What to say of minibatches that were left out; nothing if there were none.
+/// A note on skipped minibatches. `None` if there were none.
 pub fn skipped(minibatches: u64) -> Option<String> {
     let were = match minibatches {
         0 => return None,
@@ -64,7 +64,7 @@ pub fn skipped(minibatches: u64) -> Option<String> {
     Some(format!("note: {were} left out because the gradient was not finite; a smaller learning rate or network helps"))
 }
 
-/// Zero for a number that would be written as `-0.0` with so many decimals.
+/// Zero for a number that would be formatted as `-0.0` with this number of decimals.
 pub fn unsigned_zero(x: f64, decimals: i32) -> f64 {
     if x.abs() < 0.5 * 10_f64.powi(-decimals) { 0.0 } else { x }
 }
@@ -94,7 +94,7 @@ fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     text.chars().map(|c| if commands_terminals(c) { escape(c) } else { c.to_string() }).collect::<String>().into()
 }
 
-/// A path in JSON, which has no other text: bytes that are not UTF-8 become replacement characters.
+/// Serializes a path as JSON text. Bytes that are not UTF-8 become replacement characters.
 pub fn path_json<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
 }
@@ -126,7 +126,7 @@ pub fn word(text: &str) -> String {
     if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
-/// What is called almost like `path`, beside it or in one of these folders, and fits.
+/// A path with a similar name to `path`, next to it or in one of these folders, that satisfies `fits`.
 pub fn nearest_path(path: &Path, folders: &[&Path], fits: impl Fn(&Path) -> bool) -> Option<String> {
     let asked = path.display().to_string();
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -30,7 +30,7 @@ fn options_that_do_not_go_together_are_refused_by_their_names() {
         (new(|o| o.initialize_from = Some("b".into())), "initialize_from"),
         (new(|o| o.out = Some("b".into())), "out"),
     ] {
-        assert_eq!(text, format!("{name} belongs to a new run, not to one that resume goes on with"));
+        assert_eq!(text, format!("{name} is for new runs, not for one that resume continues"));
     }
     let more = LearnOptions { steps: Some(9), threads: Some(2), ..Default::default() };
     let options = RunOptions { learn: more, resume: Some("runs/a".into()), processes: 2, ..Default::default() };
@@ -55,12 +55,12 @@ fn films_have_a_length_and_a_rate() {
 fn a_front_end_spells_options_and_advice() {
     let complete = RunError::Complete { folder: "runs/a".into(), steps: 4096 };
     let told = |error: &RunError| [error.to_string(), error.spelled(&Flags("marathon"))];
-    let both = "runs/a: the run is complete with 4,096 steps; to let it learn on, give it more, such as";
+    let both = "runs/a: the run is complete with 4,096 steps; to train longer, set more, such as";
     assert_eq!(told(&complete), [format!("{both} steps 8,192"), format!("{both} --steps 8,192")]);
     let [plain, flags] = told(&RunError::HoldsRun("my runs".into()));
-    assert!(plain.starts_with("out 'my runs' holds a run already; go on with it by resuming 'my runs',"), "{plain}");
+    assert!(plain.starts_with("out 'my runs' already holds a run; continue it by resuming 'my runs',"), "{plain}");
     assert!(
-        flags.starts_with("--out 'my runs' holds a run already; go on with it by `marathon train --resume 'my runs'`,")
+        flags.starts_with("--out 'my runs' already holds a run; continue it by `marathon train --resume 'my runs'`,")
     );
     let cause = Box::new(RunError::NewRunOnly { name: "seed" });
     let stopped = RunError::Stopped { cause, folder: "runs/a".into(), steps: 9000, saved: Some(8000) };
@@ -70,7 +70,7 @@ fn a_front_end_spells_options_and_advice() {
         "the cause is spelled, too: {flags}"
     );
     assert!(
-        flags.ends_with("has 8,000 of 9,000 steps: mend that and go on by `marathon train --resume runs/a`"),
+        flags.ends_with("has 8,000 of 9,000 steps: fix the problem and continue by `marathon train --resume runs/a`"),
         "{flags}"
     );
 }
@@ -89,7 +89,7 @@ fn a_run_without_files_or_command_line_begins_from_plain_options() {
     let resume = RunOptions { resume: Some("no/such/run".into()), ..Default::default() };
     assert_eq!(text(open(None, &resume)), "no/such/run: resume: found no such folder, expected the folder of a run");
     let given = Some(marathon_config::default_for("hopper"));
-    assert!(text(Session::open(None, &resume, given, true)).starts_with("config belongs to a new run"));
+    assert!(text(Session::open(None, &resume, given, true)).starts_with("config is for new runs"));
     let sac = LearnOptions { algo: Some("sac".into()), ..Default::default() };
     let options = RunOptions { learn: sac, processes: 2, ..Default::default() };
     assert!(

@@ -1,8 +1,8 @@
-//! How well a policy obeys commands: minutes of random ones, steps from one velocity to another, turns, standing, jumps, pushes.
+//! Measures how well a policy tracks commands: minutes of random commands, speed steps, turns, standing, jumps, pushes.
 //!
-//! Velocities are those of the center of mass from one decision to the next. Forward is where the root's x axis points along
-//! the ground, or +x for figures in a plane. A command is observed at the end of the decision in which it is given, so that a
-//! response includes this decision.
+//! Velocities are those of the center of mass between two decisions. Forward is the direction of the root's x axis
+//! along the ground, or +x for planar characters. A command is observed at the end of the decision in which it is set,
+//! so a response includes this decision.
 
 mod response;
 mod table;
@@ -20,39 +20,39 @@ use trial::{Moment, Track, Trial};
 
 /// Length of a sequence of random commands, s.
 const MINUTE: f64 = 60.0;
-/// Time in which a fall may come from the start, s.
+/// Time after the start in which a fall counts as early, s.
 const EARLY: f64 = 2.0;
-/// Time after a change of command from which on the command counts as obeyed, s.
+/// Time after a change of command from which on errors count as settled, s.
 const SETTLED: f64 = 1.5;
 /// Time at the old command before a new one, s, and time at the new one.
 const BEFORE: f64 = 4.0;
 const AFTER: f64 = 4.0;
-/// Time that is left for coming to a stand, and time of standing, s.
+/// Time for stopping, and time of standing, s.
 const STOPPING: f64 = 4.0;
 const STANDING: f64 = 10.0;
-/// What counts as standing still: way of the center of mass, m, and mean speed of the parts, m/s.
+/// Limits of standing still: path of the center of mass, m, and mean speed of the bodies, m/s.
 const DRIFT: f64 = 0.1;
 const RESTLESS: f64 = 0.05;
-/// Name of the button for a backflip, how long it is held, and how long one takes with a second afterward, s.
+/// Name of the button for a backflip, how long it is held, and the time for a flip and one second afterward, s.
 const BACKFLIP: &str = "backflip";
 const HELD: f64 = 0.25;
 const FLIP: f64 = 3.0;
-/// What pushes over, m/s, and in what time one is up at once, s.
+/// Velocity of a push that makes the character fall, m/s, and the time limit for standing up promptly, s.
 const OVER: f64 = 4.0;
 const UP: f64 = 4.0;
-/// How long a button is held, s, how long one is off the ground who jumps, s, and in what time a figure that jumps at once is off the ground, s.
+/// Time for which a button is held, minimum time off the ground of a jump, and time limit of a prompt jump, s.
 const PRESSED: f64 = 1.0;
 const ALOFT: f64 = 0.1;
 const PROMPT: f64 = 0.35;
-/// Acceleration of whatever falls, m/s^2.
+/// Gravitational acceleration, m/s^2.
 const GRAVITY: f64 = 9.81;
-/// Pushes: what they would add to the velocity of a rigid body of the figure's mass, m/s, and how long they last, s.
+/// Pushes: the velocity that they would give to a rigid body of the character's mass, m/s, and their duration, s.
 const PUSHES: [f64; 3] = [0.25, 0.5, 1.0];
 const PUSH: f64 = 0.1;
-/// Angle between the pushes of one agent and of the next: the golden angle, so that they come from all sides.
+/// Angle between the pushes of consecutive agents. The golden angle spreads them over all directions.
 const GOLDEN: f64 = 0.381_966_011_250_105 * TAU;
 
-/// How well a policy obeys commands.
+/// How well a policy tracks commands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Obedience {
     /// The task.
@@ -61,21 +61,21 @@ pub struct Obedience {
     pub agents: u64,
     /// Seconds between decisions.
     pub dt: f64,
-    /// A minute of random commands each.
+    /// A minute of random commands for each agent.
     pub minutes: Minutes,
-    /// From one velocity to another.
+    /// Responses to speed steps.
     pub responses: Vec<Response>,
-    /// The sharpest turns at each speed; empty for figures in a plane.
+    /// The sharpest turns at each speed. Empty for planar characters.
     pub turns: Vec<Turn>,
-    /// Told to stand.
+    /// Standing on command.
     pub stand: Stand,
-    /// Told to jump from a stand, and at half and all of the highest speed; empty for tasks without such a button.
+    /// Jumps from a stand, and at half and at full speed. Empty for tasks without such a button.
     pub jumps: Vec<Jump>,
-    /// Told to turn over backward from a stand; none for tasks without such a button.
+    /// A backflip from a stand. `None` for tasks without such a button.
     pub backflip: Option<Flip>,
-    /// Pushed at half of the highest speed.
+    /// Pushes at half of the highest speed.
     pub pushes: Vec<Push>,
-    /// Pushed over while standing; none for tasks in which a fall is the end.
+    /// Getting up after a push. `None` for tasks in which a fall ends the episode.
     pub rise: Option<Rise>,
 }
 
@@ -84,20 +84,20 @@ pub struct Obedience {
 pub struct Minutes {
     /// Minutes without a fall.
     pub without_fall: u64,
-    /// Falls within 2 s of the start: what a start cannot help is among them.
+    /// Falls within 2 s of the start, including those that no policy can avoid.
     pub early_falls: u64,
-    /// Falls by the time that was played, 1/min.
+    /// Falls per minute of simulated time.
     pub falls_per_minute: f64,
-    /// Mean distance of the velocity from the commanded one, m/s: what the task reports as `velocity_error`, or else that of
-    /// the forward speed.
+    /// Mean distance between actual and commanded velocity, m/s: the task's metric `velocity_error`, or else the error
+    /// of the forward speed.
     pub velocity_error: f64,
-    /// The same from 1.5 s after a change of command on.
+    /// The same error from 1.5 s after a change of command on.
     pub settled_error: f64,
-    /// Mean way that a part of a sole slides each time that it stands on the ground, m.
+    /// Mean distance that a part of a sole slides per ground contact, m.
     pub slide: f64,
 }
 
-/// A turn held for seconds.
+/// A turn that is held for seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Turn {
     /// Commanded speed, m/s.
@@ -110,7 +110,7 @@ pub struct Turn {
     pub reached_turn: f64,
     /// Agents that turned.
     pub agents: u64,
-    /// Those of them that fell.
+    /// Number of agents that fell.
     pub falls: u64,
 }
 
@@ -119,33 +119,33 @@ pub struct Turn {
 pub struct Stand {
     /// Agents that stayed within 0.1 m and whose parts moved by less than 0.05 m/s in the mean.
     pub still: u64,
-    /// Agents that fell, those that came to a stand before included.
+    /// Number of agents that fell, including while stopping.
     pub falls: u64,
-    /// Median of the farthest way of the center of mass, m; none if all fell.
+    /// Median of the largest distance of the center of mass from its start, m. `None` if all fell.
     pub drift: Option<f64>,
-    /// Median of the mean speed of the parts, m/s.
+    /// Median of the mean speed of the bodies, m/s.
     pub speed: Option<f64>,
 }
 
-/// A button that is held for a second, and let go.
+/// A button that is held for a second, then released.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Jump {
     /// Commanded speed, m/s.
     pub speed: f64,
     /// Agents that had not fallen before.
     pub agents: u64,
-    /// Those of them that were off the ground within 0.35 s.
+    /// Number of agents that were off the ground within 0.35 s.
     pub prompt: u64,
-    /// Those of them whose center of mass then rose as fast as a body must to be in the air for so long, within 0.35 s: whoever draws up the
-    /// legs is off the ground, too, but falls.
+    /// Number of agents whose center of mass then also rose within 0.35 s as fast as such a time in the air requires.
+    /// Drawing up the legs leaves the ground, too, but then the character falls.
     pub thrown: u64,
-    /// Those of them that fell within 4 s.
+    /// Number of agents that fell within 4 s.
     pub falls: u64,
-    /// Median time until no foot is on the ground for a tenth of a second, s; none if fewer than half of them jumped.
+    /// Median time until no foot has touched the ground for 0.1 s, s. `None` if fewer than half of the agents jumped.
     pub latency: Option<f64>,
-    /// The same until they are thrown.
+    /// Median time until the condition of `thrown` holds, s.
     pub thrown_latency: Option<f64>,
-    /// Median of how far the center of mass rises above where it was, m; none if nobody was left.
+    /// Median rise of the center of mass, m. `None` if all agents fell.
     pub height: Option<f64>,
 }
 
@@ -154,7 +154,7 @@ pub struct Jump {
 pub struct Flip {
     /// Agents that had not fallen before.
     pub agents: u64,
-    /// Those of them that turned over and landed on their feet, and stood or went on for a second.
+    /// Number of agents that turned over, landed on their feet, and stayed up for a second.
     pub landed: u64,
 }
 
@@ -163,27 +163,27 @@ pub struct Flip {
 pub struct Rise {
     /// Agents that were pushed over.
     pub agents: u64,
-    /// Those of them that were up again within 4 s.
+    /// Number of agents that stood again within 4 s.
     pub prompt: u64,
-    /// Median of the time that it took, s; none if fewer than half of them got up.
+    /// Median time until standing, s. `None` if fewer than half of the agents got up.
     pub time: Option<f64>,
 }
 
 /// A push from any side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Push {
-    /// Impulse by the figure's mass, m/s.
+    /// Impulse per mass of the character, m/s.
     pub velocity: f64,
     /// Agents that were pushed.
     pub agents: u64,
-    /// Those of them that fell.
+    /// Number of agents that fell.
     pub falls: u64,
-    /// Median of the time until the mean speed of a quarter of a second is that of before to within 0.3 m/s, s; none if fewer
-    /// than half of them got there.
+    /// Median time until the mean speed over 0.25 s is within 0.3 m/s of the earlier one, s. `None` if fewer than half
+    /// of the agents recovered.
     pub recovery: Option<f64>,
 }
 
-/// Where a command has its speed and its turn.
+/// Indices and ranges of speed and turn in a command.
 struct Commands {
     rest: Vec<f64>,
     speed: usize,
@@ -210,13 +210,13 @@ impl Commands {
         })
     }
 
-    /// Three speeds: the lowest, the highest and rest, or what is halfway if the lowest is rest.
+    /// Three speeds: the lowest, the highest and rest, or half the highest if the lowest is rest.
     fn levels(&self) -> [f64; 3] {
         let ([low, high], rest) = (self.range, self.rest[self.speed]);
         [low, if low < rest { rest } else { 0.5 * (low + high) }, high]
     }
 
-    /// To go at a speed, and to turn.
+    /// The command for a speed and a turn.
     fn at(&self, speed: f64, turn: f64) -> Vec<f64> {
         let mut command = self.rest.clone();
         command[self.speed] = speed;
@@ -227,17 +227,17 @@ impl Commands {
     }
 }
 
-/// Tasks that can be told a speed.
+/// Tasks with a speed command.
 fn obedient() -> Vec<String> {
     let told = |id: &String| registry::agent(id).is_ok_and(|a| a.facts().command.iter().any(CommandRange::is_speed));
     registry::ids().into_iter().filter(told).collect()
 }
 
-/// Plays all trials with a policy's best actions, with so many agents each as `options` has episodes. All of them start as they do for
-/// whoever plays, wherever the policy learned.
+/// Runs all trials with a policy's best actions. Each has as many agents as `options` has episodes. All agents start as
+/// in play, regardless of the starts in training.
 ///
 /// # Errors
-/// If the policy's task does not exist, or cannot be told a speed.
+/// If the policy's task does not exist, or has no speed command.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
     let setting = Setting::asked(policy.meta()).from_the_first()?;
     let commands = Commands::of(policy, &setting)?;
@@ -284,7 +284,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
     })
 }
 
-/// A minute of each agent's own schedule.
+/// Plays a minute of each agent's own schedule.
 fn minutes(mut trial: Trial<'_>) -> Result<Minutes, RunError> {
     let dt = trial.dt();
     let settled = (SETTLED / dt).ceil() as usize;
@@ -316,7 +316,7 @@ fn minutes(mut trial: Trial<'_>) -> Result<Minutes, RunError> {
     })
 }
 
-/// From one speed to another: what the agents did that had not fallen before.
+/// Plays a speed step. Returns the tracks of agents that had not fallen before.
 fn step(mut trial: Trial<'_>, commands: &Commands, from: f64, to: f64) -> Result<(f64, Vec<Track>), RunError> {
     trial.command(|_| commands.at(from, 0.0))?;
     trial.play(BEFORE)?;
@@ -324,7 +324,7 @@ fn step(mut trial: Trial<'_>, commands: &Commands, from: f64, to: f64) -> Result
     Ok((trial.dt(), trial.play(AFTER)?))
 }
 
-/// The sharpest turn at a speed, to the left and to the right in turns.
+/// Plays the sharpest turn at a speed, alternating between left and right.
 fn turn(mut trial: Trial<'_>, commands: &Commands, speed: f64, sharpest: f64) -> Result<Turn, RunError> {
     let side = |agent: usize| if agent.is_multiple_of(2) { 1.0 } else { -1.0 };
     let dt = trial.dt();
@@ -351,7 +351,7 @@ fn turn(mut trial: Trial<'_>, commands: &Commands, speed: f64, sharpest: f64) ->
     })
 }
 
-/// Ten seconds at rest.
+/// Plays ten seconds at rest.
 fn stand(mut trial: Trial<'_>, commands: &Commands) -> Result<Stand, RunError> {
     let all = trial.agents();
     trial.command(|_| commands.rest.clone())?;
@@ -367,7 +367,7 @@ fn stand(mut trial: Trial<'_>, commands: &Commands) -> Result<Stand, RunError> {
     })
 }
 
-/// Farthest way of the center of mass, m, and mean speed of the parts, m/s.
+/// Largest distance of the center of mass from its start, m, and mean speed of the bodies, m/s.
 fn still(moments: &[Moment]) -> [f64; 2] {
     let Some(first) = moments.first() else { return [0.0; 2] };
     let way = |moment: &Moment| (moment.at[0] - first.at[0]).hypot(moment.at[1] - first.at[1]);
@@ -376,7 +376,7 @@ fn still(moments: &[Moment]) -> [f64; 2] {
     [moments.iter().map(way).fold(0.0, f64::max), speed.get()]
 }
 
-/// A jump at a speed, which holds before and afterward.
+/// Plays a jump at a speed, which is also commanded before and afterward.
 fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) -> Result<Jump, RunError> {
     let dt = trial.dt();
     let goes = commands.at(speed, 0.0);
@@ -389,7 +389,7 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) ->
     trial.command(|_| goes.clone())?;
     join(&mut tracks, trial.play(AFTER - PRESSED)?);
     let start = |agent| before.iter().find(|track| track.agent == agent).and_then(|track| track.moments.last());
-    // who steps from foot to foot has none on the ground now and then
+    // stepping from foot to foot also leaves the ground briefly
     let window = (ALOFT / dt).round().max(2.0) as usize;
     let least = 0.5 * GRAVITY * (ALOFT - dt) * dt;
     let time = |track: &Track, rise: f64| {
@@ -417,7 +417,7 @@ fn jump(mut trial: Trial<'_>, commands: &Commands, button: usize, speed: f64) ->
     })
 }
 
-/// A backflip from a stand.
+/// Plays a backflip from a stand.
 fn flip(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Flip, RunError> {
     trial.command(|_| commands.rest.clone())?;
     trial.play(BEFORE)?;
@@ -435,7 +435,7 @@ fn flip(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Flip
     Ok(Flip { agents: tracks.len() as u64, landed: tracks.iter().filter(flipped).count() as u64 })
 }
 
-/// A push over, and what follows.
+/// Pushes the character over and lets it get up.
 fn rise(mut trial: Trial<'_>, commands: &Commands) -> Result<Rise, RunError> {
     trial.command(|_| commands.rest.clone())?;
     trial.play(BEFORE)?;
@@ -448,7 +448,7 @@ fn rise(mut trial: Trial<'_>, commands: &Commands) -> Result<Rise, RunError> {
     })
 }
 
-/// Goes on with tracks.
+/// Appends later moments to tracks.
 fn join(tracks: &mut [Track], mut later: Vec<Track>) {
     for track in tracks {
         if let Some(more) = later.iter_mut().find(|more| more.agent == track.agent) {
@@ -458,7 +458,7 @@ fn join(tracks: &mut [Track], mut later: Vec<Track>) {
     }
 }
 
-/// A push at a speed.
+/// Plays a push at a speed.
 fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) -> Result<Push, RunError> {
     let dt = trial.dt();
     trial.command(|_| commands.at(speed, 0.0))?;
@@ -474,7 +474,7 @@ fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) ->
     let times = tracks.iter().map(|track| {
         let usual = usual(track.agent).filter(|_| !track.fallen)?;
         let mean = |w: &[Moment]| w.iter().map(|moment| moment.speed).sum::<f64>() / window as f64;
-        // from the last moment that is not as before
+        // counts from the last moment that differs from before
         let speeds: Vec<f64> = track.moments.windows(window).map(mean).collect();
         let last = speeds.iter().rposition(|speed| (speed - usual).abs() > 0.3);
         let settled = last.map_or(0, |i| i + 1);
@@ -484,12 +484,12 @@ fn push(mut trial: Trial<'_>, commands: &Commands, speed: f64, velocity: f64) ->
     Ok(Push { velocity, agents: tracks.len() as u64, falls: falls(&tracks), recovery: response::median_time(times) })
 }
 
-/// Agents that fell.
+/// Number of agents that fell.
 fn falls(tracks: &[Track]) -> u64 {
     tracks.iter().filter(|track| track.fallen).count() as u64
 }
 
-/// A mean that grows.
+/// A running mean.
 #[derive(Default)]
 struct Mean {
     sum: f64,

@@ -3,7 +3,7 @@
 use super::trial::Track;
 use serde::Serialize;
 
-/// What agents did after the commanded speed had changed at once.
+/// Response of agents to a sudden change of the commanded speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Response {
     /// Commanded speed before, m/s.
@@ -12,22 +12,22 @@ pub struct Response {
     pub to: f64,
     /// Agents that had not fallen before.
     pub agents: u64,
-    /// Those of them that fell then.
+    /// Number of agents that fell after the change.
     pub falls: u64,
-    /// Median time until 63 % of the change are made, s; none if fewer than half of the agents made it.
+    /// Median time to 63 % of the change, s. `None` if fewer than half of the agents reached it.
     pub to_63: Option<f64>,
-    /// The same of 90 %.
+    /// Median time to 90 % of the change, s.
     pub to_90: Option<f64>,
-    /// How far the median speed goes beyond the new one, m/s.
+    /// Largest overshoot of the median speed, m/s.
     pub overshoot: f64,
-    /// Mean distance from the new speed in the second half of the time, m/s; none if nobody was left.
+    /// Mean distance from the new speed in the second half of the time, m/s. `None` if all agents fell.
     pub error: Option<f64>,
     /// Median speed at each decision, m/s.
     pub speeds: Vec<f64>,
 }
 
 impl Response {
-    /// Of agents whose commanded speed has changed from one to another as their tracks begin.
+    /// Computes the response of agents whose commanded speed changes at the start of their tracks.
     pub(super) fn of(tracks: &[Track], dt: f64, [from, to]: [f64; 2]) -> Self {
         let speeds: Vec<Vec<f64>> =
             tracks.iter().map(|track| track.moments.iter().map(|moment| moment.speed).collect()).collect();
@@ -65,13 +65,13 @@ impl Response {
     }
 }
 
-/// The middle one of some numbers; of two in the middle the lower. None of none.
+/// The median. Of two middle numbers, the lower one. `None` without numbers.
 pub fn median(mut numbers: Vec<f64>) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len().saturating_sub(1) / 2).copied()
 }
 
-/// The median of some times, of which those that never came are infinite; none if fewer than half of them came.
+/// The median time, where infinity stands for "never". `None` if fewer than half are finite.
 pub fn median_time(times: Vec<f64>) -> Option<f64> {
     median(times).filter(|time| time.is_finite())
 }

@@ -1,4 +1,4 @@
-//! Obedience as lines for a person, and as a picture.
+//! Results of a command tracking measurement as text and as a picture.
 
 use super::{EARLY, Minutes, Obedience, PROMPT, SETTLED, STANDING, Stand, UP};
 use crate::error::RunError;
@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 impl Obedience {
-    /// As a few tables.
+    /// The results as tables.
     pub fn table(&self) -> String {
         let Obedience { agents, minutes, stand, .. } = self;
         let Minutes { without_fall, early_falls, falls_per_minute, velocity_error, settled_error, slide } = minutes;
@@ -22,7 +22,7 @@ impl Obedience {
         );
         let _ = write!(
             out,
-            "told to stand for {STANDING} s: {still} of {agents} are still, {falls} fall; drift {}, parts {}\n\n\
+            "standing on command for {STANDING} s: {still} of {agents} are still, {falls} fall; drift {}, parts {}\n\n\
              {:>14} {:>8} {:>8} {:>10} {:>10} {:>9}\n",
             number(drift, "m"),
             number(speed, "m/s"),
@@ -57,7 +57,7 @@ impl Obedience {
         for j in &self.jumps {
             let _ = write!(
                 out,
-                "\ntold to jump at {:.2} m/s: {} of {} are off the ground within {PROMPT} s, {} on the way up; half of them within {}, on the way up {}; {} high, {} fall",
+                "\njumping on command at {:.2} m/s: {} of {} are off the ground within {PROMPT} s, {} on the way up; half of them within {}, on the way up {}; {} high, {} fall",
                 j.speed,
                 j.prompt,
                 j.agents,
@@ -69,7 +69,7 @@ impl Obedience {
             );
         }
         if let Some(flip) = &self.backflip {
-            let _ = write!(out, "\ntold to turn over backward: {} of {} land on their feet", flip.landed, flip.agents);
+            let _ = write!(out, "\nbackflips on command: {} of {} land on their feet", flip.landed, flip.agents);
         }
         for p in &self.pushes {
             let _ = write!(
@@ -100,7 +100,7 @@ impl Obedience {
     pub fn draw(&self, path: &Path) -> Result<(), RunError> {
         let line = |r: &super::Response| {
             let points = r.speeds.iter().enumerate().map(|(i, speed)| ((i + 1) as f64 * self.dt, *speed));
-            (format!("told {} m/s, {} before", r.to, r.from), points.collect())
+            (format!("{} m/s, {} before", r.to, r.from), points.collect())
         };
         Chart::Times("median speed after a command, m/s", self.responses.iter().map(line).collect()).draw(path)
     }

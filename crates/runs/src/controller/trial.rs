@@ -1,4 +1,4 @@
-//! Agents that are told what to do, and what they do.
+//! Agents under given commands, and their motion.
 
 use crate::error::RunError;
 use crate::play::Play;
@@ -11,67 +11,68 @@ use marathon_physics::Model;
 use marathon_physics::model::JointType;
 use std::f64::consts::{PI, TAU};
 
-/// Name of the number with which a task tells how far a velocity is from the commanded one.
+/// Metric of a task with the error of the velocity.
 const ERROR: &str = "velocity_error";
 
-/// Name of the number with which a task tells that a figure gets up after a fall.
+/// Metric of a task for a character that gets up after a fall.
 const RISING: &str = "rising";
 
-/// What an agent did in a decision.
+/// Motion of an agent in a decision.
 pub struct Moment {
-    /// Where its center of mass is along the ground, m.
+    /// Position of the center of mass along the ground, m.
     pub at: [f64; 2],
     /// Height of its center of mass, m.
     pub height: f64,
     /// Whether a foot touched the ground.
     pub grounded: bool,
-    /// Direction of the root's x axis along the ground, rad, without jumps; 0 for figures in a plane.
+    /// Direction of the root's x axis along the ground, rad, without jumps by 2 pi. 0 for planar characters.
     pub heading: f64,
     /// Forward speed of the center of mass, m/s.
     pub speed: f64,
-    /// Mean speed of the parts' centers of mass, m/s.
+    /// Mean speed of the bodies' centers of mass, m/s.
     pub parts: f64,
-    /// How far the velocity is from the commanded one, m/s.
+    /// Distance between actual and commanded velocity, m/s.
     pub error: f64,
-    /// The command that it has observed.
+    /// The observed command.
     pub command: Vec<f64>,
     pub qpos: Vec<f64>,
 }
 
-/// What an agent did that had not fallen before.
+/// Motion of an agent that had not fallen before.
 pub struct Track {
-    /// Its number.
+    /// Index of the agent.
     pub agent: usize,
     pub moments: Vec<Moment>,
-    /// Whether it fell, be it that it gets up again.
+    /// Whether it fell, including falls from which it gets up.
     pub fallen: bool,
 }
 
-/// Where an agent was last.
+/// Last pose of an agent.
 struct Place {
     centers: Vec<DVec3>,
     com: DVec3,
     heading: f64,
 }
 
-/// Agents at play.
+/// Agents in simulation.
 pub struct Trial<'a> {
     play: Play<'a>,
     model: Model,
-    /// The body that moves freely in space; none for figures in a plane.
+    /// The free body. `None` for planar characters.
     root: Option<usize>,
-    /// Number of the command that is a speed.
+    /// Index of the speed in the command.
     speed: usize,
-    /// Number of the task's own report of the error.
+    /// Index of the task's error metric.
     error: Option<usize>,
-    /// Number of the task's report that a figure gets up; none if a fall ends its episode.
+    /// Index of the task's metric for getting up. `None` if a fall ends the episode.
     rising: Option<usize>,
-    /// Where each agent was last; none of those that fell.
+    /// Last pose of each agent. `None` for agents that fell.
     places: Vec<Option<Place>>,
 }
 
 impl<'a> Trial<'a> {
-    /// Agents at the start of an episode that only a fall ends; `speed` is the number of the command that is a speed.
+    /// Creates agents at the start of an episode that only a fall ends. `speed` is the index of the speed in the
+    /// command.
     pub fn new(setting: &Setting, policy: &'a Policy, options: &EvalOptions, speed: usize) -> Result<Self, RunError> {
         let vec_options = VecEnvOptions {
             agents: options.episodes,
@@ -96,22 +97,22 @@ impl<'a> Trial<'a> {
         self.play.spec().dt
     }
 
-    /// The figure.
+    /// The character's model.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// How many there are.
+    /// Number of agents.
     pub fn agents(&self) -> usize {
         self.places.len()
     }
 
-    /// Tells each agent what to do.
+    /// Sets the command of each agent.
     pub fn command(&mut self, command: impl Fn(usize) -> Vec<f64>) -> Result<(), RunError> {
         (0..self.agents()).try_for_each(|agent| self.play.set_command(agent, Some(&command(agent))))
     }
 
-    /// Plays for some seconds.
+    /// Simulates some seconds.
     pub fn play(&mut self, seconds: f64) -> Result<Vec<Track>, RunError> {
         let standing = (0..self.agents()).filter(|agent| self.places[*agent].is_some());
         let mut tracks: Vec<Track> =
@@ -132,8 +133,8 @@ impl<'a> Trial<'a> {
         Ok(tracks)
     }
 
-    /// Plays for some seconds in which each agent's root is pushed: by an impulse that gives the figure's mass a velocity, m/s,
-    /// in a direction along the ground, rad. Figures in a plane are pushed forward and backward.
+    /// Simulates some seconds in which each agent's root is pushed. The impulse gives the character's mass a velocity,
+    /// m/s, in a direction along the ground, rad. Planar characters are pushed forward and backward.
     pub fn pushed(
         &mut self,
         seconds: f64,
@@ -153,7 +154,7 @@ impl<'a> Trial<'a> {
         Ok(tracks)
     }
 
-    /// Whether figures get up after a fall.
+    /// Whether characters get up after a fall.
     pub fn can_rise(&self) -> bool {
         self.rising.is_some()
     }
@@ -165,7 +166,7 @@ impl<'a> Trial<'a> {
         self.rising.is_some_and(|i| step.info[agent * infos + i] > 0.5)
     }
 
-    /// Plays for some seconds and returns, for each agent that falls or lies, how long it takes to be up again, s; infinite if it
+    /// Simulates some seconds. Returns the time until standing for each agent that falls or lies, s; infinite if it
     /// does not get up.
     pub fn rise(&mut self, seconds: f64) -> Result<Vec<f64>, RunError> {
         let (n, dt) = (self.agents(), self.dt());
@@ -192,7 +193,7 @@ impl<'a> Trial<'a> {
         Ok(fell.map(|(_, time)| time.unwrap_or(f64::INFINITY)).collect())
     }
 
-    /// What an agent has done since it was looked at last.
+    /// Motion of an agent since the last call.
     fn look(&mut self, agent: usize) -> Result<Moment, RunError> {
         let (qpos, dt) = (self.play.qpos(agent)?, self.dt());
         let before = self.places[agent].as_ref();
@@ -222,7 +223,7 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// The body that moves freely in space.
+/// The free body.
 fn free(model: &Model) -> Option<usize> {
     let has = |body: &marathon_physics::model::Body| {
         model.joints[body.joint_start..body.joint_start + body.joint_count].iter().any(|j| j.kind == JointType::Free)
@@ -231,7 +232,7 @@ fn free(model: &Model) -> Option<usize> {
 }
 
 impl Place {
-    /// Of a configuration of a model with this root; the heading is the angle nearest to another one.
+    /// The pose of a configuration of a model with this root. The heading is the equivalent angle nearest to `near`.
     fn of(model: &Model, root: Option<usize>, qpos: &[f64], near: f64) -> Place {
         let pose = Pose::of(model, qpos);
         let (mut com, mut mass, mut centers) = (DVec3::ZERO, 0.0, Vec::new());

@@ -1,4 +1,4 @@
-//! What pictures with axes share: size, colors, fonts, the texts of axes, and how they are written.
+//! Common parts of charts: size, colors, fonts, axis labels, and writing.
 
 use crate::error::RunError;
 use crate::text::short;
@@ -10,12 +10,12 @@ use std::sync::Once;
 
 /// Size of the picture, pixels.
 pub const SIZE: [u32; 2] = [960, 640];
-/// Drawn this much larger and averaged: plotters' thick lines have no soft edges of their own.
+/// Factor by which charts are drawn larger and then averaged: plotters does not smooth thick lines.
 pub const SCALE: u32 = 2;
 
 /// Color of text.
 pub const INK: RGBColor = RGBColor(38, 44, 52);
-/// Color of lesser text.
+/// Color of secondary text.
 pub const FAINT: RGBColor = RGBColor(112, 120, 130);
 /// Color of the grid.
 pub const GRID: RGBColor = RGBColor(228, 232, 237);
@@ -24,10 +24,10 @@ const FAMILY: &str = "Roboto";
 const REGULAR: &[u8] = include_bytes!("../../assets/fonts/Roboto-Regular-subset.ttf");
 const MEDIUM: &[u8] = include_bytes!("../../assets/fonts/Roboto-Medium-subset.ttf");
 
-/// What can go wrong while drawing.
+/// An error while drawing.
 pub type DrawError = Box<dyn std::error::Error>;
 
-/// Makes the fonts known, once.
+/// Registers the fonts, once.
 pub fn register_fonts() {
     static FONTS: Once = Once::new();
     FONTS.call_once(|| {
@@ -63,7 +63,7 @@ pub fn axis_number(y: f64) -> String {
     }
 }
 
-/// A place in the picture, in its own pixels.
+/// Converts pixels of the picture to pixels of the enlarged one.
 pub fn at(x: u32, y: u32) -> (i32, i32) {
     ((x * SCALE) as i32, (y * SCALE) as i32)
 }
@@ -73,7 +73,7 @@ pub fn style(size: u32, color: RGBColor, weight: FontStyle) -> TextStyle<'static
     (FAMILY, size * SCALE, weight).into_font().color(&color)
 }
 
-/// Averages squares of `SCALE` pixels' side.
+/// Averages squares with sides of `SCALE` pixels.
 pub fn reduce(rgb: &[u8]) -> Vec<u8> {
     let (side, [width, height]) = (SCALE as usize, SIZE.map(|side| side as usize));
     let mut out = Vec::with_capacity(3 * width * height);

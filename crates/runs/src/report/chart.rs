@@ -1,4 +1,4 @@
-//! Pictures that compare runs: lines over steps or over time, or bars.
+//! Charts that compare runs: lines over steps or over time, or bars.
 
 use super::canvas::{
     DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
@@ -8,7 +8,7 @@ use plotters::prelude::*;
 use plotters::style::FontStyle;
 use std::path::Path;
 
-/// Colors of lines and bars, apart for all kinds of sight (Okabe and Ito).
+/// Colors of lines and bars that color-blind people can distinguish (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -20,19 +20,19 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(178, 160, 0),
 ];
 
-/// Height of the names of bars, and mean width of a letter of theirs, pixels.
+/// Height of the names of bars, and mean width of a letter in them, pixels.
 const NAMES: u32 = 76;
 const LETTER: f64 = 6.4;
-/// Height of a name of a line, pixels; names stand in two columns.
+/// Height of a line's name, pixels. Names are set in two columns.
 const LINE_NAME: u32 = 20;
 
-/// A picture.
+/// A chart.
 pub enum Chart {
-    /// Lines over agent-steps: what is drawn, and each line's name and points.
+    /// Lines over agent-steps: the quantity, and each line's name and points.
     Lines(&'static str, Vec<(String, Vec<(f64, f64)>)>),
-    /// Lines over seconds: the same.
+    /// Lines over seconds: the quantity, and each line's name and points.
     Times(&'static str, Vec<(String, Vec<(f64, f64)>)>),
-    /// Bars: what is drawn, and each bar's name and height.
+    /// Bars: the quantity, and each bar's name and height.
     Bars(&'static str, Vec<(String, f64)>),
 }
 
@@ -96,7 +96,7 @@ impl Chart {
                     for (i, (name, points)) in lines.iter().enumerate() {
                         let color = COLORS[i % COLORS.len()];
                         let (points, stroke) = (points.iter().copied(), color.stroke_width(2 * SCALE));
-                        // as many lines again have the same colors, and dashes
+                        // further lines reuse the colors, with dashes
                         let name = if i < COLORS.len() {
                             chart.draw_series(LineSeries::new(points, stroke))?;
                             name.clone()
@@ -104,7 +104,7 @@ impl Chart {
                             chart.draw_series(DashedLineSeries::new(points, 9 * SCALE, 6 * SCALE, stroke))?;
                             format!("{name} (dashed)")
                         };
-                        // the names below, where no line runs
+                        // the names below the chart
                         let (column, row) = (i as u32 % 2, i as u32 / 2);
                         let place = at(78 + column * (SIZE[0] - 110) / 2, SIZE[1] - 8 - names + LINE_NAME * row);
                         root.draw_text(&name, &style(14, color, FontStyle::Bold), place)?;
@@ -118,7 +118,7 @@ impl Chart {
                         chart.draw_series(std::iter::once(Rectangle::new(corners, color.filled())))?;
                         let (text, label) = (style(14, INK, FontStyle::Normal), crate::text::short(*y));
                         chart.draw_series(std::iter::once(Text::new(label, (left + 0.2, *y + 0.4 * room), text)))?;
-                        // the name below, as wide as there is room
+                        // the name below, wrapped to the available width
                         let (x, y) = chart.backend_coord(&(left + 0.06, bottom));
                         let letters = (0.9 * (SIZE[0] - 110) as f64 / (LETTER * bars.len() as f64)) as usize;
                         for (n, line) in wrapped(name, letters).into_iter().enumerate() {
@@ -134,7 +134,7 @@ impl Chart {
     }
 }
 
-/// A text in lines of so many letters, as far as its words allow.
+/// Wraps a text to lines of `letters` letters, without breaking words.
 fn wrapped(text: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {

@@ -6,21 +6,21 @@ use marathon_physics::budget;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 
-/// First column, which orders the rows.
+/// First column, the order of the rows.
 const ITERATION: &str = "iteration";
 /// Memory of a table's cells per byte of its file. A single comma can be an empty cell.
 const CELL_MEMORY: f64 = 16.0;
 
-/// Appends rows, each of which reaches the file at once.
+/// Appends rows. Each row is written to the file at once.
 pub struct CsvLog {
     path: PathBuf,
     writer: csv::Writer<File>,
-    /// Head and last row of what the file held when it was opened.
+    /// Header and last row of the file when it was opened.
     before: Option<(String, String)>,
 }
 
-/// Columns and values of an iteration; a value that there is none of (no episode ended) is an empty cell. `terms` are the
-/// reward terms of all roles; columns of roles but the first begin with the role's name.
+/// Columns and values of an iteration. A missing value (no episode ended) is an empty cell. `terms` are the reward
+/// terms of all roles. Columns of roles other than the first begin with the role's name.
 pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) -> Vec<(String, Option<f64>)> {
     let IterationStats { learned, others, .. } = stats;
     let about = [
@@ -53,7 +53,7 @@ pub fn columns(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     row
 }
 
-/// What learning tells of itself.
+/// Columns of the learner's statistics.
 fn of_learning(learned: &Learned) -> [(&'static str, Option<f64>); 8] {
     [
         ("kl", learned.kl),
@@ -69,7 +69,7 @@ fn of_learning(learned: &Learned) -> [(&'static str, Option<f64>); 8] {
 }
 
 impl CsvLog {
-    /// Opens the file of a run that has done `iteration` iterations: rows after that are cut off.
+    /// Opens the file of a run that has done `iteration` iterations. Later rows are removed.
     ///
     /// # Errors
     /// If the file cannot be read or written.
@@ -79,14 +79,14 @@ impl CsvLog {
         Ok(Self { path: path.into(), writer: csv::Writer::from_writer(file), before })
     }
 
-    /// A value of the last row that the file held when it was opened.
+    /// A value of the last row when the file was opened.
     pub fn before(&self, name: &str) -> Option<f64> {
         let (head, last) = self.before.as_ref()?;
         let column = head.split(',').position(|n| n == name)?;
         last.split(',').nth(column)?.parse().ok()
     }
 
-    /// Appends a row, and the head before the first. A file that was there goes on with the columns that it has.
+    /// Appends a row, and the header before the first row. An existing file keeps its columns.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -118,7 +118,7 @@ pub struct History {
 }
 
 impl History {
-    /// Reads a file written by [`CsvLog`]; a row that is not whole ends it.
+    /// Reads a file of [`CsvLog`] up to an incomplete row.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -132,15 +132,15 @@ impl History {
         let whole = reader.records().map_while(|row| row.ok()?.iter().map(cell).collect());
         Ok(Self { names, rows: whole.collect() })
     }
-    /// A column by its name, with `None` for empty cells; nothing if there is no such column.
+    /// A column by its name, with `None` for empty cells. Empty if there is no such column.
     pub fn column(&self, name: &str) -> Vec<Option<f64>> {
         let Some(i) = self.names.iter().position(|n| n == name) else { return Vec::new() };
         self.rows.iter().map(|row| row[i]).collect()
     }
 }
 
-/// Keeps the head and the rows up to an iteration; a last row that a killed process left half-written goes too. Returns
-/// the head and the last row.
+/// Keeps the header and the rows up to an iteration. Also removes an incomplete last row of a killed process. Returns
+/// the header and the last row.
 fn cut(path: &Path, iteration: u64) -> Result<Option<(String, String)>, RunError> {
     let text = budget::read_to_string(path, &budget::TABLE_FILE).map_err(RunError::io(path, "read"))?;
     let mut kept = String::with_capacity(text.len());
@@ -203,7 +203,7 @@ mod tests {
         assert_eq!((log.before(ITERATION), log.before("a")), (Some(1.0), None));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n");
         assert_eq!(History::read(&path).unwrap().column("a"), [None]);
-        // a file keeps the columns that it has
+        // a file keeps its columns
         log.push(&[("new".into(), Some(7.0)), ("a".into(), Some(1.0)), (ITERATION.into(), Some(2.0))]).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "iteration,a\n1,\n2,1\n");
     }

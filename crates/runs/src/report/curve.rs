@@ -1,4 +1,4 @@
-//! `curve.png`: return and speed against steps.
+//! `curve.png`: return and speed over steps.
 
 use super::canvas::{
     DrawError, FAINT, GRID, INK, SCALE, SIZE, at, axis_number, axis_steps, reduce, register_fonts, style, write_png,
@@ -11,10 +11,10 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::FontStyle;
 
-/// Most points of a line; longer runs are averaged in bins.
+/// Maximum number of points per line. Longer runs are averaged in bins.
 const POINTS: usize = 400;
 
-/// Largest number that can be drawn.
+/// Largest number that an axis can show.
 const LARGEST: f64 = 1e15;
 
 const RETURN: RGBColor = RGBColor(32, 99, 178);
@@ -26,7 +26,7 @@ struct Series {
     smooth: Vec<(f64, f64)>,
 }
 
-/// Draws the curve of a run from its rows; a run without an ended episode has an empty one.
+/// Draws the curve of a run from its rows. Without an ended episode the curve is empty.
 ///
 /// # Errors
 /// If the picture cannot be written.
@@ -74,7 +74,7 @@ fn picture(history: &History, run: &RunFile) -> Result<Vec<u8>, DrawError> {
     Ok(reduce(&rgb))
 }
 
-/// One panel: a faint line of the iterations' means, a strong one of their running mean.
+/// Draws one panel: a faint line of the iterations' means, a strong one of their running mean.
 fn panel_of(area: &Area<'_>, label: &str, color: RGBColor, series: &Series) -> Result<(), DrawError> {
     let span = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
@@ -117,7 +117,7 @@ fn panel_of(area: &Area<'_>, label: &str, color: RGBColor, series: &Series) -> R
 impl Series {
     fn new(steps: &[Option<f64>], values: &[Option<f64>]) -> Self {
         let known: Vec<(f64, f64)> = steps.iter().zip(values).filter_map(|(x, y)| Some(((*x)?, (*y)?))).collect();
-        // an axis cannot show other numbers, but a table may contain them
+        // tables may contain numbers that an axis cannot show
         let known: Vec<_> = known.into_iter().filter(|(x, y)| x.abs() <= LARGEST && y.abs() <= LARGEST).collect();
         let bin = known.len().div_ceil(POINTS).max(1);
         let raw: Vec<(f64, f64)> = known
@@ -127,11 +127,11 @@ impl Series {
                 (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
             })
             .collect();
-        // centered mean over a fiftieth of the run
+        // centered mean over 1/50 of the run
         let reach = raw.len() / 100;
         let smooth = (0..raw.len())
             .map(|i| {
-                // as far to one side as to the other, or the ends would be drawn inward
+                // symmetric windows, or the ends would be biased inward
                 let reach = reach.min(i).min(raw.len() - 1 - i);
                 let near = &raw[i - reach..=i + reach];
                 (raw[i].0, near.iter().map(|p| p.1).sum::<f64>() / near.len() as f64)

@@ -1,4 +1,4 @@
-//! What a run leaves behind: rows, events, checkpoints, the curve, the summary.
+//! The output of a run: rows, events, checkpoints, the curve, the summary.
 
 mod canvas;
 pub mod chart;
@@ -17,10 +17,10 @@ use progress::Progress;
 use std::path::{Path, PathBuf};
 use tensorboard::EventLog;
 
-/// Asked after every iteration whether to go on.
+/// Callback after every iteration that decides whether to continue.
 pub type Watch<'a> = dyn FnMut(&IterationStats) -> Control + 'a;
 
-/// Follows a run: shows progress, writes rows, events and checkpoints. Ends the run when it is told to, or when something
+/// Follows a run: shows progress, and writes rows, events and checkpoints. Ends the run on request, or when a file
 /// cannot be written.
 pub struct Reporter<'a> {
     folder: &'a RunFolder,
@@ -35,15 +35,15 @@ pub struct Reporter<'a> {
     due: u64,
     /// Steps and wall-clock seconds of the last iteration.
     last: (u64, f64),
-    /// Why the run was ended, if by an error.
+    /// The error that ended the run, if any.
     pub error: Option<RunError>,
-    /// Whether all iterations have their rows and events, and each policy that was due is in `policies/`.
+    /// Whether all iterations have their rows and events, and `policies/` has every policy that was due.
     pub told: bool,
 }
 
 impl<'a> Reporter<'a> {
-    /// For a run that goes on from a checkpoint, or begins: names of its reward's terms, and clips of its own. What its files say of later iterations is cut. `show`: with
-    /// progress on stderr; `watch` may end the run.
+    /// Prepares a new or resumed run, with the names of its reward terms and its own clips. Rows and events of later
+    /// iterations are removed. `show`: show progress on stderr. `watch` may end the run.
     ///
     /// # Errors
     /// If a file cannot be read or written.
@@ -77,7 +77,7 @@ impl<'a> Reporter<'a> {
         Ok(reporter)
     }
 
-    /// Takes the progress bar away.
+    /// Removes the progress bar.
     pub fn finish(&self) {
         if let Some(progress) = &self.progress {
             progress.finish();
@@ -100,7 +100,7 @@ impl<'a> Reporter<'a> {
         } else {
             let mut output = snapshot.output();
             note_clips(&mut output, &self.clips);
-            // after an interruption in between, the resumed run executes this again
+            // if the run is interrupted before this completes, the resumed run repeats it
             self.keep(&output.policy)?;
             self.told = true;
             self.plan(stats.steps);
@@ -110,7 +110,7 @@ impl<'a> Reporter<'a> {
         Ok(())
     }
 
-    /// Keeps a policy in `policies/`: that of the first role.
+    /// Keeps the first role's policy in `policies/`.
     fn keep(&self, policy: &Policy) -> Result<(), RunError> {
         if self.run.keep_checkpoints == 0 {
             return Ok(());
@@ -122,13 +122,13 @@ impl<'a> Reporter<'a> {
         Ok(())
     }
 
-    /// Removes policies of later steps, which are to come again, and the oldest.
+    /// Removes policies of later steps, which the run will write again, and the oldest ones.
     fn prune(&self, steps: u64) {
         let (kept, later): (Vec<_>, Vec<_>) =
             kept_policies(self.folder.path()).into_iter().partition(|(n, _)| *n <= steps);
         let old = kept.into_iter().rev().skip(self.run.keep_checkpoints);
         for (_, path) in old.chain(later) {
-            // one too many harms nobody
+            // an extra policy does no harm
             let _ = std::fs::remove_file(path);
         }
     }
@@ -147,7 +147,7 @@ impl Observer for Reporter<'_> {
     }
 }
 
-/// Policies in the `policies/` of a run's folder, in the order of their steps, with these.
+/// The policies in `policies/` of a run's folder with their steps, in the order of the steps.
 pub fn kept_policies(run: &Path) -> Vec<(u64, PathBuf)> {
     let entries = std::fs::read_dir(run.join(POLICIES)).into_iter().flatten().flatten();
     let of = |path: PathBuf| {
@@ -159,7 +159,7 @@ pub fn kept_policies(run: &Path) -> Vec<(u64, PathBuf)> {
     kept
 }
 
-/// Notes in policies the clips that their task needs.
+/// Adds the clips that a policy's task needs to policies.
 pub fn note_clips(output: &mut TrainOutput, clips: &Clips) {
     for policy in [&mut output.policy].into_iter().chain(output.others.iter_mut().map(|(_, policy)| policy)) {
         policy.set_task(policy.meta().options.clone(), clips.clone());
@@ -169,7 +169,7 @@ pub fn note_clips(output: &mut TrainOutput, clips: &Clips) {
 /// Writes the checkpoint, then the policies.
 ///
 /// # Errors
-/// If one of them cannot be written; the old one is whole then.
+/// If a file cannot be written. The old one then stays intact.
 pub fn save(folder: &RunFolder, output: &TrainOutput) -> Result<(), RunError> {
     output.checkpoint.save(&folder.checkpoint())?;
     save_policies(folder, &output.policy, &output.others)
@@ -178,7 +178,7 @@ pub fn save(folder: &RunFolder, output: &TrainOutput) -> Result<(), RunError> {
 /// Writes the policies of all roles.
 ///
 /// # Errors
-/// If one of them cannot be written; the old one is whole then.
+/// If a file cannot be written. The old one then stays intact.
 pub fn save_policies(folder: &RunFolder, policy: &Policy, others: &[(String, Policy)]) -> Result<(), RunError> {
     policy.save(&folder.policy())?;
     for (role, policy) in others {

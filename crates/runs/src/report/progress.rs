@@ -1,4 +1,4 @@
-//! What a person sees while a run goes on: a bar in a terminal, a line now and then elsewhere. Both go to stderr.
+//! Progress of a run on stderr: a bar in a terminal, otherwise a line now and then.
 
 use crate::text::{duration, short, thousands};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,14 +6,14 @@ use marathon_learn::IterationStats;
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
 
-/// Seconds between two looks at the speed of a run.
+/// Seconds between two measurements of a run's speed.
 const WINDOW: f64 = 1.0;
 
 /// Shows progress.
 pub struct Progress {
     bar: Option<ProgressBar>,
     total: u64,
-    /// Steps between lines, and those at which the next is due.
+    /// Steps between lines, and steps at which the next line is due.
     every: u64,
     due: u64,
     rate: Rate,
@@ -32,7 +32,7 @@ struct Episodes {
     speeds: f64,
 }
 
-/// Steps per second: of late, and since the start.
+/// Steps per second, recently and since the start.
 struct Rate {
     start: (Instant, u64),
     last: (Instant, u64),
@@ -53,7 +53,7 @@ impl Rate {
     }
 }
 
-/// A bar for so many steps, if stderr is a terminal.
+/// A bar for `total` steps, if stderr is a terminal.
 pub fn bar(total: u64) -> Option<ProgressBar> {
     stderr().is_terminal().then(|| {
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
@@ -65,7 +65,7 @@ pub fn bar(total: u64) -> Option<ProgressBar> {
 }
 
 impl Progress {
-    /// For a run of `total` steps of which `done` are done.
+    /// Progress of a run of `total` steps, `done` of which are done.
     pub fn new(total: u64, done: u64, every: u64) -> Self {
         let bar = bar(total);
         if let Some(bar) = &bar {
@@ -77,14 +77,14 @@ impl Progress {
         Self { bar, total, every, due: done.saturating_add(every), rate, shown, waiting, metrics: String::new() }
     }
 
-    /// After an iteration.
+    /// Updates the display after an iteration.
     pub fn update(&mut self, stats: &IterationStats) {
         self.rate.update(stats.steps);
         self.waiting.add(stats);
         self.metrics = stats.metrics.iter().map(|(name, x)| format!("  {name} {x:.2}")).collect();
         match &self.bar {
             Some(bar) => {
-                // enough episodes for a mean that does not flicker
+                // enough episodes for a stable mean
                 if self.waiting.count >= 32.0 || self.shown.count == 0.0 {
                     self.shown = std::mem::take(&mut self.waiting);
                 }
@@ -97,7 +97,7 @@ impl Progress {
                     self.shown = std::mem::take(&mut self.waiting);
                 }
                 let of = format!("{} of {}", thousands(stats.steps), thousands(self.total));
-                // nobody may be listening
+                // stderr may be closed
                 let _ = writeln!(stderr(), "{of:>25} steps  {}", self.line(stats.steps));
             }
             None => {}
@@ -118,7 +118,7 @@ impl Progress {
         format!("{rate:>6} steps/s  {episodes}{}  ETA {:>6}", self.metrics, duration(left))
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

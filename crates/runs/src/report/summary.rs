@@ -1,4 +1,4 @@
-//! A run in numbers: `summary.json`, and the same for a person.
+//! A summary of a run: `summary.json`, and the same as text.
 
 use super::csv::History;
 use crate::imitation::Imitation;
@@ -12,12 +12,12 @@ use std::path::PathBuf;
 /// Episodes of the evaluation at the end of a run.
 pub const EPISODES: usize = 100;
 
-/// What `summary.json` holds and `train --json` prints.
+/// Contents of `summary.json` and of the output of `train --json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Summary {
     /// Registry name of the agent.
     pub agent: String,
-    /// Arguments of its task.
+    /// Options of its task.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
     /// Folder of the run.
@@ -27,27 +27,27 @@ pub struct Summary {
     pub seed: u64,
     /// Agent-steps done.
     pub steps: u64,
-    /// Seconds of training, over all parts of an interrupted run; without evaluation and the writing of files.
+    /// Seconds of training over all parts of an interrupted run, without evaluation and writing files.
     pub wall_seconds: f64,
-    /// Processor seconds of all threads, in the same sense.
+    /// Processor seconds of all threads during that time.
     pub cpu_seconds: f64,
-    /// Agent-steps by processor seconds.
+    /// Agent-steps per processor second.
     pub steps_per_cpu_second: f64,
-    /// Times that the state of an agent was not finite while it learned; it was then made whole.
+    /// Number of times that the state of an agent became non-finite in training and was reset.
     pub diverged: u64,
-    /// Minibatches that were left out because their gradient was not finite.
+    /// Minibatches that were skipped because their gradient was not finite.
     pub skipped_minibatches: u64,
     /// Whether the run was stopped before its last step.
     pub interrupted: bool,
-    /// How the policy does; none for an interrupted run.
+    /// Evaluation of the policy. `None` for an interrupted run.
     pub eval: Option<Evaluation>,
-    /// How well it follows each clip, if its task follows clips.
+    /// How well the policy follows each clip, if its task follows clips.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imitation: Vec<Imitation>,
 }
 
 impl Summary {
-    /// Of a run with its last checkpoint and rows, in a folder.
+    /// Summarizes a run from its last checkpoint and rows, in a folder.
     pub fn new(folder: PathBuf, checkpoint: &Checkpoint, history: &History, eval: Option<Evaluation>) -> Self {
         let (steps, (wall_seconds, cpu_seconds)) = (checkpoint.steps(), checkpoint.seconds());
         Self {
@@ -80,7 +80,7 @@ impl Summary {
     }
 }
 
-/// An evaluation as a small table; `limit` is the longest episode in decisions, `dt` their seconds.
+/// An evaluation as a small table. `limit` is the longest episode in decisions, `dt` seconds per decision.
 pub fn evaluation_table(e: &Evaluation, limit: usize, dt: f64) -> String {
     let seconds = e.length_mean * dt;
     let broken = match e.diverged {

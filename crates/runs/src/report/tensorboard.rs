@@ -1,4 +1,4 @@
-//! Event files that TensorBoard reads: scalars only.
+//! Event files for TensorBoard, with scalars only.
 //!
 //! A file is a sequence of TFRecords (`u64` length, masked CRC-32C of the length, data, masked CRC-32C of the data; all
 //! little-endian, `tensorflow/core/lib/io/record_writer.cc`), each an `Event` in protocol buffer encoding
@@ -24,14 +24,14 @@ const CASTAGNOLI: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISCSI
 /// Bytes of a record around its data: length, its checksum, and the data's checksum.
 const FRAME: (usize, usize) = (12, 4);
 
-/// Appends events to a file of its own.
+/// Appends events to its own file.
 pub struct EventLog {
     path: PathBuf,
     file: File,
 }
 
-/// Tags and values of an iteration, named as ML-Agents names them where it has them. `terms` are the reward terms of all
-/// roles; tags of roles but the first begin with the role's name.
+/// Tags and values of an iteration, with ML-Agents' names where they exist. `terms` are the reward terms of all roles.
+/// Tags of roles other than the first begin with the role's name.
 pub fn scalars(stats: &IterationStats, steps_per_second: f64, terms: &[String]) -> Vec<(String, f64)> {
     let IterationStats { learned, others, .. } = stats;
     let of_run = [
@@ -54,7 +54,7 @@ pub fn scalars(stats: &IterationStats, steps_per_second: f64, terms: &[String]) 
     of_learning(learned).into_iter().chain(of_run).chain(of_others).chain(terms).chain(metrics).collect()
 }
 
-/// What a role earned and learned.
+/// Values of a role's rewards and learning.
 fn of_learning(learned: &Learned) -> Vec<(String, f64)> {
     let fixed = [
         ("Environment/Cumulative Reward", learned.return_mean),
@@ -76,8 +76,8 @@ fn of_learning(learned: &Learned) -> Vec<(String, f64)> {
 }
 
 impl EventLog {
-    /// Starts a file for a run that has done `steps` steps. Events after that are cut from the run's older files, and
-    /// the new file tells a TensorBoard that has seen them to forget them.
+    /// Starts a file for a run that has done `steps` steps. Later events are removed from the run's older files. The
+    /// new file tells a running TensorBoard to discard them.
     ///
     /// # Errors
     /// If a file cannot be read or written.
@@ -123,7 +123,7 @@ impl EventLog {
     }
 }
 
-/// Drops records after a step, and a last one that a killed process left half-written.
+/// Removes records after a step, and an incomplete last record of a killed process.
 fn cut(path: &Path, steps: u64) -> Result<(), RunError> {
     let bytes = budget::read(path, &budget::TABLE_FILE).map_err(RunError::io(path, "read"))?;
     let mut kept = Vec::with_capacity(bytes.len());
@@ -138,7 +138,7 @@ fn cut(path: &Path, steps: u64) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Whole records of a file and the data in each.
+/// Complete records of a file, with the data in each.
 fn records(mut bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     std::iter::from_fn(move || {
         let length = u64::from_le_bytes(*bytes.first_chunk()?);
@@ -150,7 +150,7 @@ fn records(mut bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     })
 }
 
-/// The step of an event; ours have it right after the time.
+/// The step of an event. Marathon's events have it right after the time.
 fn step_of(event: &[u8]) -> u64 {
     let Some((&key, mut rest)) = event.get(9..).and_then(|e| e.split_first()) else { return 0 };
     let (mut step, mut shift) = (0, 0);
@@ -170,7 +170,7 @@ fn record(data: &[u8]) -> Vec<u8> {
     parts.concat()
 }
 
-/// TFRecord's checksum: rotated and shifted, so that data that contain checksums are not their own checksum.
+/// TFRecord's checksum: rotated and shifted, so that data that contain checksums do not match their own checksum.
 fn masked_crc(data: &[u8]) -> u32 {
     CASTAGNOLI.checksum(data).rotate_right(15).wrapping_add(0xa282_ead8)
 }
@@ -179,7 +179,7 @@ fn now() -> f64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
 }
 
-/// An event of this moment.
+/// An event at the current time.
 fn message(step: u64, fill: impl FnOnce(&mut Message)) -> Vec<u8> {
     let mut event = Message::default();
     event.double(1, now());
@@ -189,7 +189,7 @@ fn message(step: u64, fill: impl FnOnce(&mut Message)) -> Vec<u8> {
     event.0
 }
 
-/// A protocol buffer message being written.
+/// A protocol buffer message under construction.
 #[derive(Default)]
 struct Message(Vec<u8>);
 

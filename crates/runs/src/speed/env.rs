@@ -1,26 +1,26 @@
-//! The environments under random actions, resets included.
+//! Speed of the environments under random actions, including resets.
 
 use super::sample::{Sample, on_threads, thread_cpu};
 use marathon_envs::{BLOCK, BlockStep, Shard, ShardFactory, Spec};
 
-/// Blocks of each thread.
+/// Blocks per thread.
 const BLOCKS: usize = 4;
-/// Decisions between two looks at the clock, and before the first.
+/// Decisions between two readings of the clock, and before the first.
 const DECISIONS: usize = 64;
 /// Repetitions of a measurement.
 const REPETITIONS: usize = 5;
-/// Blocks of actions drawn beforehand, so that their cost is not measured; a prime.
+/// Blocks of actions drawn in advance, so that drawing is not measured; a prime.
 const STOCK: usize = 257;
 
 /// Speed of the environments of an agent.
 pub struct EnvSpeed {
-    /// Repetitions; a step is a decision.
+    /// Repetitions, in which a step is a decision.
     pub samples: Vec<Sample>,
     /// Agents on all threads.
     pub agents: usize,
-    /// Mean decisions of an episode; none if no episode ended.
+    /// Mean decisions per episode. `None` if no episode ended.
     pub episode_length: Option<f64>,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     pub diverged: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Speed of computations: processor time of a step, and how many steps the environments make.
+//! Speed measurements: processor time per step, and throughput of the environments.
 
 mod env;
 mod sample;

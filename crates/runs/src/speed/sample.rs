@@ -25,7 +25,7 @@ impl Sample {
     }
 }
 
-/// The repetition in the middle by processor time per step. There must be at least one.
+/// The median repetition by processor time per step. There must be at least one.
 pub fn median(samples: &[Sample]) -> Sample {
     let mut sorted = samples.to_vec();
     sorted.sort_by(|a, b| a.cpu_per_step().total_cmp(&b.cpu_per_step()));

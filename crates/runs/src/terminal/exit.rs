@@ -3,7 +3,7 @@
 use super::console::{self, note, print_json};
 use std::fmt::Display;
 
-/// Prints the error that ends a program; with `json`, stdout gets it as an object.
+/// Prints the error that ends a program. With `json`, stdout also gets it as an object.
 pub fn failed(error: &impl Display, json: bool) {
     note(format!("error: {error}"));
     if json {
