@@ -1,8 +1,8 @@
-//! What errors say about a name that nothing has: the nearest name that something has, and all of them.
+//! Suggestions for unknown names in errors: the nearest known name, and all known names.
 
-/// The known name closest to `name`, ignoring case, if it is close enough to be a typing error. The first of several.
+/// The known name closest to `name`, ignoring case, if it is close enough to be a typo. The first of several.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // comparing takes quadratic time, and nobody mistypes a name that long
+    // comparing takes quadratic time, and names this long are not typos
     const LONGEST: usize = 200;
     if name.is_empty() || name.len() > LONGEST {
         return None;
@@ -17,7 +17,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, known)| known)
 }
 
-/// `"; did you mean 'hip'?"`, or nothing without a name.
+/// `"; did you mean 'hip'?"`, or an empty text without a name.
 pub fn did_you_mean(near: Option<impl AsRef<str>>) -> String {
     near.map(|near| format!("; did you mean '{}'?", near.as_ref())).unwrap_or_default()
 }
@@ -28,7 +28,7 @@ pub fn listed(near: Option<impl AsRef<str>>, known: &str) -> String {
     format!("{}{end} known: {known}", did_you_mean(near))
 }
 
-/// What [`listed`] says of a name and all that are known.
+/// The text of [`listed`] for a name and all known names.
 pub fn among<S: AsRef<str>>(name: &str, known: &[S]) -> String {
     let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
     listed(nearest(name, known.iter().copied()), &known.join(", "))

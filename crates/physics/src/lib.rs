@@ -5,20 +5,20 @@
 //!   [`Work`] the scratch memory of a step. [`Sim::step`] advances a group.
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
-//! * [`hint`] finds the name that an error about an unknown one may suggest.
+//! * [`hint`] suggests a known name for an unknown one in an error.
 //! * [`budget`] limits the memory and time that a file or a message can use.
 //!
 //! Each folder imports only from folders above it in this list:
 //!
-//! | folder | what it holds |
+//! | folder | contents |
 //! |---|---|
 //! | `lanes` | numbers: one agent, or several side by side in a vector register |
 //! | `algebra` | vectors, rotations, spatial vectors and inertias |
 //! | `model` | the compiled model, MuJoCo's `mjModel` |
-//! | `geometry` | where two shapes touch |
+//! | `geometry` | contacts of two shapes |
 //! | `mjcf` | from an MJCF file to a model |
 //! | `sim` | the constants of a model as the kernels see them, in lane precision |
-//! | `rows` | rows of constraints: what they measure, cost and exert |
+//! | `rows` | constraint rows: their values, costs and forces |
 //! | `multifrontal` | a sparse factorization for one agent with many contacts between its links |
 //! | `state` | the state of agents, and the scratch memory of a step |
 //! | `dynamics` | kinematics, passive and applied forces, the articulated-body recursion |
@@ -26,7 +26,7 @@
 //! | `constraint` | rows of limits, friction, equality constraints and tendons |
 //! | `solver` | Newton's method over all rows |
 //! | `step` | the stages of a step, and the integrators |
-//! | `readings` | what can be read off a group after a step |
+//! | `readings` | quantities that can be read from a group after a step |
 //! | `batch` | any number of agents on any number of threads |
 
 pub mod hint;

@@ -1,7 +1,7 @@
 //! Linear algebra over lanes: vectors, rotations, spatial (6-D) vectors and inertias.
 //!
-//! [`spatial`] has the functions, [`planar`] the same algebra restricted to planar motions, [`rigid`] the few transforms in
-//! double precision with which a model is prepared.
+//! [`spatial`] has the functions. [`planar`] has the same algebra for planar motions only. [`rigid`] has the few
+//! transforms in double precision that prepare a model.
 
 pub(crate) mod planar;
 pub(crate) mod rigid;

@@ -1,14 +1,14 @@
 //! Spatial algebra restricted to the motions a model can make.
 //!
 //! The recursions of the solver are written over [`Space`]. In [`Full`] space a motion has six components. A planar
-//! model (hopper, walker, cheetah: every joint slides in the x-z plane or turns about y) only ever uses three of them:
-//! turning about y, moving along x and along z. The others are multiplied by exact zeros, so [`Planar`] leaves them
+//! model (hopper, walker, cheetah: every joint slides in the x-z plane or turns about y) only uses three of them:
+//! rotation about y and translation along x and z. The others are multiplied by exact zeros, so [`Planar`] leaves them
 //! out: same numbers, a third of the work. The arrays keep their shape; unused components are never read.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 
-/// Components of spatial vectors that take part.
+/// Selects the components of spatial vectors that are used.
 pub(crate) trait Space: Copy + Send + Sync + 'static {
     /// Scalar product of a motion and a force.
     fn dot<T: Real>(a: &V6<T>, b: &V6<T>) -> T;
@@ -34,7 +34,7 @@ pub(crate) trait Space: Copy + Send + Sync + 'static {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Full;
 
-/// Turning about y, moving along x and z.
+/// Rotation about y, and translation along x and z.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Planar;
 

@@ -6,7 +6,7 @@ type Vec3 = [f64; 3];
 /// Position and rotation (columns) of one frame in another.
 pub(crate) type Frame = (Vec3, [Vec3; 3]);
 
-/// Rotation matrix by columns of a quaternion of any length.
+/// Rotation matrix (columns) of a quaternion of any length.
 pub(crate) fn quat_to_rot(q: &[f64; 4]) -> [Vec3; 3] {
     let n = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     let [w, x, y, z] = *q;
@@ -17,7 +17,7 @@ pub(crate) fn quat_to_rot(q: &[f64; 4]) -> [Vec3; 3] {
     ]
 }
 
-/// Rotated vector.
+/// Rotates a vector.
 pub(crate) fn rotate(r: &[Vec3; 3], v: &Vec3) -> Vec3 {
     let mut out = [0.0; 3];
     for i in 0..3 {
@@ -26,13 +26,13 @@ pub(crate) fn rotate(r: &[Vec3; 3], v: &Vec3) -> Vec3 {
     out
 }
 
-/// Frame `b` given in `a`, as seen from where `a` is given.
+/// Composes frames: `b` is given in `a`, the result in the parent of `a`.
 pub(crate) fn compose(a: &Frame, b: &Frame) -> Frame {
     let p = rotate(&a.1, &b.0);
     ([a.0[0] + p[0], a.0[1] + p[1], a.0[2] + p[2]], b.1.map(|column| rotate(&a.1, &column)))
 }
 
-/// Whether a rotation is the identity to rounding.
+/// Whether a rotation is the identity up to rounding.
 pub(crate) fn is_identity(r: &[Vec3; 3]) -> bool {
     (0..3).all(|i| (0..3).all(|j| (r[i][j] - f64::from(i == j)).abs() < 1e-14))
 }

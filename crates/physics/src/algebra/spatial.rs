@@ -1,8 +1,8 @@
 //! Vectors, rotations and spatial (6-D) algebra over lanes.
 //!
-//! A spatial motion vector is `[angular, linear]`, a spatial force `[torque, force]`, both about one reference point per
-//! kinematic tree and along world axes. Closures are avoided on purpose: they are not compiled for a backend's
-//! instruction set unless they happen to be inlined.
+//! A spatial motion vector is `[angular, linear]`, a spatial force `[torque, force]`. Both are about one reference
+//! point per kinematic tree and along world axes. Closures are avoided on purpose: they are compiled for a backend's
+//! instruction set only if they happen to be inlined.
 
 use crate::lanes::Real;
 
@@ -51,7 +51,7 @@ pub fn sub3<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The opposite.
+/// Negation.
 #[inline(always)]
 pub fn neg3<T: Real>(a: &V3<T>) -> V3<T> {
     [-a[0], -a[1], -a[2]]
@@ -63,7 +63,7 @@ pub fn splat3<T: Real>(a: &[T::Scalar; 3]) -> V3<T> {
     [T::splat(a[0]), T::splat(a[1]), T::splat(a[2])]
 }
 
-/// Rotated vector.
+/// Rotates a vector.
 #[inline(always)]
 pub fn rotate<T: Real>(r: &Rot<T>, x: &V3<T>) -> V3<T> {
     [
@@ -73,7 +73,7 @@ pub fn rotate<T: Real>(r: &Rot<T>, x: &V3<T>) -> V3<T> {
     ]
 }
 
-/// Rotated vector plus offset.
+/// Rotates a vector and adds an offset.
 #[inline(always)]
 pub fn rotate_add<T: Real>(r: &Rot<T>, x: &V3<T>, c: &V3<T>) -> V3<T> {
     [
@@ -126,7 +126,7 @@ pub fn quat_to_rot<T: Real>(q: &[T; 4]) -> Rot<T> {
     ]
 }
 
-/// `q * exp(w h)`: a body turning with angular velocity `w` (its own axes) for `h` seconds; normalized.
+/// `q * exp(w h)`: a body that turns with angular velocity `w` (in its own axes) for `h` seconds; normalized.
 #[inline(always)]
 pub fn integrate_quat<T: Real>(q: &[T; 4], w: &V3<T>, h: T) -> [T; 4] {
     let n = dot(w, w).max(T::lit(1e-30)).sqrt();
@@ -147,7 +147,7 @@ pub fn integrate_quat<T: Real>(q: &[T; 4], w: &V3<T>, h: T) -> [T; 4] {
 /// Rotation vector (axis times angle, angle in [0, pi]) of a quaternion.
 #[inline(always)]
 pub fn quat_to_rotvec<T: Real>(q: &[T; 4]) -> V3<T> {
-    // the shorter of the two rotations that the quaternion stands for
+    // the shorter of the two equivalent rotations
     let neg = q[0].lt(T::zero());
     let w = q[0].abs();
     let v = [T::select(neg, -q[1], q[1]), T::select(neg, -q[2], q[2]), T::select(neg, -q[3], q[3])];
@@ -190,7 +190,7 @@ pub fn axpy6<T: Real>(s: &V6<T>, x: T, acc: &V6<T>) -> V6<T> {
     ]
 }
 
-/// Rate of change of a motion vector `s` carried along by the motion `v`.
+/// Rate of change of a motion vector `s` that moves with `v`.
 #[inline(always)]
 pub fn cross_motion<T: Real>(v: &V6<T>, s: &V6<T>) -> V6<T> {
     let a = cross(&ang(v), &ang(s));
@@ -251,7 +251,7 @@ pub fn sym6_add_inertia<T: Real>(k: &mut Sym6<T>, c: &Inertia<T>) {
     k[17] += c[0];
 }
 
-/// `k -= u v'` for `v` proportional to `u` (so that the result stays symmetric).
+/// `k -= u v'` for `v` proportional to `u`, so that the result stays symmetric.
 #[inline(always)]
 pub fn sym6_sub_outer<T: Real>(k: &mut Sym6<T>, u: &V6<T>, v: &V6<T>) {
     k[0] = u[0].neg_mul_add(v[0], k[0]);
@@ -280,7 +280,7 @@ pub fn sym6_add_outer<T: Real>(k: &mut Sym6<T>, s: &V6<T>, d: T) {
     sym6_sub_outer(k, s, &v);
 }
 
-/// Quaternion of a rotation, `w >= 0`; a fixed sequence of selections, so that every backend agrees.
+/// Quaternion of a rotation, `w >= 0`. A fixed sequence of selections gives the same bits on every backend.
 pub fn rot_to_quat<T: Real>(r: &Rot<T>) -> [T; 4] {
     let (one, half) = (T::lit(1.0), T::lit(0.5));
     let (xx, yy, zz) = (r[0][0], r[1][1], r[2][2]);

@@ -1,4 +1,4 @@
-//! What happened before an agent's state stopped being finite, and the same again step by step.
+//! Recording and replaying the steps before an agent's state becomes non-finite.
 
 use super::{Batch, BatchOptions};
 use crate::lanes::Isa;
@@ -7,19 +7,20 @@ use crate::sim::SimError;
 use crate::state::AgentState;
 use serde::{Deserialize, Serialize};
 
-/// The last states of an agent before it broke. It can be written to a file (`serde`) and replayed elsewhere.
+/// The last states of an agent before its state became non-finite. You can write it to a file (`serde`) and replay it
+/// elsewhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Blowup {
     /// Number of the agent.
     pub agent: usize,
     /// Name of the model.
     pub model: String,
-    /// Precision: name of the instruction set.
+    /// Instruction set, which sets the precision.
     pub isa: String,
     /// Physics steps of each [`Batch::step`] call.
     pub substeps: usize,
-    /// The agent's state at the beginning of each of the last calls, oldest first, with the controls of that call. In the
-    /// last one it broke.
+    /// The agent's state and controls at the start of each of the last calls, oldest first. The state became non-finite
+    /// in the last call.
     pub states: Vec<AgentState>,
 }
 
@@ -30,15 +31,15 @@ pub struct Replay {
     pub qpos: Vec<f64>,
     /// Velocity after the step.
     pub qvel: Vec<f64>,
-    /// All of it is finite.
+    /// Whether all values are finite.
     pub finite: bool,
 }
 
 impl Blowup {
-    /// Blow-ups that a batch keeps until they are taken; further ones are only counted.
+    /// Number of blow-ups that a batch keeps until they are taken. Further ones are only counted.
     pub const MOST: usize = 16;
 
-    /// Steps the agent once more from its oldest state to where it broke, alone: the same bits.
+    /// Simulates the agent alone, from its oldest state to the non-finite one, with the same bits.
     ///
     /// # Errors
     /// If the model is not simulated.
@@ -55,7 +56,7 @@ impl Blowup {
         let mut out = Vec::new();
         for state in &self.states {
             for steps in 1..=self.substeps {
-                // from the start in one call, as it was: calls of single steps may round otherwise
+                // first the whole call at once, as recorded: calls of single steps may round differently
                 batch.set_agent_state(0, state);
                 batch.inner.step(steps);
                 let (qpos, qvel) = batch.inner.read(0);

@@ -1,4 +1,4 @@
-//! Readings of all agents at once, in arrays with a row per agent: for callers to whom an agent at a time is too slow.
+//! Readings of all agents at once, in arrays with a row per agent. Reading agent by agent is slower.
 
 use super::Batch;
 use super::lanes::LaneBatch;
@@ -10,7 +10,7 @@ use crate::sim::Sim;
 use crate::state::{Group, Work};
 
 impl Batch {
-    /// Writes readings of all agents, `[agents][width]` each, row-major; on the batch's threads.
+    /// Writes readings of all agents, `[agents][width]` each, row-major, on the batch's threads.
     ///
     /// # Panics
     /// If an array does not have `agents * width` entries.
@@ -21,14 +21,13 @@ impl Batch {
         self.inner.gather(wanted);
     }
 
-    /// Writes the heights of the ground at places of the world, m, `[agents][n]`, as
-    /// [`Readings::ground_height`](crate::Readings::ground_height) has them: at `[x, y]`, m, `[agents][n]`. Every agent has
-    /// its own ground.
+    /// Writes the heights of the ground, m, `[agents][n]`, at the positions `[x, y]`, m, `[agents][n]` of the world.
+    /// See [`Readings::ground_height`](crate::Readings::ground_height). Every agent has its own ground.
     ///
     /// # Panics
-    /// If there are not as many heights as places, or they are no rows of agents.
+    /// If the numbers of heights and positions differ, or are not a multiple of the number of agents.
     pub fn ground_height(&mut self, places: &[[f64; 2]], heights: &mut [f64]) {
-        assert_eq!(places.len(), heights.len(), "a height for each place");
+        assert_eq!(places.len(), heights.len(), "one height per place");
         assert_eq!(places.len() % self.agents, 0, "as many places for each agent");
         let each = places.len() / self.agents;
         if each > 0 {
@@ -37,7 +36,7 @@ impl Batch {
     }
 }
 
-/// AgentRows of consecutive agents, the first of which begins a group.
+/// Rows of consecutive agents. The first one is the start of a group.
 struct Part<'a> {
     quantity: Quantity,
     width: usize,
@@ -75,10 +74,10 @@ impl<T: Real> LaneBatch<T> {
 }
 
 impl<T: Real> LaneBatch<T> {
-    /// Writes the heights of the ground at `each` places of every agent.
+    /// Writes the heights of the ground at `each` positions of every agent.
     pub(super) fn ground_rows(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]) {
         let LaneBatch { sim, groups, works, .. } = self;
-        // the ground does not move: its frames are the same in all groups
+        // the ground does not move, so its frames are the same in all groups
         sim.refresh(&mut works[0], &groups[0]);
         let rows = places.chunks(T::LANES * each).zip(heights.chunks_mut(T::LANES * each));
         for (group, (places, heights)) in groups.iter().zip(rows) {
@@ -88,7 +87,7 @@ impl<T: Real> LaneBatch<T> {
     }
 }
 
-/// Heights of the ground at places of the agents of one group.
+/// Heights of the ground at positions of the agents of one group.
 struct Ground<'a, T: Real> {
     readings: Readings<'a, T>,
     grounds: &'a [usize],
@@ -148,7 +147,7 @@ fn read_sensors<T: Real>(readings: &Readings<'_, T>, mut rows: AgentRows<'_>) {
     }
 }
 
-/// AgentRows of the agents of one group, of which the last may be missing.
+/// Rows of the agents of one group. The last agents may be missing.
 struct AgentRows<'a> {
     rows: &'a mut [f64],
     width: usize,
@@ -245,7 +244,7 @@ impl<T: Real> Kernel<T> for Read<'_, T> {
                     rows.put(g, felt.normal_force[g]);
                 }
             }
-            // evaluated outside of this kernel: every sensor has one of its own
+            // evaluated outside this kernel, with a kernel per sensor
             Quantity::Sensors => {}
         }
     }

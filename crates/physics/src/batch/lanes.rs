@@ -10,7 +10,7 @@ use crate::state::{AgentState, Group, SolverStats, Variation, Work};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// What [`Batch`] needs of a lane width.
+/// Operations of a [`Batch`] that depend on the lane width.
 pub(super) trait Lanes: Send {
     fn set_ctrl(&mut self, agent: usize, ctrl: &[f64]);
     fn step(&mut self, substeps: usize);
@@ -26,9 +26,9 @@ pub(super) trait Lanes: Send {
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
     fn vary(&mut self, agent: usize, variation: &Variation);
     fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]);
-    /// Keeps the present states, as the newest of `depth`.
+    /// Stores the current states. Keeps the newest `depth` of them.
     fn remember(&mut self, depth: usize);
-    /// The states kept for an agent, oldest first.
+    /// The stored states of an agent, oldest first.
     fn remembered(&self, agent: usize) -> Vec<AgentState>;
     fn stats(&self) -> SolverStats;
 }
@@ -72,7 +72,7 @@ impl<T: Real> Lanes for LaneBatch<T> {
         let share = groups.len().div_ceil(works.len());
         let run = |groups: &mut [Group<T>], felt: &mut [Felt<T>], work: &mut Work<T>| {
             for (group, felt) in groups.iter_mut().zip(felt) {
-                // readings are brought up to date when they are asked for
+                // readings are updated on request
                 sim.advance(work, group, substeps);
                 felt.keep(work);
             }

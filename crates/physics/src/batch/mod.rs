@@ -1,8 +1,8 @@
-//! Any number of agents, on any number of threads, in the widest lanes the processor has.
+//! Any number of agents, on any number of threads, in the widest lanes of the processor.
 //!
-//! [`Batch`] hides the lane width: states go in and out in MuJoCo's layout, agent by agent or, with [`Batch::gather`], in
-//! arrays of all agents. The same agents give the same
-//! bits whatever the width, the number of threads, the number of other agents and the slots they sit in.
+//! [`Batch`] hides the lane width. States go in and out in MuJoCo's layout, agent by agent or, with [`Batch::gather`],
+//! in arrays of all agents. An agent's bits do not depend on the width, the number of threads, the number of other
+//! agents or its slot.
 
 mod blowup;
 mod gather;
@@ -29,11 +29,11 @@ pub struct BatchOptions {
     pub agents: usize,
     /// Number of threads for stepping, at least 1. They start with the first step and sleep between steps.
     pub threads: usize,
-    /// Instruction set; the best of this processor by default. A single agent takes one lane of it.
+    /// Instruction set; by default the best of this processor. A single agent uses one lane.
     pub isa: Isa,
     /// Simulation options.
     pub sim: SimOptions,
-    /// Number of past [`Batch::step`] calls whose states are kept, to find out how an agent broke: see
+    /// Number of past [`Batch::step`] calls whose states are kept, to replay how a state became non-finite: see
     /// [`Batch::take_blowups`]. 0 keeps none and costs nothing.
     pub guard: usize,
 }
@@ -44,7 +44,7 @@ impl Default for BatchOptions {
     }
 }
 
-/// The complete state of some agents: an exact copy, to be restored into a batch of the same model and precision.
+/// An exact copy of the complete state of some agents, for restoring into a batch of the same model and precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     agents: Vec<AgentState>,
@@ -63,17 +63,17 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch with every agent in the reference configuration, at rest.
+    /// Creates a batch with every agent in the reference configuration, at rest.
     ///
     /// # Errors
     /// If the model uses something that is not simulated.
     ///
     /// # Panics
-    /// If the processor does not support the instruction set asked for.
+    /// If the processor does not support the instruction set.
     pub fn new(model: &Model, options: &BatchOptions) -> Result<Batch, SimError> {
         assert!(options.isa.supported(), "this processor has no {}", options.isa.name());
         let (agents, threads) = (options.agents.max(1), options.threads.max(1));
-        // the bits are the same, and nobody waits for lanes that nobody needs
+        // one lane gives the same bits without computing unused lanes
         let isa = if agents == 1 && options.isa != Isa::F64 { Isa::F32 } else { options.isa };
         let inner = with_lanes!(isa, T => {
             let sim = Sim::<T>::new(model, options.sim.clone())?;
@@ -106,7 +106,7 @@ impl Batch {
         self.isa
     }
 
-    /// Sets the configuration that quarantined agents are put into, length `nq` (default: `qpos0`).
+    /// Sets the configuration of quarantined agents, length `nq` (default: `qpos0`).
     ///
     /// # Panics
     /// If the length is not `nq`.
@@ -117,8 +117,8 @@ impl Batch {
 
     /// Advances all agents by `substeps` steps under `ctrl` (`[agents][nu]`, row-major).
     ///
-    /// Returns the agents whose state stopped being finite: each was put back into the home configuration at rest,
-    /// before anybody could read the broken state, and counted in [`Batch::quarantined`].
+    /// Returns the agents whose state became non-finite. Each of them is reset to the home configuration at rest before
+    /// its state can be read, and counted in [`Batch::quarantined`].
     ///
     /// # Panics
     /// If `ctrl` does not have `agents * nu` entries.
@@ -143,12 +143,12 @@ impl Batch {
         broken
     }
 
-    /// Number of times an agent was quarantined since the batch was made.
+    /// Number of quarantined agents since the batch was created.
     pub fn quarantined(&self) -> u64 {
         self.quarantined
     }
 
-    /// Puts an agent into a state (MuJoCo's layout); its controls and warm start are cleared.
+    /// Sets the state of an agent (MuJoCo's layout). Clears its controls and warm start.
     ///
     /// # Panics
     /// If the agent does not exist or a length is not the model's.
@@ -172,8 +172,8 @@ impl Batch {
         self.inner.bodies(agent)
     }
 
-    /// Values of the sensors of an agent at its present state, in the model's order. The forces of the last step are not
-    /// kept between steps: they are recomputed for the present state and controls. Sensors that cannot be evaluated are
+    /// Sensor values of an agent at its current state, in the model's order. Forces of the last step are not kept
+    /// between steps, so they are recomputed for the current state and controls. Sensors that cannot be evaluated are
     /// NaN.
     pub fn sensors(&mut self, agent: usize) -> Vec<f64> {
         self.inner.sensors(agent)
@@ -200,7 +200,7 @@ impl Batch {
         self.inner.save(agent)
     }
 
-    /// Puts one agent into a complete state.
+    /// Sets the complete state of an agent.
     ///
     /// # Panics
     /// If the agent does not exist or the state belongs to another model.
@@ -209,7 +209,7 @@ impl Batch {
         self.inner.load(agent, state);
     }
 
-    /// Pushes a body of an agent until told otherwise or reset: force, N, and torque, N m, in world axes at the body's
+    /// Pushes a body of an agent until the next call or reset: force, N, and torque, N m, in world axes at the body's
     /// center of mass.
     ///
     /// # Panics
@@ -219,7 +219,7 @@ impl Batch {
         self.inner.push(agent, body, force, torque);
     }
 
-    /// Gives an agent masses, friction, strength and gravity of its own; a reset keeps them.
+    /// Sets an agent's own masses, friction, strength and gravity. They survive a reset.
     ///
     /// # Panics
     /// If the agent does not exist or a length is not the model's.
@@ -228,8 +228,8 @@ impl Batch {
         self.inner.vary(agent, variation);
     }
 
-    /// Gives an agent ground of its own: elevations, m above the zero of the model's height field `field`, row by row. It
-    /// can be changed between steps; a reset keeps it.
+    /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`, row by row. It can
+    /// change between steps and survives a reset.
     ///
     /// # Panics
     /// If the agent or the field does not exist, or the number of elevations is not that of the field's grid.
@@ -255,6 +255,6 @@ pub struct BodyReading {
     pub velocity: [f64; 3],
     /// Angular velocity, rad/s.
     pub angular_velocity: [f64; 3],
-    /// Number of contacts with the floor at the present state.
+    /// Number of contacts with the floor at the current state.
     pub contacts: usize,
 }

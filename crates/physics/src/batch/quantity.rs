@@ -1,13 +1,14 @@
-//! What can be read of all agents at once, and the contacts that are kept for it.
+//! Quantities that can be read of all agents at once, and the contacts that are kept for them.
 
 use crate::lanes::Real;
 use crate::model::Model;
 use crate::state::Work;
 
-/// What [`Batch::gather`](super::Batch::gather) can write. World axes and SI units; indices are those of the [`Model`].
+/// A quantity that [`Batch::gather`](super::Batch::gather) can write. World axes and SI units; indices are those of the
+/// [`Model`].
 ///
-/// Positions and velocities are those of the present state. Contacts are those of the last [`Batch::step`](super::Batch::step), with the
-/// static world; an agent that was put into a state since has none.
+/// Positions and velocities are those of the current state. Contacts are those of the last
+/// [`Batch::step`](super::Batch::step) with the static world. An agent whose state was set since then has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Configuration, `[nq]`.
@@ -50,7 +51,7 @@ impl Quantity {
         }
     }
 
-    /// It needs the frames of the present state.
+    /// Whether it needs the frames of the current state.
     pub(super) fn is_frame(self) -> bool {
         use Quantity as Q;
         matches!(
@@ -74,14 +75,14 @@ impl<T: Real> Felt<T> {
         Felt { touching: vec![T::none(); n], touched: vec![T::none(); n], normal_force: vec![T::zero(); n] }
     }
 
-    /// Those of the group that was stepped last with `work`.
+    /// Keeps the contacts of the group that was stepped last with `work`.
     pub(super) fn keep(&mut self, work: &Work<T>) {
         self.touching.copy_from_slice(&work.contacts.touching);
         self.touched.copy_from_slice(&work.contacts.touched);
         self.normal_force.copy_from_slice(&work.contacts.normal_force);
     }
 
-    /// An agent has left where it was.
+    /// Clears the contacts of an agent whose state was set.
     pub(super) fn forget(&mut self, lane: usize) {
         let others = T::from_bits(!(1 << lane) & ((1 << T::LANES) - 1));
         for mask in self.touching.iter_mut().chain(&mut self.touched) {

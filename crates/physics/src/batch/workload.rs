@@ -1,9 +1,9 @@
 //! The benchmark's workload: agents under random torques, falling and thrashing on the floor.
 //!
-//! The `mujoco` package runs the same protocol in `marathon bench physics --against mujoco`: start in the reference
-//! configuration with hinges off by up to 0.1 rad and velocities up to 0.1, warm up, then time steps under controls
-//! drawn uniformly from [-1, 1] and held for four steps. Nobody is reset: contacts are many and differ between agents,
-//! which is the hard case for lanes.
+//! The `mujoco` package runs the same protocol in `marathon bench physics --against mujoco`. It starts in the reference
+//! configuration, with hinges off by up to 0.1 rad and velocities up to 0.1, and warms up. It then times steps under
+//! controls drawn uniformly from [-1, 1] and held for four steps. Agents are not reset: contacts are many and differ
+//! between agents, which is the hard case for lanes.
 
 use crate::lanes::{Isa, Real};
 use crate::model::{JointType, Model};
@@ -31,7 +31,7 @@ pub struct Workload {
     pub sim: SimOptions,
 }
 
-/// What a workload did.
+/// Results of a workload.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Agents simulated.
@@ -40,7 +40,7 @@ pub struct Report {
     pub seconds: f64,
     /// Counts of the timed steps.
     pub stats: SolverStats,
-    /// Largest |qvel| seen at the end of the timed steps.
+    /// Largest |qvel| at the end of the timed steps.
     pub max_velocity: f64,
     /// Agents whose state was not finite at the end.
     pub non_finite: usize,
@@ -70,7 +70,7 @@ impl Workload {
                 group.reset_lane(&sim, lane, &qpos, &qvel);
             }
         }
-        // a stock of controls, so that drawing them is not what is measured
+        // controls are drawn in advance, so that drawing is not measured
         let stock: Vec<Vec<T>> = (0..257)
             .map(|_| {
                 let mut u = vec![T::zero(); model.nu];
@@ -111,13 +111,13 @@ impl Workload {
     }
 }
 
-/// Uniform numbers in [-1, 1) (SplitMix64): a benchmark must not depend on a library's version.
+/// Uniform numbers in [-1, 1) (SplitMix64). A benchmark must not depend on a library's version.
 #[derive(Clone, Debug)]
 pub struct Uniform(pub u64);
 
 impl Uniform {
     /// The next number.
-    #[expect(clippy::should_implement_trait, reason = "a stream without an end is no iterator's `Option`")]
+    #[expect(clippy::should_implement_trait, reason = "an endless stream needs no `Option`")]
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

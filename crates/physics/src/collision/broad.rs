@@ -1,11 +1,11 @@
-//! The broad phase of models with many pairs: boxes around geoms and trees, swept along an axis.
+//! The broad phase of models with many pairs: boxes around geoms and trees, sorted along an axis.
 //!
-//! A crowd of bodies has pairs by the million and contacts by the hundred. Every tree, and every geom that stands still,
-//! is a group. Boxes around groups are sorted along the axis along which they are spread most; only groups whose boxes
-//! overlap are looked into, and of their geoms those whose own boxes do.
+//! A crowd of bodies can have millions of pairs but only hundreds of contacts. Every tree and every static geom is a
+//! group. Boxes around groups are sorted along the axis of their largest spread. Only groups with overlapping boxes are
+//! examined further, and within them only geoms with overlapping boxes.
 //!
-//! The boxes are those of all lanes together. What is found is more than what touches, and it is taken up in the order of
-//! the list of pairs: contacts are the same as if every pair were tested, and do not depend on the other lanes.
+//! Boxes cover all lanes together, so the result includes pairs that do not touch. Pairs are processed in the order of
+//! their list. Contacts are therefore the same as if every pair were tested, and do not depend on the other lanes.
 
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
@@ -14,7 +14,7 @@ use crate::sim::{Broad, GeomPair, Sim};
 use crate::state::{Sweep, Work, nowhere};
 
 kernel_fn! {
-    /// Finds the pairs that may touch, into [`Sweep::found`], after the geoms were placed.
+    /// Finds the pairs that may touch and writes them to [`Sweep::found`]. Requires the positions of the geoms.
     pub(super) fn find<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, broad: &'a Broad<T::Scalar>) {
         for paired in &sim.contacts.paired {
             work.contacts.sweep.geoms[paired.geom] = surround(sim, work, broad, paired.geom);
@@ -54,7 +54,7 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
     }
     let mut out = nowhere();
     for i in 0..3 {
-        // more than the rounding of places and sizes
+        // more than the rounding of positions and sizes
         let slack = center[i].abs().mul_add(T::lit(32.0 * T::EPSILON), half[i] * T::lit(1e-3));
         let reach = half[i] + slack + T::splat(broad.margin);
         let (low, high) = (center[i] - reach, center[i] + reach);
@@ -134,7 +134,7 @@ kernel_fn! {
     }
 }
 
-/// The axis along which the boxes are spread most.
+/// The axis of the largest spread of the boxes.
 #[inline(always)]
 fn longest<S: Real>(groups: &[[V3<S>; 2]]) -> usize {
     let mut best = (0, S::zero());

@@ -1,4 +1,4 @@
-//! Contacts between moving geoms and a level plane: all lanes walk the same list of points, and a lane that does not touch
+//! Contacts between moving geoms and a level plane. All lanes process the same list of points; a lane without contact
 //! gets stiffness zero.
 
 use super::slots::pyramid_share;
@@ -14,7 +14,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
     let zero = T::zero();
     work.contacts.touching.fill(T::none());
     work.contacts.ground_contacts.fill(zero);
-    // corners of the present box that are already in contact, per lane
+    // per lane, corners of the current box that are already in contact
     let mut corners = zero;
     let mut past = 0;
     for (candidate, c) in sim.contacts.floor.iter().enumerate() {
@@ -50,7 +50,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let (imp, mut d) = impedance(&c.soft, violation);
         let mut mu = [T::splat(c.mu[0]), T::splat(c.mu[1])];
         if let Some(factor) = group.friction() {
-            // a frictionless contact is a flat pyramid and has nothing to vary
+            // a frictionless contact is a flat pyramid, so nothing varies
             if c.mu[0] > T::scalar(0.0) {
                 d *= pyramid_share(mu[0], factor);
             }

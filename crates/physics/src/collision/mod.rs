@@ -1,7 +1,7 @@
-//! Contacts: where geoms touch, and the rows that follow.
+//! Contacts between geoms, and their rows.
 //!
-//! Points above a level plane have their own list and their own rows ([`floor`]); every other pair of geoms is found by
-//! [`narrow_phase`].
+//! Points above a level plane have their own list and rows ([`floor`]). [`narrow_phase`] finds all other pairs of
+//! geoms.
 
 mod broad;
 mod floor;

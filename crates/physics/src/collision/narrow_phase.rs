@@ -1,7 +1,7 @@
 //! Contacts of pairs of geoms.
 //!
-//! Every pair is culled by bounding balls in all lanes at once; what comes near goes through [`crate::geometry`]. Of pairs
-//! by the thousand, the broad phase ([`broad`]) first chooses those that may be near.
+//! Bounding balls cull every pair in all lanes at once. The remaining pairs go through [`crate::geometry`]. For
+//! thousands of pairs, the broad phase ([`broad`]) first selects those that may be near.
 
 use super::broad;
 use super::slots::{Place, Slots, write_contact};
@@ -13,7 +13,7 @@ use crate::lanes::{MAX_LANES, Real};
 use crate::sim::{Cull, GeomPairOf, Mount, ShapePair, Sim};
 use crate::state::{Group, Work, clearance};
 
-/// A pair that comes near in some lanes.
+/// A pair that is near in some lanes.
 struct Candidate<T: Real> {
     place: Place,
     /// Centers of the geoms, relative to the place's reference point.
@@ -68,7 +68,7 @@ fn within_tree<T: Real>(sim: &Sim<T>, pair: &GeomPairOf<T::Scalar>) -> bool {
     matches!(pair.links, [Some(a), Some(b)] if sim.links[a].tree == sim.links[b].tree)
 }
 
-/// Centers and axes of the geoms that meet others, and how far they have moved.
+/// Centers and axes of the geoms in pairs, and how far they have moved.
 #[inline(always)]
 fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     if !work.continues && sim.contacts.broad.is_none() {
@@ -125,7 +125,7 @@ fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3
     }
 }
 
-/// Narrow phase of one pair. Returns how far it is from touching, if that is known.
+/// Narrow phase of one pair. Returns its distance from touching, if known.
 #[inline(always)]
 fn touch_pair<T: Real>(
     sim: &Sim<T>,
@@ -141,7 +141,7 @@ fn touch_pair<T: Real>(
     let [size_a, size_b]: [V3<T>; 2] = [splat3(&pair.sizes[0]), splat3(&pair.sizes[1])];
     let mut known = None;
     if pair.round() {
-        // few of those that come near touch: their distance is known before the place of contact
+        // few near pairs touch: the distance is cheaper than the contact point
         let distance = round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b));
         let clearance = clearance(distance - margin, T::splat(pair.reach));
         if !T::any(clearance.lt(T::zero())) {
@@ -194,7 +194,7 @@ fn cuboid<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3
     Cuboid { center, axes: work.motion.axes(m), half }
 }
 
-/// Writes the contacts of a pair that some lanes have.
+/// Writes the contacts that a pair has in some lanes.
 #[inline(always)]
 fn add_all<T: Real>(
     sim: &Sim<T>,
@@ -232,7 +232,7 @@ fn touch_field<T: Real>(
     work.contacts.touches = found;
 }
 
-/// Narrow phase of shapes that need branches: lane by lane, on the lanes that are near.
+/// Narrow phase of shapes that need branches: one lane at a time, for the near lanes.
 #[inline(always)]
 fn one_by_one<T: Real>(
     sim: &Sim<T>,
@@ -275,7 +275,7 @@ fn one_by_one<T: Real>(
     work.contacts.lane_touches = own;
 }
 
-/// Puts one lane's contacts into that lane of `found`.
+/// Copies one lane's contacts into that lane of `found`.
 #[inline(always)]
 fn gather<T: Real>(touches: &Touches<T::Scalar>, lane: usize, found: &mut Vec<Touch<T>>) {
     for (k, t) in touches.as_slice().iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Where contacts of pairs go: a contact takes the next free slot of its own lane, in the order of the pairs, so that
-//! the rows of a lane depend on that lane alone.
+//! Slots of pair contacts. A contact takes the next free slot of its own lane, in the order of the pairs, so that the
+//! rows of a lane depend on that lane only.
 
 use crate::algebra::spatial::*;
 use crate::geometry::Touch;
@@ -8,7 +8,7 @@ use crate::rows::{Block, Jacobian, Source};
 use crate::sim::{Cost, GeomPairOf, PairSpec, Sim, impedance};
 use crate::state::{Group, Work};
 
-/// The slots of the present class of pairs: where they begin, and how many of them each lane has filled.
+/// The slots of the current class of pairs: the first one, and how many of them each lane has filled.
 pub(super) struct Slots<T: Real> {
     class: (bool, usize),
     first: usize,
@@ -20,10 +20,11 @@ impl<T: Real> Slots<T> {
         Slots { class: (false, 0), first: 0, filled: T::zero() }
     }
 
-    /// A slot, and its number in its class, that no lane of `lanes` has free before it; `blocks` are there.
+    /// A slot, with its number in its class, such that no lane of `lanes` has a free slot before it. `blocks` slots
+    /// exist.
     #[inline(always)]
     fn least(&self, lanes: T::Mask, blocks: usize) -> (usize, T) {
-        // few are looked through faster
+        // a linear search is faster for few slots
         if blocks < self.first + 8 {
             return (self.first, T::zero());
         }
@@ -33,7 +34,7 @@ impl<T: Real> Slots<T> {
         (self.first + least, T::lit(least as f64))
     }
 
-    /// Pairs of this class follow; slots of a new class begin at block `next`.
+    /// Starts a class of pairs. Its new slots begin at block `next`.
     #[inline(always)]
     pub(super) fn turn_to(&mut self, class: (bool, usize), next: usize) {
         if class != self.class {
@@ -79,7 +80,7 @@ kernel_fn! {
         let t2 = cross(&touch.normal, &touch.tangent);
         let mut frame = [touch.normal, touch.tangent, t2];
         if links[1].is_none() {
-            // the side that moves comes second
+            // the moving side comes second
             links.swap(0, 1);
             frame = [neg3(&frame[0]), neg3(&frame[1]), neg3(&frame[2])];
         }
@@ -112,7 +113,7 @@ kernel_fn! {
     }
 }
 
-/// ContactRows of a contact in the frame `frame` whose second side, at least, moves.
+/// Rows of a contact in the frame `frame`. At least its second side moves.
 #[inline(always)]
 fn rows<T: Real>(
     sim: &Sim<T>,
@@ -157,7 +158,7 @@ fn rows<T: Real>(
     ContactRows { points, frame, d, u0, friction }
 }
 
-/// Ratio of an edge's stiffness at `factor` times the friction to that at the model's: `R` is in proportion to
+/// Ratio of an edge's stiffness at `factor` times the friction to that at the model's friction. `R` is proportional to
 /// `mu^2 (1 + mu0^2)`.
 #[inline(always)]
 pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
@@ -167,7 +168,7 @@ pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
     (one + square).div((factor * factor) * (one + varied))
 }
 
-/// Marks who touches what.
+/// Marks the touching geoms.
 #[inline(always)]
 fn report<T: Real>(pair: &GeomPairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
     if pair.coupled {

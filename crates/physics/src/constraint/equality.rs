@@ -20,7 +20,7 @@ kernel_fn! {
     }
 }
 
-/// Two points that are tied, and the links that carry them.
+/// Two connected points, and the links that carry them.
 struct Ends<T: Real> {
     links: [Option<usize>; 2],
     /// The points, relative to the references of their links' trees.
@@ -28,10 +28,10 @@ struct Ends<T: Real> {
     /// Velocities of the points, and angular velocities of the links.
     v: [V3<T>; 2],
     w: [V3<T>; 2],
-    /// Accelerations that the points and links have without any joint acceleration.
+    /// Accelerations of the points and links without joint accelerations.
     acc: [V3<T>; 2],
     spin: [V3<T>; 2],
-    /// From the second point to the first.
+    /// Vector from the second point to the first.
     gap: V3<T>,
 }
 
@@ -50,13 +50,13 @@ impl<T: Real> Ends<T> {
                 continue;
             };
             r[i] = work.motion.arm(&points[i], l);
-            // within a tree the common reference would only cost digits
+            // within a tree, adding the common reference would only lose digits
             place[i] = if same_tree { r[i] } else { add3(&r[i], &work.motion.reference[sim.links[l].tree]) };
             v[i] = cross_add(&ang(&work.motion.vel[l]), &r[i], &lin(&work.motion.vel[l]));
             w[i] = ang(&work.motion.vel[l]);
             let a = &work.motion.bias_acc[l];
             let at = cross_add(&w[i], &v[i], &cross_add(&ang(a), &r[i], &lin(a)));
-            // the bias acceleration has gravity in it
+            // the bias acceleration includes gravity
             acc[i] = add3(&at, &group.gravity(sim));
             spin[i] = ang(a);
         }
@@ -64,18 +64,18 @@ impl<T: Real> Ends<T> {
     }
 }
 
-/// What the rows of two tied bodies measure: three rows of places, then three of orientations.
+/// Row values of two connected bodies: three rows of positions, then three of orientations.
 struct Violation<T: Real> {
     error: [T; 6],
     rate: [T; 6],
-    /// Acceleration of the rows without any joint acceleration: the reference makes up for it.
+    /// Acceleration of the rows without joint accelerations. The reference compensates for it.
     drift: [T; 6],
-    /// Derivative of the last three by the relative angular velocity.
+    /// Derivative of the last three rows with respect to the relative angular velocity.
     turns: [V3<T>; 3],
 }
 
 impl<T: Real> Violation<T> {
-    /// Rows of places.
+    /// Rows of positions.
     #[inline(always)]
     fn of_places(ends: &Ends<T>) -> Self {
         let z = T::zero();
@@ -162,7 +162,7 @@ fn bodies_block<T: Real>(
         block.d[i] = ratio.div(T::splat(spec.diag[i / 3]));
         block.u0[i] = rate[i].mul_add(b, k.mul_add(error[i], drift[i]));
     }
-    // rows measure the first body against the second; the side that moves comes second
+    // rows measure the first body against the second; the moving side comes second
     let flip = links[0].is_none();
     let sign = if flip { -one } else { one };
     let (second, first) = if flip { (1, 0) } else { (0, 1) };
@@ -212,7 +212,7 @@ fn lengths_block<T: Real>(
     block.tie_joints(follower.chain(leader));
 }
 
-/// A length from its zero, and its velocity.
+/// A length relative to its zero, and its velocity.
 #[inline(always)]
 fn length_and_velocity<T: Real>(group: &Group<T>, length: &Length<T::Scalar>) -> (T, T) {
     let (mut q, mut v) = (-T::splat(length.zero), T::zero());

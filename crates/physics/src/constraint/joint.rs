@@ -48,7 +48,7 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     }
 }
 
-/// Writes the row of a joint's limit with a number; `past` walks along the rows of the evaluation before.
+/// Writes the row of joint limit number `number`. `past` advances along the rows of the previous evaluation.
 #[inline(always)]
 fn push_limit<T: Real>(
     (dof, number): (usize, usize),

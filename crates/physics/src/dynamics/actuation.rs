@@ -28,8 +28,8 @@ pub(crate) fn advance_activations<T: Real>(sim: &Sim<T>, act: &mut [T], rates: &
     }
 }
 
-/// Force of an actuator, before its gear, and the force's derivative by the velocity of what it pulls at. Notes the rate
-/// of change of its activation.
+/// Force of an actuator before its gear, and its derivative with respect to the velocity of the transmission. Stores
+/// the rate of change of its activation.
 #[inline(always)]
 fn force_and_slope<T: Real>(
     group: &Group<T>,
@@ -79,13 +79,13 @@ fn force_and_slope<T: Real>(
     (force, slope)
 }
 
-/// Forces of the actuators, and through their gears of the joints.
+/// Forces of the actuators, and, through their gears, of the joints.
 #[inline(always)]
 pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let forces = &mut work.forces;
     let bounded = !sim.joint_force_ranges.is_empty();
     if bounded {
-        // what the actuators add is bounded on its own
+        // the sum of the actuator forces has its own bounds
         forces.qfrc_passive_actuator.fill(T::zero());
     } else {
         forces.qfrc_passive_actuator.copy_from_slice(&forces.qfrc_passive);

@@ -1,12 +1,12 @@
 //! The articulated-body recursion: solves `(M + sum_b K_b + diag) x = rhs - bias + wrenches` in linear time.
 //!
-//! It is a factorization `L D L'` in disguise. Going inward over the links, [`factorize`] finds for every degree of
-//! freedom the pivot (`D`), the gain by which a force on the outside reaches the inside (`L`), and the acceleration that
-//! its own share of the forces would cause (`drive`). Going outward, [`accelerate`] completes the solution. Featherstone's
-//! recursion with rank-one updates per degree of freedom is exact for joints of several degrees of freedom.
+//! It is equivalent to a factorization `L D L'`. The inward pass over the links, [`factorize`], finds three values per
+//! degree of freedom: the pivot (`D`), the gain of outer forces on the inside (`L`), and the acceleration from its own
+//! share of the forces (`drive`). The outward pass, [`accelerate`], completes the solution. Featherstone's recursion
+//! with rank-one updates per degree of freedom is exact for joints with several degrees of freedom.
 //!
-//! Only links marked in `work.solver.stale`, and their ancestors, are done anew by [`factorize`]: towards the end of an
-//! iteration few lanes still change anything, and most of the tree keeps its factors.
+//! [`factorize`] only recomputes links marked in `work.solver.stale`, and their ancestors. Toward the end of an
+//! iteration few lanes still change, and most of the tree keeps its factors.
 
 use crate::algebra::planar::Space;
 use crate::algebra::spatial::*;
@@ -14,11 +14,11 @@ use crate::lanes::Real;
 use crate::sim::Sim;
 use crate::state::{Work, net_bias_force};
 
-/// Factorizes the stale links and brings their forces inward.
+/// Factorizes the stale links and propagates their forces inward.
 ///
-/// `M` without armature comes from the links' inertias; `work.solver.diag` is added to its diagonal (armature, limit stiffness,
-/// implicit damping). `with_stiffness` adds the contact stiffness of the links that are in contact; their wrench is
-/// applied in either case.
+/// `M` without armature comes from the links' inertias. `work.solver.diag` is added to its diagonal (armature, limit
+/// stiffness, implicit damping). `with_stiffness` adds the contact stiffness of touching links. Their wrench is applied
+/// in either case.
 #[inline(always)]
 pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
     let applied = work.forces.acts_on_links();
@@ -66,8 +66,8 @@ pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, wit
     }
 }
 
-/// Brings other joint forces (`rhs`) and link forces (`link_force`) inward with the factors at hand: only the vector half
-/// of [`factorize`], a fraction of the cost.
+/// Propagates other joint forces (`rhs`) and link forces (`link_force`) inward with the existing factors. This is only
+/// the vector half of [`factorize`], at a fraction of its cost.
 #[inline(always)]
 pub(crate) fn bring_inward<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     for l in (0..sim.links.len()).rev() {
@@ -142,7 +142,7 @@ fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work
         [k[7], k[10], k[13], k[18], k[16], k[20]],
         [k[8], k[11], k[14], k[19], k[20], k[17]],
     ];
-    // eliminate the linear part first: its pivots are masses and well conditioned
+    // eliminate the linear part first: its pivots are masses and well-conditioned
     for p in (0..6).rev() {
         let pivot = a[p][p].recip();
         for i in (0..p).rev() {
@@ -167,10 +167,10 @@ fn drive_free_root<T: Real>(d: usize, tree: usize, f: &V6<T>, work: &mut Work<T>
     }
 }
 
-/// Joint forces `rhs` and the force `f` that the motion needs, brought inward through a free root's factor `a`.
+/// Propagates joint forces `rhs` and the force `f` that the motion needs inward through a free root's factor `a`.
 #[inline(always)]
 pub(crate) fn reduce_free_root<T: Real>(d: usize, a: &[[T; 6]; 6], axis: &[V6<T>], rhs: &[T], f: &V6<T>) -> V6<T> {
-    // torques are given along the body's axes, forces along the world's
+    // torques are along the body's axes, forces along the world's
     let mut y = [T::zero(); 6];
     for i in 0..3 {
         let torque =

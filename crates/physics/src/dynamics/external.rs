@@ -1,4 +1,4 @@
-//! Forces on links that do not come from joints: compensation of gravity, a fluid, and pushes from outside.
+//! Forces on links that do not come from joints: gravity compensation, fluid forces, and external pushes.
 
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
@@ -6,7 +6,7 @@ use crate::sim::Sim;
 use crate::state::{Group, Work};
 
 kernel_fn! {
-    /// Torques and forces on links from outside.
+    /// External torques and forces on links.
     pub(crate) fn link_forces<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         work.forces.link_applied.resize(sim.links.len(), [T::zero(); 6]);
         gravity_compensation(sim, group, work);

@@ -8,8 +8,8 @@ use crate::state::{Group, Work};
 
 /// Computes every link's frame, its joints' motion axes and its spatial inertia.
 ///
-/// Everything of a tree is expressed in world axes about the origin of its root link, so that children add to parents
-/// without a transform and single precision does not suffer far from the world's origin.
+/// Everything in a tree is in world axes about the origin of its root link. Children add to parents without a
+/// transform, and single precision does not lose accuracy far from the world's origin.
 #[inline(always)]
 pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for l in 0..sim.links.len() {
@@ -43,7 +43,7 @@ pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     }
 }
 
-/// Frame of a link before its joints move it; in world coordinates for a root.
+/// Frame of a link before its joints move it, in world coordinates for a root.
 #[inline(always)]
 fn frame_at_parent<T: Real>(link: &Link<T::Scalar>, work: &Work<T>) -> (Rot<T>, V3<T>) {
     match link.parent {
@@ -87,7 +87,7 @@ fn apply_joint<T: Real>(
             let (s, c) = (q[a] - T::splat(joint.q0)).sin_cos();
             let dir;
             if let Some((k, negative)) = joint.aligned {
-                // turn the two columns beside the axis
+                // rotate the two other columns
                 let s = if negative { -s } else { s };
                 let x = rot[k];
                 dir = if negative { [-x[0], -x[1], -x[2]] } else { x };
@@ -127,7 +127,7 @@ fn anchor_of<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &V3<T>) -
     if joint.centered { *pos } else { rotate_add(rot, &splat3(&joint.pos), pos) }
 }
 
-/// Puts a link back so that a rotation leaves the joint's anchor in place.
+/// Moves a link so that a rotation leaves the joint's anchor in place.
 #[inline(always)]
 fn restore_anchor<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &mut V3<T>, anchor: &V3<T>) {
     if !joint.centered {
@@ -135,7 +135,7 @@ fn restore_anchor<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &mut
     }
 }
 
-/// Completes a joint's motion axes, now that the link's orientation and the reference point are known.
+/// Computes a joint's motion axes from the link's orientation and the reference point.
 #[inline(always)]
 fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, work: &mut Work<T>) {
     let (z, one) = (T::zero(), T::lit(1.0));
@@ -207,7 +207,7 @@ fn turned<T: Real>(t: &Rot<T>, r: &Rot<T>, a: usize, b: usize) -> T {
     t[0][a].mul_add(r[0][b], t[1][a].mul_add(r[1][b], t[2][a] * r[2][b]))
 }
 
-/// Velocities of the links and the forces that the present motion needs (first half of a recursive Newton-Euler pass).
+/// Velocities of the links, and the forces of the current motion (first half of a recursive Newton-Euler pass).
 #[inline(always)]
 pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let z = T::zero();
@@ -256,7 +256,7 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         let inertia = &work.motion.inertia[l];
         let f = inertia_mul(inertia, &acc);
         let h = inertia_mul(inertia, &vel);
-        // v x* h: the momentum carried along
+        // v x* h: the momentum that moves along
         let t = cross_add(&ang(&vel), &ang(&h), &cross_add(&lin(&vel), &lin(&h), &ang(&f)));
         let f = cross_add(&ang(&vel), &lin(&h), &lin(&f));
         work.motion.bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];

@@ -1,4 +1,4 @@
-//! Smooth dynamics: frames, velocities, applied forces, and the recursion that solves for accelerations in linear time.
+//! Smooth dynamics: frames, velocities, applied forces, and the recursion that computes accelerations in linear time.
 
 mod actuation;
 mod articulated;

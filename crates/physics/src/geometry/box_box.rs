@@ -1,31 +1,31 @@
 //! Two boxes: one contact where edges cross, up to eight where a face meets the other box.
 //!
-//! Of the 15 directions that can separate two boxes (the face normals of both and the products of their edges), the one
-//! of the largest separation is the contact's normal. If it is a face's, that face is the reference: the other box's
-//! face that opposes it most is clipped to the reference's outline, and the corners of the rest that are below the
-//! margin are the contacts. If it is that of two edges, their closest points are the contact.
+//! There are 15 candidate directions: the face normals of both boxes and the products of their edges. The contact
+//! normal is the one of largest separation. If it belongs to a face, that face is the reference. The most opposed face
+//! of the other box is clipped to the reference's outline, and the remaining corners below the margin are the contacts.
+//! If it belongs to two edges, their closest points are the contact.
 
 use super::*;
 use crate::lanes::kernel_fn;
 
-/// An edge direction wins only if it separates more than the best face by this share.
+/// An edge direction wins only if its separation exceeds that of the best face by this fraction.
 const EDGE_BIAS: f64 = 1e-6;
-/// An edge direction this close to the best face's normal (cosine) counts for it...
+/// An edge direction this close to the best face's normal (cosine) counts as that normal...
 const SAME_DIRECTION: f64 = 0.99;
-/// ...unless it separates more by this share.
+/// ...unless its separation is larger by this fraction.
 const SAME_SHARE: f64 = 0.05;
-/// Corners that a square can have after four cuts, with room for those that rounding adds.
+/// Maximum corners of a square after four cuts, plus room for corners caused by rounding.
 const CORNERS: usize = 12;
 
 /// Rounding allowances, for double and for single precision.
 struct Slack<S> {
-    /// Of a separation, per sum of the boxes' sizes.
+    /// For a separation, relative to the sum of the boxes' sizes.
     separation: S,
     /// Square of the sine below which two edges are parallel.
     parallel: S,
-    /// Component of the normal below which either edge of a face is the supporting one.
+    /// Component of the normal below which both edges of a face are supporting.
     either: S,
-    /// Square of the distance of two corners that are one, per squared size.
+    /// Squared distance of coinciding corners, relative to the squared size.
     same: S,
 }
 
@@ -38,10 +38,10 @@ impl<S: Real> Slack<S> {
     }
 }
 
-/// The direction that separates two boxes most.
+/// The direction of largest separation.
 #[derive(Clone, Copy)]
 enum Direction {
-    /// The normal of a face across this axis, of the first or of the second box.
+    /// The normal of a face across this axis, of the first or second box.
     Face { first: bool, axis: usize },
     /// The product of an edge along axis `i` of the first box and one along axis `j` of the second.
     Edges { i: usize, j: usize },
@@ -84,7 +84,7 @@ kernel_fn! {
     }
 }
 
-/// The direction of the largest separation, or none if that is above the margin.
+/// The direction of the largest separation, or `None` if that is above the margin.
 #[inline(always)]
 fn separate<S: Real>(a: &Cuboid<S>, b: &Cuboid<S>, r: &Relative<S>, margin: S, slack: &Slack<S>) -> Option<Direction> {
     let (s, t) = (&a.half, &b.half);
@@ -150,7 +150,7 @@ fn separate<S: Real>(a: &Cuboid<S>, b: &Cuboid<S>, r: &Relative<S>, margin: S, s
     Some(direction)
 }
 
-/// Unit vector across an edge of each box, in the frame of the first; none if they are parallel.
+/// Unit vector perpendicular to an edge of each box, in the frame of the first. `None` for parallel edges.
 #[inline(always)]
 fn edge_normal<S: Real>(r: &Relative<S>, i: usize, j: usize, slack: &Slack<S>) -> Option<V3<S>> {
     let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
@@ -166,7 +166,7 @@ fn edge_normal<S: Real>(r: &Relative<S>, i: usize, j: usize, slack: &Slack<S>) -
     Some(n)
 }
 
-/// A vector of the first box's frame in that of the second.
+/// Converts a vector from the first box's frame to the second's.
 #[inline(always)]
 fn in_second<S: Real>(r: &Relative<S>, x: &V3<S>) -> V3<S> {
     let c = &r.cos;
@@ -197,8 +197,8 @@ fn edge_contact<S: Real>(
     let edge_b = [r.cos[0][j], r.cos[1][j], r.cos[2][j]];
     let cosine = edge_b[i];
     let sin2 = cosine.neg_mul_add(cosine, S::lit(1.0));
-    // the supporting edge of each box; where the normal lies in a face, two edges support it, and the pair of edges
-    // that are closest is meant
+    // the supporting edge of each box; if the normal lies in a face, two edges support it, and the closest pair of
+    // edges counts
     let (ends_a, ends_b) = (supports(&n, i, slack), supports(&m, j, slack));
     let mut best2 = S::lit(1e30);
     let mut points = ([zero; 3], [zero; 3]);
@@ -233,8 +233,8 @@ fn edge_contact<S: Real>(
     Touch::new(dist, rotate_add(&a.axes, &middle, &a.center), rotate(&a.axes, &n), margin)
 }
 
-/// Sides (-1 or 1; 0 along `axis`) of the edge along `axis` that lies farthest along `n`, and of the other one if the
-/// normal does not tell them apart.
+/// Sides (-1 or 1; 0 along `axis`) of the edge along `axis` that lies farthest along `n`. Also those of the other edge
+/// if the normal does not distinguish them.
 #[inline(always)]
 fn supports<S: Real>(n: &V3<S>, axis: usize, slack: &Slack<S>) -> [Option<V3<S>>; 2] {
     let one = S::lit(1.0);
@@ -256,8 +256,8 @@ fn supports<S: Real>(n: &V3<S>, axis: usize, slack: &Slack<S>) -> [Option<V3<S>>
 
 /// The contacts of a face of the box `reference` with the box `other`.
 ///
-/// `cos[k]` holds axis `k` of the reference in the other's frame, `center` is the other's center in the reference's
-/// frame. `flip` tells that the reference is the second box of the pair.
+/// `cos[k]` is axis `k` of the reference in the other's frame, `center` the other's center in the reference's frame.
+/// `flip` means that the reference is the second box of the pair.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn face_contacts<S: Real>(
@@ -275,7 +275,7 @@ fn face_contacts<S: Real>(
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let half = &reference.half;
     let below = less(center[axis], zero);
-    // the other box's face that looks most against the reference's
+    // the face of the other box that is most opposed to the reference
     let facing = &cos[axis];
     let mut face = 0;
     for k in 1..3 {
@@ -350,7 +350,7 @@ impl<S: Real> Polygon<S> {
         }
     }
 
-    /// Cuts off what lies beyond `limit` along a coordinate, or along its negative.
+    /// Cuts off the part beyond `limit` along a coordinate, or along its negative.
     #[inline(always)]
     fn clip(&mut self, coordinate: usize, negative: bool, limit: S) {
         let zero = S::zero();
@@ -380,7 +380,7 @@ impl<S: Real> Polygon<S> {
         }
     }
 
-    /// Whether one of the first `len` corners lies closer to `p` over the plane than the root of `limit2`.
+    /// Whether one of the first `len` corners has a squared distance below `limit2` from `p` in the plane.
     #[inline(always)]
     fn has_near(&self, len: usize, p: &V3<S>, limit2: S) -> bool {
         for q in &self.corners[..len] {

@@ -1,30 +1,30 @@
 //! A capsule on a box: up to two contacts.
 //!
-//! The first is where the capsule's segment is closest to the box. One point alone would let a capsule that lies on a
-//! face or an edge tip over, so MuJoCo adds a second: from the first, it follows the segment over the face or along the
-//! edge that the first point belongs to, as far as segment and face reach. Both points are then spheres on a box.
+//! The first contact is where the capsule's segment is closest to the box. One point alone would let a capsule on a
+//! face or an edge tip over, so MuJoCo adds a second. From the first point, it follows the segment over the face or
+//! along the edge as far as both reach. Both points are then treated as spheres on a box.
 
 use super::round::sphere_box;
 use super::*;
 use crate::lanes::kernel_fn;
 
-/// Where on the box the segment's closest point lies.
+/// The box feature of the segment's closest point.
 #[derive(Clone, Copy)]
 enum Feature<S> {
-    /// Inside the box, where no second contact is sought.
+    /// Inside the box; there is no second contact.
     Inside,
     /// An end of the segment over the face across this axis.
     Face(usize),
     /// The corner with these sides, bit `k` for axis `k`.
     Corner(usize),
-    /// The edge along `axis` through the corner, at `place` in (-1, 1) of it.
+    /// The edge along `axis` through the corner, at `place` in (-1, 1) along it.
     Edge { axis: usize, corner: usize, place: S },
 }
 
 /// A closest point of the segment.
 struct Closest<S> {
     feature: Feature<S>,
-    /// Place on the segment, from -1 to 1.
+    /// Position on the segment, from -1 to 1.
     along: S,
     distance2: S,
 }
@@ -43,14 +43,14 @@ kernel_fn! {
     }
 }
 
-/// The contact of the capsule's ball at a place of its segment.
+/// The contact of the capsule's ball at a position of its segment.
 #[inline(always)]
 fn ball_at<S: Real>(a: &Capsule<S>, b: &Cuboid<S>, along: S, margin: S) -> Touch<S> {
     let center = axpy3(&a.axis, along * a.half, &a.center);
     sphere_box(&Sphere { center, axis: a.axis, radius: a.radius }, b, margin)
 }
 
-/// The closest place of the segment `center + [-1, 1] arm` to the box, in the box's frame.
+/// The point of the segment `center + [-1, 1] arm` that is closest to the box, in the box's frame.
 #[inline(always)]
 fn closest<S: Real>(center: &V3<S>, arm: &V3<S>, half_length: S, half: &V3<S>) -> Closest<S> {
     let one = S::lit(1.0);
@@ -73,7 +73,7 @@ fn closest<S: Real>(center: &V3<S>, arm: &V3<S>, half_length: S, half: &V3<S>) -
             best = Closest { feature, along, distance2 };
         }
     }
-    // an edge must be closer than an end by more than rounding: a capsule flat on a face is as close at either
+    // an edge must be closer than an end by more than rounding: a capsule flat on a face is equally close at both
     let size = half_length + half[0] + half[1] + half[2];
     let slack = size.mul_add(size * S::lit(S::EPSILON), S::lit(TINY));
     for axis in 0..3 {
@@ -89,7 +89,7 @@ fn closest<S: Real>(center: &V3<S>, arm: &V3<S>, half_length: S, half: &V3<S>) -
     best
 }
 
-/// The closest place of the segment to one edge, unless they are parallel.
+/// The point of the segment closest to one edge, unless they are parallel.
 #[inline(always)]
 fn closest_on_edge<S: Real>(
     center: &V3<S>,
@@ -110,14 +110,14 @@ fn closest_on_edge<S: Real>(
     if less(edge2 * across2, S::lit(TINY)) {
         return None;
     }
-    // places x on the edge and y on the segment minimize |from + x edge - y arm|
+    // positions x on the edge and y on the segment minimize |from + x edge - y arm|
     let mix = half[axis] * arm[axis];
     let u = -(half[axis] * from[axis]);
     let v = dot(arm, &from);
     let free = (arm2 * u + mix * v).div(edge2 * across2);
     let mut place = clamp(free, one);
     let mut y = (v + mix * place).div(arm2);
-    // the last place beyond the edge decides which end the point counts to, even if it came back onto the edge
+    // the last position beyond the edge decides the end, even if later steps return to the edge
     let mut beyond = free;
     if less(one, y.abs()) {
         y = clamp(y, one);
@@ -139,7 +139,7 @@ fn closest_on_edge<S: Real>(
     Some(Closest { feature, along: y, distance2: dot(&gap, &gap) })
 }
 
-/// How far along the segment the second contact lies from the first, if there is one.
+/// Distance along the segment from the first to the second contact, if there is one.
 #[inline(always)]
 fn second<S: Real>(first: &Closest<S>, center: &V3<S>, axis: &V3<S>, arm: &V3<S>, half: &V3<S>) -> Option<S> {
     let (zero, one, two) = (S::zero(), S::lit(1.0), S::lit(2.0));
@@ -152,7 +152,7 @@ fn second<S: Real>(first: &Closest<S>, center: &V3<S>, axis: &V3<S>, arm: &V3<S>
     match first.feature {
         Feature::Inside => None,
         Feature::Corner(corner) => {
-            // turn the segment so that it runs inward along one axis, `lead`, and outward along the others
+            // orient the segment so that it runs inward along one axis, `lead`, and outward along the others
             let inward = heading ^ corner;
             let (lead, forward) = match inward {
                 1 | 2 | 4 => (inward.trailing_zeros() as usize, true),
@@ -166,19 +166,19 @@ fn second<S: Real>(first: &Closest<S>, center: &V3<S>, axis: &V3<S>, arm: &V3<S>
                 let step = onward.min(span(half[lead], arm[lead]));
                 Some(if forward { step } else { -step })
             } else {
-                // the other way, over the face across `lead`
+                // in the other direction, over the face across `lead`
                 let (k, l) = ((lead + 1) % 3, (lead + 2) % 3);
                 let step = (two - onward).min(span(half[k], arm[k])).min(span(half[l], arm[l]));
                 Some(if forward { -step } else { step })
             }
         }
         Feature::Edge { axis: edge, corner, place } => {
-            // only a segment that runs inward over one of the edge's two faces, and outward over the other
+            // only a segment that runs inward over one of the edge's faces and outward over the other
             let inward = (heading ^ corner) & !(1 << edge);
             if inward.count_ones() != 1 {
                 return None;
             }
-            // the face that it is less steep to
+            // the face to which it is less steep
             let (k, l) = ((edge + 1) % 3, (edge + 2) % 3);
             let over = if less(axis[l].abs(), axis[k].abs()) { k } else { l };
             let forward = inward & (1 << over) != 0;

@@ -1,8 +1,8 @@
 //! A height field and a sphere or capsule.
 //!
-//! The cells that the lanes have to look at are dealt out over all lanes, and the faces of their prisms are looked at in
-//! all at once. That tells most of them apart: too far away, or an end of the capsule over the top face. What is left
-//! (edges, and segments that have sunk in) needs branches and goes prism by prism.
+//! The cells that the lanes need are distributed over all lanes, and all lanes check the faces of their prisms at once.
+//! That decides most prisms: too far away, or an end of the capsule over the top face. The rest (edges, and segments
+//! inside) needs branches and is processed prism by prism.
 
 use super::height::{Cells, Terrain};
 use super::prism::{Gap, Prism, gap};
@@ -36,7 +36,7 @@ impl<T: Real> Gaps<T> {
         }
         if k == self.items.len() {
             let zero = T::zero();
-            // any unit vector will do where there is no gap
+            // any unit vector works without a gap
             self.items.push((T::none(), Gap { dist: zero, normal: [zero, zero, T::lit(1.0)], along: zero }));
         }
         self.counts[lane] += 1;
@@ -50,8 +50,8 @@ impl<T: Real> Gaps<T> {
     }
 }
 
-/// Finds the contacts of a height field and a capsule, or a sphere (a capsule with `half` zero), in the lanes `near`, and
-/// appends them to `out`.
+/// Finds the contacts of a height field and a capsule, or a sphere (a capsule with `half` zero), in the lanes `near`,
+/// and appends them to `out`.
 #[inline(always)]
 pub(crate) fn field_capsule<T: Real>(
     a: &Terrain<T>,
@@ -66,7 +66,7 @@ pub(crate) fn field_capsule<T: Real>(
     let arm = scale3(&into_axes(&a.axes, &b.axis), b.half);
     let reach = b.radius + margin;
     let extent = [arm[0].abs() + reach, arm[1].abs() + reach, arm[2].abs() + reach];
-    // level and across the segment; zero if that is upright
+    // horizontal and perpendicular to the segment; zero for an upright one
     let flat2 = arm[0].mul_add(arm[0], arm[1] * arm[1]);
     let inv = one.div(T::select(zero.lt(flat2), flat2, one).sqrt());
     let across = [-arm[1] * inv, arm[0] * inv];
@@ -118,7 +118,7 @@ pub(crate) fn field_capsule<T: Real>(
     }
 }
 
-/// A vector's lanes in another order.
+/// Permutes the lanes of a vector.
 #[inline(always)]
 fn rearrange3<T: Real>(v: &V3<T>, from: &[i32; MAX_LANES]) -> V3<T> {
     [v[0].rearrange(from), v[1].rearrange(from), v[2].rearrange(from)]

@@ -1,10 +1,10 @@
-//! Height fields, and where a height field meets a box.
+//! Height fields, and contacts of a height field with a box.
 //!
-//! Each cell of the grid is two prisms down to the base, and each prism that comes closer than the margin makes one
-//! contact. MuJoCo finds it by iteration. For a sphere or capsule that is exact while the center (the capsule's axis) is
-//! outside of the prism; inside, and for boxes that overlap the prism, MuJoCo's tolerance is 1e-6, while the shortest
-//! way out is exact here. Where parallel features touch, MuJoCo's place among theirs is arbitrary; a box has its contact
-//! in the middle of the common area.
+//! Each cell of the grid is two prisms down to the base, and each prism closer than the margin makes one contact.
+//! MuJoCo finds it by iteration. For a sphere or capsule that is exact while the center (the capsule's axis) is outside
+//! the prism. Inside, and for boxes that overlap the prism, MuJoCo's tolerance is 1e-6, while the shortest way out is
+//! exact here. Where parallel features touch, MuJoCo's contact point within them is arbitrary. A box has its contact in
+//! the middle of the common area.
 
 use super::prism::Prism;
 use super::*;
@@ -59,7 +59,7 @@ impl<S: Real> HeightField<S> {
     /// The same grid with other elevations, m.
     ///
     /// # Panics
-    /// If their number is not that of the grid.
+    /// If their number differs from that of the grid.
     pub(crate) fn with_elevations(&self, elevations: &[f32]) -> Self {
         assert_eq!(elevations.len(), self.rows * self.cols, "one elevation per point of the grid");
         let elevations = elevations.iter().map(|z| f64::from(*z));
@@ -72,7 +72,7 @@ impl<S: Real> HeightField<S> {
 }
 
 impl<S: Real<Scalar = S>> HeightField<S> {
-    /// Height of the surface at a place in the field's frame; beyond the border, that of the nearest place.
+    /// Height of the surface at a position in the field's frame. Beyond the border, the height at the nearest position.
     #[inline(always)]
     pub(crate) fn elevation(&self, at: [S; 2]) -> S {
         let (mut first, mut part) = ([0; 2], [S::zero(); 2]);
@@ -92,14 +92,14 @@ impl<S: Real<Scalar = S>> HeightField<S> {
         S::select(y.lt(x), lower_right, upper_left)
     }
 
-    /// Whether a place in the field's frame is within its border.
+    /// Whether a position in the field's frame is within its border.
     #[inline(always)]
     pub(crate) fn covers(&self, at: [S; 2]) -> S::Mask {
         S::and(at[0].abs().lt(self.half[0]), at[1].abs().lt(self.half[1]))
     }
 }
 
-/// A height field in its place: the same grid in every lane, with heights of each lane's own.
+/// A height field with a pose: the same grid in every lane, with separate heights.
 #[derive(Clone, Copy)]
 pub(crate) struct Terrain<'a, T: Real> {
     /// One per lane.
@@ -112,22 +112,22 @@ pub(crate) struct Terrain<'a, T: Real> {
 pub(super) struct Window {
     /// The first along x and along y.
     first: [[u32; 2]; MAX_LANES],
-    /// How many from there on.
+    /// Number of cells from there on.
     count: [[u32; 2]; MAX_LANES],
-    /// The next one to visit: its lane, and which it is along x and along y.
+    /// The next cell to visit: its lane, and its indices along x and y.
     lane: usize,
     step: [u32; 2],
 }
 
-/// Cells one beside the other, whichever lane they belong to: windows differ in size, and a lane that waited for the
-/// largest would do little.
+/// Cells side by side, regardless of their lane. Windows differ in size, and a lane that waited for the largest one
+/// would be mostly idle.
 pub(super) struct Cells<T: Real> {
-    /// The lanes that they belong to.
+    /// The lane of each cell.
     pub owner: [i32; MAX_LANES],
     len: usize,
     col: [T::Scalar; MAX_LANES],
     row: [T::Scalar; MAX_LANES],
-    /// Where the lower left corner is among the heights.
+    /// Index of the lower left corner among the heights.
     start: [usize; MAX_LANES],
 }
 
@@ -146,7 +146,7 @@ impl<T: Real> Cells<T> {
 }
 
 impl<'a, T: Real> Terrain<'a, T> {
-    /// Cells that come within `extent` of `center` (in the field's frame) along each axis, in the lanes `near`.
+    /// Cells within `extent` of `center` (in the field's frame) along each axis, in the lanes `near`.
     #[inline(always)]
     pub(super) fn window(&self, center: &V3<T>, extent: &V3<T>, near: T::Mask) -> Window {
         let zero = T::zero();
@@ -199,8 +199,8 @@ impl<'a, T: Real> Terrain<'a, T> {
         cells.len > 0
     }
 
-    /// The two prisms of each cell: the upper left half, then the lower right. Relative to `center`, the center in the
-    /// cells' order.
+    /// The two prisms of each cell: the upper left half, then the lower right. Coordinates are relative to `center`,
+    /// the center in the order of the cells.
     #[inline(always)]
     pub(super) fn prisms(&self, cells: &Cells<T>, center: &V3<T>) -> [Prism<'a, T>; 2] {
         let field = self.fields[0];

@@ -1,13 +1,13 @@
-//! Narrow phase: where two shapes touch.
+//! Narrow phase: contacts of two shapes.
 //!
 //! Every function takes two shapes in the order of MuJoCo's shape types (plane, height field, sphere, capsule,
-//! ellipsoid, cylinder, box) and finds MuJoCo's contacts between them: the same features, the same number, and the same
-//! frames. Positions are relative to some point near the shapes that the caller chooses, which keeps single precision
-//! accurate far from the world's origin. Pairs without a function here are those that only iteration can find.
+//! ellipsoid, cylinder, box). It finds MuJoCo's contacts between them: the same features, number and frames. Positions
+//! are relative to a point near the shapes that the caller chooses, which keeps single precision accurate far from the
+//! world's origin. Pairs without a function here need iteration.
 //!
-//! Pairs whose contacts have fixed places ([`round`], [`plane`], and spheres on boxes) work on all lanes at once. The
-//! others ([`capsule_box`], [`box_box`], [`height`]) choose among many features, so they are written for one agent at a
-//! time, with branches, and fill a [`Touches`]. [`field_capsule`] does what it can on all lanes, and the rest so.
+//! Pairs with a fixed number of candidate contacts ([`round`], [`plane`], and spheres on boxes) use all lanes at once.
+//! The others ([`capsule_box`], [`box_box`], [`height`]) choose among many features. They process one agent at a time,
+//! with branches, and fill a [`Touches`]. [`field_capsule`] combines both methods.
 
 pub(crate) mod box_box;
 pub(crate) mod capsule_box;
@@ -24,15 +24,15 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::GeomType;
 
-/// Length below which MuJoCo takes a vector for zero.
+/// Length below which MuJoCo treats a vector as zero.
 const TINY: f64 = 1e-15;
 
-/// A contact, or in some lanes none.
+/// A contact, which some lanes may lack.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch<T: Real> {
-    /// Lanes in contact: those where `dist` is below the margin. The other fields mean nothing in other lanes.
+    /// Lanes in contact: those where `dist` is below the margin. The other fields have no meaning in other lanes.
     pub on: T::Mask,
-    /// Distance of the surfaces, negative if they overlap.
+    /// Distance of the surfaces, negative for an overlap.
     pub dist: T,
     /// Midway between the surfaces.
     pub pos: V3<T>,
@@ -59,7 +59,7 @@ impl<T: Real> Touch<T> {
     }
 }
 
-/// MuJoCo's limit of contacts per pair; further ones are left out.
+/// MuJoCo's limit of contacts per pair. Further ones are left out.
 const CAPACITY: usize = 50;
 
 /// Contacts of one pair of shapes of one agent.
@@ -79,12 +79,12 @@ impl<S: Real> Touches<S> {
     pub(crate) fn clear(&mut self) {
         self.items.clear();
     }
-    /// Whether there is no room left.
+    /// Whether the list is full.
     #[inline(always)]
     fn is_full(&self) -> bool {
         self.items.len() == CAPACITY
     }
-    /// Adds a contact if it is one and there is room.
+    /// Adds a contact if it exists and the list is not full.
     #[inline(always)]
     fn push(&mut self, touch: Touch<S>) {
         if S::any(touch.on) && !self.is_full() {
@@ -106,7 +106,7 @@ pub(crate) struct Plane<T: Real> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere<T: Real> {
     pub center: V3<T>,
-    /// The z axis, a unit vector. It is used if the centers coincide.
+    /// The z axis, a unit vector, used for coinciding centers.
     pub axis: V3<T>,
     pub radius: T,
 }
@@ -126,7 +126,7 @@ pub(crate) struct Capsule<T: Real> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cylinder<T: Real> {
     pub center: V3<T>,
-    /// The third is the axis of symmetry; the others matter where the axis is parallel to a plane's normal.
+    /// Columns: the third is the axis of symmetry. The others matter if the axis is parallel to a plane's normal.
     pub axes: Rot<T>,
     pub radius: T,
     /// Half the length.
@@ -142,8 +142,8 @@ pub(crate) struct Cuboid<T: Real> {
     pub half: V3<T>,
 }
 
-/// Radius of the smallest ball about a shape's center that contains it, from its sizes in MJCF's order; infinite for
-/// planes and height fields.
+/// Radius of the smallest ball about a shape's center that contains the shape, from its sizes in MJCF's order. Infinite
+/// for planes and height fields.
 pub(crate) fn bounding_radius(kind: GeomType, size: &[f64; 3]) -> f64 {
     let [x, y, z] = *size;
     match kind {
@@ -156,7 +156,7 @@ pub(crate) fn bounding_radius(kind: GeomType, size: &[f64; 3]) -> f64 {
     }
 }
 
-/// Lanes where balls about `a` and `b` come closer than `reach`, the sum of their radii and the margin.
+/// Lanes where balls about `a` and `b` are closer than `reach`, the sum of their radii and the margin.
 #[inline(always)]
 pub(crate) fn near<T: Real>(a: &V3<T>, b: &V3<T>, reach: T) -> T::Mask {
     let d = sub3(a, b);
@@ -202,7 +202,7 @@ fn clamp<T: Real>(x: T, limit: T) -> T {
     x.max(-limit).min(limit)
 }
 
-/// `x` with the sign bit of choice: `-x` where the mask is set.
+/// `-x` where the mask is set, else `x`.
 #[inline(always)]
 fn negate_where<T: Real>(mask: T::Mask, x: T) -> T {
     T::select(mask, -x, x)

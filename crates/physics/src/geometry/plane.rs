@@ -1,4 +1,4 @@
-//! A plane of any pose and the points of other shapes that meet it first.
+//! Contacts of a plane of any pose with the extreme points of other shapes.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn height<T: Real>(plane: &Plane<T>, point: &V3<T>) -> T {
     dot(&plane.normal, &sub3(point, &plane.point))
 }
 
-/// Lanes where a ball about `center` comes closer to the plane than the margin.
+/// Lanes where a ball about `center` is closer to the plane than the margin.
 #[inline(always)]
 pub(crate) fn near_plane<T: Real>(plane: &Plane<T>, center: &V3<T>, reach: T) -> T::Mask {
     height(plane, center).lt(reach)
@@ -29,7 +29,7 @@ pub(crate) fn plane_sphere<T: Real>(plane: &Plane<T>, b: &Sphere<T>, margin: T) 
     Touch::new(dist, pos, plane.normal, margin)
 }
 
-/// Up to two contacts, upper end first; the first tangent is the capsule's axis.
+/// Up to two contacts, upper end first. The first tangent is the capsule's axis.
 #[inline(always)]
 pub(crate) fn plane_capsule<T: Real>(plane: &Plane<T>, b: &Capsule<T>, margin: T) -> [Touch<T>; 2] {
     let n = &plane.normal;
@@ -43,7 +43,7 @@ pub(crate) fn plane_capsule<T: Real>(plane: &Plane<T>, b: &Capsule<T>, margin: T
     ]
 }
 
-/// The direction of a capsule's axis in a plane; for an upright capsule that of the x axis, else of the y axis.
+/// The direction of a capsule's axis in a plane. For an upright capsule the x axis, else the y axis.
 #[inline(always)]
 fn axis_tangent<T: Real>(n: &V3<T>, axis: &V3<T>, slope: T) -> V3<T> {
     let (zero, one) = (T::zero(), T::lit(1.0));
@@ -58,8 +58,8 @@ fn axis_tangent<T: Real>(n: &V3<T>, axis: &V3<T>, slope: T) -> V3<T> {
     scale3(&t, len2.sqrt().recip())
 }
 
-/// Up to four contacts, the corners below the center. Of two opposite corners only the lower can be one of them, so
-/// contact `i` is that of corners `i` and `7 - i` (bit `k` of a corner's number tells its side along axis `k`).
+/// Up to four contacts, the corners below the center. Of two opposite corners only the lower one qualifies, so contact
+/// `i` is that of corners `i` and `7 - i`. Bit `k` of a corner's number is its side along axis `k`.
 #[inline(always)]
 pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> [Touch<T>; 4] {
     let n = &plane.normal;
@@ -90,8 +90,8 @@ pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> 
     out
 }
 
-/// Up to four contacts: the lowest point of the rim, the point of the other rim beside it, and two more of the lower
-/// rim that complete an equilateral triangle.
+/// Up to four contacts: the lowest point of the rim, the adjacent point of the other rim, and two more of the lower rim
+/// that complete an equilateral triangle.
 #[inline(always)]
 pub(crate) fn plane_cylinder<T: Real>(plane: &Plane<T>, b: &Cylinder<T>, margin: T) -> [Touch<T>; 4] {
     let (zero, half) = (T::zero(), T::lit(0.5));
@@ -103,7 +103,7 @@ pub(crate) fn plane_cylinder<T: Real>(plane: &Plane<T>, b: &Cylinder<T>, margin:
         [negate_where::<T>(up, a[0]), negate_where::<T>(up, a[1]), negate_where::<T>(up, a[2])]
     };
     let slope = negate_where::<T>(up, slope);
-    // steepest way down across the axis; on a cylinder that stands upright the choice is free
+    // steepest descent perpendicular to the axis; arbitrary for an upright cylinder
     let down = sub3(&scale3(&axis, slope), n);
     let len2 = dot(&down, &down);
     let tiny = (4.0 * T::EPSILON).max(TINY);

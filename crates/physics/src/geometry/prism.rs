@@ -1,7 +1,7 @@
-//! The closest points of a segment and a prism: three upright columns of different heights over a triangle.
+//! The closest points of a segment and a prism: three vertical columns of different heights over a triangle.
 //!
-//! Coordinates are relative to the middle of the segment. A ball or a capsule is a segment (of length zero) with a
-//! radius, so this is all that they need to meet a height field.
+//! Coordinates are relative to the middle of the segment. A ball or a capsule is a segment (of length zero for a ball)
+//! with a radius, so this covers both on a height field.
 
 use super::*;
 use crate::lanes::kernel_fn;
@@ -16,13 +16,13 @@ pub(super) struct Prism<'a, S: Real> {
     pub base: S,
 }
 
-/// Signed distance of a segment from a prism, negative by the length of the shortest way out.
+/// Signed distance of a segment from a prism. Inside, it is the negative length of the shortest way out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gap<S: Real> {
     pub dist: S,
     /// Unit vector from the prism to the segment.
     pub normal: V3<S>,
-    /// Place of the closest point on the segment, from -1 to 1.
+    /// Position of the closest point on the segment, from -1 to 1.
     pub along: S,
 }
 
@@ -51,25 +51,25 @@ impl<S: Real> Face<S> {
     fn at(&self, along: S) -> S {
         self.slope.mul_add(along, self.middle)
     }
-    /// The least distance of the segment's points.
+    /// The smallest distance of the segment's points.
     #[inline(always)]
     fn nearest(&self) -> S {
         self.middle - self.slope.abs()
     }
 }
 
-/// What the faces alone tell.
+/// Results that follow from the faces alone.
 pub(super) struct Glance<T: Real> {
     /// Lanes where an end of the segment is closest, to a point within the prism's top.
     pub over: T::Mask,
-    /// The distance in those.
+    /// The distance in those lanes.
     pub gap: Gap<T>,
-    /// Lanes that may be nearer than the limit in some other way.
+    /// Lanes that may be closer than the limit in another way.
     pub unclear: T::Mask,
 }
 
 impl<'a, T: Real> Prism<'a, T> {
-    /// Looks at the segment from `-arm` to `arm` from above.
+    /// Checks the segment from `-arm` to `arm` from above.
     #[inline(always)]
     pub(super) fn glance(&self, arm: &V3<T>, limit: T) -> Glance<T> {
         let (zero, one) = (T::zero(), T::lit(1.0));
@@ -96,7 +96,7 @@ impl<'a, T: Real> Prism<'a, T> {
             let crossing = (limit - middle).div(rate);
             to = T::select(zero.lt(rate), to.min(crossing), to);
             from = T::select(rate.lt(zero), from.max(crossing), from);
-            // beyond both faces: the edge between them is nearer than everything behind it
+            // beyond both faces: the edge between them is closer than everything behind it
             let beside = middle - rate.abs();
             let (up, out) = (cos.neg_mul_add(beside, dist), cos.neg_mul_add(dist, beside));
             let edge2 = up.mul_add(dist, out * beside);
@@ -123,7 +123,7 @@ impl<'a, T: Real> Prism<'a, T> {
 }
 
 kernel_fn! {
-    /// Distance of the segment from `-arm` to `arm`; none if it is above `limit`.
+    /// Distance of the segment from `-arm` to `arm`. `None` if it is above `limit`.
     pub(super) fn gap<'a, S>(prism: &'a Prism<'a, S>, arm: &'a V3<S>, limit: S) -> Option<Gap<S>> {
         prism.gap(arm, limit)
     }
@@ -158,7 +158,7 @@ impl<S: Real> Prism<'_, S> {
         faces
     }
 
-    /// Edge `i`: three of the top, three of the base, three upright; from a corner, along a vector.
+    /// Edge `i` as a corner and a vector: three of the top, three of the base, three vertical.
     #[inline(always)]
     pub(super) fn edge(&self, i: usize) -> (V3<S>, V3<S>) {
         let (k, next) = (i % 3, (i + 1) % 3);
@@ -178,7 +178,7 @@ impl<S: Real> Prism<'_, S> {
             return None;
         }
         let faces = self.faces(slope, arm);
-        // part of the segment that is inside, and the quick way out: wholly beyond the limit of one face
+        // the part of the segment inside; ends early if it is completely beyond the limit of one face
         let (mut from, mut to) = (-one, one);
         let mut inside = true;
         for face in &faces {
@@ -199,15 +199,15 @@ impl<S: Real> Prism<'_, S> {
         if inside && !less(to, from) {
             return Some(self.exit(arm, &faces, (from + to) * S::lit(0.5)));
         }
-        // no closure here: it would be compiled for the baseline processor
+        // a closure here would be compiled for the baseline processor
         match self.over_face(&faces) {
             None => self.beside_edge(arm, limit),
             found => found,
         }
     }
 
-    /// An end of the segment whose closest point is within a face, which no other point of the segment can beat if the
-    /// segment does not come down toward that face.
+    /// An end of the segment whose closest point is within a face. No other point of the segment is closer if the
+    /// segment does not descend toward that face.
     #[inline(always)]
     fn over_face(&self, faces: &[Face<S>; 5]) -> Option<Gap<S>> {
         let (zero, one) = (S::zero(), S::lit(1.0));
@@ -257,13 +257,13 @@ impl<S: Real> Prism<'_, S> {
         Some(Gap { dist, normal: scale3(&d, dist.recip()), along })
     }
 
-    /// The shortest way out for a segment that is partly inside, about at `inner`.
+    /// The shortest way out for a segment that is partly inside, near `inner`.
     #[inline(always)]
     fn exit(&self, arm: &V3<S>, faces: &[Face<S>; 5], inner: S) -> Gap<S> {
         let (zero, one) = (S::zero(), S::lit(1.0));
         let mut best = Gap { dist: S::lit(-1e30), normal: [zero, zero, one], along: zero };
         for face in faces {
-            // an end goes deepest, or all of a segment along the face
+            // the deepest point is an end, or all of a segment along the face
             let level = less(face.slope.abs(), S::lit(4.0 * S::EPSILON) * face.middle.abs());
             let along = if level {
                 inner
@@ -286,7 +286,7 @@ impl<S: Real> Prism<'_, S> {
                 continue;
             }
             let mut n = scale3(&n, n2.sqrt().recip());
-            // this edge supports the prism along n or -n, or is no edge to leave by
+            // the edge must support the prism along n or -n to be a way out
             let reach = dot(&n, &corner);
             if !less(best.dist, -reach.abs()) {
                 continue;
@@ -319,7 +319,7 @@ impl<S: Real> Prism<'_, S> {
     }
 }
 
-/// Places of the closest points of the segments `[-1, 1] arm` and `corner + [0, 1] edge`.
+/// Positions of the closest points of the segments `[-1, 1] arm` and `corner + [0, 1] edge`.
 #[inline(always)]
 pub(super) fn closest_places<S: Real>(arm: &V3<S>, corner: &V3<S>, edge: &V3<S>) -> (S, S) {
     let (zero, one) = (S::zero(), S::lit(1.0));

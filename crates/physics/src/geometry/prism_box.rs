@@ -1,14 +1,14 @@
 //! The closest points of a box and a prism of a height field.
 //!
-//! Coordinates are relative to the box's center; the box is given by its arms, the vectors from the center to the middle
-//! of its faces.
+//! Coordinates are relative to the box's center. The box is given by its arms, the vectors from the center to the
+//! middle of its faces.
 
 use super::prism::{Face, Prism, closest_places};
 use super::*;
 
-/// Share of a box's half extent by which corners at one depth may differ.
+/// Depth difference of corners on the same level, as a fraction of the box's half extent.
 const LEVEL: f64 = 1e-4;
-/// Share by which an edge's way out must be shorter than a face's.
+/// Fraction by which an edge's way out must be shorter than a face's.
 const EDGE_BIAS: f64 = 1e-6;
 
 /// Signed distance of a box from a prism.
@@ -20,7 +20,7 @@ pub(super) struct BoxGap<S: Real> {
     pub pos: V3<S>,
 }
 
-/// What separates a box from a prism most.
+/// The feature of largest separation between a box and a prism.
 #[derive(Clone, Copy)]
 enum Feature {
     PrismFace(usize),
@@ -30,7 +30,7 @@ enum Feature {
 }
 
 impl<S: Real> Prism<'_, S> {
-    /// Distance of a box; none if it is above `limit`.
+    /// Distance of a box. `None` if it is above `limit`.
     #[inline(always)]
     pub(super) fn gap_to_box(&self, arms: &Rot<S>, half: &V3<S>, limit: S) -> Option<BoxGap<S>> {
         let still = [S::zero(); 3];
@@ -95,7 +95,7 @@ impl<S: Real> Prism<'_, S> {
                 }
             }
         }
-        // the direction between closest points is lost in rounding where they all but touch
+        // for almost touching shapes, rounding dominates the direction between closest points
         if less((half[0] + half[1] + half[2]) * S::lit(64.0 * S::EPSILON), separation) {
             return self.apart(arms, half, &corners, limit);
         }
@@ -103,7 +103,7 @@ impl<S: Real> Prism<'_, S> {
         Some(BoxGap { dist: separation, normal, pos: middle })
     }
 
-    /// Where a prism and a box touch that are `separation` apart along `normal` by this feature.
+    /// Contact point of a prism and a box that are `separation` apart along `normal` by this feature.
     #[inline(always)]
     fn place(
         &self,
@@ -139,7 +139,7 @@ impl<S: Real> Prism<'_, S> {
         }
     }
 
-    /// The closest points of a box that does not touch the prism: of one of its edges, or of a corner of the prism.
+    /// The closest points of a box that does not touch the prism: on one of its edges, or at a corner of the prism.
     #[inline(always)]
     fn apart(&self, arms: &Rot<S>, half: &V3<S>, corners: &[V3<S>; 6], limit: S) -> Option<BoxGap<S>> {
         let zero = S::zero();
@@ -180,7 +180,7 @@ impl<S: Real> Prism<'_, S> {
     }
 }
 
-/// How far a box extends along a unit vector.
+/// Half extent of a box along a unit vector.
 #[inline(always)]
 fn reach<S: Real>(arms: &Rot<S>, n: &V3<S>) -> S {
     dot(&arms[0], n).abs() + dot(&arms[1], n).abs() + dot(&arms[2], n).abs()
@@ -199,7 +199,7 @@ fn extent<S: Real>(points: &[V3<S>; 6], n: &V3<S>) -> (S, S) {
     (low, high)
 }
 
-/// The corners of a box that lie deepest against `normal`: one, or all of an edge or face across it.
+/// The corners of a box that are deepest along `-normal`: one, or all of a perpendicular edge or face.
 #[inline(always)]
 fn box_corners<S: Real>(arms: &Rot<S>, half: &V3<S>, normal: &V3<S>) -> Area<S> {
     let mut area = Area { points: [[S::zero(); 3]; 12], len: 1 };
@@ -208,7 +208,7 @@ fn box_corners<S: Real>(arms: &Rot<S>, half: &V3<S>, normal: &V3<S>) -> Area<S> 
         let slope = dot(&arms[k], normal);
         let level = less(slope.abs(), half[k] * S::lit(LEVEL));
         if level && open < 2 {
-            // go round: the second open direction is taken back in reverse order
+            // keep the cyclic order: the second open direction is added in reverse order
             for i in 0..area.len {
                 let p = area.points[area.len - 1 - i];
                 area.points[area.len + i] = add3(&p, &arms[k]);
@@ -228,7 +228,7 @@ fn box_corners<S: Real>(arms: &Rot<S>, half: &V3<S>, normal: &V3<S>) -> Area<S> 
     area
 }
 
-/// The corners of a prism that lie highest along `normal`, in order around it.
+/// The corners of a prism that are highest along `normal`, in cyclic order.
 #[inline(always)]
 fn prism_corners<S: Real>(corners: &[V3<S>; 6], normal: &V3<S>, size: S) -> Area<S> {
     let (_, high) = extent(corners, normal);
@@ -251,7 +251,7 @@ struct Area<S: Real> {
 }
 
 impl<S: Real> Area<S> {
-    /// The middle of what lies within the faces of a prism other than `own`.
+    /// The center of the part within the faces of a prism other than `own`.
     #[inline(always)]
     fn clip_to_prism(mut self, faces: &[Face<S>; 5], own: usize) -> V3<S> {
         for i in 0..5 {
@@ -262,7 +262,7 @@ impl<S: Real> Area<S> {
         self.middle()
     }
 
-    /// The middle of what lies within the faces of a box other than those across axis `own`.
+    /// The center of the part within the faces of a box other than those across axis `own`.
     #[inline(always)]
     fn clip_to_box(mut self, arms: &Rot<S>, half: &V3<S>, own: usize) -> V3<S> {
         for k in 0..3 {

@@ -1,4 +1,4 @@
-//! Spheres, capsules and what a sphere meets: pairs whose contacts follow from closest points.
+//! Spheres, capsules and the shapes that a sphere touches: contacts from closest points.
 
 use super::*;
 
@@ -36,7 +36,7 @@ fn across<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     select3::<T>(turned, &scale3(&n, inv), &x_axis)
 }
 
-/// The opposite vector.
+/// Negates a vector.
 #[inline(always)]
 fn against<T: Real>(a: &V3<T>) -> V3<T> {
     [-a[0], -a[1], -a[2]]
@@ -58,9 +58,9 @@ pub(crate) fn sphere_capsule<T: Real>(a: &Sphere<T>, b: &Capsule<T>, margin: T) 
 /// Square of the sine up to which the axes of two capsules count as parallel.
 const PARALLEL: f64 = 1e-8;
 
-/// One contact, at the closest points of the axes. Where these are parallel there is no one closest pair, and both
-/// ends of the stretch along which the capsules overlap are contacts: the first capsule's lower end, then its upper,
-/// each moved along to the second capsule if it lies beyond.
+/// One contact, at the closest points of the axes. Parallel axes have no unique closest pair: both ends of the overlap
+/// are contacts. The order is the first capsule's lower end, then its upper end, each moved onto the second capsule if
+/// it lies beyond.
 #[inline(always)]
 pub(crate) fn capsule_capsule<T: Real>(a: &Capsule<T>, b: &Capsule<T>, margin: T) -> [Touch<T>; 2] {
     let axes = axes(a, b);
@@ -86,11 +86,11 @@ pub(crate) fn gap<T: Real>(a: &Capsule<T>, b: &Capsule<T>) -> T {
     dot(&d, &d).sqrt() - a.radius - b.radius
 }
 
-/// How the axes of two capsules lie.
+/// Relative placement of the axes of two capsules.
 struct Axes<T: Real> {
     /// Cosine of the angle between them.
     c: T,
-    /// From the first's center to the second's, along either axis.
+    /// Vector from the first center to the second, along either axis.
     da: T,
     db: T,
     /// Square of the sine of the angle.
@@ -102,24 +102,24 @@ struct Axes<T: Real> {
 #[inline(always)]
 fn axes<T: Real>(a: &Capsule<T>, b: &Capsule<T>) -> Axes<T> {
     let d = sub3(&b.center, &a.center);
-    // sin^2 by the vector product, which does not cancel where the axes are almost parallel
+    // the vector product does not cancel for almost parallel axes
     let n = cross(&a.axis, &b.axis);
     let sin2 = dot(&n, &n);
     let crossing = T::lit(PARALLEL).lt(sin2);
     Axes { c: dot(&a.axis, &b.axis), da: dot(&a.axis, &d), db: dot(&b.axis, &d), sin2, crossing }
 }
 
-/// Places on two capsules' axes that are closest to each other; of parallel ones, some such places.
+/// The closest positions on two capsules' axes. For parallel axes, one of the possible pairs.
 #[inline(always)]
 fn closest<T: Real>(a: &Capsule<T>, b: &Capsule<T>, axes: &Axes<T>) -> (T, T) {
     let Axes { c, da, db, sin2, crossing, .. } = *axes;
     let s = clamp(c.neg_mul_add(db, da).div(T::select(crossing, sin2, T::lit(1.0))), a.half);
-    // each in turn the closest point to the other; the distance is convex, so this ends at the minimum
+    // alternating projections; the distance is convex, so they converge to the minimum
     let t = clamp(c.mul_add(s, -db), b.half);
     (clamp(c.mul_add(t, da), a.half), t)
 }
 
-/// The place `end` of a capsule's axis and the place on a parallel one beside it, which may have to be moved onto both.
+/// The position `end` of a capsule's axis and the position next to it on a parallel axis, both clamped to their axes.
 #[inline(always)]
 fn beside<T: Real>(end: T, c: T, da: T, db: T, half_a: T, half_b: T) -> (T, T) {
     let free = c.mul_add(end, -db);
@@ -128,14 +128,14 @@ fn beside<T: Real>(end: T, c: T, da: T, db: T, half_a: T, half_b: T) -> (T, T) {
     (T::select(moved, clamp(c.mul_add(t, da), half_a), end), t)
 }
 
-/// Contact of the balls at given places of two capsules' axes.
+/// Contact of the balls at given positions of two capsules' axes.
 #[inline(always)]
 fn axis_points<T: Real>(a: &Capsule<T>, s: T, b: &Capsule<T>, t: T, margin: T) -> Touch<T> {
     let (p, q) = (axpy3(&a.axis, s, &a.center), axpy3(&b.axis, t, &b.center));
     balls(&p, a.radius, &q, b.radius, margin, [&a.axis, &b.axis])
 }
 
-/// One contact; a center inside the box leaves by the nearest face.
+/// One contact. A center inside the box leaves through the nearest face.
 #[inline(always)]
 pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Cuboid<T>, margin: T) -> Touch<T> {
     let (zero, one) = (T::zero(), T::lit(1.0));
@@ -168,7 +168,7 @@ pub(crate) fn sphere_box<T: Real>(a: &Sphere<T>, b: &Cuboid<T>, margin: T) -> To
     Touch::new(dist, pos, normal, margin)
 }
 
-/// One contact, with the side, a cap or a rim; a center inside leaves by the nearer of side and cap.
+/// One contact, with the side, a cap or a rim. A center inside leaves through the nearer of side and cap.
 #[inline(always)]
 pub(crate) fn sphere_cylinder<T: Real>(a: &Sphere<T>, b: &Cylinder<T>, margin: T) -> Touch<T> {
     let zero = T::zero();

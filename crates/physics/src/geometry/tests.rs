@@ -1,12 +1,12 @@
 //! Contract: the contacts between two shapes are MuJoCo's.
 //!
-//! On 2,000 poses per pair of shapes (any, barely touching, deep, with parallel or perpendicular axes, and nearly so) the
-//! number of contacts, their distances, positions and frames agree with those of the `mujoco` package, in its order.
-//! Where a displacement of 1e-7 would change which features touch, rounding decides, and the results may differ. Single
-//! precision agrees with double precision, and every vector width with one lane to the last bit.
+//! On 2,000 poses per pair of shapes, the number of contacts, their distances, positions and frames agree with those of
+//! the `mujoco` package, in its order. Poses are random, barely touching, deep, or with (almost) parallel or
+//! perpendicular axes. If a displacement of 1e-7 would change which features touch, rounding decides and results may
+//! differ. Single precision agrees with double precision, and every vector width with one lane to the last bit.
 //!
-//! In degenerate poses MuJoCo's special cases decide, and the contacts agree too. There, centers coincide or lie on axes,
-//! faces, edges and corners, axes are parallel or perpendicular, and numbers have no rounding errors.
+//! In degenerate poses MuJoCo's special cases decide, and the contacts agree too. In these poses, centers coincide or
+//! lie on axes, faces, edges and corners; axes are parallel or perpendicular; numbers have no rounding errors.
 
 #[path = "../../tests/common/mod.rs"]
 mod common;
@@ -71,7 +71,7 @@ fn reference(state: &State) -> [f64; 3] {
     [state[0][0] + 0.125, state[0][1], state[0][2]]
 }
 
-/// Where a shape is, in lanes.
+/// Pose of a shape, in lanes.
 #[derive(Clone, Copy)]
 struct Pose<T> {
     center: V3<T>,
@@ -158,7 +158,7 @@ fn on_field<T: Real>(place: &Pose<T>, capsule: &super::Capsule<T>) -> Vec<Touch<
     out
 }
 
-/// Contacts of the pairs that are treated agent by agent.
+/// Contacts of the pairs that are processed agent by agent.
 fn branching<S: Real>(shapes: [Shape; 2], [a, b]: [Pose<S>; 2]) -> Vec<Touch<S>> {
     let margin = S::lit(MARGIN);
     let mut out = Touches::new();
@@ -175,7 +175,7 @@ fn branching<S: Real>(shapes: [Shape; 2], [a, b]: [Pose<S>; 2]) -> Vec<Touch<S>>
     out.as_slice().to_vec()
 }
 
-/// The contacts of every state; none for shapes that are treated agent by agent if there are several lanes.
+/// The contacts of every state. `None` for shapes that are processed agent by agent if there are several lanes.
 fn contacts<T: Real>(shapes: [Shape; 2], states: &[State]) -> Option<Vec<Vec<Contact>>> {
     let mut out = Vec::new();
     for group in states.chunks(T::LANES) {
@@ -209,7 +209,7 @@ fn difference(a: &Contact, b: &Contact) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
-/// Largest difference of two lists of contacts, in order or, if `sorted` is false, of the best partners.
+/// Largest difference of two lists of contacts, in order if `ordered`, otherwise between best matches.
 fn distance(got: &[Contact], want: &[Contact], ordered: bool) -> f64 {
     if got.len() != want.len() {
         return f64::INFINITY;
@@ -227,7 +227,7 @@ fn distance(got: &[Contact], want: &[Contact], ordered: bool) -> f64 {
     worst
 }
 
-/// How far the contacts of a list of states are from MuJoCo's.
+/// Differences between the contacts of a list of states and MuJoCo's.
 #[derive(Debug, Default)]
 struct Outcome {
     states: usize,
@@ -236,7 +236,7 @@ struct Outcome {
     ties: usize,
     /// States in which small displacements have large effects, ties among them.
     rough: usize,
-    /// States that are no ties and differ.
+    /// Other states that differ.
     wrong: usize,
     /// Ties that differ.
     wrong_ties: usize,
@@ -264,7 +264,7 @@ fn agrees(shapes: [Shape; 2], got: &[Contact], want: &[Contact], rough: bool, ou
             return d < 1e-9;
         }
     };
-    // inside the ground, MuJoCo's way out is approximate; along parallel features, its place is arbitrary
+    // inside the ground, MuJoCo's way out is approximate; along parallel features, its position is arbitrary
     let mut elsewhere = false;
     let close = got.len() == want.len()
         && got.iter().zip(want).all(|(g, w)| {
@@ -278,7 +278,7 @@ fn agrees(shapes: [Shape; 2], got: &[Contact], want: &[Contact], rough: bool, ou
     close
 }
 
-/// Whether the bounds of the shapes come closer than the margin.
+/// Whether the bounds of the shapes are closer than the margin.
 fn may_touch(shapes: [Shape; 2], state: &State) -> bool {
     let radius = shapes.map(|shape| match shape {
         Plane | Field => f64::INFINITY,
@@ -392,7 +392,7 @@ fn boxes_agree_with_mujoco() {
     check(&[[BRICK, BRICK], [BRICK, SLAB]], 2);
 }
 
-/// Compares pairs of shapes in poses without a nearest feature of their own.
+/// Compares pairs of shapes in degenerate poses.
 #[test]
 fn degenerate_poses_agree_with_mujoco() {
     let (ball, limb, can) = (Sphere(0.125), Capsule(0.0625, 0.25), Cylinder(0.125, 0.25));

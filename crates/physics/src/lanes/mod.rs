@@ -1,11 +1,11 @@
 //! Lanes: one generic number that is a plain `f64` or `f32`, or `L` agents side by side in one vector register.
 //!
-//! Every kernel of the engine is written once over [`Real`]. Lane `i` of every value belongs to agent `i` of a group and
-//! no operation mixes lanes, which is what makes a trajectory independent of the slot an agent sits in and of the
-//! vector width. All backends round alike: `mul_add` is fused (one rounding) everywhere, emulated exactly where the
-//! processor has no such instruction; the transcendentals in [`math`] are built from these operations alone.
+//! Every kernel of the engine is written once over [`Real`]. Lane `i` of every value belongs to agent `i` of a group.
+//! No operation mixes lanes, so a trajectory depends neither on the agent's slot nor on the vector width. All backends
+//! round alike: `mul_add` is fused (one rounding) everywhere, and emulated exactly on processors without such an
+//! instruction. The transcendentals in [`math`] use these operations alone.
 //!
-//! Rust compiles a function for the baseline processor unless told otherwise, so vector code must be entered through
+//! By default, Rust compiles a function for the baseline processor. Vector code must therefore be entered through
 //! [`Real::enter`], which runs a [`Kernel`] inside a function compiled for the right instruction set. Everything a
 //! kernel calls must be `#[inline(always)]`.
 
@@ -69,7 +69,7 @@ pub trait Real:
     /// If the processor does not support it.
     fn enter<K: Kernel<Self>>(kernel: K) -> K::Output;
 
-    /// Rounds to the precision of a lane.
+    /// Rounds a number to the precision of a lane.
     fn scalar(x: f64) -> Self::Scalar;
     /// The exact value of a lane's number.
     fn widen(x: Self::Scalar) -> f64;
@@ -121,8 +121,8 @@ pub trait Real:
     fn exp2_int(self) -> Self;
     /// `(m, e)` with `self = m * 2^e`, `1 <= m < 2`, for positive normal numbers.
     fn split_exponent(self) -> (Self, Self);
-    /// The number of lane `from[i]` in lane `i`, for `from` within `LANES`. For work that is spread over the lanes
-    /// regardless of whose it is; the numbers of an agent still meet no others.
+    /// The number of lane `from[i]` in lane `i`, for `from` within `LANES`. It is for work that is distributed over the
+    /// lanes regardless of the agent. Numbers of different agents still never mix.
     #[inline(always)]
     fn rearrange(self, from: &[i32; MAX_LANES]) -> Self {
         let mut out = self;
@@ -160,7 +160,7 @@ pub trait Real:
     fn all(a: Self::Mask) -> bool {
         !Self::any(Self::not(a))
     }
-    /// Bit `i` tells lane `i`.
+    /// A bit mask: bit `i` is lane `i`.
     fn bits(a: Self::Mask) -> u32;
     /// The inverse of [`Real::bits`].
     fn from_bits(bits: u32) -> Self::Mask;
@@ -224,7 +224,7 @@ pub fn sum16<T: Real>(v: &[T]) -> T::Scalar {
 /// Instruction sets a group of agents can be stepped with, chosen at run time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Isa {
-    /// One `f64` lane: the oracle that tests compare with MuJoCo.
+    /// One `f64` lane: the reference that tests compare with MuJoCo.
     F64,
     /// One `f32` lane.
     F32,
@@ -240,8 +240,8 @@ impl Isa {
     /// All of them, narrowest first.
     pub const ALL: [Isa; 5] = [Isa::F64, Isa::F32, Isa::X4, Isa::X8, Isa::X16];
 
-    /// The fastest that this processor supports: without hardware for fused products in vectors, one lane at a time
-    /// beats four that emulate them.
+    /// The fastest one that this processor supports. Without hardware for fused vector products, one lane at a time is
+    /// faster than four that emulate them.
     pub fn best() -> Isa {
         let narrow = if cfg!(target_arch = "aarch64") { Isa::X4 } else { Isa::F32 };
         *[Isa::X16, Isa::X8].iter().find(|isa| isa.supported()).unwrap_or(&narrow)
@@ -322,7 +322,8 @@ macro_rules! with_lanes {
     };
 }
 
-/// A function over lanes that is compiled on its own for each instruction set: its body is the [`Kernel`] that it enters.
+/// A function over lanes that is compiled separately for each instruction set. Its body is the [`Kernel`] that it
+/// enters.
 macro_rules! kernel_fn {
     ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime, $T:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $crate::lanes::kernel_fn! { $(#[$meta])* $vis fn $name<$life, $T>($($arg: $type),*) -> () $body }

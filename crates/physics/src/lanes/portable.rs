@@ -26,7 +26,8 @@ fn fused(a: f32, b: f32, c: f32) -> f32 {
     f64::from_bits(if inexact { odd } else { bits }) as f32
 }
 
-/// The emulation in four lanes. A call per product keeps the kernels' code small, which matters more than the call.
+/// The emulation in four lanes. A function call per product keeps the kernels' code small, which matters more than the
+/// cost of the call.
 #[inline(never)]
 fn fused4(a: &[f32; 4], b: &[f32; 4], c: &[f32; 4]) -> [f32; 4] {
     [fused(a[0], b[0], c[0]), fused(a[1], b[1], c[1]), fused(a[2], b[2], c[2]), fused(a[3], b[3], c[3])]

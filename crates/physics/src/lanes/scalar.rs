@@ -16,7 +16,7 @@ macro_rules! scalar_backend {
             }
             #[inline]
             fn enter<K: Kernel<Self>>(kernel: K) -> K::Output {
-                // not inlined: a function that is not is compiled in one crate, and shared by the others
+                // a function that is not inlined is compiled once, and shared by all crates
                 #[inline(never)]
                 fn plain<K: Kernel<$t>>(kernel: K) -> K::Output {
                     kernel.run()
@@ -161,7 +161,7 @@ macro_rules! scalar_backend {
 }
 
 scalar_backend!(f32, "f32", u32, 23, 127;);
-// double precision is the oracle: full-precision functions from the `libm` crate (not the platform's)
+// double precision is the reference: full-precision functions from the `libm` crate (not the platform's)
 scalar_backend!(f64, "f64", u64, 52, 1023;
     #[inline(always)]
     fn sin_cos(self) -> (f64, f64) {

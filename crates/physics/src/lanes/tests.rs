@@ -1,4 +1,4 @@
-//! Every backend gives the bits of the scalar one, and the functions are as accurate as promised.
+//! Every backend gives the bits of the scalar one, and the functions have the documented accuracy.
 
 use super::*;
 
@@ -77,7 +77,7 @@ fn backends_agree_bit_for_bit() {
     let check = |got: Vec<Vec<u32>>, isa: &str| {
         for (k, (g, w)) in got.iter().zip(&want).enumerate() {
             for (i, (g, w)) in g.iter().zip(w).enumerate() {
-                // the sign and payload of a NaN are not part of the promise
+                // the sign and payload of a NaN are unspecified
                 let nan = f32::from_bits(*g).is_nan() && f32::from_bits(*w).is_nan();
                 assert!(
                     g == w || nan,

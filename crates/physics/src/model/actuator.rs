@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What an actuator's force acts on (MuJoCo `actuator_trntype`, `actuator_trnid`).
+/// Target of an actuator's force (MuJoCo `actuator_trntype`, `actuator_trnid`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Transmission {
     /// A joint, by index. The torque on a ball joint and the wrench on a free joint are given in the body's frame.
@@ -38,9 +38,9 @@ pub enum Dynamics {
 pub struct Actuator {
     /// Name; empty when the file gives none.
     pub name: String,
-    /// What it acts on.
+    /// Target of the force.
     pub transmission: Transmission,
-    /// Transmission ratio per degree of freedom of the joint; a tendon has the first only.
+    /// Transmission ratio per degree of freedom of the joint. A tendon only has the first.
     pub gear: [f64; 6],
     /// Whether `ctrl` is clamped to `ctrl_range`.
     pub ctrl_limited: bool,
@@ -63,7 +63,7 @@ pub struct Actuator {
     pub act_limited: bool,
     /// Range of the activation.
     pub act_range: [f64; 2],
-    /// The force follows the activation at the end of the step, not that at its start (`actearly`).
+    /// Whether the force follows the activation at the end of the step instead of at its start (`actearly`).
     pub act_early: bool,
 }
 

@@ -1,15 +1,15 @@
-//! What couples degrees of freedom: tendons and equality constraints.
+//! Coupled degrees of freedom: tendons and equality constraints.
 
 use super::{Quat, SolImp, SolRef, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What a tendon runs over.
+/// Path of a tendon.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TendonKind {
     /// `length = sum(coef * qpos)` over hinge and slide joints, as `(joint, coef)`. A joint occurs once.
     Fixed(Vec<(usize, f64)>),
-    /// A string through sites and around geoms. Only such as exert no force pass the loader; their `length0`,
-    /// `spring_length` and `invweight0` are 0, not MuJoCo's.
+    /// A string through sites and around geoms. The loader only accepts those that exert no force. Their `length0`,
+    /// `spring_length` and `invweight0` are 0, unlike MuJoCo's.
     Spatial,
 }
 
@@ -18,7 +18,7 @@ pub enum TendonKind {
 pub struct Tendon {
     /// Name; empty when the file gives none.
     pub name: String,
-    /// What it runs over.
+    /// Path.
     pub kind: TendonKind,
     /// Whether `range` is enforced.
     pub limited: bool,
@@ -32,14 +32,14 @@ pub struct Tendon {
     pub stiffness_poly: [f64; 2],
     /// The spring is slack between these lengths and pulls towards them from outside (MuJoCo `tendon_lengthspring`).
     pub spring_length: [f64; 2],
-    /// Viscous damping per unit of velocity, that of actuators included.
+    /// Viscous damping per unit of velocity, including that of actuators.
     pub damping: f64,
     /// Higher orders of the damping, see [`Dof::damping_poly`](super::Dof::damping_poly).
     pub damping_poly: [f64; 2],
     /// Dry friction.
     pub frictionloss: f64,
-    /// Inertia of the tendon's velocity, that of actuators included: adds `armature * J' J` to the mass matrix, but only
-    /// where one of the two dofs is the other or its ancestor; MuJoCo's matrix has no other entries.
+    /// Inertia of the tendon's velocity, including that of actuators. It adds `armature * J' J` to the mass matrix, but
+    /// only for dofs that are equal or an ancestor of each other. MuJoCo's matrix has no other entries.
     pub armature: f64,
     /// `solreflimit`.
     pub solref_limit: SolRef,
@@ -59,36 +59,36 @@ pub struct Tendon {
     pub group: i32,
 }
 
-/// What an equality constraint keeps equal (MuJoCo `eq_type`, `eq_data`).
+/// Kind of an equality constraint (MuJoCo `eq_type`, `eq_data`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum EqualityKind {
     /// A point of one body stays on a point of another: 3 rows, world axes.
     Connect {
         /// The two bodies; 0 is the world.
         bodies: [usize; 2],
-        /// The two sites, if the constraint was given with sites; their places are in `anchors`.
+        /// The two sites, if the constraint was given with sites. `anchors` has their positions.
         sites: Option<[usize; 2]>,
         /// The point in the first body's frame and in the second's.
         anchors: [Vec3; 2],
     },
-    /// A frame of one body stays on a frame of another: 3 rows for the position as in `Connect`, then 3 for the
-    /// orientation, `torquescale` times the vector part of `conj(q[1]) * q[0]` where `q[i]` is the orientation of
+    /// A frame of one body stays on a frame of another. There are 3 rows for the position as in `Connect`, and 3 for
+    /// the orientation: `torquescale` times the vector part of `conj(q[1]) * q[0]`, where `q[i]` is the orientation of
     /// `bodies[i]` times `quats[i]`.
     Weld {
         /// The two bodies; 0 is the world.
         bodies: [usize; 2],
-        /// The two sites, if the constraint was given with sites; their places are in `anchors` and `quats`.
+        /// The two sites, if the constraint was given with sites. `anchors` and `quats` have their poses.
         sites: Option<[usize; 2]>,
         /// The point in the first body's frame and in the second's.
         anchors: [Vec3; 2],
-        /// The orientation in the first body's frame and in the second's. With bodies the first is the relative
-        /// orientation `relpose` and the second the identity.
+        /// The orientation in the first body's frame and in the second's. For constraints given with bodies, the first
+        /// is the relative orientation `relpose` and the second the identity.
         quats: [Quat; 2],
         /// Ratio of angular to linear error, m.
         torquescale: f64,
     },
-    /// `q1 - q1_0 = p(q2 - q2_0)`, where `_0` marks the reference configuration and `p` is the polynomial; without a
-    /// second joint `q1 - q1_0 = polycoef[0]`. Hinge and slide joints only.
+    /// `q1 - q1_0 = p(q2 - q2_0)`, where `_0` marks the reference configuration and `p` is the polynomial. Without a
+    /// second joint, `q1 - q1_0 = polycoef[0]`. Hinge and slide joints only.
     Joint {
         /// The joint that follows.
         joint1: usize,
@@ -113,9 +113,9 @@ pub enum EqualityKind {
 pub struct Equality {
     /// Name; empty when the file gives none.
     pub name: String,
-    /// What it keeps equal.
+    /// Kind.
     pub kind: EqualityKind,
-    /// Whether it holds from the start (MuJoCo `eq_active0`).
+    /// Whether it is active from the start (MuJoCo `eq_active0`).
     pub active: bool,
     /// Solver reference.
     pub solref: SolRef,

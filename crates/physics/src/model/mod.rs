@@ -1,7 +1,7 @@
 //! The compiled model: everything that stays constant while a simulation runs.
 //!
-//! It is the counterpart of MuJoCo's `mjModel` and uses its names and conventions: SI units, radians, quaternions as
-//! `[w, x, y, z]`, body 0 is the world, positions and orientations of a body, geom or site are relative to its parent
+//! It corresponds to MuJoCo's `mjModel` and uses its names and conventions: SI units, radians, quaternions as `[w, x,
+//! y, z]`, and body 0 as the world. Positions and orientations of a body, geom or site are relative to its parent
 //! body's frame. Numbers are `f64`; the lane kernels convert them once to their own precision.
 
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub type Vec3 = [f64; 3];
 /// A unit quaternion `[w, x, y, z]`.
 pub type Quat = [f64; 4];
 
-/// A compiled model. Made by [`Model::from_xml_file`] and friends, then never changed.
+/// A compiled model. [`Model::from_xml_file`] and related functions create it; it never changes afterward.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Name from `<mujoco model="...">`.
@@ -111,12 +111,12 @@ pub struct Options {
     pub solver: Solver,
     /// Parameters that replace those of every contact (`<flag override="enable"/>`), if any.
     pub contact_override: Option<ContactOverride>,
-    /// `<flag>` switches that this engine honours.
+    /// `<flag>` switches that this engine supports.
     pub flags: Flags,
 }
 
-/// The constraint solver set in the file. All algorithms find the same minimum. Their results differ if a low cap stops
-/// them early.
+/// The constraint solver set in the file. All algorithms find the same minimum, but a low cap that stops them early
+/// gives different results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Solver {
     /// Projected Gauss-Seidel.
@@ -128,7 +128,7 @@ pub enum Solver {
     Newton,
 }
 
-/// Parameters that all contacts share when `<flag override="enable"/>` (MuJoCo `o_margin`, `o_solref`...).
+/// Parameters of all contacts with `<flag override="enable"/>` (MuJoCo `o_margin`, `o_solref`...).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactOverride {
     /// Margin, m.
@@ -141,7 +141,7 @@ pub struct ContactOverride {
     pub friction: [f64; 5],
 }
 
-/// Parts of the pipeline that `<option><flag .../>` may switch off. `true` means enabled, the default.
+/// Parts of the pipeline that `<option><flag .../>` may disable. `true`, the default, means enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Flags {
     /// All constraints.
@@ -166,17 +166,17 @@ pub struct Flags {
     pub warmstart: bool,
     /// Actuator forces.
     pub actuation: bool,
-    /// `solref` time constants are kept at or above twice the timestep.
+    /// Whether `solref` time constants are kept at or above twice the timestep.
     pub refsafe: bool,
     /// Implicit treatment of joint damping in the Euler integrator.
     pub eulerdamp: bool,
-    /// Parents and children are excluded from colliding with each other.
+    /// Whether parents and children do not collide with each other.
     pub filterparent: bool,
-    /// Trees that no constraint connects are solved separately.
+    /// Whether trees that no constraint connects are solved separately.
     pub island: bool,
 }
 
-/// How the state is advanced in time.
+/// Integration method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Integrator {
     /// Semi-implicit Euler, joint damping implicit.
@@ -231,15 +231,15 @@ pub struct Body {
     pub geom_start: usize,
     /// Number of geoms.
     pub geom_count: usize,
-    /// Body whose motion this one follows rigidly: itself if it has joints, else its parent's `weld_id`.
+    /// Body that this one is rigidly attached to: itself if it has joints, else its parent's `weld_id`.
     pub weld_id: usize,
     /// Index of the first body of this body's kinematic tree (the child of the world), 0 for the world.
     pub root_id: usize,
     /// Mean inverse inertia at the reference configuration: `[translational 1/kg, rotational 1/(kg m^2)]`.
     pub invweight0: [f64; 2],
-    /// Part of the body's weight that an upward force carries (1: weightless).
+    /// Fraction of the body's weight that gravity compensation carries (1: weightless).
     pub gravcomp: f64,
-    /// `mocap="true"`: a static body that the user may move.
+    /// Whether it is a mocap body: a static body that the user may move.
     pub mocap: bool,
 }
 
@@ -301,7 +301,7 @@ pub struct Joint {
     pub solimp_limit: SolImp,
     /// Limits of the total actuator force on this joint (`actuatorfrcrange`), if any.
     pub actuator_force_range: Option<[f64; 2]>,
-    /// Gravity compensation of this joint counts as an actuator force (`actuatorgravcomp`).
+    /// Whether gravity compensation of this joint counts as an actuator force (`actuatorgravcomp`).
     pub actuator_gravcomp: bool,
     /// User group, for viewers.
     pub group: i32,
@@ -316,9 +316,9 @@ pub struct Dof {
     pub joint: usize,
     /// Next degree of freedom towards the root, if any.
     pub parent: Option<usize>,
-    /// Rotor inertia added to the diagonal of the mass matrix, that of actuators (times gear squared) included.
+    /// Rotor inertia added to the diagonal of the mass matrix, including that of actuators (times gear squared).
     pub armature: f64,
-    /// Viscous damping, N s/m or N m s/rad, that of actuators (times gear squared) included.
+    /// Viscous damping, N s/m or N m s/rad, including that of actuators (times gear squared).
     pub damping: f64,
     /// Higher orders of the damping (MuJoCo `dof_dampingpoly`): at the velocity `v` the damping is
     /// `damping + poly[0] |v| + poly[1] v^2`.
@@ -359,7 +359,7 @@ pub struct Keyframe {
     pub mquat: Vec<Quat>,
 }
 
-/// `<statistic>`: given in the file or computed at the reference configuration.
+/// `<statistic>`: from the file, or computed at the reference configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Mean diagonal of the mass matrix; scales the solver's tolerance.

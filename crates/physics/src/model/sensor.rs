@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a sensor measures.
+/// Quantity that a sensor measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SensorType {
     /// Sum of contact normal forces (N) inside a site's volume; on a geom's whole body when the object is a geom.
@@ -19,7 +19,7 @@ pub enum SensorType {
     Torque,
     /// Magnetic flux in a site's own axes, 3.
     Magnetometer,
-    /// Distance along a site's z axis to the nearest geom; -1: none.
+    /// Distance along a site's z axis to the nearest geom; -1 for none.
     RangeFinder,
     /// Position of a scalar joint.
     JointPos,
@@ -55,7 +55,7 @@ pub enum SensorType {
     TendonLimitVel,
     /// Force of the limit of a tendon.
     TendonLimitFrc,
-    /// Position of a frame, 3; in the axes of the reference frame, if there is one, as for all frame sensors.
+    /// Position of a frame, 3. Like all frame sensors, in the axes of the reference frame if there is one.
     FramePos,
     /// Orientation of a frame, quaternion, 4.
     FrameQuat,
@@ -83,9 +83,9 @@ pub enum SensorType {
     InsideSite,
     /// Smallest distance between the geoms of `object` and of `reference`, at most `cutoff`.
     Distance,
-    /// Unit vector of that distance, 3.
+    /// Unit vector along that distance, 3.
     Normal,
-    /// The two points of that distance, 6.
+    /// The two closest points, 6.
     FromTo,
     /// Contacts between `object` and `reference`, see [`Sensor::intprm`].
     Contact,
@@ -95,11 +95,11 @@ pub enum SensorType {
     KineticEnergy,
     /// Simulation time, s.
     Clock,
-    /// A sensor that is kept by name but cannot be evaluated; reading it is an error.
+    /// A sensor that is kept by name but cannot be evaluated. Reading it is an error.
     Unsupported,
 }
 
-/// The object a sensor is attached to.
+/// The object of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SensorObject {
     /// Body frame at its inertial frame (`objtype="body"`), by index.
@@ -131,7 +131,7 @@ pub struct Sensor {
     pub element: String,
     /// Quantity.
     pub kind: SensorType,
-    /// Object it is attached to.
+    /// Object that it is attached to.
     pub object: SensorObject,
     /// Reference frame (`reftype`, `refname`), or the second of two objects.
     pub reference: SensorObject,

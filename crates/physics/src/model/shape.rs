@@ -20,8 +20,8 @@ pub enum GeomType {
     Cylinder,
     /// `size` half lengths.
     Box,
-    /// Triangle mesh. The loader takes only meshes that neither collide nor weigh, without reading their files: the
-    /// geom has no size, and its frame is the one given, not MuJoCo's principal axes.
+    /// Triangle mesh. The loader only accepts meshes that neither collide nor have mass, and does not read their files.
+    /// The geom has no size. Its frame is the given one, not MuJoCo's principal axes.
     Mesh,
 }
 
@@ -42,9 +42,9 @@ pub struct Geom {
     pub size: Vec3,
     /// Index of the height field, for [`GeomType::Hfield`].
     pub hfield: Option<usize>,
-    /// Bit mask: what this geom is.
+    /// Bit mask: the collision type of this geom.
     pub contype: u32,
-    /// Bit mask: what this geom collides with.
+    /// Bit mask: the types that this geom collides with.
     pub conaffinity: u32,
     /// Dimension of the contact space: 1, 3, 4 or 6.
     pub condim: usize,
@@ -58,9 +58,9 @@ pub struct Geom {
     pub solref: SolRef,
     /// Solver impedance.
     pub solimp: SolImp,
-    /// Distance below which contacts are made.
+    /// Distance below which contacts are generated.
     pub margin: f64,
-    /// Contacts are reported up to margin + gap; beyond the margin they exert no force.
+    /// Contacts are reported up to margin + gap. Beyond the margin they exert no force.
     pub gap: f64,
     /// Colour, each in 0..=1.
     pub rgba: [f32; 4],
@@ -110,7 +110,7 @@ pub struct Pair {
     pub gap: f64,
 }
 
-/// A height field: a grid of elevations over a rectangle, at rest in the geom's frame (MuJoCo `hfield_*`).
+/// A height field: a grid of elevations over a rectangle, fixed in the geom's frame (MuJoCo `hfield_*`).
 ///
 /// Column `c` lies at `x = size[0] * (2 c / (ncol - 1) - 1)`, row `r` at `y = size[1] * (2 r / (nrow - 1) - 1)`, and the
 /// surface there at `z = size[2] * data[r * ncol + c]`. Below `z = 0` the ground is solid down to `-size[3]`.

@@ -1,4 +1,4 @@
-//! What viewers need: cameras and lights.
+//! Cameras and lights, for viewers.
 
 use super::{Quat, Vec3};
 use serde::{Deserialize, Serialize};

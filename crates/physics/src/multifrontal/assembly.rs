@@ -1,4 +1,4 @@
-//! What a front is made of: the stiffness of its link, the contacts and rows that enter, and what is left of others.
+//! Assembly of a front: the stiffness of its link, its contacts and rows, and the remainders of other fronts.
 
 use super::numbers::Numbers;
 use super::plan::{Front, NONE, Plan};
@@ -18,7 +18,7 @@ const PACKED: [[usize; 6]; 6] = [
     [8, 11, 14, 19, 20, 17],
 ];
 
-/// Fills a front: the link's own stiffness, contacts and rows that enter here, and what is left of other fronts.
+/// Fills a front: the link's own stiffness, its contacts and rows, and the remainders of other fronts.
 #[inline(always)]
 pub(crate) fn assemble<S: Real>(links: &[Link<S>], plan: &Plan<S>, n: &mut Numbers<S>, l: usize) {
     let front = &plan.fronts[l];
@@ -53,7 +53,7 @@ pub(crate) fn assemble<S: Real>(links: &[Link<S>], plan: &Plan<S>, n: &mut Numbe
     }
 }
 
-/// Adds the stiffness of a contact: with the points' motions `P' a`, `P = [r x; 1]`, it is `P W P'` on both sides.
+/// Adds the stiffness of a contact. With the points' motions `P' a`, `P = [r x; 1]`, it is `P W P'` on both sides.
 #[inline(always)]
 fn add_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
     if tie.dim > 3 {
@@ -98,7 +98,7 @@ fn add_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
     }
 }
 
-/// The same with rows that measure turning.
+/// The same with rows that measure rotation.
 #[inline(always)]
 fn add_turning_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
     let mut columns = [[[S::zero(); 6]; 6]; 2];
@@ -125,7 +125,7 @@ fn add_turning_tie<S: Real>(f: &mut [S], stride: usize, tie: &Tie<S>) {
     }
 }
 
-/// Adds what is left of a front to the one that takes it.
+/// Adds the remainder of a front to its target.
 #[inline(always)]
 fn add_rest<S: Real>(f: &mut [S], stride: usize, plan: &Plan<S>, rest: &Front, from: &[S], root: bool) {
     let blocks = 1 + rest.links + rest.row_count;
@@ -159,7 +159,7 @@ fn add_rest<S: Real>(f: &mut [S], stride: usize, plan: &Plan<S>, rest: &Front, f
                         continue;
                     }
                     let x = from[(rows + i) * rest.stride + columns + j];
-                    // the block's transpose has a place too, above the diagonal of a square on it
+                    // the transpose also has a place, above the diagonal of a diagonal block
                     if to > across {
                         f[(across + j) * stride + to + i] += x;
                     } else {

@@ -1,8 +1,8 @@
-//! The numbers of a crowd's factorization: one agent, in scalar arithmetic.
+//! The numerical factorization of a crowd: one agent, in scalar arithmetic.
 //!
-//! A front is kept as the rows of its upper triangle; the six rows of its own link are whole. Eliminating a degree of
-//! freedom with axis s takes `u = F s`, the pivot `1 / (s' u + diag)`, the gains `v = u pivot`, and leaves `F - u v'`: the
-//! articulated-body recursion, with more than one body.
+//! A front is stored as the rows of its upper triangle. The six rows of its own link are complete. Eliminating a degree
+//! of freedom with axis s takes `u = F s`, the pivot `1 / (s' u + diag)`, the gains `v = u pivot`, and leaves `F - u
+//! v'`. This is the articulated-body recursion with more than one body.
 
 use super::assembly::assemble;
 use super::numbers::Numbers;
@@ -12,8 +12,8 @@ use crate::lanes::{Real, kernel_fn};
 use crate::sim::Link;
 
 kernel_fn! {
-    /// Factorizes the stale fronts, and those that take what is left of them. Returns the number of entries of the
-    /// factors that were computed.
+    /// Factorizes the stale fronts, and those that receive their remainders. Returns the number of computed entries of
+    /// the factors.
     pub(crate) fn factorize<'a, S>(links: &'a [Link<S>], plan: &'a Plan<S>, n: &'a mut Numbers<S>) -> u64 {
         let mut entries = 0;
         for l in &plan.order {
@@ -45,7 +45,7 @@ kernel_fn! {
     }
 }
 
-/// Takes the degrees of freedom of a link out of its front.
+/// Eliminates the degrees of freedom of a link from its front.
 #[inline(always)]
 fn eliminate<S: Real>(link: &Link<S>, plan: &Plan<S>, n: &mut Numbers<S>, front: &Front) {
     let (size, stride) = (front.size, front.stride);
@@ -60,7 +60,7 @@ fn eliminate<S: Real>(link: &Link<S>, plan: &Plan<S>, n: &mut Numbers<S>, front:
         let d = link.dofs.start + k;
         let (u, v) = (&mut n.u[k * stride..(k + 1) * stride], &mut gains[k * stride..(k + 1) * stride]);
         let pivot = if by_coordinates {
-            // linear coordinates first: their pivots are masses and well conditioned
+            // linear coordinates first: their pivots are masses and well-conditioned
             u.copy_from_slice(&f[k * stride..(k + 1) * stride]);
             u[k] + n.diag[if k < 3 { d + 3 } else { d - 3 }]
         } else {
@@ -138,11 +138,11 @@ fn subtract<S: Real, const K: usize>(row: &mut [S], u: [S; K], v: [&[S]; K]) {
     }
 }
 
-/// Takes `K` degrees of freedom out of the rows below a front's own six.
+/// Eliminates `K` degrees of freedom from the rows below a front's own six.
 #[inline(always)]
 fn trailing<S: Real, const K: usize>(f: &mut [S], stride: usize, u: &[S], v: &[S]) {
     for (i, row) in f.chunks_exact_mut(stride).enumerate().skip(6) {
-        // whole vectors: what is below the diagonal is never read
+        // whole vectors: entries below the diagonal are never read
         let from = i - i % 8;
         let u = std::array::from_fn::<S, K, _>(|k| u[k * stride + i]);
         let v = std::array::from_fn::<&[S], K, _>(|k| &v[k * stride + from..(k + 1) * stride]);
@@ -150,7 +150,7 @@ fn trailing<S: Real, const K: usize>(f: &mut [S], stride: usize, u: &[S], v: &[S
     }
 }
 
-/// Brings the forces on a link inward.
+/// Propagates the forces on a link inward.
 #[inline(always)]
 fn inward<S: Real>(link: &Link<S>, plan: &Plan<S>, n: &mut Numbers<S>, l: usize) {
     let front = &plan.fronts[l];
@@ -162,7 +162,7 @@ fn inward<S: Real>(link: &Link<S>, plan: &Plan<S>, n: &mut Numbers<S>, l: usize)
     for k in (0..count).rev() {
         let d = first + k;
         let mut force = if by_coordinates {
-            // torques are given along the body's axes, forces along the world's
+            // torques are along the body's axes, forces along the world's
             let applied = if k < 3 {
                 let (s, t) = (&n.axis[first + 3..], &n.rhs[first + 3..]);
                 s[0][k].mul_add(t[0], s[1][k].mul_add(t[1], s[2][k] * t[2]))

@@ -1,17 +1,17 @@
-//! A sparse factorization for one agent whose links touch each other in many places.
+//! A sparse factorization for one agent with many contacts between its links.
 //!
-//! It generalizes the articulated-body recursion. The recursion eliminates the joints of a link and hands a 6x6 matrix
+//! It generalizes the articulated-body recursion. The recursion eliminates the joints of a link and passes a 6x6 matrix
 //! over the parent's spatial acceleration to the parent. Here the matrix of a link, its *front*, also covers the
-//! accelerations of the links that touch it. Those accelerations are carried inward unchanged until the elimination
-//! reaches their links (Duff and Reid's multifrontal method, with links as variables). Rows over several joints, such as
-//! tendons, are carried in the same way, each as the sum of its terms that are still to come.
+//! accelerations of the links that touch it. Those accelerations are passed inward unchanged until the elimination
+//! reaches their links (Duff and Reid's multifrontal method, with links as variables). Rows over several joints, such
+//! as tendons, are passed in the same way, each as the sum of its remaining terms.
 //!
-//! A link that touches nothing costs as much as in the recursion, and separate islands never meet. The cost of a contact
+//! A link without contacts costs as much as in the recursion, and separate islands stay separate. The cost of a contact
 //! depends on the links between it and the root, not on the other contacts. Trees are eliminated by minimum degree
 //! ([`order`]), the links of a tree from the tips to the root.
 //!
-//! Agents differ in which of their links touch, and therefore in order and fronts. So an agent is factorized in scalar
-//! arithmetic, whatever lanes it shares. The order and every sum depend on this agent alone.
+//! Agents differ in their touching links, and therefore in order and fronts. So each agent is factorized in scalar
+//! arithmetic, independently of its lanes. The order and every sum depend on this agent alone.
 
 mod assembly;
 mod front;

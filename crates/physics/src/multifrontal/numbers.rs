@@ -16,7 +16,7 @@ pub(crate) struct JointRow<S> {
 /// Matrix, factors and vectors of one agent.
 #[derive(Clone, Debug)]
 pub(crate) struct Numbers<S> {
-    /// By link: stiffness with its inertia and what stands still; whether the front is to be done anew.
+    /// By link: stiffness with its inertia and static contacts; whether the front must be recomputed.
     pub stiffness: Vec<Sym6<S>>,
     pub stale: Vec<bool>,
     /// By degree of freedom.
@@ -25,7 +25,7 @@ pub(crate) struct Numbers<S> {
     pub rhs: Vec<S>,
     pub ties: Vec<Tie<S>>,
     pub rows: Vec<JointRow<S>>,
-    /// By link: the force that the motion needs, and the acceleration found; the same of the rows.
+    /// By link: the force that the motion needs, and the resulting acceleration; the same for the rows.
     pub force: Vec<V6<S>>,
     pub acc: Vec<V6<S>>,
     pub row_force: Vec<S>,
@@ -36,7 +36,7 @@ pub(crate) struct Numbers<S> {
     pub(super) pivot: Vec<S>,
     pub matrix: Vec<S>,
     pub(super) gains: Vec<S>,
-    /// Scratch: columns of the present front.
+    /// Scratch: columns of the current front.
     pub(super) u: Vec<S>,
 }
 
@@ -63,7 +63,7 @@ impl<S: Real> Numbers<S> {
         }
     }
 
-    /// Makes room for a model.
+    /// Allocates memory for a model.
     pub fn resize(&mut self, links: usize, nv: usize) {
         let z = S::zero();
         self.stiffness.resize(links, [z; 21]);
@@ -76,7 +76,7 @@ impl<S: Real> Numbers<S> {
         }
     }
 
-    /// Makes room for a plan.
+    /// Allocates memory for a plan.
     pub fn follow(&mut self, plan: &Plan<S>) {
         let z = S::zero();
         if self.matrix.len() < plan.matrix_len {

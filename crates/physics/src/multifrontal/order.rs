@@ -1,25 +1,25 @@
-//! In which order the trees of a crowd are eliminated.
+//! Elimination order of the trees of a crowd.
 //!
-//! Eliminating a tree ties all trees that it touches to each other. The tree with the fewest neighbors goes first, and
-//! the lower number where two have as many (minimum degree): what is eliminated in a pile are its rims, and its islands
-//! never meet.
+//! Eliminating a tree connects all trees that it touches. The tree with the fewest neighbors goes first, and the lower
+//! number if several have as many (minimum degree). In a pile, this eliminates the rim first, and islands stay
+//! separate.
 
-/// Order of trees by minimum degree; the memory is kept from step to step.
+/// Order of trees by minimum degree. The memory is reused from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TreeOrder {
-    /// Trees that touch another, ascending, and the place of each tree among them.
+    /// Trees that touch another, ascending, and the index of each tree among them.
     tied: Vec<usize>,
     place: Vec<usize>,
-    /// Which of them touch or are tied by an elimination: a row of bits each.
+    /// Bit rows: which of them touch or are connected by an elimination.
     bits: Vec<u64>,
     words: usize,
     degree: Vec<u32>,
     pivot: Vec<u64>,
-    /// All trees, in the order in which they are eliminated.
+    /// All trees in elimination order.
     pub order: Vec<usize>,
 }
 
-/// Trees beyond which the order is that of the model: the rows of bits grow with the square.
+/// Number of trees above which the model's order is used: the bit rows grow with the square.
 const MOST: usize = 4096;
 /// A tree that touches no other.
 const ALONE: usize = usize::MAX;
@@ -81,7 +81,7 @@ impl TreeOrder {
         (*degree != GONE).then_some(index)
     }
 
-    /// Ties the neighbors of a tree to each other and takes it away.
+    /// Connects the neighbors of a tree and removes the tree.
     fn eliminate(&mut self, gone: usize) {
         let words = self.words;
         let mut pivot = std::mem::take(&mut self.pivot);
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn rims_go_first() {
-        // a star: its center last but one, when one arm is left and the lower number decides
+        // a star: the center is last but one, when one arm is left and the lower number decides
         assert_eq!(order(5, &[[2, 0], [2, 1], [2, 3], [4, 2]]), [0, 1, 3, 2, 4]);
         // trees that touch nothing come before all others
         assert_eq!(order(4, &[[0, 3]]), [1, 2, 0, 3]);

@@ -1,8 +1,8 @@
-//! Which numbers a crowd's factorization has: the fronts of its links, before any of them is known.
+//! The symbolic factorization of a crowd: the fronts of its links, without numbers.
 //!
-//! The front of a link is the matrix of everything that the link's elimination meets: the link itself, the links that it
-//! is tied to by contacts or by earlier eliminations, and the rows over joints that have terms here or above. What is
-//! left of a front after the elimination is added to the front of whichever of its members is eliminated next.
+//! The front of a link is the matrix of all variables in the link's elimination: the link itself, the links that
+//! contacts or earlier eliminations connect it to, and the rows over joints with terms here or above. The remainder of
+//! a front is added to the front of the member that is eliminated next.
 
 use super::order::TreeOrder;
 use super::tie::Tie;
@@ -11,35 +11,35 @@ use crate::sim::Link;
 
 /// No link, no row, no place.
 pub(crate) const NONE: usize = usize::MAX;
-/// Matrices' rows begin at multiples of this.
+/// Rows of matrices start at multiples of this.
 const ALIGN: usize = 8;
 
 /// The front of a link.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Front {
-    /// Where its other links begin in [`Plan::others`], and how many there are.
+    /// First index of its other links in [`Plan::others`], and their number.
     pub others: usize,
     pub links: usize,
     /// The same for its rows in [`Plan::rows`], and in [`Plan::coefficients`].
     pub rows: usize,
     pub row_count: usize,
     pub coefficients: usize,
-    /// Some row has a term in this link's joints.
+    /// Whether a row has a term in this link's joints.
     pub own_rows: bool,
-    /// Width of the matrix, and with its padding.
+    /// Width of the matrix, without and with padding.
     pub size: usize,
     pub stride: usize,
-    /// Where the matrix begins, and where the gains do.
+    /// Start of the matrix, and of the gains.
     pub matrix: usize,
     pub gains: usize,
-    /// The link whose front takes what is left.
+    /// The link whose front receives the remainder.
     pub target: usize,
-    /// Where its places in the target's front begin in [`Plan::places`].
+    /// Start of its places in the target's front in [`Plan::places`].
     pub places: usize,
-    /// First of the fronts whose rest comes here, and the next one with the same target.
+    /// First of the fronts whose remainder comes here, and the next front with the same target.
     pub child: usize,
     pub sibling: usize,
-    /// First of the contacts that enter here, and of the rows.
+    /// First contact of this front, and first row.
     pub tie: usize,
     pub row: usize,
 }
@@ -70,15 +70,15 @@ impl Front {
 pub(crate) struct RowTerms {
     pub start: usize,
     pub end: usize,
-    /// The link in whose front it enters, and the next row there.
+    /// The link in whose front it starts, and the next row there.
     pub enters: usize,
     pub next: usize,
 }
 
-/// Order and fronts; the memory is kept from step to step.
+/// Order and fronts. The memory is reused from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan<S> {
-    /// Links in the order of elimination, and the place of each in it.
+    /// Links in elimination order, and the index of each in it.
     pub order: Vec<usize>,
     pub position: Vec<usize>,
     /// By link.
@@ -93,10 +93,10 @@ pub(crate) struct Plan<S> {
     /// Numbers in all matrices and all gains.
     pub matrix_len: usize,
     pub gains_len: usize,
-    /// Entries of the factors, and products that they take.
+    /// Number of entries of the factors, and of products that they take.
     pub fill: u64,
     trees: TreeOrder,
-    /// Scratch: place in the present front, by link and by row.
+    /// Scratch: place in the current front, by link and by row.
     slot: Vec<usize>,
     row_slot: Vec<usize>,
 }
@@ -122,7 +122,7 @@ impl<S: Real> Plan<S> {
         }
     }
 
-    /// Orders the links. `ties` lists the links that contacts tie together; rows are in `row_terms`.
+    /// Orders the links. `ties` lists the links that contacts connect; rows are in `row_terms`.
     pub fn order<C>(&mut self, links: &[Link<C>], trees: usize, ties: impl Iterator<Item = [usize; 2]> + Clone) {
         let tree = |l: usize| links[l].tree;
         let rows = self.row_terms.iter().flat_map(|r| {
@@ -130,7 +130,7 @@ impl<S: Real> Plan<S> {
             terms.windows(2).map(|t| [t[0].1, t[1].1])
         });
         self.trees.find(trees, ties.chain(rows).map(|[a, b]| [tree(a), tree(b)]));
-        // the links of a tree follow each other: its root comes first
+        // the links of a tree are consecutive, with its root first
         self.slot.clear();
         self.slot.resize(trees + 1, links.len());
         for l in (0..links.len()).rev() {
@@ -171,7 +171,7 @@ impl<S: Real> Plan<S> {
             let l = self.order[at];
             self.find_members(links, l, ties);
             self.measure(links, l);
-            // places of what comes here
+            // places of the incoming remainders
             let mut t = self.fronts[l].tie;
             while t != NONE {
                 ties[t].slot = self.slot[ties[t].links[1]];
@@ -183,7 +183,7 @@ impl<S: Real> Plan<S> {
                 child = self.fronts[child].sibling;
             }
             self.find_target(links, l);
-            // the scratch is clean again
+            // reset the scratch
             let f = self.fronts[l];
             self.slot[l] = NONE;
             for i in f.others..f.others + f.links {
@@ -275,7 +275,7 @@ impl<S: Real> Plan<S> {
         self.fronts[l] = f;
     }
 
-    /// Places of what is left of a front in the one that takes it: that of the parent, the other links, the rows.
+    /// Places of a front's remainder in its target: that of the parent, the other links, the rows.
     fn place<C>(&mut self, links: &[Link<C>], child: usize) {
         let f = self.fronts[child];
         self.fronts[child].places = self.places.len();
@@ -291,14 +291,14 @@ impl<S: Real> Plan<S> {
         }
     }
 
-    /// Place in the order of the next link, after `link`, that a row has a term in.
+    /// Position in the order of the next link after `link` in which a row has a term.
     fn next_place(&self, row: usize, link: usize) -> usize {
         let (terms, here) = (self.row_terms[row], self.position[link]);
         let places = self.terms[terms.start..terms.end].iter().map(|t| self.position[t.1]);
         places.filter(|p| *p > here).min().unwrap_or(NONE)
     }
 
-    /// Gives what will be left of a front to the member that is eliminated next.
+    /// Assigns the remainder of a front to the member that is eliminated next.
     fn find_target<C>(&mut self, links: &[Link<C>], l: usize) {
         let f = self.fronts[l];
         let mut next = links[l].parent.map_or(NONE, |p| self.position[p]);

@@ -1,4 +1,4 @@
-//! A contact of two links, as their fronts take it in.
+//! A contact of two links, as part of their fronts.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
@@ -26,8 +26,8 @@ pub(crate) struct Tie<S> {
 }
 
 impl<S> Tie<S> {
-    /// Sides of the blocks that a tie adds to its front, rows and columns: of both links' blocks the one above the diagonal.
-    /// Two points of one link meet on the diagonal, which needs both.
+    /// Sides of the blocks that a tie adds to its front, rows and columns. Of the blocks of both links, only the one
+    /// above the diagonal is added. Two points of one link meet on the diagonal, which needs both.
     #[inline(always)]
     pub(super) fn blocks(&self) -> impl Iterator<Item = (usize, usize)> + use<S> {
         let both = self.slot == 0;
@@ -50,7 +50,7 @@ impl<S: Real> Tie<S> {
         }
     }
 
-    /// Takes the force on both links off what their motion needs.
+    /// Subtracts the force on both links from what their motion needs.
     #[inline(always)]
     pub fn exert(&self, forces: &mut [V6<S>]) {
         for side in 0..2 {
